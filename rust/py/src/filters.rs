@@ -92,7 +92,8 @@ impl PyFilter {
             mag: mag.as_ref().map(Rows::values).transpose()?,
         };
         let replay = &mut self.replay;
-        let mut look = || Python::attach(Python::check_signals);
+        #[allow(clippy::redundant_closure_for_method_calls)] // the path is not general enough over the lifetime
+        let mut look = || Python::attach(|py| py.check_signals());
         let (attitude, skipped) = filled_rows::<4, _, _>(
             py,
             n,
