@@ -1,1 +1,96 @@
-//! To be filled.
+//! Attitude filters: one file each with settings (unit, default, source), state and step.
+//!
+//! | file | filter | source |
+//! |---|---|---|
+//! | [`accel`] | inclination from the specific force | paper B, eqs. (1) to (3) |
+//! | [`gyro`] | integration of the angular rate | paper B, eq. (4) |
+//! | [`complementary`] | gyro and accelerometer, weighted | paper B, eq. (5) |
+//! | [`kalman`] | attitude and gyro bias | paper B, the filter it cites |
+//! | [`triad`] | two vectors | paper C, Black 1964 |
+//! | [`mahony`] | nonlinear complementary filter | paper C, eqs. (5) to (7) |
+//!
+//! A filter sees one [`Sample`] at a time and never a time stamp or a value that is not finite: gaps, NaN, free fall and
+//! slow sensors are the business of [`replay`] alone.
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::float_cmp))]
+
+pub mod accel;
+pub mod complementary;
+pub mod filter;
+pub mod gyro;
+pub mod kalman;
+pub mod mahony;
+pub mod replay;
+pub mod sample;
+pub mod triad;
+
+pub use filter::{Description, FILTERS, Filter, Parameter};
+pub use replay::{Columns, Replay, Rules, Skipped, Start};
+pub use sample::{AngularRate, Environment, FluxDensity, Reading, Sample, Sensor, SpecificForce};
+
+/// What stops a filter before its first row.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FilterError {
+    /// No filter of that name.
+    #[error("filter {name:?} is unknown: use one of {known}")]
+    UnknownFilter {
+        /// What was asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// The filter has no setting of that name.
+    #[error("{filter} has no setting {name:?}: it has {known}")]
+    UnknownSetting {
+        /// The filter, or `replay` for the rules.
+        filter: &'static str,
+        /// What was asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A setting outside its range.
+    #[error("{filter}: {name} = {value} is out of range: {range}")]
+    Setting {
+        /// The filter, or `replay` for the rules.
+        filter: &'static str,
+        /// The setting.
+        name: &'static str,
+        /// What came.
+        value: f64,
+        /// What is allowed.
+        range: &'static str,
+    },
+    /// A value of the surroundings that cannot be.
+    #[error("{0}")]
+    Environment(String),
+    /// The log lacks a sensor without which the filter says nothing.
+    #[error("{filter} needs {sensor}, which is not there: record it or leave this filter out")]
+    MissingSensor {
+        /// The filter.
+        filter: &'static str,
+        /// `acc`, `gyr` or `mag`.
+        sensor: &'static str,
+    },
+    /// Columns of one log with different numbers of rows.
+    #[error("{name} has {came} rows but t has {expected}: pass one row per time")]
+    Length {
+        /// The column.
+        name: &'static str,
+        /// Its rows.
+        came: usize,
+        /// The rows of `t`.
+        expected: usize,
+    },
+    /// A state that was not written by this filter.
+    #[error(
+        "the state does not belong to {filter}: it has {came} values instead of {expected}, or they are no attitude"
+    )]
+    State {
+        /// The filter that should take it.
+        filter: &'static str,
+        /// Values that came.
+        came: usize,
+        /// Values it has.
+        expected: usize,
+    },
+}

@@ -1,0 +1,175 @@
+//! The trait of all filters and THE list of them.
+
+use imufit_attitude::Quaternion;
+
+use crate::{Environment, FilterError, Sample, Sensor};
+use crate::{accel, complementary, gyro, kalman, mahony, triad};
+
+/// What a step could not use of the sample it was given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Usage {
+    /// All that the filter looks at.
+    Full,
+    /// The field was too close to the vertical to show a heading.
+    NoHeading,
+}
+
+/// An attitude filter: sample in, attitude out. It may rely on each reading being finite and each `dt` not negative.
+pub trait Filter: Send + Sync {
+    /// Advances to the time of `sample`.
+    fn step(&mut self, sample: &Sample) -> Usage;
+
+    /// The attitude `q_nb` after the last step, unit within 1e-12.
+    fn attitude(&self) -> Quaternion;
+
+    /// Starts over at `attitude`, everything learned forgotten.
+    fn reset(&mut self, attitude: Quaternion);
+
+    /// All that the next step depends on.
+    fn state(&self) -> Vec<f64>;
+
+    /// Takes over what [`Filter::state`] gave; `false`, and nothing changed, where it does not fit.
+    fn set_state(&mut self, state: &[f64]) -> bool;
+}
+
+/// One setting of a filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Its name, as printed in the paper where there is one.
+    pub name: &'static str,
+    /// Value without a choice.
+    pub default: f64,
+    /// Unit; `1` for a number.
+    pub unit: &'static str,
+    /// What it is, and what a smaller and a larger value do.
+    pub meaning: &'static str,
+}
+
+type Make = fn(&Environment, &[f64]) -> Box<dyn Filter>;
+
+/// A filter by name.
+#[derive(Debug, Clone, Copy)]
+pub struct Description {
+    /// Name in commands, JSON and columns.
+    pub name: &'static str,
+    /// One sentence.
+    pub summary: &'static str,
+    /// Sensors without which it says nothing.
+    pub needs: &'static [Sensor],
+    /// Its settings.
+    pub parameters: &'static [Parameter],
+    make: Make,
+}
+
+/// The filters there are.
+pub const FILTERS: [Description; 6] = [
+    Description {
+        name: "accel",
+        summary: "Inclination from the specific force alone, row by row; the heading stays where it started.",
+        needs: &[Sensor::Acc],
+        parameters: accel::PARAMETERS,
+        make: |environment, _| Box::new(accel::Accel::new(environment)),
+    },
+    Description {
+        name: "gyro",
+        summary: "The angular rate integrated from the initial attitude; exact for a constant rate, and it drifts.",
+        needs: &[Sensor::Gyr],
+        parameters: gyro::PARAMETERS,
+        make: |_, _| Box::new(gyro::Gyro::default()),
+    },
+    Description {
+        name: "complementary",
+        summary: "The integrated rate pulled a little towards the accelerometer's inclination at each step.",
+        needs: &[Sensor::Gyr, Sensor::Acc],
+        parameters: complementary::PARAMETERS,
+        make: |environment, values| Box::new(complementary::Complementary::new(environment, values)),
+    },
+    Description {
+        name: "kalman",
+        summary: "A Kalman filter of attitude and gyro bias with the accelerometer's inclination as its measurement.",
+        needs: &[Sensor::Gyr, Sensor::Acc],
+        parameters: kalman::PARAMETERS,
+        make: |environment, values| Box::new(kalman::Kalman::new(environment, values)),
+    },
+    Description {
+        name: "triad",
+        summary: "Attitude from two vectors, specific force first and magnetic field second, row by row.",
+        needs: &[Sensor::Acc, Sensor::Mag],
+        parameters: triad::PARAMETERS,
+        make: |environment, values| Box::new(triad::Triad::new(environment, values)),
+    },
+    Description {
+        name: "mahony",
+        summary: "Mahony's nonlinear complementary filter with gyro bias, with or without a magnetometer.",
+        needs: &[Sensor::Gyr, Sensor::Acc],
+        parameters: mahony::PARAMETERS,
+        make: |environment, values| Box::new(mahony::Mahony::new(environment, values)),
+    },
+];
+
+/// The description of a filter.
+pub fn find(name: &str) -> Result<&'static Description, FilterError> {
+    FILTERS
+        .iter()
+        .find(|filter| filter.name == name)
+        .ok_or_else(|| FilterError::UnknownFilter {
+            name: name.to_owned(),
+            known: FILTERS.map(|filter| filter.name).join(", "),
+        })
+}
+
+impl Description {
+    /// The filter with the settings given by name, the others at their defaults. Every setting is a finite number
+    /// that is not negative.
+    pub fn build(
+        &'static self,
+        environment: &Environment,
+        settings: &[(String, f64)],
+    ) -> Result<Box<dyn Filter>, FilterError> {
+        let values = fill(self.name, self.parameters, settings)?;
+        Ok((self.make)(environment, &values))
+    }
+}
+
+/// The values of `parameters` in their order, from settings by name.
+pub(crate) fn fill(
+    filter: &'static str,
+    parameters: &'static [Parameter],
+    settings: &[(String, f64)],
+) -> Result<Vec<f64>, FilterError> {
+    let mut values: Vec<f64> = parameters.iter().map(|parameter| parameter.default).collect();
+    for (name, value) in settings {
+        let Some(at) = parameters.iter().position(|parameter| parameter.name == name) else {
+            let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name).collect();
+            let known = if names.is_empty() {
+                "none".to_owned()
+            } else {
+                names.join(", ")
+            };
+            return Err(FilterError::UnknownSetting {
+                filter,
+                name: name.clone(),
+                known,
+            });
+        };
+        if !(value.is_finite() && *value >= 0.0) {
+            let (name, range) = (parameters[at].name, "a finite number that is not negative");
+            return Err(FilterError::Setting {
+                filter,
+                name,
+                value: *value,
+                range,
+            });
+        }
+        values[at] = *value;
+    }
+    Ok(values)
+}
+
+/// The four components of an attitude at the head of a state, and the rest.
+pub(crate) fn split_state<const REST: usize>(state: &[f64]) -> Option<(Quaternion, [f64; REST])> {
+    let (head, rest) = state.split_at_checked(4)?;
+    let q = Quaternion::from_unit(head.try_into().ok()?)?;
+    let rest: [f64; REST] = rest.try_into().ok()?;
+    rest.iter().all(|value| value.is_finite()).then_some((q, rest))
+}

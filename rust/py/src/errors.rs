@@ -1,0 +1,23 @@
+//! Each core error to one Python exception: what the caller passed was unusable, so all are `ValueError`.
+
+use imufit_attitude::InvalidAttitude;
+use imufit_filters::FilterError;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// The text of a core error as a `ValueError`.
+pub fn value_error(message: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(message.to_string())
+}
+
+/// An error of the attitude crate.
+#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
+pub fn from_attitude(error: InvalidAttitude) -> PyErr {
+    value_error(error)
+}
+
+/// An error of the filters crate.
+#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
+pub fn from_filters(error: FilterError) -> PyErr {
+    value_error(error)
+}

@@ -1,0 +1,204 @@
+//! `rust/filters`: one class that serves a whole log, pieces of one, and a running device.
+
+use std::collections::HashMap;
+
+use imufit_attitude::Frame;
+use imufit_filters::filter::{self, FILTERS, Parameter};
+use imufit_filters::{Columns, Environment, FilterError, Replay, Rules, Skipped, Start};
+use nalgebra::Vector3;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::arrays::{self, Column, Rows, filled_rows};
+use crate::errors::{from_attitude, from_filters};
+
+/// Rows between two looks for Ctrl-C.
+const WINDOW: usize = 1 << 18;
+
+/// An attitude filter with the rules for gaps, NaN, free fall and the start around it.
+#[pyclass(name = "Filter", module = "imufit._imufit")]
+struct PyFilter {
+    replay: Replay,
+}
+
+type Run<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyDict>);
+
+#[pymethods]
+impl PyFilter {
+    /// A filter by name; `settings` of the filter and `rules` of the replay by name, the others at their defaults.
+    #[new]
+    #[pyo3(signature = (
+        name, *, frame="NED", gravity=9.80665, mag_reference=None, settings=None, rules=None, initial=None, start_time=None
+    ))]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of one Python call
+    fn new(
+        name: &str,
+        frame: &str,
+        gravity: f64,
+        mag_reference: Option<&Bound<'_, PyAny>>,
+        settings: Option<HashMap<String, f64>>,
+        rules: Option<HashMap<String, f64>>,
+        initial: Option<&Bound<'_, PyAny>>,
+        start_time: Option<f64>,
+    ) -> PyResult<Self> {
+        let frame: Frame = frame.parse().map_err(from_attitude)?;
+        let field = mag_reference
+            .map(|m| arrays::vector("mag_reference", m))
+            .transpose()?
+            .map(Vector3::from);
+        let start = match initial {
+            None => Start::Vectors,
+            Some(q) => Start::Given {
+                time: start_time.unwrap_or(f64::NEG_INFINITY),
+                attitude: arrays::quaternion("initial", q)?,
+            },
+        };
+        let build = || {
+            let environment = Environment::new(frame, gravity, field)?;
+            let rules = Rules::from_settings(&sorted(rules))?;
+            Replay::new(filter::find(name)?, &sorted(settings), environment, rules, start)
+        };
+        Ok(Self {
+            replay: build().map_err(from_filters)?,
+        })
+    }
+
+    /// The filter's name.
+    #[getter]
+    fn name(&self) -> &'static str {
+        self.replay.name()
+    }
+
+    /// Attitudes (n, 4), scalar first, for the next rows, and the rows of which something was not used, by reason.
+    #[pyo3(signature = (t, acc=None, gyr=None, mag=None))]
+    fn run<'py>(
+        &mut self,
+        py: Python<'py>,
+        t: &Bound<'py, PyAny>,
+        acc: Option<&Bound<'py, PyAny>>,
+        gyr: Option<&Bound<'py, PyAny>>,
+        mag: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Run<'py>> {
+        let t = Column::new("t", t)?;
+        let n = t.len();
+        let acc = Rows::<3>::optional_with_rows("acc", acc, "t", n)?;
+        let gyr = Rows::<3>::optional_with_rows("gyr", gyr, "t", n)?;
+        let mag = Rows::<3>::optional_with_rows("mag", mag, "t", n)?;
+        let columns = Columns {
+            t: t.values()?,
+            acc: acc.as_ref().map(Rows::values).transpose()?,
+            gyr: gyr.as_ref().map(Rows::values).transpose()?,
+            mag: mag.as_ref().map(Rows::values).transpose()?,
+        };
+        let replay = &mut self.replay;
+        #[allow(clippy::redundant_closure_for_method_calls)] // the path is not general enough over the lifetime
+        let mut look = || Python::attach(|py| py.check_signals());
+        let (attitude, skipped) = filled_rows::<4, _, _>(
+            py,
+            n,
+            |out| run_in_windows(replay, &columns, out, &mut look),
+            |stop| match stop {
+                Stop::Filter(error) => from_filters(error),
+                Stop::Signal(error) => error,
+            },
+        )?;
+        let reasons = PyDict::new(py);
+        for (reason, rows) in skipped.by_reason() {
+            if rows > 0 {
+                reasons.set_item(reason, rows)?;
+            }
+        }
+        Ok((attitude, reasons))
+    }
+
+    /// All that the next row depends on: hand it to another filter with the same settings.
+    #[getter]
+    fn state<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.replay.state())
+    }
+
+    #[setter]
+    fn set_state(&mut self, state: &Bound<'_, PyAny>) -> PyResult<()> {
+        let state = Column::new("state", state)?;
+        self.replay.set_state(state.values()?).map_err(from_filters)
+    }
+
+    /// Back to before the first row.
+    fn reset(&mut self) {
+        self.replay.reset();
+    }
+}
+
+/// What ends a run early.
+enum Stop {
+    Filter(FilterError),
+    Signal(PyErr),
+}
+
+/// The whole log, with a look for Ctrl-C between windows.
+fn run_in_windows(
+    replay: &mut Replay,
+    columns: &Columns<'_>,
+    out: &mut [f64],
+    look: &mut impl FnMut() -> PyResult<()>,
+) -> Result<Skipped, Stop> {
+    if columns.t.len() <= WINDOW {
+        return replay.run(columns, out).map_err(Stop::Filter);
+    }
+    let mut skipped = Skipped::default();
+    for (window, out) in columns.windows(WINDOW).zip(out.chunks_mut(4 * WINDOW)) {
+        skipped += replay.run(&window, out).map_err(Stop::Filter)?;
+        look().map_err(Stop::Signal)?;
+    }
+    Ok(skipped)
+}
+
+/// Settings in the order of their names, so that the first wrong one is always the same.
+fn sorted(settings: Option<HashMap<String, f64>>) -> Vec<(String, f64)> {
+    let mut settings: Vec<_> = settings.unwrap_or_default().into_iter().collect();
+    settings.sort_by(|a, b| a.0.cmp(&b.0));
+    settings
+}
+
+fn describe<'py>(py: Python<'py>, parameters: &[Parameter]) -> PyResult<Bound<'py, PyDict>> {
+    let described = PyDict::new(py);
+    for parameter in parameters {
+        let entry = PyDict::new(py);
+        entry.set_item("default", parameter.default)?;
+        entry.set_item("unit", parameter.unit)?;
+        entry.set_item("meaning", parameter.meaning)?;
+        described.set_item(parameter.name, entry)?;
+    }
+    Ok(described)
+}
+
+/// The filters by name: summary, needed sensors, and settings with default, unit and meaning.
+#[pyfunction]
+fn filter_descriptions(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let filters = PyDict::new(py);
+    for filter in &FILTERS {
+        let entry = PyDict::new(py);
+        entry.set_item("summary", filter.summary)?;
+        entry.set_item(
+            "needs",
+            PyList::new(py, filter.needs.iter().map(|sensor| sensor.name()))?,
+        )?;
+        entry.set_item("settings", describe(py, filter.parameters)?)?;
+        filters.set_item(filter.name, entry)?;
+    }
+    Ok(filters)
+}
+
+/// The settings of the rules for gaps and free fall, with default, unit and meaning.
+#[pyfunction]
+fn replay_rules(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    describe(py, imufit_filters::replay::PARAMETERS)
+}
+
+/// Adds this file's class and functions to the module.
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_class::<PyFilter>()?;
+    m.add_function(wrap_pyfunction!(filter_descriptions, m)?)?;
+    m.add_function(wrap_pyfunction!(replay_rules, m)?)
+}
