@@ -14,6 +14,7 @@ from imufit.log.foreign import Plan, PlannedColumn
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import TimeRepair
+from imufit.log.units import Conversion
 
 RawBlock = Mapping[str, NDArray[Any]]
 """File columns by name: (n,) float64 for numbers, (n,) object for text."""
@@ -58,12 +59,15 @@ def fields_of(
         if column.target == "pose":
             text["pose"] = _poses(raw, rows, start, place)
         elif (
-            raw is not None and raw.dtype == object and column.target not in NUMERIC and column.source == column.target
+            raw is not None
+            and raw.dtype == object
+            and column.target not in NUMERIC
+            and column.conversion == Conversion()
         ):
             text[column.target] = checked_labels(raw)
         else:
             values = _numbers(column, block, start, rows, place)
-            check_finite(values, column.target, start, place)
+            check_finite(values, column.source or column.target, start, place)
             numbers[column.target] = values
     t = repair.apply(time_of(plan, block, start, rows, place), start)
     return group_fields(t, numbers, text, start=start, metadata=metadata, place=place)

@@ -157,6 +157,8 @@ class CsvSource:
             if fields != width:
                 last = next(rows, None) is None
                 break
+        if fields == width:
+            return InputError("the table cannot be parsed: look for unbalanced quotes", file=self._path)
         if last and fields < width:
             problem, remedy = f"the last line has {fields} of {width} fields: the file was cut off", "Delete that line."
         else:

@@ -13,18 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
-from imufit.log.assemble import fields_of, group_fields, time_of
-from imufit.log.check import check_finite, check_poses, checked_labels
+from imufit.log.arrays import contiguous, fields_from_arrays, quaternions_from_rotation, rotation_from_quaternions
 from imufit.log.columns import GROUPS, present
 from imufit.log.csv import write_csv
-from imufit.log.foreign import plan_columns
+from imufit.log.frame import fields_from_frame
 from imufit.log.metadata import Metadata
 from imufit.log.npz import write_npz
 from imufit.log.parquet import write_parquet
-from imufit.log.place import Place
-from imufit.log.source import FrameSource
-from imufit.log.time_order import TimeScan
-from imufit.log.unit_check import check_units
 
 Array = NDArray[np.float64]
 Text = NDArray[np.object_]
@@ -88,8 +83,8 @@ class Log:
             values = getattr(self, name)
             if values is not None:
                 shape = (n, width) if width else (n,)
-                object.__setattr__(self, name, _contiguous(values, name, shape))
-        covariates = {name: _contiguous(values, name, (n,)) for name, values in self.covariates.items()}
+                object.__setattr__(self, name, contiguous(values, name, shape))
+        covariates = {name: contiguous(values, name, (n,)) for name, values in self.covariates.items()}
         object.__setattr__(self, "covariates", covariates)
         for name, cells in [*self.labels.items(), *([("pose", self.pose)] if self.pose is not None else [])]:
             if cells.shape != (n,):
@@ -112,8 +107,16 @@ class Log:
 
     @property
     def reference(self) -> Rotation | None:
-        """Reference attitude, body to reference frame; rows without one are NaN. None without any."""
+        """Reference attitude, n rotations from the body to the reference frame; None without any.
+
+        Rotations cannot be NaN: rows without a reference are the identity here and False in `has_reference`.
+        """
         return None if self.ref_q is None else rotation_from_quaternions(self.ref_q)
+
+    @property
+    def has_reference(self) -> NDArray[np.bool_]:
+        """Rows with a reference attitude, (n,)."""
+        return np.zeros(self.n, np.bool_) if self.ref_q is None else ~np.isnan(self.ref_q[:, 0])
 
     def rows(self, start: int, stop: int) -> Self:
         """Rows ``start <= row < stop`` as views on the same memory."""
@@ -171,7 +174,10 @@ class Log:
                 remedy="Write .parquet, .npz or .csv.",
             )
         writer = {".parquet": write_parquet, ".npz": write_npz, ".csv": write_csv}[suffix]
-        writer(path, self.table(), self.metadata)
+        try:
+            writer(path, self.table(), self.metadata)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written ({error.strerror or error})", file=path) from None
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:
         """Cut the log into chunks of `rows` rows with up to `margin` rows more on either side."""
@@ -223,34 +229,11 @@ class Log:
         **metadata
             As in `Metadata`: frame, gravity, mag_reference, ...
         """
-        place, meta = Place(), Metadata.from_mapping(metadata, "log")
-        scan = TimeScan(place)
-        time = _contiguous(t, "t", None)
-        if time.ndim != 1:
-            raise InputError(f"the array has shape {time.shape}, but (n,) is wanted", file="log", column="t")
-        scan.add(time)
+        given = {"acc": acc, "gyr": gyr, "mag": mag, "ref_p": ref_p, "temp": temp, "ref_angle": ref_angle}
         ref_q = quaternions_from_rotation(reference) if isinstance(reference, Rotation) else reference
-        given = {
-            "acc": acc,
-            "gyr": gyr,
-            "mag": mag,
-            "ref_q": ref_q,
-            "ref_p": ref_p,
-            "temp": temp,
-            "ref_angle": ref_angle,
-        }
-        numbers: dict[str, Array] = {}
-        for name, values in [*given.items(), *(covariates or {}).items()]:
-            if values is not None:
-                numbers |= _split(name, values, time.size)
-        for column, numeric in numbers.items():
-            check_finite(numeric, column, 0, place)
-        cells = {**(labels or {}), **({} if pose is None else {"pose": pose})}
-        text = {name: checked_labels(np.array(column, dtype=object)) for name, column in cells.items()}
-        check_poses(text.get("pose", np.empty(0, object)), 0, place)
-        repair = scan.finish()
-        made = group_fields(repair.apply(time, 0), numbers, text, start=0, metadata=meta, place=place)
-        return cls(**made, metadata=meta, notes=(repair.note,) if repair.note else ())
+        text = {**(labels or {}), **({} if pose is None else {"pose": pose})}
+        meta = Metadata.from_mapping(metadata, "log")
+        return cls(**fields_from_arrays(t, {**given, "ref_q": ref_q}, covariates or {}, text, meta))
 
     @classmethod
     def from_dataframe(
@@ -270,18 +253,9 @@ class Log:
         mapping : mapping, optional
             Source text for target columns, as for files.
         """
-        place, source = Place(), FrameSource(df)
-        meta = metadata if isinstance(metadata, Metadata) else Metadata.from_mapping(metadata or {}, "log")
-        plan = plan_columns(source.names, mapping, place)
-        if source.n == 0:
-            raise place.error("the table has no rows")
-        _, rows, block = next(source.blocks(plan.sources))
-        scan = TimeScan(place)
-        scan.add(time_of(plan, block, 0, rows, place))
-        repair = scan.finish()
-        log = cls(**fields_of(plan, block, 0, rows, repair=repair, metadata=meta, place=place), metadata=meta)
-        odd = check_units(log.t, log.sensors(), meta, place, plan.origin)
-        return replace(log, notes=tuple(note for note in (*plan.notes, repair.note, *odd) if note))
+        if not isinstance(metadata, Metadata):
+            metadata = Metadata.from_mapping(metadata or {}, "log")
+        return cls(**fields_from_frame(df, mapping, metadata))
 
     def sensors(self) -> dict[str, Array | None]:
         """Sensors and reference attitude by name, None where absent."""
@@ -376,32 +350,3 @@ def concatenate(logs: Sequence[Log]) -> Log:
                 name: np.concatenate([getattr(log, item.name)[name] for log in logs]) for name in value
             }
     return replace(first, **joined)
-
-
-def rotation_from_quaternions(q: Array) -> Rotation:
-    """Rotations from (n, 4) quaternions, scalar first; rows of NaN stay NaN."""
-    return Rotation.from_quat(q[:, [1, 2, 3, 0]])
-
-
-def quaternions_from_rotation(rotation: Rotation) -> Array:
-    """Return (n, 4) quaternions, scalar first."""
-    return np.ascontiguousarray(np.atleast_2d(rotation.as_quat())[:, [3, 0, 1, 2]])
-
-
-def _contiguous(values: ArrayLike, name: str, shape: tuple[int, ...] | None) -> Array:
-    try:
-        array = np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("the array does not hold numbers", file="log", column=name) from None
-    if shape is not None and array.shape != shape:
-        raise InputError(
-            f"the array has shape {array.shape}, but {shape} is wanted: rows are samples", file="log", column=name
-        )
-    return array
-
-
-def _split(name: str, values: ArrayLike, n: int) -> dict[str, Array]:
-    """Take a group apart into its columns."""
-    columns = GROUPS.get(name)
-    array = _contiguous(values, name, (n,) if columns is None else (n, len(columns)))
-    return {name: array} if columns is None else {column: array[:, i] for i, column in enumerate(columns)}

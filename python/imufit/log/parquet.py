@@ -53,7 +53,9 @@ class ParquetSource:
         """Give the named columns block by block."""
         start = 0
         try:
-            with pq.ParquetFile(self._path, pre_buffer=False, buffer_size=1 << 16) as file:
+            with pq.ParquetFile(
+                self._path, pre_buffer=False, buffer_size=1 << 16, page_checksum_verification=True
+            ) as file:
                 wanted = list(columns) or None
                 for batch in file.iter_batches(batch_size=_BATCH, columns=wanted, use_threads=False):
                     yield start, batch.num_rows, {name: _array(batch.column(name)) for name in columns}
@@ -107,4 +109,6 @@ def write_parquet(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metad
     )
     if sidecar_path(path).exists():
         write_sidecar(path, metadata)
-    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), path, row_group_size=_ROW_GROUP)
+    pq.write_table(
+        pa.Table.from_arrays(arrays, schema=schema), path, row_group_size=_ROW_GROUP, write_page_checksum=True
+    )

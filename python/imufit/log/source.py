@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
@@ -85,36 +83,3 @@ def open_source(path: Path) -> Source:
         return NpzSource(path) if suffix == ".npz" else CsvSource(path)
     except OSError as error:
         raise InputError(f"the file cannot be read ({error.strerror or error})", file=path) from None
-
-
-class FrameSource:
-    """A pandas table in memory as a source."""
-
-    embedded: Mapping[str, Any] = {}
-    notes: tuple[str, ...] = ()
-
-    def __init__(self, frame: pd.DataFrame) -> None:
-        self._frame = frame
-        self.names = tuple(str(name) for name in frame.columns)
-        self.n = len(frame)
-
-    def scan(self, columns: Sequence[str]) -> Iterator[Block]:
-        """Give the named columns in one block."""
-        yield from self.blocks(columns)
-
-    def blocks(self, columns: Sequence[str]) -> Iterator[Block]:
-        """Give the named columns in one block."""
-        if self.n:
-            yield 0, self.n, {name: self._column(self.names.index(name)) for name in columns}
-
-    def _column(self, index: int) -> NDArray[Any]:
-        column = self._frame.iloc[:, index]
-        if pd.api.types.is_numeric_dtype(column.dtype) and not pd.api.types.is_complex_dtype(column.dtype):
-            return column.to_numpy(dtype=np.float64, na_value=np.nan)
-        cells = np.empty(self.n, dtype=object)
-        cells[:] = [None if pd.isna(cell) else cell for cell in column]
-        return cells
-
-    def line_of(self, row: int) -> int | None:
-        """Tables in memory have no lines."""
-        return None

@@ -5,6 +5,7 @@ Each rule refuses only what is unmistakable. A sensor that merely reads oddly pa
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Mapping
 from typing import Final
@@ -218,10 +219,7 @@ def _check_mag(mag: Array, metadata: Metadata, place: Place, origin: Mapping[str
     if not complete.any():
         return []
     size = float(np.median(norm[complete]))
-    if (
-        metadata.mag_reference is not None
-        and 0.2 < size / max(float(np.linalg.norm(metadata.mag_reference)), 1e-9) < 5.0
-    ):
+    if metadata.mag_reference is not None and 0.2 < size / max(math.hypot(*metadata.mag_reference), 1e-9) < 5.0:
         return []
     for low, high, words, unit in _MAG_UNITS:
         if not low <= size <= high:
