@@ -58,9 +58,10 @@ OBSERVABLE: Mapping[str, Mapping[str, str]] = {
     # turned against the reference shows at rest in acc and mag alike.
     "poses": {**_ANYWHERE, **_ALL_ATTITUDES, **_ALL_RATES, "ref.alignment": _LIVELY["ref.alignment"]},
     # One axis: half of the gains are never excited, an offset in acc or mag is also a gain times what stays constant,
-    # a tilted table is also a zero of the angle. What remains does not depend on attitude, or follows the drive.
+    # a tilted table is also a zero of the angle, a gyroscope's bias is also its sensitivity to a gravity that keeps
+    # much of its direction. What remains does not depend on attitude, or follows the drive.
     "tilt": {
-        **_ANYWHERE,
+        **{effect: reason for effect, reason in _ANYWHERE.items() if effect != "gyr.bias"},
         "rig.backlash": "Changes sign with the direction of travel and stays while the rig rests, unlike a delay.",
         "rig.periodic": "Several periods within the travel, which no gain, offset or flexure has.",
     },
