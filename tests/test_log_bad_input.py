@@ -350,3 +350,32 @@ def test_other_repeated_times_are_an_error(tmp_path: Path, suffix: str, repeats:
     df = coarse(2000, np.sort(repeats))
     df.loc[51, "t"] = df.loc[50, "t"] if 51 in repeats else df.loc[51, "t"]
     assert f"column t: t = {df['t'][repeats[0]]} repeats" in message(save(df, tmp_path / f"a{suffix}"))
+
+
+def test_unclosed_quote(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text('t,mag_x,mag_y,mag_z,note\n0,20,0,40,"a\n1,20,0,40,b\n')
+    assert message(path) == (
+        "a.csv: row 0 (line 2): a quote is not closed in this line. Close it; text must not go on in the next line."
+    )
+
+
+def test_carriage_returns_alone(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"t,mag_x,mag_y,mag_z\r0,20,0,40\r")
+    assert message(path) == "a.csv: the lines end in CR alone. Save it with LF or CR LF line ends."
+
+
+def test_last_line_without_end_is_noted(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,mag_x,mag_y,mag_z\n0,20,0,40\n1,20,0,4")
+    assert read(path).notes == (
+        "a.csv: the last line has no line end; if the file was cut off, its last value is wrong",
+    )
+
+
+def test_values_that_are_no_numbers_in_npz(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", t=np.arange(3.0), z=np.ones(3) * 1j)
+    assert message(tmp_path / "a.npz") == (
+        "a.npz: column z: the array holds values of type complex128. Save it as numbers or text."
+    )

@@ -48,6 +48,7 @@ def identical(x: np.ndarray, y: np.ndarray) -> None:
 def logs(draw: st.DrawFn, least: int = 1) -> Log:
     n = draw(st.integers(least, 40))
     t = sorted(draw(st.lists(st.floats(-1e9, 1e9), min_size=n, max_size=n, unique=True)))
+    t[0] -= 0.3  # whole numbers alone would be taken for ticks
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
 
     def columns(k: int) -> Any:

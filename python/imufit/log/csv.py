@@ -36,7 +36,7 @@ class CsvSource:
         self._path = path
         self._layout = read_layout(path)
         self.names = self._layout.names
-        self.notes = self._layout.notes
+        self.notes = (*self._layout.notes, *self._open_end())
         self.n = 0
         # "number": read as such; "word": numbers that need the slow way (True, blanks); "text": not numbers
         self._kinds = dict.fromkeys(self.names, "number")
@@ -60,14 +60,21 @@ class CsvSource:
                 yield start, table.num_rows, {name: self._array(table, name) for name in columns}
             start += table.num_rows
 
+    def _open_end(self) -> Iterator[str]:
+        """Note that the last line has no end: a cut inside its last number cannot be seen otherwise."""
+        with self._path.open("rb") as file:
+            file.seek(-1, 2)
+            if file.read(1) != b"\n":
+                note = "the last line has no line end; if the file was cut off, its last value is wrong"
+                yield f"{self._path.name}: {note}"
+
     def _data(self) -> Iterator[bytes]:
         """Whole data lines in blocks, without comments, in UTF-8, blanks reduced to one."""
         with self._path.open("rb") as file:
             file.seek(self._layout.data_offset)
-            rest = b"\xef\xbb\xbf" if self._layout.data_offset == 0 and file.read(3) != b"\xef\xbb\xbf" else b""
-            if rest:
+            if self._layout.data_offset == 0 and file.read(3) != b"\xef\xbb\xbf":
                 file.seek(0)
-                rest = b""
+            rest = b""
             while block := file.read(_BLOCK):
                 block = rest + block
                 cut = block.rfind(b"\n") + 1
@@ -80,8 +87,9 @@ class CsvSource:
     def _clean(self, block: bytes) -> bytes:
         if not block.isascii():
             block = text_of(block).encode()
-        if NOT_DATA.search(block):
-            block = b"".join(line + b"\n" for line in block.split(b"\n") if line and not NOT_DATA.match(line))
+        if NOT_DATA.search(b"\n" + block[:4096]) or NOT_DATA.search(block):
+            lines = block.split(b"\n")
+            block = b"".join(line + b"\n" for line in lines if line and not NOT_DATA.match(b"\n" + line + b"\n"))
         if self._layout.separator == " ":
             block = re.sub(rb"(?m)^ | (?=\r?$)", b"", re.sub(rb"[ \t]+", b" ", block))
         return block
@@ -110,6 +118,8 @@ class CsvSource:
         )
         if ragged:
             raise self._ragged()
+        if table.num_rows != data.count(b"\n"):
+            raise self._unclosed()
         return table
 
     def _parse_learning(self, data: bytes) -> Any:
@@ -165,6 +175,19 @@ class CsvSource:
             problem = f"the line has {fields} fields, the header has {width}"
             remedy = "Correct or delete that line."
         return InputError(problem, file=self._path, row=row, line=line, remedy=remedy)
+
+    def _unclosed(self) -> InputError:
+        """Error for the first line whose quotes do not close in it."""
+        for row, (line, text) in enumerate(self._rows()):
+            if text.count('"') % 2:
+                return InputError(
+                    "a quote is not closed in this line",
+                    file=self._path,
+                    row=row,
+                    line=line,
+                    remedy="Close it; text must not go on in the next line.",
+                )
+        return InputError("the table cannot be parsed: rows and lines do not agree", file=self._path)
 
     def line_of(self, row: int) -> int | None:
         """Line of the file, from 1, of a data row."""

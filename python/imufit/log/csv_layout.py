@@ -15,8 +15,8 @@ from imufit.log.check import number_from_text
 _SAMPLE: Final = 1 << 16
 _LINES: Final = 60
 COMMENT: Final = ("#", "%", "//")
-NOT_DATA: Final = re.compile(rb"(?m)^[ \t]*(?:#|%|//|\r?$)")
-"""Lines that hold no data: comments and blank lines."""
+NOT_DATA: Final = re.compile(rb"\n[ \t]*(?:#|%|//|\r?\n)")
+"""Line end before a line that holds no data: a comment or a blank line."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,10 @@ def split_line(line: str, separator: str) -> list[str]:
     """Fields of one line, stripped."""
     if separator == " ":
         return line.split()
-    return [field.strip() for field in next(csv.reader([line], delimiter=separator), [])]
+    try:
+        return [field.strip() for field in next(csv.reader([line], delimiter=separator), [])]
+    except csv.Error:
+        return line.split(separator)
 
 
 def is_comment(line: str) -> bool:
@@ -79,6 +82,8 @@ def read_layout(path: Path) -> Layout:
         raw = file.read(_SAMPLE + 1)
     if b"\0" in raw:
         raise InputError("this is not a text file", file=path, remedy="Check the suffix.")
+    if b"\r" in raw and b"\n" not in raw:
+        raise InputError("the lines end in CR alone", file=path, remedy="Save it with LF or CR LF line ends.")
     whole = len(raw) <= _SAMPLE
     pieces = raw[:_SAMPLE].split(b"\n")
     if not whole and len(pieces) > 1:
@@ -122,7 +127,11 @@ def _header(
         if len(fields) in (width, width - 1) and not any(_numeric(field) for field in fields) and any(fields):
             if len(fields) == width - 1 and not _trailing(lines, table[position + 1 :], separator):
                 continue
-            notes = (f"{path.name}: {position} lines before the header skipped",) if position else ()
+            notes = (
+                (f"{path.name}: {position} {'lines' if position > 1 else 'line'} before the header skipped",)
+                if position
+                else ()
+            )
             return i, _named([*fields, *[""] * (width - len(fields))]), notes
         if len(fields) == width and all(_numeric(field) for field in fields if field):
             break

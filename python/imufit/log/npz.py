@@ -70,9 +70,10 @@ class NpzSource:
     def _add(self, entry: str, file: IO[bytes], lengths: dict[str, int]) -> None:
         name = entry.removesuffix(".npy")
         shape, fortran, dtype = _header(file)
-        if dtype.hasobject:
+        if dtype.kind not in "fiubUS":
+            kind = "Python objects" if dtype.hasobject else f"values of type {dtype}"
             raise InputError(
-                "the array holds Python objects", file=self._path, column=name, remedy="Save it as numbers or text."
+                f"the array holds {kind}", file=self._path, column=name, remedy="Save it as numbers or text."
             )
         if shape == ():
             if name == _METADATA:
@@ -87,7 +88,12 @@ class NpzSource:
                 self._members[column] = _Member(entry, dtype, shape[1], i)
         else:
             wanted = f"(n, {len(columns)}) in C order" if columns else "(n,)"
-            raise InputError(f"the array has shape {shape}, but {wanted} is wanted", file=self._path, column=name)
+            raise InputError(
+                f"the array has shape {shape}, but {wanted} is wanted",
+                file=self._path,
+                column=name,
+                remedy=f"Save np.ascontiguousarray({name}).",
+            )
         lengths[name] = int(shape[0])
 
     def _unreadable(self) -> InputError:
@@ -141,9 +147,7 @@ def _read(file: IO[bytes], member: _Member, rows: int) -> NDArray[Any]:
 def _array(column: NDArray[Any]) -> NDArray[Any]:
     if column.dtype.kind in "US":
         return column.astype(str).astype(object)
-    if column.dtype.kind in "fiub":
-        return column.astype(np.float64)
-    raise ValueError(column.dtype)
+    return column.astype(np.float64)
 
 
 def write_npz(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metadata) -> None:
