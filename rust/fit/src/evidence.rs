@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use imufit_model::effect::EffectError;
-use imufit_model::facts::LogFacts;
-use imufit_model::sensor::{CHANNELS, Sensor};
+use imufit_model::facts::{LOOKBACK, LogFacts};
+use imufit_model::sensor::Sensor;
 use imufit_model::sensor_model::{Evaluation, SensorModel};
 use imufit_model::window::Window;
 use nalgebra::{DMatrix, DMatrixView};
@@ -17,8 +17,6 @@ use rayon::prelude::*;
 use crate::bins::Bins;
 use crate::whitening::Filter;
 
-/// Rows before a window that whitening may look back on.
-pub const LOOKBACK: usize = 128;
 /// Rows worked on at a time: their columns stay in the cache.
 const PART: usize = 2048;
 /// Consecutive samples further apart than this many sample intervals are a gap, which no filter reaches across.
@@ -148,7 +146,7 @@ impl Evidence {
         let layout = &self.layout;
         let parts: Vec<Result<Blocks, EffectError>> = starts
             .into_par_iter()
-            .map(|begin| take(layout, &window.with_core(begin, (begin + PART).min(window.end))))
+            .map(|begin| take(layout, &window.part(begin, (begin + PART).min(window.end), layout.facts.margin())))
             .collect();
         // Summed in the order of time, so that the result does not depend on the number of threads.
         for part in parts {

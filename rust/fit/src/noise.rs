@@ -1,6 +1,7 @@
 //! Noise of the residual: autocovariance and spectrum, from which whitening filters come.
 
 use imufit_model::effect::EffectError;
+use imufit_model::facts::LOOKBACK;
 use imufit_model::sensor::{CHANNELS, Sensor};
 use imufit_model::window::Window;
 
@@ -26,7 +27,7 @@ impl Autocovariance {
     /// Adds the core rows of a window: the residual less the columns times `step`.
     pub fn add(&mut self, window: &Window, layout: &Layout, step: &[f64]) -> Result<(), EffectError> {
         let core = window.begin;
-        let window = window.with_core(core.saturating_sub(crate::evidence::LOOKBACK), window.end);
+        let window = window.with_core(core.saturating_sub(LOOKBACK), window.end);
         let evaluation = layout.model.evaluate(&window, &layout.facts)?;
         let t = &window.t[window.begin..window.end];
         for sensor in Sensor::ALL {
@@ -44,7 +45,7 @@ impl Autocovariance {
                 for k in samples.with_past(core - window.begin, 0) {
                     let now = residual[samples.rows[k]];
                     for lag in 0..=MAX_ORDER.min(samples.run[k]) {
-                        if samples.rows[k] - samples.rows[k - lag] > crate::evidence::LOOKBACK {
+                        if samples.rows[k] - samples.rows[k - lag] > LOOKBACK {
                             break;
                         }
                         self.sums[channel][lag] += now * residual[samples.rows[k - lag]];

@@ -177,6 +177,7 @@ impl Survey {
             has_temperature: self.temperature.1 > 0,
             attitude_smoothing: self.attitude_width.choose(),
             position_smoothing: self.has_position.then(|| self.position_width.choose()),
+            reference_dt: self.attitude_width.spacing().unwrap_or(dt),
             covariates: self.given.covariates.clone(),
         };
         let bins = Bins::new(&self.given.covariates, &mut self.samples);

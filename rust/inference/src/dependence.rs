@@ -136,7 +136,7 @@ pub fn test(problem: &Problem, evidence: &Evidence, model: &[usize], base: &Held
 pub fn shape_name(shape: &[f64]) -> &'static str {
     let total: f64 = shape.iter().map(|c| c * c).sum();
     let share = |k: usize| shape.get(k).map_or(0.0, |c| c * c) / total.max(f64::MIN_POSITIVE);
-    if share(0) > 0.8 {
+    if share(0) > 0.9 {
         "rising or falling steadily"
     } else if share(1) + share(3) > 0.8 {
         if share(3) > 0.02 { "V-shaped" } else { "parabolic" }

@@ -37,6 +37,7 @@ pub struct Bandwidth {
     difference: [f64; WIDTHS.len()],
     gain: [f64; WIDTHS.len()],
     count: [usize; WIDTHS.len()],
+    spacing: Option<f64>,
 }
 
 impl Bandwidth {
@@ -52,14 +53,17 @@ impl Bandwidth {
 
     fn new(of_attitude: bool, order: usize) -> Self {
         let zero = [0.0; WIDTHS.len()];
-        Self { of_attitude, order, noise_sum: 0.0, noise_freedom: 0, difference: zero, gain: zero, count: [0; WIDTHS.len()] }
+        Self { of_attitude, order, noise_sum: 0.0, noise_freedom: 0, difference: zero, gain: zero, count: [0; WIDTHS.len()], spacing: None }
     }
 
     /// Adds the rows given (indices into the window).
     pub fn add(&mut self, window: &Window, rows: impl Iterator<Item = usize>) {
         let reference =
-            if self.of_attitude { LocalReference::attitude(window) } else { LocalReference::position(window) };
+            if self.of_attitude { LocalReference::attitude(window, None) } else { LocalReference::position(window, None) };
         let Some(mut reference) = reference else { return };
+        if self.spacing.is_none() {
+            self.spacing = Some(reference.spacing()).filter(|s| *s > 0.0);
+        }
         for row in rows {
             let at = window.t[row];
             if let Some((fit, values)) = reference.local_fit(at, NOISE_FIT, self.of_attitude) {
@@ -96,15 +100,9 @@ impl Bandwidth {
         }
     }
 
-    /// Sums of two parts of a log.
-    pub fn merge(&mut self, other: &Self) {
-        self.noise_sum += other.noise_sum;
-        self.noise_freedom += other.noise_freedom;
-        for k in 0..WIDTHS.len() {
-            self.difference[k] += other.difference[k];
-            self.gain[k] += other.gain[k];
-            self.count[k] += other.count[k];
-        }
+    /// Median time between reference samples, s, where the log begins.
+    pub fn spacing(&self) -> Option<f64> {
+        self.spacing
     }
 
     /// White noise of the reference, per component: rad of attitude or m of position.

@@ -4,6 +4,9 @@ use nalgebra::Vector3;
 
 use crate::smoothing::Smoothing;
 
+/// Rows before a window that a whitening filter may look back on.
+pub const LOOKBACK: usize = 128;
+
 /// Facts of a log that its effects and its reference kinematics need: constants over all windows.
 #[derive(Clone, Debug)]
 pub struct LogFacts {
@@ -37,9 +40,19 @@ pub struct LogFacts {
     pub attitude_smoothing: Smoothing,
     /// How the reference position is differentiated; `None` without position.
     pub position_smoothing: Option<Smoothing>,
+    /// Median time between reference samples, s.
+    pub reference_dt: f64,
 }
 
 impl LogFacts {
+    /// Rows around a window that its derivatives, held columns and whitening filters may need.
+    pub fn margin(&self) -> usize {
+        let widest = self.attitude_smoothing.half_width.max(self.position_smoothing.map_or(0, |s| s.half_width));
+        let reach = 2.0 * (widest as f64 + 4.0) * (self.reference_dt / self.dt).max(1.0);
+        let reach = if reach.is_finite() { reach as usize } else { 0 };
+        reach + crate::window::HOLD_ROWS + LOOKBACK
+    }
+
     /// Index of a covariate by its name.
     pub fn covariate(&self, name: &str) -> Option<usize> {
         self.covariates.iter().position(|c| c == name)

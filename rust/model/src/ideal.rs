@@ -60,8 +60,14 @@ pub struct Ideal {
 impl Ideal {
     /// Ideal readings of the window's core rows.
     pub fn new(window: &Window, facts: &LogFacts, change: &ReferenceChange) -> Self {
-        let rows =
-            reference::kinematics(window, facts.attitude_smoothing, facts.position_smoothing, change.delay);
+        let spacing = Some(facts.reference_dt);
+        let rows = reference::kinematics(
+            window,
+            facts.attitude_smoothing,
+            facts.position_smoothing,
+            spacing,
+            change.delay,
+        );
         let mut ideal = Self::default();
         for k in &rows {
             ideal.push(k.as_ref(), facts, change);

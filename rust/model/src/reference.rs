@@ -31,18 +31,12 @@ struct Knots {
 }
 
 impl Knots {
-    fn new(window: &Window, known: impl Fn(usize) -> bool) -> Self {
+    fn new(window: &Window, known: impl Fn(usize) -> bool, spacing: Option<f64>) -> Self {
         let row: Vec<usize> = (0..window.len())
             .filter(|&i| known(i) && window.reference_exact.is_none_or(|e| e[i] > 0.5))
             .collect();
         let t: Vec<f64> = row.iter().map(|&i| window.t[i]).collect();
-        let mut spacing: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-        let widest = if spacing.is_empty() {
-            0.0
-        } else {
-            let middle = spacing.len() / 2;
-            *spacing.select_nth_unstable_by(middle, f64::total_cmp).1 * MAX_GAP
-        };
+        let widest = MAX_GAP * spacing.unwrap_or_else(|| median_step(&t));
         let mut segment = vec![(0, 0); t.len()];
         let mut first = 0;
         for k in 0..t.len() {
@@ -79,6 +73,13 @@ impl Knots {
         let reach = 0.75 * (self.t[k + 1.min(last - 1 - k)] - self.t[k - 1.min(k - first)]);
         ((at - self.t[k]).abs() <= reach).then_some((k, k - half_width, k + half_width + 1))
     }
+}
+
+/// Median step between times; zero if there are none.
+fn median_step(t: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// A gap in the reference is a step of more than this many median steps.
@@ -120,16 +121,24 @@ fn quaternion_at(column: &[f64], row: usize) -> UnitQuaternion<f64> {
 }
 
 impl<'a> LocalReference<'a> {
-    /// Attitude knots of a window; `None` without a reference attitude.
-    pub fn attitude(window: &'a Window<'a>) -> Option<Self> {
+    /// Attitude knots of a window; `None` without a reference attitude. `spacing` is the usual time between knots,
+    /// taken from the window if not given.
+    pub fn attitude(window: &'a Window<'a>, spacing: Option<f64>) -> Option<Self> {
         let q = window.attitude?;
-        Some(Self::new(window, Knots::new(window, |i| q[4 * i..4 * i + 4].iter().all(|v| v.is_finite()))))
+        let known = |i: usize| q[4 * i..4 * i + 4].iter().all(|v| v.is_finite());
+        Some(Self::new(window, Knots::new(window, known, spacing)))
     }
 
     /// Position knots of a window; `None` without a reference position.
-    pub fn position(window: &'a Window<'a>) -> Option<Self> {
+    pub fn position(window: &'a Window<'a>, spacing: Option<f64>) -> Option<Self> {
         let p = window.position?;
-        Some(Self::new(window, Knots::new(window, |i| p[3 * i..3 * i + 3].iter().all(|v| v.is_finite()))))
+        let known = |i: usize| p[3 * i..3 * i + 3].iter().all(|v| v.is_finite());
+        Some(Self::new(window, Knots::new(window, known, spacing)))
+    }
+
+    /// Median time between the knots.
+    pub fn spacing(&self) -> f64 {
+        median_step(&self.knots.t)
     }
 
     fn new(window: &'a Window<'a>, knots: Knots) -> Self {
@@ -218,10 +227,11 @@ pub fn kinematics(
     window: &Window,
     attitude: Smoothing,
     position: Option<Smoothing>,
+    spacing: Option<f64>,
     shift: f64,
 ) -> Vec<Option<Kinematics>> {
-    let mut rotation = LocalReference::attitude(window);
-    let mut translation = position.and_then(|s| LocalReference::position(window).map(|r| (r, s)));
+    let mut rotation = LocalReference::attitude(window, spacing);
+    let mut translation = position.and_then(|s| LocalReference::position(window, spacing).map(|r| (r, s)));
     (window.begin..window.end)
         .map(|i| {
             let at = window.t[i] + shift;
@@ -269,7 +279,7 @@ mod tests {
         };
         for shift in [0.0, 0.0037] {
             let mut worst = (0.0_f64, 0.0_f64);
-            let k = kinematics(&window, NARROWEST, None, shift);
+            let k = kinematics(&window, NARROWEST, None, None, shift);
             for (i, k) in k.iter().enumerate().skip(5).take(n as usize - 10) {
                 let k = k.expect("inside");
                 let (_, omega, alpha) = truth(t[i] + shift);
@@ -278,7 +288,7 @@ mod tests {
             }
             assert!(worst.0 < 1e-6 * 5.0 && worst.1 < 1e-5 * 60.0, "{worst:?}");
         }
-        assert!(kinematics(&window, NARROWEST, None, 0.0)[3].is_none());
+        assert!(kinematics(&window, NARROWEST, None, None, 0.0)[3].is_none());
     }
 
     #[test]
@@ -290,7 +300,7 @@ mod tests {
             t: &t, readings: [None; 3], temperature: None, attitude: Some(&q), position: None, reference_exact: None,
             covariates: vec![], offset: 0, begin: 0, end: 200,
         };
-        let k = kinematics(&window, NARROWEST, None, 0.0);
+        let k = kinematics(&window, NARROWEST, None, None, 0.0);
         assert!((97..123).all(|i| k[i].is_none()));
         assert!(k[90].is_some() && k[130].is_some());
     }

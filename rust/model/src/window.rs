@@ -43,6 +43,25 @@ impl<'a> Window<'a> {
         self.readings[sensor.index()]
     }
 
+    /// A part of the window with its own rows to work on and at most `margin` rows around them.
+    #[must_use]
+    pub fn part(&self, begin: usize, end: usize, margin: usize) -> Self {
+        let (first, last) = (begin.saturating_sub(margin), (end + margin).min(self.len()));
+        let cut = |column: Option<&'a [f64]>, width: usize| column.map(|c| &c[width * first..width * last]);
+        Self {
+            t: &self.t[first..last],
+            readings: self.readings.map(|r| cut(r, 3)),
+            temperature: cut(self.temperature, 1),
+            attitude: cut(self.attitude, 4),
+            position: cut(self.position, 3),
+            reference_exact: cut(self.reference_exact, 1),
+            covariates: self.covariates.iter().map(|c| &c[first..last]).collect(),
+            offset: self.offset + first,
+            begin: begin - first,
+            end: end - first,
+        }
+    }
+
     /// The same window with other rows to work on.
     #[must_use]
     pub fn with_core(&self, begin: usize, end: usize) -> Self {
