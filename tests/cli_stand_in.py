@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 from imufit.cli import engine
 from imufit.cli.app import main
+from imufit.simulate import Grade, ParameterGrade
 from loop_results import BIAS, addition, card, comparison, diagnosis, ladder
 
 
@@ -46,14 +47,14 @@ class Truth:
         return {"effects": self.effects}
 
 
-class Mark:
-    """A graded answer."""
+class Study:
+    """The blind protocol's result."""
 
     def to_dict(self):
         return {"correct": True}
 
     def __str__(self):
-        return "right"
+        return "3 of 3 right"
 
 
 class Replay:
@@ -79,6 +80,8 @@ def install(monkeypatch):
 
     ladder_result = ladder()
     object.__setattr__(ladder_result, "fit", Fit())
+    found = ParameterGrade("gyr.g_sensitivity", "xx", 3.6e-5, 3.5e-5, 1e-6)
+    mark = Grade("right", ("gyr.g_sensitivity",), ("gyr.g_sensitivity",), (found,))
     simulation = SimpleNamespace(t=np.arange(200) / 100.0, truth=Truth())
     model = SimpleNamespace(fit=lambda log, progress: Fit())
     for name, result in (
@@ -93,8 +96,8 @@ def install(monkeypatch):
         ("simulate", simulation),
         ("hidden", simulation),
         ("unseal", Truth()),
-        ("grade_answer", Mark()),
-        ("grade_blind", Mark()),
+        ("grade_answer", mark),
+        ("grade_blind", Study()),
     ):
         note(name, result)
     ids = ("gyr.g_sensitivity", "gyr.bias", "gyr.scale", "acc.bias", "mag.hard_iron")

@@ -135,7 +135,8 @@ def test_reveal_tells_and_grades(capsys, tmp_path, log):
     assert code == 0
     assert "Put into this log: gyr.g_sensitivity." in out
     assert "0.0202 deg/s per g" in out
-    assert "right" in out
+    assert "The answer names gyr.g_sensitivity: right." in out
+    assert "0.01967 ± 0.00056 deg/s per g" in out
 
 
 def test_explain_prints_a_card_or_the_catalogue(capsys):

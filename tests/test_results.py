@@ -139,6 +139,8 @@ def test_waterfall_is_logarithmic_only_where_the_fall_is_large():
 def test_figures_have_a_sentence_for_a_title():
     assert "from 1.52 to 1.03" in diagnosis().plot().axes[0].get_title(loc="left")
     assert "beyond chance" in diagnosis("adequate").plot().axes[0].get_title(loc="left")
+    assert "equally well" in diagnosis("ambiguous").plot().axes[0].get_title(loc="left")
+    assert "No effect takes away enough" in diagnosis("unknown").plot().axes[0].get_title(loc="left")
     assert "63 %" in comparison().plot().get_suptitle()
     assert "plausible" in Parameter("gyr.bias", "x", 0.01, 1e-4, "rad/s", 0.02).plot().axes[0].get_title(loc="left")
 

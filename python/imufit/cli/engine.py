@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from imufit.log import Log
     from imufit.results import EffectCard, Ladder
+    from imufit.simulate import Grade, Simulation, Truth
 
 Progress = Callable[[int, int, str], None]
 
@@ -92,7 +94,7 @@ def injections() -> list[str]:
     return list(INJECTIONS)
 
 
-def simulate(scenario: str, effects: Mapping[str, Mapping[str, float] | None], **settings: Any) -> Any:
+def simulate(scenario: str, effects: Mapping[str, Mapping[str, float] | None], **settings: Any) -> Simulation:
     """Simulate a log with these effects; None instead of parameters draws them.
 
     Raises
@@ -109,26 +111,46 @@ def simulate(scenario: str, effects: Mapping[str, Mapping[str, float] | None], *
         raise InputError(str(error)) from error
 
 
-def hidden(scenario: str, seed: int, **settings: Any) -> Any:
+def hidden(scenario: str, seed: int, **settings: Any) -> Simulation:
     """Simulate a log with an effect that the seed picks."""
     from imufit.errors import InputError  # noqa: PLC0415
     from imufit.simulate import hidden  # noqa: PLC0415
 
     try:
-        return hidden(seed, scenario=scenario, **settings)
+        simulation, _ = hidden(scenario, seed, **settings)
     except ValueError as error:
         raise InputError(str(error)) from error
+    return simulation
 
 
-def save_simulation(simulation: Any, path: Path) -> Path:
+def log_of(simulation: Simulation) -> Log:
+    """Return the log of a simulation, without what is known of it."""
+    from imufit.log import Log  # noqa: PLC0415
+
+    return Log.from_arrays(
+        simulation.t,
+        acc=simulation.acc,
+        gyr=simulation.gyr,
+        mag=simulation.mag,
+        temp=simulation.temp,
+        reference=simulation.ref_q,
+        ref_p=simulation.ref_p,
+        ref_angle=simulation.ref_angle,
+        pose=None if simulation.pose is None else simulation.pose.tolist(),
+        covariates=simulation.covariates,
+        **simulation.metadata,
+    )
+
+
+def save_simulation(simulation: Simulation, path: Path) -> Path:
     """Write the log to `path` and its sealed truth beside it; return where that is."""
-    from imufit.simulate import save, seal  # noqa: PLC0415
+    from imufit.simulate import seal  # noqa: PLC0415
 
-    save(simulation, path)
+    log_of(simulation).write(path)
     return seal(simulation.truth, path)
 
 
-def unseal(path: Path) -> Any:
+def unseal(path: Path) -> Truth:
     """Return what was done to a simulated log.
 
     Raises
@@ -145,7 +167,7 @@ def unseal(path: Path) -> Any:
         raise InputError(str(error)) from error
 
 
-def grade_answer(truth: Any, answer: Mapping[str, Any]) -> Any:
+def grade_answer(truth: Truth, answer: Mapping[str, Any]) -> Grade:
     """Judge the JSON of `diagnose` or `ladder` against the truth."""
     from imufit.simulate import grade  # noqa: PLC0415
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,12 +13,44 @@ from imufit.cli import engine
 from imufit.cli.arguments import EXISTING, json_option
 from imufit.cli.output import Output
 
+if TYPE_CHECKING:
+    from imufit.simulate import Grade, Truth
 
-def truth_rows(truth: Any) -> tuple[tuple[str, str, str], ...]:
+
+def parameter_units() -> dict[str, dict[str, str]]:
+    """Return the SI unit of each parameter of each effect."""
+    return {card.id: {name: unit for name, unit, _ in card.parameters} for card in engine.catalogue()}
+
+
+def grade_rows(mark: Grade) -> tuple[tuple[str, str, str, str], ...]:
+    """Return effect, name, truth and answer of each parameter that there is to find."""
+    from imufit.figures import quantity  # noqa: PLC0415
+
+    units = parameter_units()
+
+    def shown(effect: str, name: str, value: float | None, error: float | None = None) -> str:
+        unit = units.get(effect, {}).get(name)
+        if unit is None or value is None:
+            return quantity.number(value)
+        return quantity.with_error(value, error or 0.0, unit)
+
+    return tuple(
+        (
+            item.effect,
+            item.name,
+            shown(item.effect, item.name, item.truth),
+            shown(item.effect, item.name, item.estimate, item.standard_error),
+        )
+        for item in mark.parameters
+        if item.estimate is not None
+    )
+
+
+def truth_rows(truth: Truth) -> tuple[tuple[str, str, str], ...]:
     """Return effect, parameters and size of all that was injected, in the shown units."""
     from imufit.figures import quantity  # noqa: PLC0415
 
-    units = {card.id: {name: unit for name, unit, _ in card.parameters} for card in engine.catalogue()}
+    units = parameter_units()
     rows = []
     for effect, parameters in truth.effects.items():
         known = units.get(effect, {})
@@ -70,6 +103,7 @@ def reveal(log: Path, *, answer: Path | None, json_file: Path | None) -> None:
     out.table(Table("", ("effect", "parameters", ">size"), truth_rows(truth)))
     if read is not None:
         mark = engine.grade_answer(truth, read)
-        value["grade"] = json_value(mark.to_dict())
-        out.say(str(mark))
+        value["grade"] = json_value(asdict(mark))
+        out.say(f"The answer names {', '.join(mark.answer) or 'no effect'}: {mark.mark}.", bold=True)
+        out.table(Table("Truth and answer", ("effect", "parameter", ">truth", ">answer"), grade_rows(mark)))
     out.json(value)

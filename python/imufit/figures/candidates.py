@@ -23,6 +23,7 @@ def candidate_bars(
     after: ArrayLike,
     error: ArrayLike,
     status: Sequence[str],
+    sentence: str = "",
     limit: int = 12,
 ) -> Figure:
     """Bars from the held-out error now to the one expected with each effect.
@@ -37,6 +38,8 @@ def candidate_bars(
         (k,) standard error of the drop; NaN where it is not known.
     status : sequence of str
         ``passed``, ``not significant`` or ``not testable here``.
+    sentence : str
+        Title; without it what the best candidate promises.
     limit : int
         Draw at most so many.
 
@@ -85,13 +88,16 @@ def candidate_bars(
     axes.set_xlim(low - 0.04 * (high - low), high + 0.04 * (high - low))
     axes.set_xlabel("held-out error over noise floor (solid line: noise floor; dashed: now)", fontsize=9)
     best = drawn[0]
-    if status[best] == "passed":
-        sentence = (
-            f"Adding {effects[best]} should cut the held-out error "
-            f"from {quantity.ratio(before[best])} to {quantity.ratio(after[best])} times the noise floor"
-        )
-    else:
-        sentence = "No effect lowers the held-out error beyond chance"
-    style.title(axes, sentence)
+    style.title(axes, sentence or _promise(effects[best], before[best], after[best], status[best]))
     style.tidy(axes)
     return figure
+
+
+def _promise(effect: str, before: float, after: float, status: str) -> str:
+    """Say what the best candidate would bring."""
+    if status != "passed":
+        return "No effect lowers the held-out error beyond chance"
+    return (
+        f"Adding {effect} should cut the held-out error "
+        f"from {quantity.ratio(before)} to {quantity.ratio(after)} times the noise floor"
+    )

@@ -236,12 +236,17 @@ class Diagnosis:
         """Draw the expected held-out error of the ranked candidates."""
         from imufit.figures.candidates import candidate_bars  # noqa: PLC0415
 
+        titles = {
+            "ambiguous": f"{' and '.join(self.ambiguous_with)} explain this log equally well",
+            "unknown": "No effect takes away enough of the held-out error to be the cause",
+        }
         return candidate_bars(
             [item.effect for item in self.candidates],
             before=[item.held_out_before for item in self.candidates],
             after=[item.held_out_after for item in self.candidates],
             error=[item.gain_error for item in self.candidates],
             status=[item.status for item in self.candidates],
+            sentence=titles.get(self.verdict, ""),
         )
 
     def candidate_table(self, limit: int = 10) -> Table:

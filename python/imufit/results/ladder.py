@@ -10,6 +10,7 @@ from imufit.results.addition import surprise
 from imufit.results.comparison import Comparison
 from imufit.results.diagnosis import VERDICTS, Diagnosis
 from imufit.results.json_value import json_value
+from imufit.results.parameter import by_effect
 from imufit.results.table import Table, html, page
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ class Ladder:
     sentence: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of `ladder`; rivals, what is unexplained, experiment and sentence of the final verdict besides."""
+        """JSON of `ladder`; rivals, what is unexplained, experiment, sentence and parameters besides."""
         return {
             "steps": [step.to_dict() for step in self.steps],
             "model": list(self.model),
@@ -102,6 +103,7 @@ class Ladder:
             "unexplained": [item.to_dict() for item in self.diagnosis.unexplained],
             "experiment": self.diagnosis.experiment,
             "sentence": self.sentence,
+            "parameters": by_effect(getattr(self.fit, "parameters", ()) or ()),
         }
 
     def to_dataframe(self) -> pd.DataFrame:
