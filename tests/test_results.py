@@ -98,12 +98,33 @@ def test_values_are_shown_in_the_units_people_use(value, error, unit, shown):
     assert quantity.with_error(value, error, unit) == shown
 
 
-def test_shown_unit_converts_the_number_with_the_unit():
-    factor, unit = quantity.shown_unit("rad/s")
-    assert unit == "deg/s"
-    assert factor * math.pi == pytest.approx(180.0)
-    assert quantity.shown_unit("rad")[1] == "deg"
-    assert quantity.shown_unit("1/degC") == (100.0, "%/°C")
+DEG = 180.0 / math.pi
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "shown"),
+    [
+        ("rad/s", DEG, "deg/s"),
+        ("rad", DEG, "deg"),
+        ("rad/s^2", DEG, "deg/s²"),
+        ("(rad/s)/K", DEG, "deg/s/K"),
+        ("(rad/s)/(m/s^2)", DEG * 9.80665, "deg/s per g"),
+        ("rad/s/(m/s^2)", DEG * 9.80665, "deg/s per g"),
+        ("(m/s^2)/K", 1.0, "m/s²/K"),
+        ("m/s^2", 1.0, "m/s²"),
+        ("1/K", 100.0, "%/K"),
+        ("1/(rad/s)", 100.0 / DEG, "%/(deg/s)"),
+        ("(rad/s)/(rad/s)^2", 1.0 / DEG, "deg/s/(deg/s)²"),
+        ("(rad/s)/sqrt(Hz)", DEG, "deg/s/√Hz"),
+        ("uT/A", 1.0, "µT/A"),
+        ("1", 100.0, "%"),
+        ("s", 1.0, "s"),
+        ("rad s/m", 1.0, "rad s/m"),
+    ],
+)
+def test_shown_unit_converts_the_number_with_the_unit(unit, factor, shown):
+    assert quantity.shown_unit(unit)[0] == pytest.approx(factor)
+    assert quantity.shown_unit(unit)[1] == shown
 
 
 def test_missing_numbers_are_dashes():

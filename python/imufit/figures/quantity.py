@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 
 _DEGREES = 180.0 / math.pi
 _GRAVITY = 9.80665
-_PER_SPECIFIC_FORCE = ("/(m/s^2)", "/(m/s²)", " per m/s^2", " per m/s²")
-_SPELLING = (("m/s^2", "m/s²"), ("^2", "²"), ("^3", "³"), ("degC", "°C"), ("uT", "µT"), ("sqrt(Hz)", "√Hz"))
+_PARTS = re.compile(r"(?P<head>\([^()]*\)|rad/s\^2|rad/s|m/s\^2|[^/ ()]+)(?:(?:/| per )(?P<tail>.+))?")
+_SPELLING = (("^2", "²"), ("^3", "³"), ("degC", "°C"), ("uT", "µT"), ("sqrt(Hz)", "√Hz"))
 
 
 def shown_unit(unit: str) -> tuple[float, str]:
@@ -31,19 +32,28 @@ def shown_unit(unit: str) -> tuple[float, str]:
     (1.0, 'm/s²')
     """
     text = unit.strip()
-    factor = 1.0
     if text in ("", "1", "-"):
         return 100.0, "%"
-    if text.startswith("1/"):
-        factor, text = 100.0, "%" + text[1:]
-    elif text.startswith("rad"):
-        factor, text = _DEGREES, "deg" + text[3:]
-        for ending in _PER_SPECIFIC_FORCE:
-            if text.endswith(ending):
-                factor, text = factor * _GRAVITY, text.removesuffix(ending) + " per g"
+    parts = _PARTS.fullmatch(text)
+    if parts is None:
+        return 1.0, _pretty(text)
+    head, tail = parts["head"].strip("()"), parts["tail"] or ""
+    factor, shown = (100.0, "%") if head == "1" else (1.0, head)
+    if head.startswith("rad"):
+        factor, shown = _DEGREES, "deg" + head[3:]
+        if tail in ("(m/s^2)", "m/s^2"):
+            return factor * _GRAVITY, f"{shown} per g"
+    for rate, power in (("(rad/s)^2", 2), ("(rad/s)^3", 3), ("(rad/s)", 1), ("rad/s", 1)):
+        if tail == rate:
+            factor, tail = factor / _DEGREES**power, rate.replace("rad", "deg")
+    return factor, _pretty(f"{shown}/{tail}" if tail else shown)
+
+
+def _pretty(unit: str) -> str:
+    """Write powers and degrees as people do."""
     for plain, pretty in _SPELLING:
-        text = text.replace(plain, pretty)
-    return factor, text
+        unit = unit.replace(plain, pretty)
+    return unit
 
 
 def number(value: float | None, digits: int = 3) -> str:
