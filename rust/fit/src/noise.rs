@@ -34,14 +34,7 @@ impl Autocovariance {
             let samples = Samples::new(sensor, &evaluation, t, layout.facts.sensor_dt[sensor.index()]);
             for channel in 3 * sensor.index()..3 * sensor.index() + 3 {
                 let Some(columns) = &evaluation.channels[channel] else { continue };
-                let mut residual = columns.residual.clone();
-                for (column, parameter) in columns.columns.iter().zip(&layout.model.active()[channel]) {
-                    if step[*parameter] != 0.0 {
-                        for (r, c) in residual.iter_mut().zip(column) {
-                            *r -= step[*parameter] * c;
-                        }
-                    }
-                }
+                let residual = columns.residual_after(&layout.model.active()[channel], step);
                 for k in samples.with_past(core - window.begin, 0) {
                     let now = residual[samples.rows[k]];
                     for lag in 0..=MAX_ORDER.min(samples.run[k]) {

@@ -43,6 +43,21 @@ pub struct ChannelColumns {
     pub residual: Vec<f64>,
 }
 
+impl ChannelColumns {
+    /// Residual after a step of all parameters, of which `active` are the channel's own.
+    pub fn residual_after(&self, active: &[usize], step: &[f64]) -> Vec<f64> {
+        let mut residual = self.residual.clone();
+        for (column, parameter) in self.columns.iter().zip(active) {
+            if step[*parameter] != 0.0 {
+                for (r, c) in residual.iter_mut().zip(column) {
+                    *r -= step[*parameter] * c;
+                }
+            }
+        }
+        residual
+    }
+}
+
 /// What a model says of the core rows of a window.
 pub struct Evaluation {
     /// Ideal readings the model started from.
@@ -177,6 +192,17 @@ impl SensorModel {
             }
         }
         Ok(Evaluation { ideal, channels, covariates, temperature })
+    }
+
+    /// Residual of each channel over the core rows of a window after a step of all parameters.
+    pub fn residuals(&self, window: &Window, facts: &LogFacts, step: &[f64]) -> Result<Vec<Option<Vec<f64>>>, EffectError> {
+        let evaluation = self.evaluate(window, facts)?;
+        Ok(evaluation
+            .channels
+            .into_iter()
+            .zip(&self.active)
+            .map(|(channel, active)| channel.map(|c| c.residual_after(active, step)))
+            .collect())
     }
 
     /// Modelled readings of one sensor and the columns of its three channels, stage after stage.

@@ -139,14 +139,22 @@ impl PyEvidence {
     }
 }
 
-/// Residual and columns of a chunk as arrays, for those who want to look at them.
+/// Residual of each channel over the core rows of a chunk, after a step of all parameters; None for a sensor that the log has not.
 #[pyfunction]
-fn evaluate<'py>(py: Python<'py>, evidence: &PyEvidence, chunk: &Bound<'py, PyDict>) -> PyResult<Vec<Option<Bound<'py, PyArray1<f64>>>>> {
+fn evaluate<'py>(
+    py: Python<'py>,
+    evidence: &PyEvidence,
+    chunk: &Bound<'py, PyDict>,
+    step: Vec<f64>,
+) -> PyResult<Vec<Option<Bound<'py, PyArray1<f64>>>>> {
+    let layout = &evidence.0.layout;
+    if step.len() != layout.model.parameters() {
+        return Err(value_error("step must have one number per parameter"));
+    }
     let arrays = ChunkArrays::new(chunk)?;
     let window = arrays.window()?;
-    let layout = &evidence.0.layout;
-    let evaluation = py.detach(|| layout.model.evaluate(&window, &layout.facts)).map_err(from_effect)?;
-    Ok(evaluation.channels.into_iter().map(|c| c.map(|c| PyArray1::from_vec(py, c.residual))).collect())
+    let residuals = py.detach(|| layout.model.residuals(&window, &layout.facts, &step)).map_err(from_effect)?;
+    Ok(residuals.into_iter().map(|r| r.map(|r| PyArray1::from_vec(py, r))).collect())
 }
 
 /// Autocovariances of the residual, from which whitening filters come.

@@ -25,7 +25,7 @@ pub fn column(sensor: Sensor, name: &str) -> Covariate {
     };
     let parameters = VECTOR
         .iter()
-        .map(|v| Parameter { name: (*v).to_string(), unit: format!("({})/{name}", sensor.unit()), typical: None })
+        .map(|v| Parameter { name: (*v).to_string(), unit: format!("{}/{name}", sensor.unit()), typical: None })
         .collect();
     Covariate {
         card: words.card(format!("{}.column:{name}", sensor.prefix()), Stage::Offset, parameters),

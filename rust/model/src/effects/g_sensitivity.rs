@@ -24,7 +24,7 @@ pub fn g_sensitivity() -> Linear {
             "gyr.g_sensitivity".to_string(),
             Stage::Offset,
             // 0.1 deg/s per g is 1.8e-4 rad/s per m/s^2.
-            parameters(&MATRIX, "(rad/s)/(m/s^2)", 2e-4),
+            parameters(&MATRIX, "rad/s/(m/s^2)", 2e-4),
         ),
         sensor: [Sensor::Gyr],
         needs: Needs::Sensor,

@@ -41,7 +41,7 @@ pub fn bias_temperature(sensor: Sensor) -> Linear {
             0.0028,
         ),
     };
-    let unit = format!("{}/K", if sensor == Sensor::Gyr { "(rad/s)" } else { "(m/s^2)" });
+    let unit = format!("{}/K", sensor.unit());
     Linear {
         card: words.card(
             format!("{}.bias_temperature", sensor.prefix()),
