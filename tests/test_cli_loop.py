@@ -5,11 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import imufit
 import pytest
 from cli_stand_in import run, strict_json
-
-needs_engine = pytest.mark.skipif(not hasattr(imufit, "ladder"), reason="the loop is not in this build")
 
 
 def test_same_hidden_seed_makes_the_same_log_and_the_seal_hides_the_effect(capsys, tmp_path):
@@ -44,7 +41,6 @@ def test_simulation_that_cannot_be_is_one_line(capsys, tmp_path, arguments, word
     "content",
     [b"", b"t,acc_x\n", b"t,acc_x,acc_y,acc_z\n0,1,2\n", b"\x00\x01\x02", b"t,acc_x,acc_y,acc_z\n0,a,b,c\n"],
 )
-@needs_engine
 @pytest.mark.parametrize("command", ["compare", "diagnose", "ladder", "replay"])
 def test_bad_log_is_one_line_for_every_command(capsys, tmp_path, command, content):
     log = tmp_path / "bad.csv"
@@ -55,7 +51,6 @@ def test_bad_log_is_one_line_for_every_command(capsys, tmp_path, command, conten
     assert "bad.csv" in err[0]
 
 
-@needs_engine
 def test_loop_finds_an_effect_that_was_put_in(capsys, tmp_path):
     log, model, answer = tmp_path / "log.parquet", tmp_path / "model.toml", tmp_path / "answer.json"
     effect = "gyr.bias:x=0.01,y=-0.02,z=0.005"
@@ -87,7 +82,6 @@ def test_loop_finds_an_effect_that_was_put_in(capsys, tmp_path):
     assert "The answer names gyr.bias: right." in out
 
 
-@needs_engine
 def test_demo_ends_with_the_truth(capsys, tmp_path):
     code, out, err = run(capsys, "demo", "-o", tmp_path / "shown")
     assert (code, err) == (0, [])

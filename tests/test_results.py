@@ -1,5 +1,6 @@
 """Results turn into strict JSON, data frames, text, HTML and figures."""
 
+import dataclasses
 import json
 import math
 
@@ -148,6 +149,14 @@ def test_card_prints_its_parts_and_equal_typical_sizes_once():
 
 def test_smallest_detectable_sizes_that_are_equal_stand_once():
     assert diagnosis().candidates[0].smallest_detectable == "each 0.00281 deg/s per g"
+
+
+def test_error_of_the_drop_does_not_depend_on_the_unit_of_the_gain():
+    best = diagnosis().candidates[0]
+    scaled = dataclasses.replace(best, gain=1e4 * best.gain, gain_error=1e4 * best.gain_error)
+    assert scaled.drop_error == pytest.approx(best.drop_error)
+    assert best.drop_error == pytest.approx(0.49 * 0.02 / 0.41)
+    assert math.isnan(dataclasses.replace(best, gain=0.0).drop_error)
 
 
 def test_waterfall_is_logarithmic_only_where_the_fall_is_large():

@@ -51,7 +51,7 @@ def demo(*, directory: Path, seed: int, json_file: Path | None) -> None:
     out = Output(json_file)
     with ProgressBar() as progress:
         out.say("1. A hand-held sensor with one hidden effect", bold=True)
-        engine.save_simulation(engine.hidden(SCENARIO, seed), log)
+        engine.save_simulation(engine.hidden(SCENARIO, seed, size="large"), log)
         opened = engine.open_log(log)
         out.say(f"   simulated to {log}", "")
 

@@ -30,9 +30,9 @@ def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
 
 def ladder(log: Any, model: Any, progress: Progress) -> Ladder:
     """Repeat diagnose and add until nothing is missing."""
-    import imufit  # noqa: PLC0415
+    from imufit.diagnose.ladder import ladder  # noqa: PLC0415
 
-    return imufit.ladder(log, model=model, progress=progress)
+    return ladder(log, model=model, progress=progress)
 
 
 def catalogue() -> list[EffectCard]:

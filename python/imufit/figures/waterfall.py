@@ -61,7 +61,7 @@ def waterfall(
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_major_formatter(lambda value, _: quantity.number(float(value), 1))
-    axes.set_ylim(bottom, top * (1.9 if logarithmic else 1.17))
+    axes.set_ylim(bottom, top * (1.6 if logarithmic else 1.12))
     axes.bar(0, start - bottom, bottom=bottom, width=0.62, color=style.GREY, zorder=2)
     if count:
         falls = after <= before
@@ -113,7 +113,7 @@ def waterfall(
     edge = 0.6 if count else 1.6
     axes.set_xlim(-edge, count + edge)
     axes.set_ylabel("held-out error over noise floor", fontsize=9)
-    axes.legend(frameon=False, fontsize=9, loc="upper right")
+    figure.legend(frameon=False, fontsize=9, loc="outside lower center", ncols=3)
     if count:
         effect_word = "effect takes" if count == 1 else "effects take"
         sentence = (

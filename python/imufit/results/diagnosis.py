@@ -61,7 +61,7 @@ class Candidate:
     held_out_before, held_out_after : float
         Held-out residual over noise floor without and with it.
     gain, gain_error : float
-        Held-out gain and its standard error.
+        Held-out gain and its standard error, in any common unit.
     parameters : tuple of Parameter
         Predicted parameters.
     confounded_with : tuple of Rival
@@ -106,6 +106,13 @@ class Candidate:
                 for name, (value, unit) in self.minimal_detectable.items()
             },
         }
+
+    @property
+    def drop_error(self) -> float:
+        """Standard error of the drop of the held-out ratio: beside the drop what `gain_error` is beside `gain`."""
+        if self.gain == 0.0 or not math.isfinite(self.gain):
+            return math.nan
+        return abs(self.gain_error * (self.held_out_before - self.held_out_after) / self.gain)
 
     @property
     def smallest_detectable(self) -> str:
@@ -244,7 +251,7 @@ class Diagnosis:
             [item.effect for item in self.candidates],
             before=[item.held_out_before for item in self.candidates],
             after=[item.held_out_after for item in self.candidates],
-            error=[item.gain_error for item in self.candidates],
+            error=[item.drop_error for item in self.candidates],
             status=[item.status for item in self.candidates],
             sentence=titles.get(self.verdict, ""),
         )
