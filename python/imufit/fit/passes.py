@@ -28,12 +28,8 @@ MIN_COVERAGE = 0.98
 
 def covariate_names(log: LogSource) -> list[str]:
     """Columns of a log that can act on its sensors."""
-    return [name for name in log.columns if name not in MASKS and name in _own_columns(log)]
-
-
-def _own_columns(log: LogSource) -> set[str]:
     first = next(iter(log.chunks(1024, 0)), None)
-    return set() if first is None else set(first.log.covariates)
+    return [] if first is None else [name for name in first.log.covariates if name not in MASKS]
 
 
 def chunk_arrays(chunk: Chunk, covariates: Sequence[str]) -> dict[str, Any]:

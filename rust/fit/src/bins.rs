@@ -5,6 +5,11 @@ use imufit_model::sensor_model::Evaluation;
 /// Bins per covariate, at most.
 pub const BINS: usize = 12;
 
+/// Rows within this many noise deviations of an edge may fall on either side of it.
+const NEAR: f64 = 4.0;
+/// Share of the rows that may do so.
+const CROWDED: f64 = 0.04;
+
 /// Covariates that every log has, before the log's own columns.
 const FIXED: [&str; 9] = ["t", "temp", "f_x", "f_y", "f_z", "omega_x", "omega_y", "omega_z", "omega_norm"];
 
@@ -34,11 +39,19 @@ impl Bins {
         }
     }
 
-    /// Bins of equal count from samples of each covariate.
-    pub fn new(own: &[String], samples: &mut [Vec<f64>]) -> Self {
+    /// Bins of equal count from samples of each covariate; `rate_noise` (rad/s) and `force_noise` (m/s^2) are the noise of
+    /// the reference's own rates and specific forces. Rows sorted into bins by their reference's noise
+    /// would show a dependence that is none: no edge is put where many rows lie within that noise.
+    pub fn new(own: &[String], samples: &mut [Vec<f64>], rate_noise: f64, force_noise: f64) -> Self {
         let edges = samples
             .iter_mut()
-            .map(|sample| {
+            .enumerate()
+            .map(|(covariate, sample)| {
+                let noise = match covariate {
+                    2..=4 => force_noise,
+                    5..=8 => rate_noise,
+                    _ => 0.0,
+                };
                 sample.sort_unstable_by(f64::total_cmp);
                 let mut edges: Vec<f64> = Vec::new();
                 for k in 1..BINS {
@@ -47,6 +60,11 @@ impl Bins {
                     }
                     let edge = sample[k * sample.len() / BINS];
                     // A covariate that rests on one value gets no bin of width zero.
+                    let near = sample.partition_point(|v| *v <= edge + NEAR * noise)
+                        - sample.partition_point(|v| *v < edge - NEAR * noise);
+                    if noise > 0.0 && near as f64 > CROWDED * sample.len() as f64 {
+                        continue;
+                    }
                     if edge > sample[0] && edges.last().is_none_or(|e| edge > *e) {
                         edges.push(edge);
                     }

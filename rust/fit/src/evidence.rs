@@ -11,7 +11,7 @@ use imufit_model::facts::{LOOKBACK, LogFacts};
 use imufit_model::sensor::Sensor;
 use imufit_model::sensor_model::{Evaluation, SensorModel};
 use imufit_model::window::Window;
-use nalgebra::{DMatrix, DMatrixView};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
 use crate::bins::Bins;
@@ -56,6 +56,8 @@ pub struct ChannelBlock {
     pub n: usize,
     /// Gram matrix (w x w).
     pub gram: DMatrix<f64>,
+    /// Sums of columns and residual.
+    pub sum: DVector<f64>,
     /// Number of samples in each bin of each covariate.
     pub bin_count: Vec<Vec<f64>>,
     /// Sums of columns and residual in each bin (bins x w, row by row) of each covariate.
@@ -67,6 +69,7 @@ impl ChannelBlock {
         Self {
             n: 0,
             gram: DMatrix::zeros(width, width),
+            sum: DVector::zeros(width),
             bin_count: bins.edges.iter().map(|e| vec![0.0; if e.is_empty() { 0 } else { e.len() + 1 }]).collect(),
             bin_sum: bins.edges.iter().map(|e| vec![0.0; if e.is_empty() { 0 } else { (e.len() + 1) * width }]).collect(),
         }
@@ -75,6 +78,7 @@ impl ChannelBlock {
     fn add(&mut self, other: &Self) {
         self.n += other.n;
         self.gram += &other.gram;
+        self.sum += &other.sum;
         for (a, b) in self.bin_count.iter_mut().zip(&other.bin_count).chain(self.bin_sum.iter_mut().zip(&other.bin_sum)) {
             for (x, y) in a.iter_mut().zip(b) {
                 *x += y;
@@ -233,6 +237,7 @@ fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
                 let rows = DMatrixView::from_slice(&by_row[first * width..last * width], width, last - first);
                 let columns = DMatrixView::from_slice_with_strides(&by_column[first..], last - first, width, 1, n);
                 target.gram.gemm(1.0, &rows, &columns, 1.0);
+                target.sum += rows.column_sum();
                 for (covariate, assigned) in assigned.iter().enumerate().filter(|(_, a)| !a.is_empty()) {
                     for i in first..last {
                         let bin = assigned[samples.rows[kept[i]]];

@@ -11,7 +11,7 @@ use crate::bins::Bins;
 /// Rows looked at more closely, at most.
 const SAMPLES: usize = 8192;
 /// Rows on which the width of the reference polynomial is judged, at most.
-const BANDWIDTH_SAMPLES: usize = 2048;
+const BANDWIDTH_SAMPLES: usize = 4096;
 
 /// What the caller knows before the first pass.
 #[derive(Clone, Debug)]
@@ -180,7 +180,10 @@ impl Survey {
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),
             covariates: self.given.covariates.clone(),
         };
-        let bins = Bins::new(&self.given.covariates, &mut self.samples);
+        let rate = self.attitude_width.derivative_noise(facts.attitude_smoothing);
+        let force = self.attitude_width.noise() * facts.gravity.norm()
+            + facts.position_smoothing.map_or(0.0, |s| self.position_width.derivative_noise(s));
+        let bins = Bins::new(&self.given.covariates, &mut self.samples, rate, force);
         (facts, bins)
     }
 

@@ -92,7 +92,24 @@ fn question(problem: &Problem, evidence: &Evidence, model: &[usize], channel: us
         // Weak: a contrast that stands out a hundredfold is as good as free.
         precision[p + i] = 1e-4 * total.gram[(p + i, p + i)].max(1e-300);
     }
-    Some(Question { raw: white.clone(), white, precision, model: p })
+    let sums = problem
+        .sums
+        .iter()
+        .map(|s| {
+            let mut own = DMatrix::zeros(problem.blocks(), p + m);
+            own.columns_mut(0, p).copy_from(&s.columns(model));
+            if s.channel == channel {
+                for b in 0..problem.blocks() {
+                    if let Some(block) = evidence.get(b, channel) {
+                        let counts = DVector::from_column_slice(&block.bin_count[covariate]);
+                        own.view_mut((b, p), (1, m)).copy_from(&q.tr_mul(&counts).transpose());
+                    }
+                }
+            }
+            s.with_sums(own)
+        })
+        .collect();
+    Some(Question { raw: white.clone(), white, precision, model: p, sums })
 }
 
 /// Expected drop of the whitened sum of squares over all data: a quick look before the full test.

@@ -13,9 +13,9 @@ pub struct Estimate {
     pub covariance: DMatrix<f64>,
 }
 
-/// Fits the model's parameters. The covariance is that of whitened observations of unit variance, inflated where the blocks scatter more than that.
+/// Fits the model's parameters. The covariance is that of whitened observations of unit variance whose zeros may wander.
 pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
-    let total = problem.total(model);
+    let total = problem.total_without_drift(model);
     let precision = DVector::from_iterator(model.len(), model.iter().map(|j| 0.01 * problem.precision(*j)));
     let solved = total.solve(&precision)?;
     let covariance = solved.covariance();

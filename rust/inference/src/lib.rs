@@ -4,6 +4,7 @@
 
 pub mod confounding;
 pub mod dependence;
+pub mod drift;
 pub mod estimate;
 pub mod held_out;
 pub mod jackknife;

@@ -5,6 +5,7 @@ use imufit_fit::normal_equations::NormalEquations;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::{DMatrix, DVector};
 
+use crate::drift::{self, ChannelSums};
 use crate::saturated::assemble;
 
 /// Evidence in the form that every question is asked of.
@@ -17,6 +18,8 @@ pub struct Problem {
     pub plausible: DVector<f64>,
     /// Weight of each channel in `white`.
     pub weights: [f64; CHANNELS],
+    /// Block sums of every channel, for zeros that wander.
+    pub sums: Vec<ChannelSums>,
 }
 
 /// Parameters that a question is about: those of the model, then the reduced ones of a candidate.
@@ -29,6 +32,8 @@ pub struct Question {
     pub precision: DVector<f64>,
     /// How many parameters belong to the model.
     pub model: usize,
+    /// Block sums of every channel over the same parameters, for zeros that wander.
+    pub sums: Vec<ChannelSums>,
 }
 
 /// Plausible sizes are this many times the typical ones.
@@ -57,7 +62,8 @@ impl Problem {
                 };
             }
         }
-        Self { white: white_blocks, raw: raw_blocks, plausible, weights }
+        let sums = drift::channel_sums(white, &weights);
+        Self { white: white_blocks, raw: raw_blocks, plausible, weights, sums }
     }
 
     /// Number of blocks.
@@ -77,6 +83,15 @@ impl Problem {
         for block in &self.white {
             total.add(&block.selected(parameters), 1.0);
         }
+        total
+    }
+
+    /// The same with the wandering of zeros taken into account.
+    pub fn total_without_drift(&self, parameters: &[usize]) -> NormalEquations {
+        let mut total = self.total(parameters);
+        let basis = DMatrix::identity(parameters.len(), parameters.len());
+        let sums: Vec<ChannelSums> = self.sums.iter().map(|s| s.reduced(parameters, &basis)).collect();
+        drift::take_out(&sums, &mut total);
         total
     }
 
@@ -124,7 +139,8 @@ impl Problem {
         for (k, j) in model.iter().enumerate() {
             precision[k] = self.precision(*j);
         }
-        Question { white: reduce(&self.white), raw: reduce(&self.raw), precision, model: p }
+        let sums = self.sums.iter().map(|s| s.reduced(&all, &basis)).collect();
+        Question { white: reduce(&self.white), raw: reduce(&self.raw), precision, model: p, sums }
     }
 }
 
@@ -138,7 +154,14 @@ impl Question {
             raw: self.raw.iter().map(|b| b.selected(&kept)).collect(),
             precision: self.precision.rows(0, self.model).into_owned(),
             model: self.model,
+            sums: self.sums.iter().map(|s| s.with_sums(s.columns(&kept))).collect(),
         }
+    }
+
+    /// Sum over blocks, the wandering of zeros taken into account; `None` if no zero wanders.
+    pub fn total_without_drift(&self) -> Option<NormalEquations> {
+        let mut total = self.total();
+        drift::take_out(&self.sums, &mut total).then_some(total)
     }
 
     /// Sum over blocks.

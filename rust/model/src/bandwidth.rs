@@ -24,19 +24,34 @@ pub const WIDTHS: [Smoothing; 10] = [
 
 const NOISE_FIT: Smoothing = Smoothing { degree: 8, half_width: 5 };
 
-/// Two widths agree if the mean square of their difference is at most this much above what noise explains.
-const TOLERANCE: f64 = 1.1;
+/// Rows are judged in groups of like motion, so that short turns are not outvoted by long rests: upper ends of the groups, as shares of
+/// the rows ordered by how fast the first derivative changes.
+const GROUPS: [f64; 5] = [0.3, 0.7, 0.9, 0.97, 1.0];
 
-/// Sums over sampled rows; additive over windows.
+/// Two widths agree if the mean square of their difference is at most this much above what noise explains, plus three times its own scatter.
+const TOLERANCE: f64 = 1.1;
+const SCATTER: f64 = 3.0;
+/// The width whose second derivative tells how lively a row is.
+const LIVELY: usize = 4;
+
+/// Differences of neighbouring widths at one sampled row.
+#[derive(Clone, Debug)]
+struct Sample {
+    lively: f64,
+    difference: [f64; WIDTHS.len()],
+    gain: [f64; WIDTHS.len()],
+    own_gain: [f64; WIDTHS.len()],
+    widths: usize,
+}
+
+/// Sampled rows and the noise of the reference.
 #[derive(Clone, Debug)]
 pub struct Bandwidth {
     of_attitude: bool,
     order: usize,
     noise_sum: f64,
     noise_freedom: usize,
-    difference: [f64; WIDTHS.len()],
-    gain: [f64; WIDTHS.len()],
-    count: [usize; WIDTHS.len()],
+    samples: Vec<Sample>,
     spacing: Option<f64>,
 }
 
@@ -52,8 +67,7 @@ impl Bandwidth {
     }
 
     fn new(of_attitude: bool, order: usize) -> Self {
-        let zero = [0.0; WIDTHS.len()];
-        Self { of_attitude, order, noise_sum: 0.0, noise_freedom: 0, difference: zero, gain: zero, count: [0; WIDTHS.len()], spacing: None }
+        Self { of_attitude, order, noise_sum: 0.0, noise_freedom: 0, samples: Vec::new(), spacing: None }
     }
 
     /// Adds the rows given (indices into the window).
@@ -71,15 +85,26 @@ impl Bandwidth {
                 self.noise_sum += sum;
                 self.noise_freedom += freedom;
             }
+            let zero = [0.0; WIDTHS.len()];
+            let mut sample = Sample { lively: 0.0, difference: zero, gain: zero, own_gain: zero, widths: 0 };
             let mut last: Option<(usize, Vec<f64>, [f64; 3])> = None;
             for (k, width) in WIDTHS.iter().enumerate() {
                 let Some((fit, values)) = reference.local_fit(at, *width, self.of_attitude) else { break };
-                let weights = fit.weights()[self.order].clone();
-                let mut value = [0.0; 3];
-                for (w, v) in weights.iter().zip(&values) {
-                    for axis in 0..3 {
-                        value[axis] += w * v[axis];
+                let all = fit.weights();
+                let combine = |weights: &[f64]| {
+                    let mut value = [0.0; 3];
+                    for (w, v) in weights.iter().zip(&values) {
+                        for axis in 0..3 {
+                            value[axis] += w * v[axis];
+                        }
                     }
+                    value
+                };
+                let weights = all[self.order].clone();
+                let value = combine(&weights);
+                sample.own_gain[k] = weights.iter().map(|w| w * w).sum();
+                if k <= LIVELY {
+                    sample.lively = combine(&all[self.order + 1]).iter().map(|v| v * v).sum();
                 }
                 if let Some((half, narrow, before)) = &last {
                     let margin = width.half_width - half;
@@ -91,12 +116,13 @@ impl Bandwidth {
                             (w - inner).powi(2)
                         })
                         .sum();
-                    self.gain[k] += 3.0 * gain;
-                    self.difference[k] += (0..3).map(|a| (value[a] - before[a]).powi(2)).sum::<f64>();
-                    self.count[k] += 1;
+                    sample.gain[k] = 3.0 * gain;
+                    sample.difference[k] = (0..3).map(|a| (value[a] - before[a]).powi(2)).sum::<f64>();
                 }
+                sample.widths = k + 1;
                 last = Some((width.half_width, weights, value));
             }
+            self.samples.push(sample);
         }
     }
 
@@ -110,21 +136,47 @@ impl Bandwidth {
         (self.noise_sum / self.noise_freedom.max(1) as f64).sqrt()
     }
 
-    /// Mean square difference of each width to the next narrower one, over what noise explains.
+    /// Noise of the derivative at a width, per component: rad/s of the angular rate or m/s^2 of the acceleration.
+    pub fn derivative_noise(&self, width: Smoothing) -> f64 {
+        let Some(k) = WIDTHS.iter().position(|w| *w == width) else { return 0.0 };
+        let gains: Vec<f64> = self.samples.iter().filter(|s| s.widths > k).map(|s| s.own_gain[k]).collect();
+        if gains.is_empty() { 0.0 } else { self.noise() * (gains.iter().sum::<f64>() / gains.len() as f64).sqrt() }
+    }
+
+    /// Mean square difference of each width to the next narrower one, over what noise explains: the worst group of rows,
+    /// less what scatter allows that group. Infinite for a width that most rows cannot have.
     pub fn excess(&self) -> Vec<f64> {
         let variance = self.noise().powi(2);
-        (1..WIDTHS.len()).map(|k| self.difference[k] / (variance * self.gain[k]).max(f64::MIN_POSITIVE)).collect()
+        let mut order: Vec<&Sample> = self.samples.iter().collect();
+        order.sort_by(|a, b| a.lively.total_cmp(&b.lively));
+        (1..WIDTHS.len())
+            .map(|k| {
+                let reached = order.iter().filter(|s| s.widths > k).count();
+                if reached == 0 || 2 * reached < order.iter().filter(|s| s.widths > 1).count() {
+                    return f64::INFINITY;
+                }
+                let mut first = 0;
+                let mut worst = 0.0_f64;
+                for share in GROUPS {
+                    let last = (share * order.len() as f64).round() as usize;
+                    let group: Vec<&&Sample> = order[first..last].iter().filter(|s| s.widths > k).collect();
+                    first = last;
+                    if group.is_empty() {
+                        continue;
+                    }
+                    let difference: f64 = group.iter().map(|s| s.difference[k]).sum();
+                    let gain: f64 = group.iter().map(|s| s.gain[k]).sum();
+                    let scatter = SCATTER * (2.0 / (3.0 * group.len() as f64)).sqrt();
+                    worst = worst.max(difference / (variance * gain).max(f64::MIN_POSITIVE) - scatter);
+                }
+                worst
+            })
+            .collect()
     }
 
     /// The width to use: one narrower than the widest that still agrees with its neighbour.
     pub fn choose(&self) -> Smoothing {
-        let rows = self.count[1];
-        let agreeing = self
-            .excess()
-            .iter()
-            .zip(&self.count[1..])
-            .take_while(|(excess, count)| **excess <= TOLERANCE && 2 * **count > rows)
-            .count();
+        let agreeing = self.excess().iter().take_while(|excess| **excess <= TOLERANCE).count();
         WIDTHS[if agreeing == WIDTHS.len() - 1 { agreeing } else { agreeing.saturating_sub(1) }]
     }
 }

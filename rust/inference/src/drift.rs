@@ -1,0 +1,229 @@
+//! Wandering zeros: a random walk of each channel's bias from block to block.
+//!
+//! A gyroscope's zero wanders more slowly than any whitening filter of affordable length can see. Whatever varies as slowly (a bias,
+//! a temperature, an attitude that hardly changes) would then look significant. For each question the strength of the walk
+//! is estimated by restricted maximum likelihood from block means of the residual that the question's own parameters leave,
+//! and taken into account by generalised least squares.
+
+use std::sync::Arc;
+
+use imufit_fit::evidence::Evidence;
+use imufit_fit::normal_equations::NormalEquations;
+use imufit_model::sensor::CHANNELS;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// Walk variances per block tried, in units of a block mean's variance.
+const GRID: [f64; 18] = [
+    0.0, 3e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016, 0.032, 0.064, 0.128, 0.256, 0.5, 1.0, 2.0, 4.0, 10.0, 40.0, 200.0,
+];
+/// Fewer blocks than this cannot show a walk.
+const MIN_BLOCKS: usize = 8;
+
+/// One strength of the walk for blocks of given sample counts.
+struct Strength {
+    kappa: f64,
+    /// Covariance of block means in units of the noise of one sample, factorised.
+    covariance: Cholesky<f64, Dyn>,
+    log_determinant: f64,
+    /// (R^-1 / kappa + D)^-1 with R the covariance of a unit random walk and D the samples of each block.
+    smoother: DMatrix<f64>,
+}
+
+/// Block sums of one channel over the parameters of a question.
+#[derive(Clone)]
+pub struct ChannelSums {
+    /// Channel index.
+    pub channel: usize,
+    /// Weight of the channel.
+    weight: f64,
+    /// Sums of each parameter's column (blocks x parameters).
+    pub sums: DMatrix<f64>,
+    /// Sums of the residual.
+    right: DVector<f64>,
+    /// Number of samples in each block.
+    count: DVector<f64>,
+    strengths: Arc<Vec<Strength>>,
+}
+
+/// ln det of a factorised matrix.
+fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
+    factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum()
+}
+
+/// Every strength of the walk for blocks with these sample counts.
+fn strengths(count: &DVector<f64>) -> Vec<Strength> {
+    let blocks = count.len();
+    let filled = count.iter().filter(|n| **n > 0.0).count();
+    if filled < MIN_BLOCKS {
+        return Vec::new();
+    }
+    let unit = filled as f64 / count.sum();
+    GRID.iter()
+        .filter_map(|step| {
+            let kappa = step * unit;
+            // A block without samples has a mean of no weight.
+            let noise = |b: usize| if count[b] > 0.0 { 1.0 / count[b] } else { 1e6 * unit };
+            let covariance = DMatrix::from_fn(blocks, blocks, |i, j| {
+                kappa * (i.min(j) + 1) as f64 + if i == j { noise(i) } else { 0.0 }
+            });
+            let covariance = Cholesky::new(covariance)?;
+            // Inverse covariance of a random walk from zero: tridiagonal.
+            let inner = DMatrix::from_fn(blocks, blocks, |i, j| match i.abs_diff(j) {
+                0 if i + 1 == blocks => 1.0 / kappa + count[i],
+                0 => 2.0 / kappa + count[i],
+                1 => -1.0 / kappa,
+                _ => 0.0,
+            });
+            let smoother = if kappa > 0.0 { Cholesky::new(inner)?.inverse() } else { DMatrix::zeros(blocks, blocks) };
+            Some(Strength { kappa, log_determinant: log_determinant(&covariance), covariance, smoother })
+        })
+        .collect()
+}
+
+/// Block sums of every channel over all parameters.
+pub fn channel_sums(white: &Evidence, weights: &[f64; CHANNELS]) -> Vec<ChannelSums> {
+    let blocks = white.layout.blocks;
+    let mut out: Vec<ChannelSums> = Vec::new();
+    for channel in (0..CHANNELS).filter(|c| weights[*c] > 0.0) {
+        let mut sums = DMatrix::zeros(blocks, white.layout.model.parameters());
+        let (mut right, mut count) = (DVector::zeros(blocks), DVector::zeros(blocks));
+        let active = &white.layout.model.active()[channel];
+        for b in 0..blocks {
+            let Some(block) = white.get(b, channel) else { continue };
+            count[b] = block.n as f64;
+            for (k, p) in active.iter().enumerate() {
+                sums[(b, *p)] = block.sum[k];
+            }
+            right[b] = block.sum[active.len()];
+        }
+        let same = out.iter().find(|o| o.count == count).map(|o| o.strengths.clone());
+        let strengths = same.unwrap_or_else(|| Arc::new(strengths(&count)));
+        out.push(ChannelSums { channel, weight: weights[channel], sums, right, count, strengths });
+    }
+    out
+}
+
+impl ChannelSums {
+    /// The same in other parameters: `beta = basis * gamma` of the parameters chosen.
+    #[must_use]
+    pub fn reduced(&self, chosen: &[usize], basis: &DMatrix<f64>) -> Self {
+        Self { sums: self.sums.select_columns(chosen) * basis, ..self.clone() }
+    }
+
+    /// The same with other sums.
+    #[must_use]
+    pub fn with_sums(&self, sums: DMatrix<f64>) -> Self {
+        Self { sums, ..self.clone() }
+    }
+
+    /// Sums of some of the parameters already in these sums.
+    pub fn columns(&self, chosen: &[usize]) -> DMatrix<f64> {
+        self.sums.select_columns(chosen)
+    }
+
+    /// Restricted log likelihoods of every strength, whatever the question's parameters.
+    fn likelihoods(&self) -> Vec<f64> {
+        let blocks = self.count.len();
+        let mean = |sum: f64, b: usize| if self.count[b] > 0.0 { sum / self.count[b] } else { 0.0 };
+        let residual = DVector::from_fn(blocks, |b, _| mean(self.right[b], b) * self.weight.sqrt());
+        let used: Vec<usize> = (0..self.sums.ncols()).filter(|k| self.sums.column(*k).iter().any(|v| *v != 0.0)).collect();
+        let mut columns = DMatrix::from_fn(blocks, used.len(), |b, k| mean(self.sums[(b, used[k])], b));
+        for mut column in columns.column_iter_mut() {
+            let norm = column.norm();
+            column /= norm.max(f64::MIN_POSITIVE);
+        }
+        let basis = if used.is_empty() {
+            columns
+        } else {
+            let svd = columns.svd(true, false);
+            let kept: Vec<usize> = (0..svd.singular_values.len())
+                .filter(|k| svd.singular_values[*k] > 1e-6 && *k < blocks / 2)
+                .collect();
+            svd.u.map_or_else(|| DMatrix::zeros(blocks, 0), |u| u.select_columns(&kept))
+        };
+        self.strengths
+            .iter()
+            .map(|s| {
+                let plain = s.log_determinant + residual.dot(&s.covariance.solve(&residual));
+                if basis.ncols() == 0 {
+                    return -0.5 * plain;
+                }
+                let x = s.covariance.solve(&basis);
+                let Some(inner) = Cholesky::new(basis.tr_mul(&x)) else { return f64::NEG_INFINITY };
+                let right = x.tr_mul(&residual);
+                -0.5 * (plain + log_determinant(&inner) - right.dot(&inner.solve(&right)))
+            })
+            .collect()
+    }
+
+    /// Takes the wandering mean of one strength out of equations over the same parameters.
+    fn take_out(&self, strength: usize, equations: &mut NormalEquations) {
+        let smoother = &self.strengths[strength].smoother;
+        let smoothed = smoother * &self.sums;
+        let right = smoother * &self.right;
+        equations.gram.gemm_tr(-self.weight, &self.sums, &smoothed, 1.0);
+        equations.right.gemv_tr(-self.weight, &self.sums, &right, 1.0);
+        equations.square -= self.weight * self.right.dot(&right);
+    }
+}
+
+/// Takes wandering zeros out of the equations of a question, one strength per sensor; false if no zero wanders.
+pub fn take_out(channels: &[ChannelSums], equations: &mut NormalEquations) -> bool {
+    let mut wanders = false;
+    for sensor in 0..3 {
+        let own: Vec<&ChannelSums> = channels.iter().filter(|c| c.channel / 3 == sensor && !c.strengths.is_empty()).collect();
+        let Some(first) = own.first() else { continue };
+        let strengths = first.strengths.len();
+        let mut total = vec![0.0; strengths];
+        for channel in own.iter().filter(|c| c.strengths.len() == strengths) {
+            for (t, l) in total.iter_mut().zip(channel.likelihoods()) {
+                *t += l;
+            }
+        }
+        let best = (0..total.len()).max_by(|a, b| total[*a].total_cmp(&total[*b])).unwrap_or(0);
+        if first.strengths[best].kappa > 0.0 {
+            wanders = true;
+            for channel in own {
+                channel.take_out(best, equations);
+            }
+        }
+    }
+    wanders
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_walk_is_told_from_white_block_means() {
+        let mut state = 12345_u64;
+        let mut normal = || {
+            // Sum of twelve uniforms: good enough here, and without a dependency.
+            let mut uniform = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (state >> 33) as f64 / f64::from(1_u32 << 31)
+            };
+            (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+        };
+        let count = DVector::from_element(48, 100.0);
+        let strengths = Arc::new(strengths(&count));
+        let mut sums = |walk: f64| {
+            let mut level = 0.0;
+            let right = DVector::from_fn(48, |_, _| {
+                level += walk * normal();
+                100.0 * level + 10.0 * normal()
+            });
+            let (sums, strengths) = (DMatrix::from_element(48, 1, 100.0), strengths.clone());
+            ChannelSums { channel: 3, weight: 1.0, sums, right, count: count.clone(), strengths }
+        };
+        let best = |s: &ChannelSums| {
+            let l = s.likelihoods();
+            (0..l.len()).max_by(|a, b| l[*a].total_cmp(&l[*b])).map(|k| s.strengths[k].kappa)
+        };
+        let (white, walking) = (sums(0.0), sums(0.1));
+        assert!(best(&white) < Some(1e-4));
+        // The walk's variance is 0.01 a block.
+        assert!(best(&walking) > Some(3e-3) && best(&walking) < Some(3e-2));
+    }
+}
