@@ -1,1 +1,11 @@
-//! To be filled.
+//! Evidence of a log: block Gram matrices of all columns, noise, and the normal equations solved from them.
+//!
+//! A log is gone over in windows; everything here is additive over windows, so that a log need not fit in memory and parts of it, or logs of one
+//! sensor, can be added up.
+
+pub mod bins;
+pub mod evidence;
+pub mod noise;
+pub mod normal_equations;
+pub mod survey;
+pub mod whitening;

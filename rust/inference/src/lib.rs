@@ -1,1 +1,14 @@
-//! To be filled.
+//! Which effect is missing: ranking by held-out error, a gate that survives correlated noise, rivals, and a verdict that may abstain.
+//!
+//! All of it works on [`imufit_fit::evidence::Evidence`]; no function here sees a row of the log.
+
+pub mod confounding;
+pub mod dependence;
+pub mod estimate;
+pub mod held_out;
+pub mod jackknife;
+pub mod problem;
+pub mod residual;
+pub mod saturated;
+pub mod screening;
+pub mod verdict;

@@ -1,1 +1,19 @@
-//! To be filled.
+//! Ideal readings from a reference, and the catalogue of effects that make a real sensor read otherwise.
+//!
+//! A reading is modelled as `y = ideal + effects + noise`. Each effect hands out its columns of the design matrix; the crates above fit,
+//! rank and decide. Units are SI (uT for the magnetometer), vectors are in the body frame unless said otherwise.
+
+pub mod bandwidth;
+pub mod card;
+pub mod catalogue;
+pub mod contract;
+pub mod effect;
+pub mod effects;
+pub mod facts;
+pub mod ideal;
+pub mod reference;
+pub mod sensor;
+pub mod sensor_model;
+pub mod smoothing;
+pub mod triple;
+pub mod window;

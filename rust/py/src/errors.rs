@@ -2,6 +2,7 @@
 
 use imufit_attitude::InvalidAttitude;
 use imufit_filters::FilterError;
+use imufit_model::effect::EffectError;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -20,4 +21,13 @@ pub fn from_attitude(error: InvalidAttitude) -> PyErr {
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 pub fn from_filters(error: FilterError) -> PyErr {
     value_error(error)
+}
+
+/// An error of an effect; a user's own exception comes out as it went in.
+#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
+pub fn from_effect(error: EffectError) -> PyErr {
+    match (&error, crate::python_effect::take_raised()) {
+        (EffectError::User { .. }, Some(raised)) => raised,
+        _ => value_error(error),
+    }
 }

@@ -5,6 +5,11 @@ mod arrays;
 mod attitude;
 mod errors;
 mod filters;
+mod fit;
+mod inference;
+mod model;
+mod python_effect;
+mod window;
 
 use pyo3::prelude::*;
 
@@ -13,5 +18,8 @@ fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     attitude::register(m)?;
     filters::register(m)?;
+    model::register(m)?;
+    fit::register(m)?;
+    inference::register(m)?;
     Ok(())
 }

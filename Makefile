@@ -1,0 +1,59 @@
+# Every target makes its own set-up from a fresh clone: cargo, CPython >= 3.11 and a C compiler are enough.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.built
+DEPENDENCIES := $(VENV)/.dependencies
+
+# Compiled crates are shared between the extension module and the Rust tests.
+CARGO_FLAGS := --workspace --release
+SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
+
+.DEFAULT_GOAL := help
+.PHONY: help build demo test test-rust test-python lint wheel bench clean
+
+help: ## Show this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+build: $(STAMP) ## Make .venv and build the package into it
+
+demo: $(STAMP) ## The whole loop on a log with a hidden effect; report in demo/
+	$(BIN)/imufit demo -o demo
+
+test: test-rust test-python ## Rust and Python tests
+
+test-rust: ## Rust tests
+	cargo test $(CARGO_FLAGS) --exclude imufit-py --quiet
+
+test-python: $(STAMP) ## Python tests
+	$(BIN)/python -m pytest -n 2
+
+lint: $(STAMP) ## Formatting, clippy, ruff, mypy, import layers
+	cargo fmt --all --check
+	cargo clippy $(CARGO_FLAGS) --all-targets -- -D warnings
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+wheel: $(DEPENDENCIES) ## One abi3 wheel in dist/
+	$(BIN)/maturin build --release --out dist
+
+bench: $(STAMP) ## Speed and accuracy against other packages
+	cargo bench --workspace --exclude imufit-py
+	for file in benches/*.py; do if [ -f "$$file" ]; then $(BIN)/python "$$file" || exit 1; fi; done
+
+clean: ## Remove what was built
+	rm -rf $(VENV) target dist demo
+
+# The build backend and the development tools are named in pyproject.toml, and only there.
+$(DEPENDENCIES): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "imufit needs CPython 3.11 or newer: make PYTHON=python3.12")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
+	touch $@
+
+$(STAMP): $(DEPENDENCIES) $(SOURCES)
+	. $(BIN)/activate && maturin develop --release --extras dev --quiet
+	touch $@

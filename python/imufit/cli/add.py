@@ -1,0 +1,63 @@
+"""``imufit add``: put an effect into the model and see what it brings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import (
+    html_option,
+    json_option,
+    keep_inputs,
+    log_argument,
+    model_option,
+    model_output,
+    plot_option,
+)
+from imufit.cli.names import check_effects
+from imufit.cli.output import Output
+from imufit.cli.progress import ProgressBar
+
+
+@click.command(short_help="Add an effect, refit, show the error before, expected and after.")
+@click.argument("effect", metavar="EFFECT")
+@log_argument
+@model_option
+@model_output
+@json_option
+@html_option
+@plot_option
+def add(
+    effect: str,
+    log: Path,
+    *,
+    mapping: tuple[str, ...],
+    model: Path | None,
+    output: Path | None,
+    json_file: Path | None,
+    html_file: Path | None,
+    plot_file: Path | None,
+) -> None:
+    """Add EFFECT to the model of LOG, refit, and show the held-out error before, as expected and after."""
+    keep_inputs([log], [output, json_file, html_file, plot_file])
+    check_effects([effect])
+    out = Output(json_file)
+    with ProgressBar() as progress:
+        opened = engine.open_log(log, mapping)
+        fit = engine.sensor_model(path=model).fit(opened, progress=progress)
+        addition = fit.add(effect, log=opened, progress=progress)
+    out.say(addition.sentence, bold=True)
+    out.say(addition.warning)
+    out.tables(addition.tables())
+    if output is not None:
+        addition.fit.save(output)
+        out.wrote(output)
+    out.json(addition.to_dict())
+    if plot_file is not None:
+        out.plot(plot_file, addition.plot())
+    if html_file is not None:
+        from imufit.report import page  # noqa: PLC0415
+
+        out.html(html_file, page(addition=addition, title=f"{log.name}: {effect} added"))

@@ -1,0 +1,138 @@
+"""The program ``imufit``: its commands, its exit codes, and one line on standard error for whatever goes wrong."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Sequence
+
+import click
+
+from imufit.cli.add import add
+from imufit.cli.compare import compare
+from imufit.cli.demo import demo
+from imufit.cli.diagnose import diagnose
+from imufit.cli.explain import explain
+from imufit.cli.fit import fit
+from imufit.cli.grade import grade
+from imufit.cli.ladder import ladder
+from imufit.cli.names import unknown
+from imufit.cli.replay import replay
+from imufit.cli.reveal import reveal
+from imufit.cli.simulate import simulate
+
+SUCCESS, INTERNAL, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
+DEBUG = "IMUFIT_DEBUG"
+
+
+class Commands(click.Group):
+    """The commands in the order of the loop, with a guess at misspelt names."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names in the order in which they were registered."""
+        return list(self.commands)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command, or fail with the name that was probably meant."""
+        if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            ctx.fail(unknown("command", args[0], self.commands))
+        return super().resolve_command(ctx, args)
+
+
+def _version(ctx: click.Context, _param: click.Parameter, wanted: bool) -> None:
+    """Print the version and stop."""
+    if wanted:
+        from imufit import __version__  # noqa: PLC0415
+
+        click.echo(f"imufit {__version__}")
+        ctx.exit(SUCCESS)
+
+
+@click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Show the version.")
+@click.pass_context
+def imufit(ctx: click.Context) -> None:
+    """Find out which physical effect your inertial sensor model is missing, add it, and watch the error fall.
+
+    LOG is a Parquet, CSV or NPZ table with one row per sample. `imufit demo` shows the whole loop on a made-up log.
+    """
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
+
+
+for _command in (compare, diagnose, add, ladder, fit, explain, simulate, reveal, grade, replay, demo):
+    imufit.add_command(_command)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Without it those of the process.
+
+    Returns
+    -------
+    int
+        0 on success, 2 on unusable input or arguments, 130 when interrupted, 1 on a fault of the program.
+    """
+    if "_IMUFIT_COMPLETE" in os.environ:
+        imufit.main(prog_name="imufit")
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        with warnings.catch_warnings():
+            if not os.environ.get(DEBUG):
+                warnings.simplefilter("ignore")
+            with imufit.make_context("imufit", given) as ctx:
+                imufit.invoke(ctx)
+                sys.stdout.flush()
+    except Exception as error:
+        return _report(error)
+    except KeyboardInterrupt:
+        return _fail("interrupted", INTERRUPTED)
+    return SUCCESS
+
+
+def _report(error: Exception) -> int:
+    """Say in one line what went wrong, and return the exit code."""
+    if isinstance(error, click.exceptions.Exit):
+        return error.exit_code
+    if isinstance(error, click.exceptions.Abort):
+        return _fail("interrupted", INTERRUPTED)
+    if isinstance(error, BrokenPipeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return SUCCESS
+    message = _unusable(error)
+    if message is not None:
+        return _fail(message, UNUSABLE)
+    if os.environ.get(DEBUG):
+        traceback.print_exception(error)
+        return INTERNAL
+    return _fail(f"internal error: {type(error).__name__}: {error} ({DEBUG}=1 shows the traceback)", INTERNAL)
+
+
+def _unusable(error: Exception) -> str | None:
+    """Return what is wrong with the input or the arguments; None if the fault is the program's."""
+    from imufit.errors import InputError  # noqa: PLC0415
+
+    if isinstance(error, click.ClickException):
+        return error.format_message()
+    if isinstance(error, OSError):
+        where = f"{error.filename}: " if error.filename is not None else ""
+        return f"{where}{error.strerror or error}"
+    return str(error) if isinstance(error, InputError) else None
+
+
+def _fail(message: str, code: int) -> int:
+    """Print one line on standard error."""
+    sys.stderr.write(f"imufit: {' '.join(message.split())}\n")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

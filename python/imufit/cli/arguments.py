@@ -1,0 +1,155 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+LOG_ENDINGS = (".parquet", ".csv", ".npz")
+PLOT_ENDINGS = (".png", ".svg", ".pdf")
+
+
+class OutputFile(click.ParamType):  # type: ignore[type-arg]
+    """A file to be written, refused before the work starts if it cannot be.
+
+    Parameters
+    ----------
+    endings : iterable of str
+        Endings that the file may have; none means any.
+    standard_output : bool
+        Whether ``-`` stands for standard output.
+    """
+
+    name = "file"
+
+    def __init__(self, endings: Iterable[str] = (), standard_output: bool = False) -> None:
+        self.endings = tuple(endings)
+        self.standard_output = standard_output
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path."""
+        path = Path(value)
+        if str(value) == "-" and self.standard_output:
+            return path
+        if self.endings and path.suffix.lower() not in self.endings:
+            self.fail(f"{path.name!r} must end in {' or '.join(self.endings)}", param, ctx)
+        if path.is_dir():
+            self.fail(f"{str(path)!r} is a directory", param, ctx)
+        if not path.parent.is_dir():
+            self.fail(f"the directory {str(path.parent)!r} does not exist", param, ctx)
+        if not os.access(path if path.exists() else path.parent, os.W_OK):
+            self.fail(f"{str(path)!r} cannot be written", param, ctx)
+        return path
+
+
+class OutputDirectory(click.ParamType):  # type: ignore[type-arg]
+    """A directory to be made where it does not exist yet."""
+
+    name = "directory"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path."""
+        path = Path(value)
+        if path.exists() and not path.is_dir():
+            self.fail(f"{str(path)!r} is a file, not a directory", param, ctx)
+        return path
+
+
+EXISTING = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+
+
+def log_argument(command: Command) -> Command:
+    """Add LOG and --map."""
+    command = click.option(
+        "--map",
+        "mapping",
+        multiple=True,
+        metavar="COL=NAME[unit]",
+        help="Column COL of the log is the file's column NAME in that unit, e.g. acc_x=AccX[g]. Repeatable.",
+    )(command)
+    return click.argument("log", metavar="LOG", type=EXISTING)(command)
+
+
+def model_option(command: Command) -> Command:
+    """Add --model and --effects-from."""
+    command = effects_from_option(command)
+    return click.option(
+        "--model", type=EXISTING, metavar="MODEL", help="Start from this model file; without it from the ideal sensor."
+    )(command)
+
+
+def effects_from_option(command: Command) -> Command:
+    """Add --effects-from, which runs before anything looks at the catalogue."""
+    return click.option(
+        "--effects-from",
+        type=EXISTING,
+        multiple=True,
+        metavar="FILE.py",
+        is_eager=True,
+        expose_value=False,
+        callback=_load_effects,
+        help="Run this Python file and use the effects that it defines. Repeatable.",
+    )(command)
+
+
+def _load_effects(_ctx: click.Context, _param: click.Parameter, files: tuple[Path, ...]) -> None:
+    """Load the user's effects."""
+    from imufit.cli import engine  # noqa: PLC0415
+
+    for file in files:
+        engine.load_effects(file)
+
+
+def json_option(command: Command) -> Command:
+    """Add --json."""
+    return click.option(
+        "--json",
+        "json_file",
+        type=OutputFile(standard_output=True),
+        metavar="FILE",
+        help="Write the result as JSON; - is standard output, where nothing else is printed then.",
+    )(command)
+
+
+def html_option(command: Command) -> Command:
+    """Add --html."""
+    return click.option(
+        "--html", "html_file", type=OutputFile(), metavar="FILE", help="Write one HTML page that opens offline."
+    )(command)
+
+
+def plot_option(command: Command) -> Command:
+    """Add --plot."""
+    return click.option(
+        "--plot", "plot_file", type=OutputFile(PLOT_ENDINGS), metavar="FILE.png", help="Write the main figure."
+    )(command)
+
+
+def model_output(command: Command) -> Command:
+    """Add -o for a model file."""
+    return click.option(
+        "-o", "--output", type=OutputFile((".toml",)), metavar="MODEL.toml", help="Write the fitted model."
+    )(command)
+
+
+def keep_inputs(inputs: Iterable[Path | None], outputs: Iterable[Path | None]) -> None:
+    """Refuse outputs that would overwrite an input or each other.
+
+    Raises
+    ------
+    click.UsageError
+        Names the file.
+    """
+    taken = {path.resolve() for path in inputs if path is not None}
+    for path in outputs:
+        if path is None or str(path) == "-":
+            continue
+        if path.resolve() in taken:
+            raise click.UsageError(f"{str(path)!r} would be overwritten: give each output its own file")
+        taken.add(path.resolve())

@@ -1,0 +1,45 @@
+"""``imufit compare``: where the model fails."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import html_option, json_option, keep_inputs, log_argument, model_option, plot_option
+from imufit.cli.output import Output
+from imufit.cli.progress import ProgressBar
+
+
+@click.command(short_help="Where the model fails: by channel, segment and covariate.")
+@log_argument
+@model_option
+@json_option
+@html_option
+@plot_option
+def compare(
+    log: Path,
+    *,
+    mapping: tuple[str, ...],
+    model: Path | None,
+    json_file: Path | None,
+    html_file: Path | None,
+    plot_file: Path | None,
+) -> None:
+    """Hold the model against LOG: channel by channel, segment by segment, against every covariate."""
+    keep_inputs([log, model], [json_file, html_file, plot_file])
+    output = Output(json_file)
+    with ProgressBar() as progress:
+        opened = engine.open_log(log, mapping)
+        comparison = engine.sensor_model(path=model).fit(opened, progress=progress).compare(opened, progress=progress)
+    output.say(comparison.sentence, bold=True)
+    output.say(*comparison.notes)
+    output.tables(comparison.tables())
+    output.json(comparison.to_dict())
+    if plot_file is not None:
+        output.plot(plot_file, comparison.plot())
+    if html_file is not None:
+        from imufit.report import page  # noqa: PLC0415
+
+        output.html(html_file, page(comparison=comparison, title=f"{log.name}: where the model fails"))

@@ -1,0 +1,49 @@
+"""``imufit diagnose``: which effect is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import html_option, json_option, keep_inputs, log_argument, model_option, plot_option
+from imufit.cli.output import Output
+from imufit.cli.progress import ProgressBar
+
+
+@click.command(short_help="Which effect is missing, with its expected gain.")
+@log_argument
+@model_option
+@json_option
+@html_option
+@plot_option
+def diagnose(
+    log: Path,
+    *,
+    mapping: tuple[str, ...],
+    model: Path | None,
+    json_file: Path | None,
+    html_file: Path | None,
+    plot_file: Path | None,
+) -> None:
+    """Say which effect is missing in the model of LOG, or that none is, or that this log cannot tell."""
+    keep_inputs([log, model], [json_file, html_file, plot_file])
+    output = Output(json_file)
+    with ProgressBar() as progress:
+        opened = engine.open_log(log, mapping)
+        fit = engine.sensor_model(path=model).fit(opened, progress=progress)
+        diagnosis = fit.diagnose(opened, progress=progress)
+        comparison = fit.compare(opened, progress=progress) if html_file is not None else None
+    verdict, *rest = diagnosis.sentences()
+    output.say(verdict, bold=True)
+    output.say(*rest)
+    output.tables(diagnosis.tables())
+    output.json(diagnosis.to_dict())
+    if plot_file is not None:
+        output.plot(plot_file, diagnosis.plot())
+    if html_file is not None:
+        from imufit.report import page  # noqa: PLC0415
+
+        title = f"{log.name}: which effect is missing"
+        output.html(html_file, page(comparison=comparison, diagnosis=diagnosis, title=title))

@@ -1,0 +1,181 @@
+"""The command line's way into the library: every heavy import waits here for its first use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from imufit.log import Log
+    from imufit.results import EffectCard, Ladder
+    from imufit.simulate import Grade, Simulation, Truth
+
+Progress = Callable[[int, int, str], None]
+
+
+def open_log(path: Path, mapping: Sequence[str] = ()) -> Any:
+    """Open a log; `mapping` holds texts such as ``acc_x=AccX[g]``."""
+    from imufit.log import open_log, parse_mapping  # noqa: PLC0415
+
+    return open_log(path, mapping=parse_mapping(*mapping) or None)
+
+
+def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
+    """Return the model kept in the file `path`, or a stack of `effects`; no effects is the ideal sensor."""
+    import imufit  # noqa: PLC0415
+
+    return imufit.SensorModel.load(path) if path is not None else imufit.SensorModel(list(effects))
+
+
+def ladder(log: Any, model: Any, progress: Progress) -> Ladder:
+    """Repeat diagnose and add until nothing is missing."""
+    import imufit  # noqa: PLC0415
+
+    return imufit.ladder(log, model=model, progress=progress)
+
+
+def catalogue() -> list[EffectCard]:
+    """Return every effect there is, the user's own included."""
+    import imufit  # noqa: PLC0415
+
+    return list(imufit.catalogue())
+
+
+def explain(effect: str) -> EffectCard:
+    """Return the card of one effect."""
+    import imufit  # noqa: PLC0415
+
+    return imufit.explain(effect)
+
+
+def load_effects(path: Path) -> None:
+    """Run a user's file of effects, so that the catalogue has them.
+
+    Raises
+    ------
+    InputError
+        The file cannot be run; the message says why.
+    """
+    import imufit  # noqa: PLC0415
+    from imufit.errors import InputError  # noqa: PLC0415
+
+    try:
+        imufit.load_effects(path)
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"the effects cannot be loaded: {type(error).__name__}: {error}", file=path) from error
+
+
+def replay(log: Any, filters: Sequence[str], progress: Progress) -> Any:
+    """Run attitude filters over a log."""
+    from imufit.replay import replay  # noqa: PLC0415
+
+    return replay(log, filters=tuple(filters), progress=progress)
+
+
+def write_log(log: Any, path: Path) -> None:
+    """Write a log as Parquet, CSV or NPZ, by the path's ending."""
+    log.write(path)
+
+
+def scenarios() -> dict[str, str]:
+    """Return the scenarios that can be simulated, with what happens in each."""
+    from imufit.simulate.scenarios import SCENARIOS  # noqa: PLC0415
+
+    return {name: scenario.description for name, scenario in SCENARIOS.items()}
+
+
+def injections() -> list[str]:
+    """Return the effects that can be simulated."""
+    from imufit.simulate.injections import INJECTIONS  # noqa: PLC0415
+
+    return list(INJECTIONS)
+
+
+def simulate(scenario: str, effects: Mapping[str, Mapping[str, float] | None], **settings: Any) -> Simulation:
+    """Simulate a log with these effects; None instead of parameters draws them.
+
+    Raises
+    ------
+    InputError
+        The scenario cannot have such an effect, or a setting cannot be.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.simulate import simulate  # noqa: PLC0415
+
+    try:
+        return simulate(scenario, effects, **settings)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+
+
+def hidden(scenario: str, seed: int, **settings: Any) -> Simulation:
+    """Simulate a log with an effect that the seed picks."""
+    from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.simulate import hidden  # noqa: PLC0415
+
+    try:
+        simulation, _ = hidden(scenario, seed, **settings)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    return simulation
+
+
+def log_of(simulation: Simulation) -> Log:
+    """Return the log of a simulation, without what is known of it."""
+    from imufit.log import Log  # noqa: PLC0415
+
+    return Log.from_arrays(
+        simulation.t,
+        acc=simulation.acc,
+        gyr=simulation.gyr,
+        mag=simulation.mag,
+        temp=simulation.temp,
+        reference=simulation.ref_q,
+        ref_p=simulation.ref_p,
+        ref_angle=simulation.ref_angle,
+        pose=None if simulation.pose is None else simulation.pose.tolist(),
+        covariates=simulation.covariates,
+        **simulation.metadata,
+    )
+
+
+def save_simulation(simulation: Simulation, path: Path) -> Path:
+    """Write the log to `path` and its sealed truth beside it; return where that is."""
+    from imufit.simulate import seal  # noqa: PLC0415
+
+    log_of(simulation).write(path)
+    return seal(simulation.truth, path)
+
+
+def unseal(path: Path) -> Truth:
+    """Return what was done to a simulated log.
+
+    Raises
+    ------
+    InputError
+        There is no sealed truth beside the log, or it is damaged.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.simulate import unseal  # noqa: PLC0415
+
+    try:
+        return unseal(path)
+    except (ValueError, FileNotFoundError) as error:
+        raise InputError(str(error)) from error
+
+
+def grade_answer(truth: Truth, answer: Mapping[str, Any]) -> Grade:
+    """Judge the JSON of `diagnose` or `ladder` against the truth."""
+    from imufit.simulate import grade  # noqa: PLC0415
+
+    return grade(truth, answer)
+
+
+def grade_blind(*, logs: int, nothing: int, seed: int, progress: Progress) -> Any:
+    """Run the blind protocol on many hidden logs."""
+    from imufit.grade import grade  # noqa: PLC0415
+
+    return grade(logs=logs, nothing=nothing, seed=seed, progress=progress)

@@ -1,0 +1,60 @@
+"""``imufit ladder``: add what is missing until nothing is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import (
+    html_option,
+    json_option,
+    keep_inputs,
+    log_argument,
+    model_option,
+    model_output,
+    plot_option,
+)
+from imufit.cli.output import Output
+from imufit.cli.progress import ProgressBar
+
+
+@click.command(short_help="Repeat diagnose and add until nothing is missing.")
+@log_argument
+@model_option
+@model_output
+@json_option
+@html_option
+@plot_option
+def ladder(
+    log: Path,
+    *,
+    mapping: tuple[str, ...],
+    model: Path | None,
+    output: Path | None,
+    json_file: Path | None,
+    html_file: Path | None,
+    plot_file: Path | None,
+) -> None:
+    """Add the missing effects one by one to the model of LOG, and show the held-out error fall."""
+    keep_inputs([log], [output, json_file, html_file, plot_file])
+    out = Output(json_file)
+    with ProgressBar() as progress:
+        opened = engine.open_log(log, mapping)
+        start = engine.sensor_model(path=model) if model is not None else None
+        result = engine.ladder(opened, start, progress)
+    verdict, *rest = result.sentences()
+    out.say(verdict, bold=True)
+    out.say(*rest)
+    out.tables(result.tables())
+    if output is not None:
+        result.fit.save(output)
+        out.wrote(output)
+    out.json(result.to_dict())
+    if plot_file is not None:
+        out.plot(plot_file, result.plot())
+    if html_file is not None:
+        from imufit.report import page  # noqa: PLC0415
+
+        out.html(html_file, page(ladder=result, title=f"{log.name}: the error ladder"))

@@ -1,0 +1,91 @@
+"""What the commands print and write."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from imufit.results import Table
+
+_WIDTH_OF_FILES = 150
+
+
+class Output:
+    """Standard output for people, and the files that were asked for.
+
+    Parameters
+    ----------
+    json_file : Path or None
+        ``-`` keeps standard output for the JSON alone.
+    """
+
+    def __init__(self, json_file: Path | None = None) -> None:
+        from rich.console import Console  # noqa: PLC0415
+
+        self._json_file = json_file
+        quiet = json_file is not None and str(json_file) == "-"
+        width = None if sys.stdout.isatty() else _WIDTH_OF_FILES
+        self._console = Console(quiet=quiet, width=width, highlight=False, markup=False, emoji=False)
+
+    def say(self, *sentences: str, bold: bool = False) -> None:
+        """Print sentences, one paragraph each."""
+        for sentence in sentences:
+            if sentence:
+                self._console.print(sentence, style="bold" if bold else None)
+
+    def table(self, table: Table, limit: int | None = None) -> None:
+        """Print a table, if it has rows."""
+        if not table.rows:
+            return
+        from rich import box  # noqa: PLC0415
+        from rich.table import Table as RichTable  # noqa: PLC0415
+        from rich.text import Text  # noqa: PLC0415
+
+        rich_table = RichTable(
+            title=Text(table.title) if table.title else None, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
+        )
+        for place, (name, right) in enumerate(zip(table.names, table.right, strict=True)):
+            rich_table.add_column(
+                Text(name), justify="right" if right else "left", no_wrap=place == 0 or right, overflow="fold"
+            )
+        for row in table.rows[:limit]:
+            rich_table.add_row(*(Text(cell) for cell in row))
+        self._console.print(rich_table)
+
+    def tables(self, tables: Iterable[Table]) -> None:
+        """Print tables, those without rows left out."""
+        for table in tables:
+            self.table(table)
+
+    def json(self, value: Mapping[str, Any] | list[Any]) -> None:
+        """Write the JSON, if it was asked for."""
+        if self._json_file is None:
+            return
+        text = json.dumps(value, indent=2, allow_nan=False) + "\n"
+        if str(self._json_file) == "-":
+            sys.stdout.write(text)
+        else:
+            self._json_file.write_text(text, encoding="utf-8")
+            self.wrote(self._json_file)
+
+    def html(self, path: Path | None, page: str) -> None:
+        """Write a page."""
+        if path is not None:
+            path.write_text(page, encoding="utf-8")
+            self.wrote(path)
+
+    def plot(self, path: Path | None, figure: Figure) -> None:
+        """Write a figure."""
+        if path is not None:
+            figure.savefig(path, dpi=150)
+            self.wrote(path)
+
+    def wrote(self, path: Path) -> None:
+        """Say which file was written."""
+        self.say(f"wrote {path}")

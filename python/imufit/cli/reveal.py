@@ -1,0 +1,109 @@
+"""``imufit reveal``: what was done to a simulated log."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import EXISTING, json_option
+from imufit.cli.output import Output
+
+if TYPE_CHECKING:
+    from imufit.simulate import Grade, Truth
+
+
+def parameter_units() -> dict[str, dict[str, str]]:
+    """Return the SI unit of each parameter of each effect."""
+    return {card.id: {name: unit for name, unit, _ in card.parameters} for card in engine.catalogue()}
+
+
+def grade_rows(mark: Grade) -> tuple[tuple[str, str, str, str], ...]:
+    """Return effect, name, truth and answer of each parameter that there is to find."""
+    from imufit.figures import quantity  # noqa: PLC0415
+
+    units = parameter_units()
+
+    def shown(effect: str, name: str, value: float | None, error: float | None = None) -> str:
+        unit = units.get(effect, {}).get(name)
+        if unit is None or value is None:
+            return quantity.number(value)
+        return quantity.with_error(value, error or 0.0, unit)
+
+    return tuple(
+        (
+            item.effect,
+            item.name,
+            shown(item.effect, item.name, item.truth),
+            shown(item.effect, item.name, item.estimate, item.standard_error),
+        )
+        for item in mark.parameters
+        if item.estimate is not None
+    )
+
+
+def truth_rows(truth: Truth) -> tuple[tuple[str, str, str], ...]:
+    """Return effect, parameters and size of all that was injected, in the shown units."""
+    from imufit.figures import quantity  # noqa: PLC0415
+
+    units = parameter_units()
+    rows = []
+    for effect, parameters in truth.effects.items():
+        known = units.get(effect, {})
+        words = (
+            f"{name} {quantity.quantity(value, known[name]) if name in known else quantity.number(value)}"
+            for name, value in parameters.items()
+        )
+        rows.append((effect, ", ".join(words), f"{quantity.number(truth.sizes.get(effect), 2)} x noise"))
+    return tuple(rows)
+
+
+def read_answer(path: Path) -> dict[str, Any]:
+    """Read the JSON of `diagnose` or `ladder`.
+
+    Raises
+    ------
+    InputError
+        The file is not such a JSON.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+
+    try:
+        answer = json.loads(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise InputError("this is not a JSON text file", file=path) from None
+    except json.JSONDecodeError as error:
+        raise InputError(f"this is not JSON: {error.msg}", file=path, line=error.lineno) from None
+    if not isinstance(answer, dict) or "verdict" not in answer:
+        raise InputError("this is not the JSON of `imufit diagnose` or `imufit ladder`: it has no verdict", file=path)
+    return answer
+
+
+@click.command(short_help="What was done to a simulated log; grades an answer.")
+@click.argument("log", metavar="LOG", type=EXISTING)
+@click.option("--answer", type=EXISTING, metavar="JSON", help="Grade this JSON of `diagnose` or `ladder`.")
+@json_option
+def reveal(log: Path, *, answer: Path | None, json_file: Path | None) -> None:
+    """Tell what was done to the simulated LOG, and whether an answer was right."""
+    from imufit.results import Table  # noqa: PLC0415
+    from imufit.results.json_value import json_value  # noqa: PLC0415
+
+    out = Output(json_file)
+    read = read_answer(answer) if answer is not None else None
+    truth = engine.unseal(log)
+    value = {"truth": json_value(truth.to_json())}
+    if truth.effects:
+        out.say(f"Put into this log: {', '.join(truth.effects)}.", bold=True)
+    else:
+        out.say("Nothing was put into this log: only noise.", bold=True)
+    out.table(Table("", ("effect", "parameters", ">size"), truth_rows(truth)))
+    if read is not None:
+        mark = engine.grade_answer(truth, read)
+        value["grade"] = json_value(asdict(mark))
+        out.say(f"The answer names {', '.join(mark.answer) or 'no effect'}: {mark.mark}.", bold=True)
+        out.table(Table("Truth and answer", ("effect", "parameter", ">truth", ">answer"), grade_rows(mark)))
+    out.json(value)

@@ -1,0 +1,112 @@
+"""``imufit simulate``: a synthetic log whose truth is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option
+from imufit.cli.names import Known, unknown
+from imufit.cli.output import Output
+
+SIZES = ("large", "medium", "small")
+FRAMES = ("NED", "ENU", "NWU")
+
+
+def parse_effect(text: str) -> tuple[str, dict[str, float] | None]:
+    """Read ``ID`` or ``ID:x=0.01,y=0``.
+
+    Parameters
+    ----------
+    text : str
+        As given on the command line.
+
+    Returns
+    -------
+    effect : str
+        The id.
+    parameters : dict or None
+        Values in SI units; None to have them drawn.
+
+    Raises
+    ------
+    click.UsageError
+        A value is not a number, or the effect is not known.
+    """
+    head, colon, tail = text.rpartition(":")
+    effect, values = (head, tail) if colon and "=" in tail else (text, "")
+    if ".column:" not in effect and effect not in (known := engine.injections()):
+        raise click.UsageError(unknown("effect", effect, known))
+    if not values:
+        return effect, None
+    parameters = {}
+    for part in values.split(","):
+        name, _, value = part.partition("=")
+        try:
+            parameters[name.strip()] = float(value)
+        except ValueError:
+            raise click.UsageError(f"--effect {text}: {part!r} does not read NAME=NUMBER") from None
+    return effect, parameters
+
+
+@click.command(short_help="A synthetic log, on request with a hidden effect.")
+@click.argument("scenario", type=Known("scenario", lambda: list(engine.scenarios())), metavar="SCENARIO")
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="ID[:NAME=VALUE,...]",
+    help="Effect to put in, SI units; without values they are drawn. Repeatable.",
+)
+@click.option("--hidden", type=click.IntRange(min=0), metavar="SEED", help="Let this seed pick the effect, untold.")
+@click.option("--size", type=Known("size", lambda: SIZES), metavar="|".join(SIZES), help="Size of drawn effects.")
+@click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="Length, s.")
+@click.option("--rate", type=click.FloatRange(min=0.0, min_open=True), metavar="HZ", help="Samples per second.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="SEED", help="Seed of motion and noise.")
+@click.option(
+    "--frame", type=Known("frame", lambda: FRAMES), metavar="|".join(FRAMES), default="NED", show_default=True
+)
+@click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
+@json_option
+def simulate(
+    scenario: str,
+    *,
+    effects: tuple[str, ...],
+    hidden: int | None,
+    size: str | None,
+    duration: float | None,
+    rate: float | None,
+    seed: int | None,
+    frame: str,
+    output: Path,
+    json_file: Path | None,
+) -> None:
+    """Simulate a log of SCENARIO: turntable, arm, poses, tilt or handheld.
+
+    What was done to it is kept sealed beside the log; `imufit reveal LOG` opens it.
+    """
+    if hidden is not None and effects:
+        raise click.UsageError("--hidden picks the effect itself: leave out --effect")
+    if hidden is not None and seed is not None:
+        raise click.UsageError("--hidden is the seed: leave out --seed")
+    chosen = dict(parse_effect(text) for text in effects)
+    if len(chosen) < len(effects):
+        raise click.UsageError("--effect names one effect twice")
+    given = {"duration": duration, "rate": rate, "size": size, "frame": frame}
+    settings = {name: value for name, value in given.items() if value is not None}
+    out = Output(json_file)
+    if hidden is not None:
+        simulation = engine.hidden(scenario, hidden, **settings)
+    else:
+        simulation = engine.simulate(scenario, chosen, **settings, **({} if seed is None else {"seed": seed}))
+    sealed = engine.save_simulation(simulation, output)
+    rows, span = len(simulation.t), float(simulation.t[-1] - simulation.t[0])
+    out.say(f"{scenario}: {rows} rows over {span:.1f} s, frame {frame}.", bold=True)
+    if hidden is not None:
+        out.say(f"What is wrong with the sensor is hidden; `imufit reveal {output}` tells.")
+    else:
+        out.say(f"Effects: {', '.join(chosen) or 'none'}.")
+    out.wrote(output)
+    out.json({"log": str(output), "sealed": str(sealed), "n": rows, "duration_s": span, "scenario": scenario})

@@ -1,0 +1,163 @@
+"""Where a model fails: by channel, against every covariate, by segment, by frequency."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit import _imufit
+from imufit.fit.analysis import Analysis
+from imufit.fit.passes import CHANNELS, UNITS
+from imufit.progress import Progress
+from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
+
+if TYPE_CHECKING:
+    from imufit.fit import Fit
+    from imufit.log import LogSource
+
+Array = NDArray[np.float64]
+
+MIN_SHARE = 0.02
+WORST_SEGMENTS = 8
+SPECTRUM_ROWS = 512
+SPECTRUM_CHUNKS = 8
+OFF_FLOOR = 1.2
+"""Stated noise is doubted where what nothing explains differs from it by this factor."""
+
+
+def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
+    """Hold a fitted model against a log (default: its own), the parameters as they are."""
+    if log is None or log is fit.log:
+        analysis, step = fit.analysis, fit.estimate.step
+    else:
+        analysis = Analysis.of(fit.model, log, progress, keep_constants=True)
+        step = analysis.estimate_unnamed().step
+    return comparison(analysis, step)
+
+
+def comparison(analysis: Analysis, step: Array) -> Comparison:
+    """Comparison of a log with the model after a step of all parameters from where the evidence was taken."""
+    facts = analysis.facts
+    result = analysis.problem.residual(step)
+    floors = analysis.floors
+    edges = np.linspace(facts.t_start, facts.t_end, analysis.raw.blocks + 1)
+    channels, where, segments = [], [], []
+    spans = {}
+    for item in result["channels"]:
+        name, floor = item["channel"], floors[item["index"]]
+        channels.append(
+            ChannelResidual(name, item["rms"], item["mean"], floor, item["rms"] / floor, UNITS[name[:3]], item["n"])
+        )
+        first, last = item["stretch"]
+        spans[name] = (float(edges[first]), float(edges[last]))
+        segments += [
+            (float(edges[b]), float(edges[b + 1]), name, float(rms / floor))
+            for b, rms in enumerate(item["block_rms"])
+            if np.isfinite(rms)
+        ]
+    panels = [_panel(item, floors, facts) for item in result["panels"]]
+    ratios = {channel.channel: channel.ratio for channel in channels}
+    for panel in panels:
+        if panel.share >= MIN_SHARE and ratios[panel.channel] > 1.0:
+            where.append(Where(panel.channel, panel.covariate, panel.share, *spans[panel.channel]))
+    where.sort(key=lambda w: -w.share * (ratios[w.channel] ** 2 - 1.0))
+    panels.sort(key=lambda p: -p.share * max(ratios[p.channel] ** 2 - 1.0, 1e-6))
+    segments.sort(key=lambda s: -s[3])
+    sensors = {
+        sensor: float(np.sqrt(np.mean([c.ratio**2 for c in channels if c.channel.startswith(sensor)])))
+        for sensor in facts.sensors
+    }
+    return Comparison(
+        n=facts.n,
+        duration_s=facts.t_end - facts.t_start,
+        model=analysis.model.effects,
+        channels=tuple(channels),
+        sensors=sensors,
+        attitude=None,
+        where=tuple(where),
+        panels=tuple(panels),
+        spectra=_spectra(analysis, step),
+        segments=tuple(segments[:WORST_SEGMENTS]),
+        notes=notes(analysis),
+    )
+
+
+def _panel(item: dict[str, Any], floors: list[float], facts: _imufit.Facts) -> Panel:
+    name = item["channel"]
+    inner = item["edges"]
+    width = np.diff(inner)
+    first = inner[0] - (width[0] if width.size else 1.0)
+    last = inner[-1] + (width[-1] if width.size else 1.0)
+    if item["covariate"] == "t":
+        first, last = facts.t_start, facts.t_end
+    edges = np.concatenate([[first], inner, [last]])
+    return Panel(
+        channel=name,
+        covariate=item["covariate"],
+        channel_unit=UNITS[name[:3]],
+        covariate_unit=item["unit"],
+        centre=(edges[1:] + edges[:-1]) / 2,
+        mean=item["mean"],
+        band=item["band"],
+        noise_floor=floors[CHANNELS.index(name)],
+        share=item["share"],
+    )
+
+
+def _spectra(analysis: Analysis, step: Array) -> tuple[Spectrum, ...]:
+    """Density of the residual of each channel, averaged over stretches without a gap (Welch's method)."""
+    from scipy.signal import welch  # noqa: PLC0415  only needed here
+
+    sums: dict[int, list[Array]] = {}
+    frequency = np.empty(0)
+    rate = 1.0 / analysis.facts.dt
+    chunks = 0
+    for arrays in analysis.passes.chunks(analysis.facts.margin, "spectrum"):
+        residuals = _imufit.evaluate(analysis.raw, arrays, step)
+        t = arrays["t"][arrays["begin"] : arrays["end"]]
+        steady = np.diff(t, prepend=t[0]) < 1.75 * analysis.facts.dt
+        for index, residual in enumerate(residuals):
+            if residual is None:
+                continue
+            good = np.isfinite(residual) & steady
+            for start in range(0, len(residual) - SPECTRUM_ROWS + 1, SPECTRUM_ROWS):
+                if good[start : start + SPECTRUM_ROWS].all():
+                    piece = residual[start : start + SPECTRUM_ROWS]
+                    frequency, density = welch(piece, rate, nperseg=SPECTRUM_ROWS, detrend="constant")
+                    sums.setdefault(index, []).append(density)
+        chunks += 1
+        if chunks >= SPECTRUM_CHUNKS:
+            break
+    return tuple(
+        Spectrum(
+            CHANNELS[index],
+            f"({UNITS[CHANNELS[index][:3]]})^2/Hz",
+            frequency[1:],
+            np.mean(densities, axis=0)[1:],
+            2.0 * analysis.floors[index] ** 2 / rate,
+        )
+        for index, densities in sorted(sums.items())
+    )
+
+
+def notes(analysis: Analysis) -> tuple[str, ...]:
+    """What the reader should know about the figures of this log."""
+    out = list(analysis.passes.log.notes)
+    stated = analysis.passes.log.metadata.noise
+    for index, (floor, variance) in enumerate(zip(analysis.floors, analysis.raw_variance, strict=True)):
+        if index % 3 == 0 and CHANNELS[index][:3] in stated and np.isfinite(variance):
+            group = np.sqrt(np.mean(analysis.raw_variance[index : index + 3]))
+            if not 1 / OFF_FLOOR < group / floor < OFF_FLOOR:
+                sensor = CHANNELS[index][:3]
+                out.append(
+                    f"The stated noise of {sensor} is {floor:.3g} {UNITS[sensor]}; what no effect explains here is "
+                    f"{group:.3g} {UNITS[sensor]}."
+                )
+    if analysis.facts.field_estimated and "mag" in analysis.facts.sensors:
+        out.append("The reference field was estimated from this log and is fitted along.")
+    coloured = sorted({CHANNELS[k][:3] for k, taps in enumerate(analysis.filters) if taps})
+    if coloured:
+        out.append(f"The residual noise of {', '.join(coloured)} is coloured; the fit whitens it.")
+    return tuple(out)

@@ -1,0 +1,129 @@
+"""Which effect is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from imufit import _imufit
+from imufit.diagnose import sentences
+from imufit.diagnose.compare import notes
+from imufit.fit.analysis import BLOCKS, Analysis
+from imufit.fit.passes import CHANNELS
+from imufit.model.catalogue import card_of
+from imufit.results import Candidate, Diagnosis, Parameter, Rival, Unexplained
+
+if TYPE_CHECKING:
+    from imufit.fit import Fit
+
+ALPHA = 0.01
+POWER = 0.84
+"""Standard errors beyond the threshold at which an effect is seen with 80 % power."""
+
+STATUS = {True: "passed", False: "not significant"}
+
+
+def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
+    """Rank every effect that is not in the model by held-out error, and decide.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model and the evidence of its log.
+    excluded : sequence of str
+        Candidates that are not to be considered.
+    """
+    analysis = fit.analysis
+    ids = analysis.slots
+    slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
+    result = analysis.problem.diagnose(analysis.fitted_slots, slots)
+    confounded: dict[str, list[Rival]] = {}
+    for first, second, correlation in result["correlations"]:
+        confounded.setdefault(ids[first], []).append(Rival(ids[second], correlation))
+        confounded.setdefault(ids[second], []).append(Rival(ids[first], correlation))
+    tested = max(sum(item["testable"] for item in result["screened"]), 1)
+    candidates = [
+        _candidate(item, analysis.candidates[ids[item["slot"]]], confounded.get(ids[item["slot"]], []), tested)
+        for item in result["screened"]
+    ]
+    by_id = {candidate.effect: candidate for candidate in candidates}
+    cards = {key: card_of(analysis.candidates[key]) for key in by_id}
+    best = None if result["best"] is None else ids[result["best"]]
+    rivals = tuple(ids[slot] for slot in result["rivals"])
+    word = result["verdict"]
+    unexplained = _unexplained(analysis, fit.estimate.step, result["unexplained"])
+    named = best if word in ("missing", "ambiguous") else None
+    sentence = sentences.verdict(
+        word, by_id[best] if best else None, cards[best] if best else None, rivals, unexplained
+    )
+    experiment = None
+    if word == "ambiguous" and best is not None:
+        experiment = sentences.experiment(cards[best], [cards[rival] for rival in rivals])
+    return Diagnosis(
+        verdict=word,
+        best=named,
+        ambiguous_with=rivals if word == "ambiguous" else (),
+        candidates=tuple(candidates),
+        unexplained=unexplained,
+        model=analysis.model.effects,
+        experiment=experiment,
+        sentence=sentence,
+        notes=notes(analysis),
+    )
+
+
+def _candidate(item: dict[str, Any], effect: _imufit.Effect, rivals: list[Rival], tested: int) -> Candidate:
+    parameters = tuple(
+        Parameter(effect.id, name, value, error, unit, typical)
+        for (name, unit, typical), (value, error) in zip(effect.parameters, item["parameters"], strict=True)
+    )
+    threshold = float(student.isf(ALPHA / tested / 2, BLOCKS - 1)) + POWER
+    detectable = {
+        p.name: (threshold * p.standard_error, p.unit)
+        for p in parameters
+        if item["testable"] and np.isfinite(p.standard_error) and p.standard_error > 0
+    }
+    candidate = Candidate(
+        effect=effect.id,
+        p_value=item["p_value"],
+        expected_ratio=item["expected_ratio"],
+        held_out_before=item["held_out_before"],
+        held_out_after=item["held_out_after"],
+        gain=item["gain"],
+        gain_error=item["gain_error"],
+        parameters=parameters,
+        confounded_with=tuple(sorted(rivals, key=lambda rival: -rival.correlation)),
+        explanation="",
+        status=STATUS[item["passed"]] if item["testable"] else "not testable here",
+        minimal_detectable=detectable,
+    )
+    return replace(candidate, explanation=sentences.explanation(card_of(effect), candidate))
+
+
+def _unexplained(analysis: Analysis, step: Any, found: list[dict[str, Any]]) -> tuple[Unexplained, ...]:
+    """Dependences that nothing in the catalogue explains, with their share of the excess and where in time it lies."""
+    if not found:
+        return ()
+    channels = {item["channel"]: item for item in analysis.problem.residual(step)["channels"]}
+    edges = np.linspace(analysis.facts.t_start, analysis.facts.t_end, analysis.raw.blocks + 1)
+    out = []
+    for item in found:
+        channel = channels[item["channel"]]
+        floor = analysis.floors[CHANNELS.index(item["channel"])]
+        excess = max(channel["n"] * ((channel["rms"] / floor) ** 2 - 1.0), item["gain"])
+        first, last = channel["stretch"]
+        out.append(
+            Unexplained(
+                item["channel"],
+                item["covariate"],
+                float(item["gain"] / excess),
+                item["shape"],
+                float(edges[first]),
+                float(edges[last]),
+            )
+        )
+    return tuple(out)

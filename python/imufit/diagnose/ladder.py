@@ -1,0 +1,86 @@
+"""Diagnose and add, again and again, until nothing is missing."""
+
+from __future__ import annotations
+
+from imufit.diagnose.add import add
+from imufit.diagnose.compare import comparison
+from imufit.diagnose.diagnose import diagnose
+from imufit.fit import Fit
+from imufit.log import LogSource
+from imufit.model import SensorModel
+from imufit.progress import Progress
+from imufit.results import Diagnosis, Ladder, Step
+
+MAX_STEPS = 12
+
+
+def ladder(log: LogSource, model: SensorModel | None = None, progress: Progress | None = None) -> Ladder:
+    """Repeat diagnose and add until nothing is missing, or until the log cannot tell what is.
+
+    Parameters
+    ----------
+    log : Log or LogStream
+        With reference attitude.
+    model : SensorModel, optional
+        Where to start from; default: the ideal sensor.
+    progress : callable, optional
+        Called with (rows done, rows in all, what is being done).
+
+    Returns
+    -------
+    Ladder
+        Every step with the held-out error before, expected and after, the final model and verdict.
+
+    Raises
+    ------
+    InputError
+        The log has no usable reference, or an effect of the model cannot be tested on it.
+    """
+    fit = Fit.of(model or SensorModel(), log, progress)
+    start, first_fit = fit.ratio, fit
+    steps: list[Step] = []
+    first: Diagnosis | None = None
+    diagnosis = diagnose(fit)
+    while len(steps) < MAX_STEPS:
+        first = first or diagnosis
+        effect = next_effect(diagnosis)
+        if effect is None:
+            break
+        expected = next(c.held_out_after for c in diagnosis.candidates if c.effect == effect)
+        addition = add(fit, effect, expected)
+        if not addition.after < addition.before:
+            break
+        fit = addition.fit
+        steps.append(Step(effect, addition.before, expected, addition.after, fit.training_ratio))
+        diagnosis = diagnose(fit)
+    return Ladder(
+        steps=tuple(steps),
+        model=fit.model.effects,
+        verdict=diagnosis.verdict,
+        ratio_start=start,
+        ratio_end=fit.ratio,
+        attitude=None,
+        diagnosis=diagnosis,
+        comparison_start=comparison(first_fit.analysis, first_fit.estimate.step),
+        comparison_end=comparison(fit.analysis, fit.estimate.step),
+        first=first,
+        fit=fit,
+        sentence=_sentence(start, fit.ratio, steps, diagnosis),
+    )
+
+
+def next_effect(diagnosis: Diagnosis) -> str | None:
+    """The effect to add next: the best that passed and that nothing else in the catalogue explains as well."""
+    if diagnosis.verdict == "adequate":
+        return None
+    unsure = {diagnosis.best, *diagnosis.ambiguous_with} if diagnosis.verdict == "ambiguous" else set()
+    return next((c.effect for c in diagnosis.candidates if c.status == "passed" and c.effect not in unsure), None)
+
+
+def _sentence(start: float, end: float, steps: list[Step], diagnosis: Diagnosis) -> str:
+    if not steps:
+        return diagnosis.sentence
+    names = ", ".join(step.effect for step in steps)
+    return f"Adding {names} cut the held-out error from {start:.3f} to {end:.3f} of the noise floor. {diagnosis.sentence}"
+
+

@@ -1,0 +1,71 @@
+"""Sentences from descriptions and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from imufit.figures import quantity
+from imufit.results import Candidate, EffectCard, Parameter, Unexplained
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def leading(parameters: Sequence[Parameter]) -> Parameter | None:
+    """The parameter that stands out most from its error."""
+    known = [p for p in parameters if p.standard_error > 0]
+    return max(known, key=lambda p: abs(p.value / p.standard_error), default=None)
+
+
+def explanation(card: EffectCard, candidate: Candidate) -> str:
+    """One candidate in a sentence: the physics, its size, what adding it should bring."""
+    if candidate.status == "not testable here":
+        return f"{_capital(card.name)}: this log cannot show it (no such motion or temperature, or inside the model already)."
+    text = f"{_capital(card.name)}: {card.physics}." if card.physics else f"{_capital(card.name)}."
+    top = leading(candidate.parameters)
+    if top is not None:
+        text += f" Here {top.name} = {quantity.with_error(top.value, top.standard_error, top.unit)}"
+        if top.typical:
+            text += f" (typically {quantity.quantity(top.typical, top.unit)})"
+        text += "."
+    before, after = candidate.held_out_before, candidate.held_out_after
+    if candidate.status == "passed":
+        text += f" Adding it should cut the held-out error from {before:.3f} to {after:.3f} of the noise floor."
+    else:
+        text += " Adding it would not lower the held-out error by more than chance does."
+    return text
+
+
+def verdict(
+    word: str, best: Candidate | None, card: EffectCard | None, rivals: Sequence[str], unexplained: Sequence[Unexplained]
+) -> str:
+    """The answer in a sentence or two."""
+    left = ""
+    if unexplained:
+        first = unexplained[0]
+        left = f"{first.channel} still depends on {first.covariate} ({first.shape})"
+    if word == "adequate":
+        return "Nothing that this log can show is missing: the residual is at its noise floor as far as can be told."
+    if word == "unknown":
+        text = f"Something is missing that no effect of the catalogue explains: {left}." if left else "Something is missing."
+        if best is not None:
+            text += f" {best.effect} would take a part of it, but not most."
+        return text
+    if best is None or card is None:
+        raise ValueError(f"verdict {word} needs a candidate")
+    if word == "ambiguous":
+        return (
+            f"{best.effect} or {' or '.join(rivals)} is missing: each explains this log as well as the other, "
+            f"and neither adds anything to the other."
+        )
+    text = f"{best.effect} is missing. {best.explanation}"
+    return f"{text} Apart from it, {left}." if left else text
+
+
+def experiment(best: EffectCard, rivals: Sequence[EffectCard]) -> str:
+    """What would separate candidates that this log cannot tell apart."""
+    parts = [f"for {card.id}, {card.confirm}" for card in (best, *rivals) if card.confirm]
+    if not parts:
+        return "Record a log with another motion, in more attitudes and over a wider range of temperature."
+    return "Record another log that separates them: " + "; ".join(parts) + "."

@@ -1,0 +1,77 @@
+"""The one exception that unusable input raises: it says what is wrong, where, and what to do."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+
+class InputError(ValueError):
+    """Input that cannot be used, told in one line.
+
+    The message reads ``file: row R, column C: problem. Remedy.``, with the parts that apply. Rows are counted from 0
+    and are data rows as in the table; for text files the line of the file (counted from 1) stands behind it, as in
+    ``row 57 (line 59)``.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong, without the final stop.
+    file : str or Path, optional
+        File concerned; the message shows its name.
+    row : int, optional
+        Data row, counted from 0.
+    column : str, optional
+        Column or metadata key concerned.
+    remedy : str, optional
+        What the user can do about it: a full sentence.
+    line : int, optional
+        Line of the text file, counted from 1.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        file: str | Path | None = None,
+        row: int | None = None,
+        column: str | None = None,
+        remedy: str | None = None,
+        line: int | None = None,
+    ) -> None:
+        self.problem = problem
+        self.file = None if file is None else str(file)
+        self.row = row
+        self.column = column
+        self.remedy = remedy
+        self.line = line
+        super().__init__(self._message())
+
+    def _message(self) -> str:
+        where = []
+        if self.row is not None:
+            where.append(f"row {self.row}" + ("" if self.line is None else f" (line {self.line})"))
+        elif self.line is not None:
+            where.append(f"line {self.line}")
+        if self.column is not None and not self.problem.startswith(f"column {self.column} "):
+            where.append(f"column {self.column}")
+        parts = [Path(self.file).name] if self.file else []
+        parts += [", ".join(where)] if where else []
+        text = ": ".join([*parts, self.problem])
+        if not text.endswith((".", "?", "!")):
+            text += "."
+        if self.remedy:
+            text += f" {self.remedy}"
+        return " ".join(text.split())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle with all parts, so that the error survives the way back from a worker process."""
+        where: dict[str, Any] = {
+            "file": self.file,
+            "row": self.row,
+            "column": self.column,
+            "remedy": self.remedy,
+            "line": self.line,
+        }
+        return partial(InputError, self.problem, **where), ()

@@ -1,0 +1,103 @@
+"""Ranked candidates: how far the held-out error is expected to fall with each effect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imufit.figures import quantity, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_COLOURS = {"passed": style.BLUE, "not significant": style.GREY, "not testable here": style.PALE}
+
+
+def candidate_bars(
+    effects: Sequence[str],
+    *,
+    before: ArrayLike,
+    after: ArrayLike,
+    error: ArrayLike,
+    status: Sequence[str],
+    sentence: str = "",
+    limit: int = 12,
+) -> Figure:
+    """Bars from the held-out error now to the one expected with each effect.
+
+    Parameters
+    ----------
+    effects : sequence of str
+        Effect ids, best first.
+    before, after : array_like
+        (k,) held-out residual over noise floor now and with the effect.
+    error : array_like
+        (k,) standard error of the drop; NaN where it is not known.
+    status : sequence of str
+        ``passed``, ``not significant`` or ``not testable here``.
+    sentence : str
+        Title; without it what the best candidate promises.
+    limit : int
+        Draw at most so many.
+
+    Returns
+    -------
+    Figure
+        The dashed line is the error now, the solid one the noise floor.
+    """
+    before, after, error = (np.asarray(values, dtype=float) for values in (before, after, error))
+    drawn = [index for index in range(len(effects)) if np.isfinite(before[index]) and np.isfinite(after[index])][:limit]
+    if not drawn:
+        return style.empty("No effect of the catalogue can be tested in this log.")
+    figure = style.new_figure(10.0, 1.5 + 0.34 * len(drawn))
+    axes = figure.subplots()
+    places = np.arange(len(drawn))
+    for place, index in zip(places, drawn, strict=True):
+        passed = status[index] == "passed"
+        axes.barh(
+            place,
+            before[index] - after[index],
+            left=after[index],
+            height=0.62,
+            color=_COLOURS.get(status[index], style.GREY),
+            zorder=2,
+        )
+        if np.isfinite(error[index]):
+            axes.errorbar(after[index], place, xerr=error[index], color=style.INK, capsize=2.5, linewidth=1.0, zorder=3)
+        axes.annotate(
+            f"{quantity.ratio(before[index])} → {quantity.ratio(after[index])}",
+            (1.01, place),
+            xycoords=axes.get_yaxis_transform(),
+            annotation_clip=False,
+            va="center",
+            fontsize=9,
+            color=style.INK,
+            fontweight="bold" if passed else "normal",
+        )
+    now = float(np.nanmedian(before[drawn]))
+    axes.axvline(1.0, color=style.INK, linewidth=1.2)
+    axes.axvline(now, color=style.GREY, linewidth=1.0, linestyle="--")
+    axes.set_yticks(places, [effects[index] for index in drawn])
+    axes.invert_yaxis()
+    margin = np.nan_to_num(error[drawn])
+    low = min(1.0, float((after[drawn] - margin).min()))
+    high = max(now, float(before[drawn].max()), float((after[drawn] + margin).max()), 1.02)
+    axes.set_xlim(low - 0.04 * (high - low), high + 0.04 * (high - low))
+    axes.set_xlabel("held-out error over noise floor (solid line: noise floor; dashed: now)", fontsize=9)
+    best = drawn[0]
+    style.title(axes, sentence or _promise(effects[best], before[best], after[best], status[best]))
+    style.tidy(axes)
+    return figure
+
+
+def _promise(effect: str, before: float, after: float, status: str) -> str:
+    """Say what the best candidate would bring."""
+    if status != "passed":
+        return "No effect lowers the held-out error beyond chance"
+    return (
+        f"Adding {effect} should cut the held-out error "
+        f"from {quantity.ratio(before)} to {quantity.ratio(after)} times the noise floor"
+    )

@@ -1,0 +1,87 @@
+"""Predicted parameters beside the size that is typical for such sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imufit.figures import quantity, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def parameter_sizes(
+    labels: Sequence[str],
+    values: ArrayLike,
+    standard_errors: ArrayLike,
+    typical: ArrayLike,
+    units: Sequence[str],
+) -> Figure:
+    """Each parameter over its typical size, with a 95 % interval.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Names, e.g. ``gyr.bias x``.
+    values, standard_errors : array_like
+        (k,) SI units as in `units`.
+    typical : array_like
+        (k,) typical sizes, same units; rows with NaN are not drawn.
+    units : sequence of str
+        (k,) SI units.
+
+    Returns
+    -------
+    Figure
+        Within the shaded band a parameter is of ordinary size.
+    """
+    values, errors, typical = (np.asarray(part, dtype=float) for part in (values, standard_errors, typical))
+    usable = np.isfinite(values) & np.isfinite(typical) & (typical != 0.0)
+    drawn = [index for index in range(len(labels)) if usable[index]]
+    if not drawn:
+        return style.empty("No typical size is known for these parameters.")
+    scaled = values[drawn] / np.abs(typical[drawn])
+    margin = np.nan_to_num(1.96 * errors[drawn] / np.abs(typical[drawn]))
+    figure = style.new_figure(10.0, 1.5 + 0.32 * len(drawn))
+    axes = figure.subplots()
+    places = np.arange(len(drawn))
+    axes.axvspan(-1.0, 1.0, color=style.PALE, zorder=0)
+    axes.axvline(0.0, color=style.GREY, linewidth=0.8)
+    ordinary = np.abs(scaled) <= 3.0
+    for chosen, colour in ((ordinary, style.BLUE), (~ordinary, style.VERMILION)):
+        if chosen.any():
+            axes.errorbar(
+                scaled[chosen], places[chosen], xerr=margin[chosen], fmt="o", markersize=5, color=colour, capsize=3
+            )
+    reach = float(np.max(np.abs(scaled) + margin))
+    if reach > 12.0:
+        axes.set_xscale("symlog", linthresh=1.0)
+        axes.set_xlim(-1.6 * reach, 1.6 * reach)
+    else:
+        axes.set_xlim(-1.1 * max(reach, 1.2), 1.1 * max(reach, 1.2))
+    for place, index in zip(places, drawn, strict=True):
+        axes.annotate(
+            quantity.with_error(values[index], errors[index], units[index]),
+            (1.01, place),
+            xycoords=axes.get_yaxis_transform(),
+            va="center",
+            fontsize=9,
+            color=style.INK,
+            annotation_clip=False,
+        )
+    axes.set_yticks(places, [labels[index] for index in drawn])
+    axes.set_ylim(len(drawn) - 0.5, -0.5)
+    axes.set_xlabel("value over typical size (shaded: up to the typical size; bars: 95 %)", fontsize=9)
+    count = int((~ordinary).sum())
+    if count == 0:
+        sentence = "Every parameter is of a plausible size"
+    else:
+        largest = drawn[int(np.abs(scaled).argmax())]
+        sentence = f"{labels[largest]} is {quantity.number(float(np.abs(scaled).max()), 2)} times its typical size"
+    style.title(axes, sentence)
+    style.tidy(axes)
+    return figure

@@ -1,0 +1,151 @@
+"""Numbers and units as a person reads them: SI inside, degrees and g only where something is shown."""
+
+from __future__ import annotations
+
+import math
+import re
+
+_DEGREES = 180.0 / math.pi
+_GRAVITY = 9.80665
+_PARTS = re.compile(r"(?P<head>\([^()]*\)|rad/s\^2|rad/s|m/s\^2|[^/ ()]+)(?:(?:/| per )(?P<tail>.+))?")
+_SPELLING = (("^2", "²"), ("^3", "³"), ("degC", "°C"), ("uT", "µT"), ("sqrt(Hz)", "√Hz"))
+
+
+def shown_unit(unit: str) -> tuple[float, str]:
+    """Find the unit in which a quantity is shown, and the factor that leads there.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit as the library keeps it, e.g. ``rad/s`` or ``1``.
+
+    Returns
+    -------
+    factor : float
+        Shown value = factor * value.
+    shown : str
+        The unit to print: radians become degrees, pure numbers become per cent.
+
+    Examples
+    --------
+    >>> shown_unit("m/s^2")
+    (1.0, 'm/s²')
+    """
+    text = unit.strip()
+    if text in ("", "1", "-"):
+        return 100.0, "%"
+    parts = _PARTS.fullmatch(text)
+    if parts is None:
+        return 1.0, _pretty(text)
+    head, tail = parts["head"].strip("()"), parts["tail"] or ""
+    factor, shown = (100.0, "%") if head == "1" else (1.0, head)
+    if head.startswith("rad"):
+        factor, shown = _DEGREES, "deg" + head[3:]
+        if tail in ("(m/s^2)", "m/s^2"):
+            return factor * _GRAVITY, f"{shown} per g"
+    for rate, power in (("(rad/s)^2", 2), ("(rad/s)^3", 3), ("(rad/s)", 1), ("rad/s", 1)):
+        if tail == rate:
+            factor, tail = factor / _DEGREES**power, rate.replace("rad", "deg")
+    return factor, _pretty(f"{shown}/{tail}" if tail else shown)
+
+
+def _pretty(unit: str) -> str:
+    """Write powers and degrees as people do."""
+    for plain, pretty in _SPELLING:
+        unit = unit.replace(plain, pretty)
+    return unit
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Value in few significant digits; a dash where there is none.
+
+    Parameters
+    ----------
+    value : float or None
+        Any unit.
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+        For instance ``0.0213``, ``1.5e-06`` or ``-``.
+    """
+    if value is None or not math.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    if 1e-4 <= abs(value) < 1e5:
+        places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+        return f"{value:.{places}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+def ratio(value: float | None) -> str:
+    """Residual over noise floor, e.g. ``1.04``, ``23.1`` or ``1240``."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    return f"{value:.2f}" if abs(value) < 10.0 else f"{value:.1f}" if abs(value) < 100.0 else f"{value:.0f}"
+
+
+def share(value: float | None) -> str:
+    """Fraction as per cent, e.g. ``63 %``."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    return f"{100.0 * value:.1f} %" if 0.0005 <= abs(value) < 0.0995 else f"{100.0 * value:.0f} %"
+
+
+def p_value(value: float | None) -> str:
+    """Probability without false precision, e.g. ``< 1e-06`` or ``0.031``."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    return (
+        "< 1e-06"
+        if value < 1e-6
+        else f"{value:.1e}"
+        if value < 1e-3
+        else f"{value:.3f}"
+        if value < 0.1
+        else f"{value:.2f}"
+    )
+
+
+def with_error(value: float, standard_error: float, unit: str) -> str:
+    """Value and standard error in the shown unit, rounded by the error.
+
+    Parameters
+    ----------
+    value, standard_error : float
+        In `unit`.
+    unit : str
+        SI unit.
+
+    Returns
+    -------
+    str
+        For instance ``0.0200 ± 0.0004 deg/s per g``.
+    """
+    factor, shown = shown_unit(unit)
+    value, standard_error = factor * value, factor * standard_error
+    if not (math.isfinite(standard_error) and standard_error > 0.0):
+        return f"{number(value)} {shown}"
+    if standard_error >= 1e5 or standard_error < 1e-6:
+        return f"{number(value)} ± {number(standard_error, 2)} {shown}"
+    places = max(0, 1 - math.floor(math.log10(standard_error)))
+    return f"{value:.{places}f} ± {standard_error:.{places}f} {shown}"
+
+
+def quantity(value: float | None, unit: str) -> str:
+    """Value in the shown unit, e.g. ``0.573 deg/s``; a dash without a value."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    factor, shown = shown_unit(unit)
+    return f"{number(factor * value)} {shown}"
+
+
+def span(t_start: float, t_end: float) -> str:
+    """Stretch of time, e.g. ``120 to 180 s``; a dash if it is not known."""
+    if not (math.isfinite(t_start) and math.isfinite(t_end)):
+        return "-"
+    places = 0 if t_end - t_start >= 20.0 else 1 if t_end - t_start >= 2.0 else 3
+    return f"{t_start:.{places}f} to {t_end:.{places}f} s"

@@ -1,0 +1,98 @@
+"""Spectrum of the residual over its noise floor, one axes per sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.figures import quantity, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_NAMES = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}
+
+
+class SpectrumLike(Protocol):
+    """What one line needs; `imufit.results.Spectrum` has it."""
+
+    @property
+    def channel(self) -> str:
+        """Channel of the residual."""
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """(k,) frequencies, Hz."""
+
+    @property
+    def density(self) -> NDArray[np.float64]:
+        """(k,) density of the residual, any unit."""
+
+    @property
+    def floor(self) -> float:
+        """Density of the noise floor, same unit."""
+
+
+def residual_spectra(spectra: Sequence[SpectrumLike]) -> Figure:
+    """Density of each channel's residual over that of its noise floor.
+
+    Parameters
+    ----------
+    spectra : sequence of SpectrumLike
+        One per channel.
+
+    Returns
+    -------
+    Figure
+        Both axes logarithmic; 1 is the noise floor.
+    """
+    sensors = list(dict.fromkeys(spectrum.channel.split("_")[0] for spectrum in spectra))
+    if not sensors:
+        return style.empty("The log is too short for a spectrum of the residual.")
+    figure = style.new_figure(max(5.2, 10.4 * len(sensors) / 3), 3.4)
+    grid = figure.subplots(1, len(sensors), squeeze=False, sharey=True)[0]
+    for axes, sensor in zip(grid, sensors, strict=True):
+        _sensor(axes, sensor, [spectrum for spectrum in spectra if spectrum.channel.split("_")[0] == sensor])
+    grid[0].set_ylabel("residual density over noise floor", fontsize=9)
+    return figure
+
+
+def _sensor(axes: Axes, sensor: str, spectra: Sequence[SpectrumLike]) -> None:
+    """Draw the lines of one sensor."""
+    peak, peak_frequency = 0.0, float("nan")
+    axes.axhline(1.0, color=style.INK, linewidth=1.0, linestyle=":")
+    for spectrum in spectra:
+        axis = spectrum.channel.rpartition("_")[2]
+        frequency, density = np.asarray(spectrum.frequency), np.asarray(spectrum.density) / spectrum.floor
+        usable = (frequency > 0.0) & (density > 0.0) & np.isfinite(density)
+        if not usable.any():
+            continue
+        frequency, density = frequency[usable], density[usable]
+        axes.plot(
+            frequency,
+            density,
+            color=style.AXES.get(axis, style.INK),
+            linestyle=style.LINES.get(axis, "-"),
+            linewidth=1.2,
+            label=axis,
+        )
+        if density.max() > peak:
+            peak, peak_frequency = float(density.max()), float(frequency[density.argmax()])
+    if peak > 0.0:
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.legend(frameon=False, fontsize=8, ncols=3, loc="upper right")
+    name = _NAMES.get(sensor, sensor)
+    style.title(
+        axes,
+        f"The {name}'s residual peaks at {quantity.number(peak_frequency, 2)} Hz"
+        if peak > 3.0
+        else f"The {name}'s residual is flat",
+        9.5,
+    )
+    axes.set_xlabel("frequency, Hz", fontsize=9)
+    style.tidy(axes)

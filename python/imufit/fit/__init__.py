@@ -1,0 +1,5 @@
+"""A stack of effects fitted to a log."""
+
+from imufit.fit.fit import Fit
+
+__all__ = ["Fit"]

@@ -1,0 +1,247 @@
+"""Evidence of one log around one model: what every question is asked of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit import _imufit
+from imufit.errors import InputError
+from imufit.fit.passes import CHANNELS, MIN_COVERAGE, Passes
+from imufit.log import LogSource
+from imufit.model.catalogue import COLUMN, column_effects, effects, find_effect
+from imufit.model.sensor_model import SensorModel
+from imufit.progress import Progress
+
+Array = NDArray[np.float64]
+
+BLOCKS = 48
+FIELD_REFERENCE = "mag.field_reference"
+"""Fitted along, unnamed, wherever the reference field was estimated from the log itself."""
+
+MAX_ITERATIONS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Fitted parameters of some slots.
+
+    Attributes
+    ----------
+    values, errors : dict of int to ndarray
+        By slot: parameter values and standard errors, SI units.
+    step : ndarray
+        (p,) step of every parameter of the evidence.
+    held_out, training : float
+        Residual RMS over noise floor on data not used for the fit, and on all data.
+    """
+
+    values: dict[int, Array]
+    errors: dict[int, Array]
+    step: Array
+    held_out: float
+    training: float
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """Evidence of a log with the columns of every effect, taken around given parameter values.
+
+    Slots are effects in a fixed order: those of the model, the unnamed ones that are always fitted, the candidates.
+    """
+
+    passes: Passes
+    facts: _imufit.Facts
+    model: SensorModel
+    nuisance: dict[str, list[float]]
+    candidates: dict[str, _imufit.Effect]
+    refused: dict[str, str]
+    raw: _imufit.Evidence
+    white: _imufit.Evidence
+    problem: _imufit.Problem
+    raw_variance: list[float]
+    variance: list[float]
+    floors: list[float]
+    filters: list[list[float]]
+
+    @classmethod
+    def of(cls, model: SensorModel, log: LogSource, progress: Progress, *, keep_constants: bool = False) -> Analysis:
+        """Survey a log, find its noise and take its evidence around a model.
+
+        Parameters
+        ----------
+        model : SensorModel
+            Effects and parameters to take the evidence around.
+        log : LogSource
+            The log.
+        progress : callable
+            Told of the rows done.
+        keep_constants : bool
+            Temperatures and covariates count from the means that the model was fitted with, not from this log's.
+        """
+        passes = Passes(log, progress)
+        facts, coverage = passes.survey()
+        if keep_constants and model.constants:
+            facts = facts.with_means(model.constants.get("temperature_mean"), model.constants.get("covariate_means"))
+        candidates, refused = _candidates(model, facts, coverage)
+        for effect, _ in model.stack():
+            reason = effect.not_testable(facts) or _not_covered(effect.id, coverage)
+            if reason is not None:
+                raise InputError(f"effect {effect.id} cannot be fitted: {reason}", file=log.path)
+        nuisance = {}
+        if facts.field_estimated and FIELD_REFERENCE not in model.effects:
+            nuisance = {FIELD_REFERENCE: [0.0, 0.0, 0.0]}
+        white = [[] for _ in CHANNELS]  # type: list[list[float]]
+        raw = _empty(facts, model, nuisance, candidates, white)
+        passes.evidence(raw, facts, "taking evidence")
+        step, raw_variance = _imufit.saturate(raw)
+        filters = passes.autocovariance(raw, facts, step).filters()
+        floors = _floors(log, raw_variance)
+        analysis = cls(
+            passes, facts, model, nuisance, candidates, refused, raw, raw, None, raw_variance, raw_variance, floors, filters
+        )
+        return analysis._whitened()
+
+    def _whitened(self) -> Analysis:
+        white, variance = self.raw, self.raw_variance
+        if any(self.filters):
+            white = self.passes.evidence(self.raw.with_filters(self.filters), self.facts, "whitening the evidence")
+            _, variance = _imufit.saturate(white)
+        problem = _imufit.Problem(white, self.raw, variance, self.floors)
+        return replace(self, white=white, variance=variance, problem=problem)
+
+    def around(self, model: SensorModel, nuisance: Mapping[str, list[float]]) -> Analysis:
+        """Evidence of the same log around other parameter values or another stack of effects."""
+        known = {**self.candidates, **dict(zip(self.model.effects, (e for e, _ in self.model.stack()), strict=True))}
+        candidates = {key: effect for key, effect in known.items() if key not in model.effects and key not in nuisance}
+        raw = _empty(self.facts, model, nuisance, candidates, [[] for _ in CHANNELS])
+        self.passes.evidence(raw, self.facts, "taking evidence")
+        moved = replace(self, model=model, nuisance=dict(nuisance), candidates=candidates, raw=raw)
+        return moved._whitened()
+
+    @property
+    def slots(self) -> list[str]:
+        """Ids of all slots: the model's effects, the unnamed ones, the candidates."""
+        return [*self.model.effects, *self.nuisance, *self.candidates]
+
+    @property
+    def fitted_slots(self) -> list[int]:
+        """Slots that are fitted: the model's effects and the unnamed ones."""
+        return list(range(len(self.model.effects) + len(self.nuisance)))
+
+    @property
+    def candidate_slots(self) -> list[int]:
+        """Slots of the candidates."""
+        return list(range(len(self.fitted_slots), len(self.slots)))
+
+    def estimate(self) -> Estimate:
+        """Fit the model's effects (and the unnamed ones) to the evidence."""
+        return self._estimate(self.fitted_slots)
+
+    def estimate_unnamed(self) -> Estimate:
+        """Keep the model as it is and fit only what is always fitted along."""
+        return self._estimate(self.fitted_slots[len(self.model.effects) :])
+
+    def _estimate(self, chosen: list[int]) -> Estimate:
+        result = self.problem.estimate(chosen)
+        values, errors, at = {}, {}, 0
+        present = [*(v for _, v in self.model.stack()), *self.nuisance.values()]
+        for slot in chosen:
+            count = len(present[slot])
+            values[slot] = np.asarray(present[slot]) + result["step"][at : at + count]
+            errors[slot] = result["standard_error"][at : at + count]
+            at += count
+        return Estimate(values, errors, result["full_step"], result["held_out"], result["training"])
+
+    def moved_to(self, estimate: Estimate) -> tuple[SensorModel, dict[str, list[float]]]:
+        """The model and the unnamed effects with estimated parameters."""
+        ids = self.slots
+        parameters, errors = {}, {}
+        for slot in range(len(self.model.effects)):
+            names = [name for name, _, _ in find_effect(ids[slot]).parameters]
+            parameters[ids[slot]] = dict(zip(names, map(float, estimate.values[slot]), strict=True))
+            errors[ids[slot]] = dict(zip(names, map(float, estimate.errors[slot]), strict=True))
+        nuisance = {ids[slot]: [float(v) for v in estimate.values[slot]] for slot in self.fitted_slots if ids[slot] in self.nuisance}
+        constants = {
+            "temperature_mean": self.facts.temperature_mean if self.facts.has_temperature else None,
+            "covariate_means": {
+                name: mean
+                for name, mean in self.facts.covariate_means.items()
+                if any(key.endswith(COLUMN + name) for key in self.model.effects)
+            },
+        }
+        kept = {key: value for key, value in constants.items() if value}
+        return SensorModel(self.model.effects, parameters, constants=kept, standard_errors=errors), nuisance
+
+    def converged(self, estimate: Estimate) -> bool:
+        """True if no parameter still moves by more than a hundredth of its standard error."""
+        present = [*(v for _, v in self.model.stack()), *self.nuisance.values()]
+        return all(
+            bool(np.all(np.abs(estimate.values[slot] - present[slot]) <= 0.01 * estimate.errors[slot]))
+            for slot in estimate.values
+        )
+
+    @property
+    def linear(self) -> bool:
+        """True if the reading is proportional to the fitted parameters, so that one solution is exact."""
+        stages = {effect.stage for effect, _ in self.model.stack()}
+        stages |= {find_effect(key).stage for key in self.nuisance} if "gain" in stages else set()
+        return "reference" not in stages and not {"input", "gain"} <= stages
+
+    def solved(self) -> tuple[Analysis, Estimate]:
+        """Evidence around the best parameters, by Gauss and Newton's iteration where the effects are not linear."""
+        analysis, estimate = self, self.estimate()
+        if analysis.linear:
+            return analysis, estimate
+        for _ in range(MAX_ITERATIONS):
+            if analysis.converged(estimate):
+                break
+            analysis = analysis.around(*analysis.moved_to(estimate))
+            estimate = analysis.estimate()
+        return analysis, estimate
+
+
+def _candidates(
+    model: SensorModel, facts: _imufit.Facts, coverage: Mapping[str, float]
+) -> tuple[dict[str, _imufit.Effect], dict[str, str]]:
+    """Effects that can be asked about on this log, and why the others cannot."""
+    own = [name for name in coverage if name != "temp"]
+    offered: dict[str, Any] = {**effects(), **column_effects(own, facts.sensors)}
+    candidates, refused = {}, {}
+    for key, effect in offered.items():
+        if key in model.effects or (key == FIELD_REFERENCE and facts.field_estimated):
+            continue
+        reason = effect.not_testable(facts) or _not_covered(key, coverage)
+        if reason is None:
+            candidates[key] = effect
+        else:
+            refused[key] = reason
+    return candidates, refused
+
+
+def _not_covered(effect_id: str, coverage: Mapping[str, float]) -> str | None:
+    column = effect_id.split(COLUMN, 1)[1] if COLUMN in effect_id else "temp" if "temperature" in effect_id else None
+    if column is None or coverage.get(column, 0.0) >= MIN_COVERAGE:
+        return None
+    return f"column {column} is known in only {100 * coverage.get(column, 0.0):.0f} % of the rows"
+
+
+def _empty(
+    facts: _imufit.Facts,
+    model: SensorModel,
+    nuisance: Mapping[str, list[float]],
+    candidates: Mapping[str, _imufit.Effect],
+    filters: list[list[float]],
+) -> _imufit.Evidence:
+    stack = [*model.stack(), *((find_effect(key), values) for key, values in nuisance.items())]
+    return _imufit.Evidence(facts, stack, list(candidates.values()), BLOCKS, filters)
+
+
+def _floors(log: LogSource, variance: list[float]) -> list[float]:
+    """Noise floor of each channel: from the metadata, else what no effect of the catalogue explains."""
+    given = log.metadata.noise
+    return [given.get(channel[:3]) or float(np.sqrt(v)) for channel, v in zip(CHANNELS, variance, strict=True)]

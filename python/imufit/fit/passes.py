@@ -1,0 +1,141 @@
+"""Passes over a log, chunk by chunk: survey, evidence, noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit import _imufit
+from imufit.errors import InputError
+from imufit.log import Chunk, LogSource
+from imufit.progress import Progress
+
+CHUNK_ROWS = 65536
+SURVEY_MARGIN = 4096
+
+MASKS = ("ref_exact", "movement")
+"""Columns that say how to use a row; they are no covariates."""
+
+CHANNELS = tuple(f"{sensor}_{axis}" for sensor in ("acc", "gyr", "mag") for axis in "xyz")
+UNITS = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
+
+MIN_ROWS = 200
+MIN_COVERAGE = 0.98
+
+
+def covariate_names(log: LogSource) -> list[str]:
+    """Columns of a log that can act on its sensors."""
+    return [name for name in log.columns if name not in MASKS and name in _own_columns(log)]
+
+
+def _own_columns(log: LogSource) -> set[str]:
+    first = next(iter(log.chunks(1024, 0)), None)
+    return set() if first is None else set(first.log.covariates)
+
+
+def chunk_arrays(chunk: Chunk, covariates: Sequence[str]) -> dict[str, Any]:
+    """A chunk as the compiled core takes it."""
+    log = chunk.log
+    return {
+        "t": log.t,
+        "acc": log.acc,
+        "gyr": log.gyr,
+        "mag": log.mag,
+        "temp": log.temp,
+        "ref_q": log.ref_q,
+        "ref_p": log.ref_p,
+        "ref_exact": log.covariates.get("ref_exact"),
+        "covariates": [log.covariates[name] for name in covariates],
+        "offset": chunk.start - chunk.begin,
+        "begin": chunk.begin,
+        "end": chunk.end,
+    }
+
+
+class Passes:
+    """Passes over one log with the same covariates.
+
+    Parameters
+    ----------
+    log : LogSource
+        The log.
+    progress : callable
+        Told of the rows done.
+    """
+
+    def __init__(self, log: LogSource, progress: Progress) -> None:
+        self.log = log
+        self.covariates = covariate_names(log)
+        self._progress = progress
+
+    def chunks(self, margin: int, label: str) -> Iterator[dict[str, Any]]:
+        """Chunks of the log as the compiled core takes them, telling the progress."""
+        for chunk in self.log.chunks(CHUNK_ROWS, margin):
+            yield chunk_arrays(chunk, self.covariates)
+            self._progress(chunk.start + chunk.end - chunk.begin, self.log.n, label)
+
+    def survey(self) -> tuple[_imufit.Facts, dict[str, float]]:
+        """First pass: facts of the log, and which share of the rows each covariate (``temp`` too) is known in.
+
+        Raises
+        ------
+        InputError
+            The log has no reference, no sensor or too few rows.
+        """
+        log, metadata = self.log, self.log.metadata
+        if log.n < MIN_ROWS:
+            raise InputError(f"{log.n} rows are too few for a fit", file=log.path, remedy=f"Record at least {MIN_ROWS}.")
+        survey = _imufit.Survey(
+            log.n,
+            metadata.frame,
+            metadata.gravity,
+            None if metadata.mag_reference is None else tuple(metadata.mag_reference),
+            self.covariates,
+        )
+        reference = 0
+        known = np.zeros(len(self.covariates) + 1)
+        for arrays in self.chunks(SURVEY_MARGIN, "surveying"):
+            core = slice(arrays["begin"], arrays["end"])
+            if arrays["ref_q"] is not None:
+                reference += int(np.isfinite(arrays["ref_q"][core, 0]).sum())
+            for k, column in enumerate([arrays["temp"], *arrays["covariates"]]):
+                if column is not None:
+                    known[k] += _held_count(column[core])
+            survey.add(arrays)
+        if reference == 0:
+            raise InputError(
+                "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz)",
+                file=log.path,
+                remedy="Add the reference, or ref_angle with the metadata rig_axis.",
+            )
+        facts = survey.finish()
+        if not facts.sensors:
+            raise InputError("no sensor of the log has a sample", file=log.path)
+        return facts, dict(zip(["temp", *self.covariates], known / log.n, strict=True))
+
+    def evidence(self, evidence: _imufit.Evidence, facts: _imufit.Facts, label: str) -> _imufit.Evidence:
+        """Fill empty evidence with the whole log."""
+        for arrays in self.chunks(facts.margin, label):
+            evidence.add(arrays)
+        return evidence
+
+    def autocovariance(
+        self, evidence: _imufit.Evidence, facts: _imufit.Facts, step: NDArray[np.float64]
+    ) -> _imufit.Autocovariance:
+        """Autocovariance of the residual left by a step of all parameters."""
+        out = _imufit.Autocovariance()
+        for arrays in self.chunks(facts.margin, "measuring the noise"):
+            out.add(arrays, evidence, step)
+        return out
+
+
+def _held_count(column: NDArray[np.float64], hold: int = 256) -> int:
+    """Rows in which a column is known or known at most `hold` rows before."""
+    rows = np.flatnonzero(np.isfinite(column))
+    if rows.size == 0:
+        return 0
+    reach = np.diff(np.append(rows, len(column)))
+    return int(np.minimum(reach, hold + 1).sum())

@@ -1,0 +1,22 @@
+"""Log files: read, check, convert, write."""
+
+from imufit.errors import InputError
+from imufit.log.log import Chunk, Log, LogSource, concatenate
+from imufit.log.metadata import Metadata
+from imufit.log.segments import gaps
+from imufit.log.stream import LogStream, open_log, read
+from imufit.log.units import parse_mapping
+
+__all__ = [
+    "Chunk",
+    "InputError",
+    "Log",
+    "LogSource",
+    "LogStream",
+    "Metadata",
+    "concatenate",
+    "gaps",
+    "open_log",
+    "parse_mapping",
+    "read",
+]

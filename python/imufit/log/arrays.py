@@ -1,0 +1,102 @@
+"""From arrays in memory to the checked fields of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from imufit.errors import InputError
+from imufit.log.assemble import group_fields
+from imufit.log.check import check_finite, check_poses, checked_labels
+from imufit.log.columns import CONTRACT, GROUPS
+from imufit.log.metadata import Metadata
+from imufit.log.place import Place
+from imufit.log.time_order import TimeScan
+
+Array = NDArray[np.float64]
+
+
+def rotation_from_quaternions(q: Array) -> Rotation:
+    """Make rotations of (n, 4) quaternions, scalar first; rows of NaN become the identity."""
+    scalar_last = q[:, [1, 2, 3, 0]].copy()
+    scalar_last[np.isnan(scalar_last).any(axis=1)] = [0.0, 0.0, 0.0, 1.0]
+    return Rotation.from_quat(scalar_last)
+
+
+def quaternions_from_rotation(rotation: Rotation) -> Array:
+    """Return (n, 4) quaternions, scalar first."""
+    return np.ascontiguousarray(np.atleast_2d(rotation.as_quat())[:, [3, 0, 1, 2]])
+
+
+def contiguous(values: ArrayLike, name: str, shape: tuple[int, ...] | None = None) -> Array:
+    """Make a C-contiguous float64 array, without a copy where it is one; refuse another shape."""
+    try:
+        array = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("the array does not hold numbers", file="log", column=name) from None
+    if shape is not None and array.shape != shape:
+        raise InputError(
+            f"the array has shape {array.shape}, but {shape} is wanted: rows are samples", file="log", column=name
+        )
+    return array
+
+
+def fields_from_arrays(
+    t: ArrayLike,
+    given: Mapping[str, ArrayLike | None],
+    covariates: Mapping[str, ArrayLike],
+    text: Mapping[str, Any],
+    metadata: Metadata,
+) -> dict[str, Any]:
+    """Check arrays as if they had been read, and make the fields of a log.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Time, s.
+    given : mapping
+        ``acc``, ``gyr``, ``mag``, ``ref_p`` (n, 3), ``ref_q`` (n, 4), ``temp``, ``ref_angle`` (n,), or None.
+    covariates : mapping
+        Other numeric columns, (n,).
+    text : mapping
+        Text columns, (n,), the pose among them.
+    metadata : Metadata
+        Its rig axis turns `ref_angle` into an attitude.
+
+    Returns
+    -------
+    dict
+        Fields as in `imufit.log.Log`.
+    """
+    place = Place()
+    time = contiguous(t, "t")
+    if time.ndim != 1:
+        raise InputError(f"the array has shape {time.shape}, but (n,) is wanted", file="log", column="t")
+    scan = TimeScan(place)
+    scan.add(time)
+    numbers: dict[str, Array] = {}
+    for name, values in given.items():
+        if values is not None:
+            numbers |= _split(name, values, time.size)
+    for name, values in covariates.items():
+        if name in CONTRACT:
+            raise place.error("a covariate cannot have the name of a log column", column=name, remedy="Rename it.")
+        numbers[name] = contiguous(values, name, (time.size,))
+    for column, numeric in numbers.items():
+        check_finite(numeric, column, 0, place)
+    cells = {name: checked_labels(np.array(column, dtype=object)) for name, column in text.items()}
+    check_poses(cells.get("pose", np.empty(0, object)), 0, place)
+    repair = scan.finish()
+    fields = group_fields(repair.apply(time, 0), numbers, cells, start=0, metadata=metadata, place=place)
+    return {**fields, "metadata": metadata, "notes": (repair.note,) if repair.note else ()}
+
+
+def _split(name: str, values: ArrayLike, n: int) -> dict[str, Array]:
+    """Take a group apart into its columns."""
+    columns = GROUPS.get(name)
+    array = contiguous(values, name, (n,) if columns is None else (n, len(columns)))
+    return {name: array} if columns is None else {column: array[:, i] for i, column in enumerate(columns)}

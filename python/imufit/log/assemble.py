@@ -1,0 +1,142 @@
+"""From a block of file columns to the checked fields of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.log.check import check_finite, check_poses, checked_attitude, checked_labels, numbers_from_text
+from imufit.log.columns import GROUPS, NUMERIC
+from imufit.log.foreign import Plan, PlannedColumn
+from imufit.log.metadata import Metadata
+from imufit.log.place import Place
+from imufit.log.time_order import TimeRepair
+from imufit.log.units import Conversion
+
+RawBlock = Mapping[str, NDArray[Any]]
+"""File columns by name: (n,) float64 for numbers, (n,) object for text."""
+
+
+def time_of(plan: Plan, block: RawBlock, start: int, rows: int, place: Place) -> NDArray[np.float64]:
+    """Time stamps of one block in s, (n,), before any repair."""
+    return _numbers(plan.time, block, start, rows, place)
+
+
+def fields_of(
+    plan: Plan, block: RawBlock, start: int, rows: int, *, repair: TimeRepair, metadata: Metadata, place: Place
+) -> dict[str, Any]:
+    """Check one block and group its columns into the fields of a log.
+
+    Parameters
+    ----------
+    plan : Plan
+        Which file column becomes which column of the log.
+    block : mapping
+        File columns, each (n,).
+    start, rows : int
+        First row of the block in the log, and its number of rows n.
+    repair : TimeRepair
+        New time stamps from the pass over `t`.
+    metadata : Metadata
+        Its rig axis turns `ref_angle` into an attitude.
+    place : Place
+        To name the file in errors.
+
+    Returns
+    -------
+    dict
+        Fields as in `imufit.log.Log`, without metadata, path and notes.
+    """
+    numbers: dict[str, NDArray[np.float64]] = {}
+    text: dict[str, NDArray[np.object_]] = {}
+    for column in plan.columns:
+        if column.target == "t":
+            continue
+        raw = block[column.source] if column.source is not None else None
+        if column.target == "pose":
+            text["pose"] = _poses(raw, rows, start, place)
+        elif (
+            raw is not None
+            and raw.dtype == object
+            and column.target not in NUMERIC
+            and column.conversion == Conversion()
+        ):
+            text[column.target] = checked_labels(raw)
+        else:
+            values = _numbers(column, block, start, rows, place)
+            check_finite(values, column.source or column.target, start, place)
+            numbers[column.target] = values
+    t = repair.apply(time_of(plan, block, start, rows, place), start)
+    return group_fields(t, numbers, text, start=start, metadata=metadata, place=place)
+
+
+def group_fields(
+    t: NDArray[np.float64],
+    numbers: dict[str, NDArray[np.float64]],
+    text: dict[str, NDArray[np.object_]],
+    *,
+    start: int,
+    metadata: Metadata,
+    place: Place,
+) -> dict[str, Any]:
+    """Group checked columns into fields; what has no fixed meaning becomes covariates and labels."""
+    fields: dict[str, Any] = {"t": t}
+    for name, columns in GROUPS.items():
+        if columns[0] in numbers:
+            fields[name] = np.stack([numbers.pop(column) for column in columns], axis=1)
+    for name in ("temp", "ref_angle"):
+        if name in numbers:
+            fields[name] = numbers.pop(name)
+    if "ref_q" in fields:
+        fields["ref_q"] = checked_attitude(fields["ref_q"], start, place)
+    elif "ref_angle" in fields and metadata.rig_axis is not None:
+        fields["ref_q"] = attitude_of_rig(fields["ref_angle"], metadata.rig_axis)
+    if "pose" in text:
+        fields["pose"] = text.pop("pose")
+    return {**fields, "covariates": numbers, "labels": text}
+
+
+def attitude_of_rig(angle: NDArray[np.float64], axis: str) -> NDArray[np.float64]:
+    """Attitude of a one-axis rig that is the identity at angle 0.
+
+    Parameters
+    ----------
+    angle : (n,) array
+        Rotation about the body axis, rad; NaN is missing.
+    axis : {"x", "y", "z"}
+        Body axis of the rig.
+
+    Returns
+    -------
+    (n, 4) array
+        Unit quaternions, scalar first.
+    """
+    q = np.zeros((angle.size, 4))
+    q[:, 0] = np.cos(0.5 * angle)
+    q[:, 1 + "xyz".index(axis)] = np.sin(0.5 * angle)
+    q[np.isnan(angle)] = np.nan
+    return q
+
+
+def _numbers(column: PlannedColumn, block: RawBlock, start: int, rows: int, place: Place) -> NDArray[np.float64]:
+    if column.source is None:
+        return column.conversion.apply(np.arange(start, start + rows, dtype=np.float64))
+    raw = block[column.source]
+    if raw.dtype == object:
+        raw = numbers_from_text(raw, column.source, start, place)
+    return column.conversion.apply(raw)
+
+
+def _poses(raw: NDArray[Any] | None, rows: int, start: int, place: Place) -> NDArray[np.object_]:
+    cells = np.full(rows, None) if raw is None else raw
+    if cells.dtype != object:
+        found = np.flatnonzero(~np.isnan(cells))
+        if found.size:
+            check_poses(np.array([str(cells[found[0]])], dtype=object), start + int(found[0]), place)
+        cells = np.full(rows, None)
+    poses = checked_labels(cells)
+    check_poses(poses, start, place)
+    return poses

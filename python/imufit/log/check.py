@@ -1,0 +1,133 @@
+"""Values that no log may hold, row by row: infinite readings, bad quaternions, unknown poses, text for numbers."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.log.columns import GROUPS, POSES
+from imufit.log.place import Place
+
+UNIT_TOLERANCE: Final = 1e-3
+_EXACT: Final = 1e-12
+_MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--"})
+_BOOLEAN: Final = {"true": 1.0, "false": 0.0}
+
+
+def number_from_text(cell: Any) -> float:
+    """Read one cell; empty and the usual words for a missing value give NaN.
+
+    Raises
+    ------
+    ValueError
+        The cell is no number.
+    """
+    if cell is None:
+        return float("nan")
+    text = str(cell).strip()
+    folded = text.lower()
+    if folded in _MISSING:
+        return float("nan")
+    if folded in _BOOLEAN:
+        return _BOOLEAN[folded]
+    if "_" in text:
+        raise ValueError(text)
+    return float(text)
+
+
+def numbers_from_text(cells: NDArray[np.object_], column: str, start: int, place: Place) -> NDArray[np.float64]:
+    """Read a text column that has to hold numbers; (n,) float64."""
+    values = np.empty(len(cells))
+    for i, cell in enumerate(cells):
+        try:
+            values[i] = number_from_text(cell)
+        except ValueError:
+            text = str(cell).strip()
+            shown = text if len(text) <= 40 else text[:37] + "..."
+            remedy = "Write a number, or leave the cell empty for a missing sample."
+            if text.count(",") == 1 and "." not in text:
+                remedy = "Write a decimal point, not a comma."
+            raise place.error(f"{shown!r} is not a number", row=start + i, column=column, remedy=remedy) from None
+    return values
+
+
+def check_finite(values: NDArray[np.float64], column: str, start: int, place: Place) -> None:
+    """Refuse infinite values; NaN is a missing sample."""
+    bad = np.flatnonzero(np.isinf(values))
+    if bad.size:
+        raise place.error(
+            f"{values[bad[0]]} is not a reading",
+            row=start + int(bad[0]),
+            column=column,
+            remedy="Write NaN (or leave the cell empty) for a missing sample.",
+        )
+
+
+def checked_attitude(q: NDArray[np.float64], start: int, place: Place) -> NDArray[np.float64]:
+    """Check reference quaternions and take away rounding of their norm.
+
+    Parameters
+    ----------
+    q : (n, 4) array
+        Scalar first; a row of NaN is a missing reference.
+    start : int
+        Row of the log at which the block begins.
+    place : Place
+        To name the file in errors.
+
+    Returns
+    -------
+    (n, 4) array
+        Unit quaternions. Norms up to 1e-3 off one are set right; beyond, it is an error.
+    """
+    missing = np.isnan(q)
+    half = np.flatnonzero(missing.any(axis=1) & ~missing.all(axis=1))
+    if half.size:
+        column = GROUPS["ref_q"][int(np.flatnonzero(missing[half[0]])[0])]
+        raise place.error(
+            "NaN in one part of a quaternion whose other parts are there",
+            row=start + int(half[0]),
+            column=column,
+            remedy="A missing reference needs NaN in all of ref_qw ref_qx ref_qy ref_qz.",
+        )
+    norm = np.linalg.norm(q, axis=1)
+    off = np.abs(norm - 1.0)
+    bad = np.flatnonzero(off > UNIT_TOLERANCE)
+    if bad.size:
+        i = int(bad[0])
+        if norm[i] == 0.0:
+            problem, remedy = "the quaternion is all zero", "Write NaN in all four parts for a missing reference."
+        else:
+            problem = f"the quaternion has norm {norm[i]:.6g}, not 1"
+            remedy = "Reference attitudes are unit quaternions, scalar first: normalise them."
+        raise place.error(problem, row=start + i, column="ref_qw", remedy=remedy)
+    rounded = off > _EXACT
+    if rounded.any():
+        q = q.copy()
+        q[rounded] /= norm[rounded, None]
+    return q
+
+
+def checked_labels(cells: NDArray[np.object_]) -> NDArray[np.object_]:
+    """Text column with None where there is no text."""
+    labels = np.empty(len(cells), dtype=object)
+    labels[:] = [None if _absent(cell) else str(cell) for cell in cells]
+    return labels
+
+
+def _absent(cell: Any) -> bool:
+    return cell is None or cell == "" or cell is np.ma.masked or (isinstance(cell, float) and np.isnan(cell))
+
+
+def check_poses(poses: NDArray[np.object_], start: int, place: Place) -> None:
+    """Refuse pose labels other than the six."""
+    for i, pose in enumerate(poses):
+        if pose is not None and pose not in POSES:
+            raise place.error(
+                f"{pose!r} is not a pose",
+                row=start + i,
+                column="pose",
+                remedy=f"Write one of {' '.join(POSES)} (that body axis points up), or nothing.",
+            )

@@ -1,0 +1,161 @@
+"""How a text table is laid out: encoding, separator, preamble, header, first data line."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from imufit.errors import InputError
+from imufit.log.check import number_from_text
+
+_SAMPLE: Final = 1 << 16
+_LINES: Final = 60
+COMMENT: Final = ("#", "%", "//")
+NOT_DATA: Final = re.compile(rb"\n[ \t]*(?:#|%|//|\r?\n)")
+"""Line end before a line that holds no data: a comment or a blank line."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Layout of a text table.
+
+    Parameters
+    ----------
+    separator : str
+        Comma, semicolon, tab; a blank stands for any run of blanks.
+    names : tuple of str
+        Header; ``1``, ``2``, ... when there is none.
+    header_line : int or None
+        Line of the header, from 0.
+    data_offset : int
+        Byte at which the line after the header begins.
+    data_line : int
+        Line, from 0, at that byte.
+    notes : tuple of str
+        What was skipped.
+    """
+
+    separator: str
+    names: tuple[str, ...]
+    header_line: int | None
+    data_offset: int
+    data_line: int
+    notes: tuple[str, ...] = ()
+
+
+def text_of(data: bytes) -> str:
+    """Decode UTF-8, or else the western Windows code page."""
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
+
+
+def split_line(line: str, separator: str) -> list[str]:
+    """Fields of one line, stripped."""
+    if separator == " ":
+        return line.split()
+    try:
+        return [field.strip() for field in next(csv.reader([line], delimiter=separator), [])]
+    except csv.Error:
+        return line.split(separator)
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is blank or a comment."""
+    return not line.strip() or line.lstrip().startswith(COMMENT)
+
+
+def read_layout(path: Path) -> Layout:
+    """Find the layout of a text table from its first 64 kB.
+
+    Raises
+    ------
+    InputError
+        It is no text, or no header and rows can be made out.
+    """
+    with path.open("rb") as file:
+        raw = file.read(_SAMPLE + 1)
+    if b"\0" in raw:
+        raise InputError("this is not a text file", file=path, remedy="Check the suffix.")
+    if b"\r" in raw and b"\n" not in raw:
+        raise InputError("the lines end in CR alone", file=path, remedy="Save it with LF or CR LF line ends.")
+    whole = len(raw) <= _SAMPLE
+    pieces = raw[:_SAMPLE].split(b"\n")
+    if not whole and len(pieces) > 1:
+        pieces.pop()
+    lines = [text_of(piece).rstrip("\r") for piece in pieces]
+    lines[0] = lines[0].removeprefix("\ufeff")
+    table = [i for i, line in enumerate(lines) if not is_comment(line)]
+    if not table:
+        raise InputError("the file holds no table", file=path, remedy="A header and rows are wanted.")
+    separator, width = _separator([lines[i] for i in table])
+    header, names, notes = _header(lines, table, separator, width, path)
+    offset = 0 if header is None else sum(len(piece) + 1 for piece in pieces[: header + 1])
+    first = 0 if header is None else header + 1
+    return Layout(separator, names, header, min(offset, path.stat().st_size), first, notes)
+
+
+def _separator(lines: list[str]) -> tuple[str, int]:
+    """Find the separator and the number of fields that most of the last lines of the sample agree on."""
+    best = (0.0, 0, " ", 1)
+    for order, separator in enumerate("\t;, "):
+        counts = Counter(len(split_line(line, separator)) for line in lines[-_LINES:])
+        width, times = max(counts.items(), key=lambda item: (item[1], item[0]))
+        if width > 1:
+            best = max(best, (times / sum(counts.values()), -order, separator, width))
+    return best[2], best[3]
+
+
+def _numeric(field: str) -> bool:
+    try:
+        return number_from_text(field) is not None and field != ""
+    except ValueError:
+        return False
+
+
+def _header(
+    lines: list[str], table: list[int], separator: str, width: int, path: Path
+) -> tuple[int | None, tuple[str, ...], tuple[str, ...]]:
+    """Header line, its names and notes; numbered columns when the table begins without a header."""
+    for position, i in enumerate(table[:_LINES]):
+        fields = split_line(lines[i], separator)
+        if len(fields) in (width, width - 1) and not any(_numeric(field) for field in fields) and any(fields):
+            if len(fields) == width - 1 and not _trailing(lines, table[position + 1 :], separator):
+                continue
+            notes = (
+                (f"{path.name}: {position} {'lines' if position > 1 else 'line'} before the header skipped",)
+                if position
+                else ()
+            )
+            return i, _named([*fields, *[""] * (width - len(fields))]), notes
+        if len(fields) == width and all(_numeric(field) for field in fields if field):
+            break
+    first = split_line(lines[table[0]], separator)
+    commented = [i for i, line in enumerate(lines[: table[0]]) if line.strip()]
+    if commented:
+        fields = split_line(lines[commented[-1]].strip().lstrip("#%/").strip(), separator)
+        if len(fields) == width and not any(_numeric(field) for field in fields):
+            return commented[-1], _named(fields), ()
+    if not any(_numeric(field) for field in first):
+        raise InputError(
+            f"the header has {len(first)} names, but the rows have {width} fields",
+            file=path,
+            line=table[0] + 1,
+            remedy="Give every column one name.",
+        )
+    names = tuple(str(k + 1) for k in range(width))
+    return None, names, (f"{path.name}: no header: the columns are called 1 to {width}",)
+
+
+def _trailing(lines: list[str], rows: list[int], separator: str) -> bool:
+    """Whether the rows end with a separator that the header has not."""
+    return separator != " " and bool(rows) and all(lines[i].rstrip().endswith(separator.strip()) for i in rows[:5])
+
+
+def _named(fields: list[str]) -> tuple[str, ...]:
+    return tuple(field or f"column_{k + 1}" for k, field in enumerate(fields))

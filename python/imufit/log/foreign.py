@@ -1,0 +1,194 @@
+"""Which columns of a file become which columns of the log, and in which unit they stand."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from imufit.errors import InputError
+from imufit.log.columns import CONTRACT, GROUPS, SENSORS, meant, nearest
+from imufit.log.place import Place
+from imufit.log.units import Conversion, conversion, unit_in_header
+
+ROW: Final = "row"
+"""Name that stands for the row number in a mapping, when the file has no column of that name."""
+
+
+@dataclass(frozen=True)
+class PlannedColumn:
+    """One column of the log to be made.
+
+    Parameters
+    ----------
+    target : str
+        Column of the log.
+    source : str or None
+        Column of the file; None for the row number.
+    conversion : Conversion
+        To SI.
+    """
+
+    target: str
+    source: str | None
+    conversion: Conversion
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All columns of the log to be made, from the columns of a file.
+
+    Parameters
+    ----------
+    columns : tuple of PlannedColumn
+        In the order of the file.
+    notes : tuple of str
+        What the plan leaves out.
+    """
+
+    columns: tuple[PlannedColumn, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Columns of the file that are read, each once."""
+        return tuple(dict.fromkeys(column.source for column in self.columns if column.source is not None))
+
+    @property
+    def origin(self) -> dict[str, str]:
+        """Column of the file for each column of the log."""
+        return {column.target: column.source or ROW for column in self.columns}
+
+    @property
+    def time(self) -> PlannedColumn:
+        """The column that becomes `t`."""
+        return next(column for column in self.columns if column.target == "t")
+
+
+def plan_columns(names: Sequence[str], mapping: Mapping[str, str] | None, place: Place) -> Plan:
+    """Decide which columns of the file become which columns of the log.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Columns of the file.
+    mapping : mapping, optional
+        Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
+    place : Place
+        To name the file in errors.
+
+    Raises
+    ------
+    InputError
+        A column is missing, misspelt, there twice, or mapped from a column that is not there.
+    """
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            raise place.error(f"column {name} is there twice", column=name, remedy="Rename or delete one of them.")
+    mapped = [_resolve(target, text, names, place) for target, text in (mapping or {}).items()]
+    targets = {column.target for column in mapped}
+    used = {column.source for column in mapped}
+    kept = [PlannedColumn(name, name, Conversion()) for name in names if name not in targets | used]
+    for column in mapped:
+        if column.target not in CONTRACT and column.target != column.source and (close := meant(column.target)):
+            raise place.error(
+                f"the mapping makes a column {column.target}; did you mean {close}?", column=column.target
+            )
+    lost = [name for name in names if name in targets - used]
+    columns = [*mapped, *kept]
+    _check_complete([column.target for column in columns], [n for n in names if n not in used], place)
+    notes = tuple(f"{place.name}: column {name} left out: the mapping gives that name to another" for name in lost)
+    return Plan(tuple(columns), notes)
+
+
+def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> PlannedColumn:
+    """Find the column, sign and unit that a mapping's source text means."""
+    bare, unit = _bracket(text)
+    for name, given in ((text.strip(), None), (bare, unit)):
+        for sign, column in _signed(name):
+            if column in names or (column == ROW and ROW not in names):
+                return _planned(target, column, sign=sign, unit=given, names=names, place=place)
+    wanted = bare.lstrip("+-").strip()
+    close = nearest(wanted, names, n=3)
+    raise place.error(
+        f"column {wanted} is not in the file, but the mapping takes {target} from it",
+        column=wanted,
+        remedy=f"Nearest are {', '.join(close)}." if close else f"The columns are {', '.join(names)}.",
+    )
+
+
+def _planned(
+    target: str, column: str, *, sign: float, unit: str | None, names: Sequence[str], place: Place
+) -> PlannedColumn:
+    try:
+        text = unit if unit is not None else unit_in_header(column, target)
+        to_si = conversion(target, text)
+    except InputError as error:
+        raise place.error(error.problem, column=error.column, remedy=error.remedy) from None
+    if sign < 0.0:
+        to_si = Conversion(-to_si.factor, -to_si.offset)
+    return PlannedColumn(target, column if column in names else None, to_si)
+
+
+def _bracket(text: str) -> tuple[str, str]:
+    """Split ``AccX[g]`` into the name and the unit."""
+    found = re.fullmatch(r"(.*?)\s*\[([^\[\]]*)\]\s*", text)
+    return (found[1].strip(), found[2]) if found else (text.strip(), "")
+
+
+def _signed(name: str) -> list[tuple[float, str]]:
+    if name[:1] in "+-" and name[1:]:
+        return [(1.0, name), (-1.0 if name[0] == "-" else 1.0, name[1:].strip())]
+    return [(1.0, name)]
+
+
+def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place) -> None:
+    """Refuse a log with a missing or misspelt column, and name the nearest."""
+    free = [name for name in unused if name not in CONTRACT]
+    missing: dict[str, str] = {}
+    for name in free:
+        column = meant(name) if name in targets else None
+        if column is not None and column not in targets:
+            missing.setdefault(column, name)
+    for group in GROUPS.values():
+        if any(column in targets for column in group):
+            for column in group:
+                if column not in targets and column not in missing:
+                    missing[column] = next(iter(nearest(column, free)), "")
+    if "t" not in targets and "t" not in missing:
+        missing["t"] = ""
+    if missing:
+        raise _missing(missing, targets, place)
+    complete = [group for group in (*SENSORS, "ref_q") if all(column in targets for column in GROUPS[group])]
+    if not complete and "ref_angle" not in targets:
+        raise place.error(
+            "there is no sensor: neither acc_x acc_y acc_z nor gyr_* nor mag_* nor a reference ref_q*",
+            remedy="Name the columns with --map acc_x=COLUMN[UNIT] and so on." + _listing(free),
+        )
+
+
+def _missing(missing: dict[str, str], targets: Sequence[str], place: Place) -> InputError:
+    """Error for the first missing column, with the mapping for all of them."""
+    first = min(missing, key=CONTRACT.index)
+    if not missing[first]:
+        group = next((group for group in GROUPS.values() if first in group), ())
+        there = [column for column in group if column in targets]
+        problem = f"column {first} is missing" + (f" although {' and '.join(there)} are there" if there else "")
+        remedy = "Give time in s, for a fixed rate with --map t=row[100Hz]." if first == "t" else ""
+        remedy = remedy or f"Add it, or leave out the others of {', '.join(group)}."
+        return place.error(problem, column=first, remedy=remedy)
+    known = {column: name for column, name in missing.items() if name}
+    pairs = ",".join(f"{column}={known[column]}" for column in sorted(known, key=CONTRACT.index))
+    return place.error(
+        f"column {first} is missing; did you mean {missing[first]}?",
+        column=first,
+        remedy=f"Use --map {shlex.quote(pairs)}",
+    )
+
+
+def _listing(names: Sequence[str]) -> str:
+    if not names:
+        return ""
+    return " The columns are " + ", ".join(names[:12]) + (", ..." if len(names) > 12 else ".")

@@ -1,0 +1,244 @@
+"""What a log says about itself: frame, gravity, field, rig axis, noise."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Final, Literal, cast
+
+import tomli_w
+
+from imufit.errors import InputError
+
+Frame = Literal["NED", "ENU", "NWU"]
+FRAMES: Final = ("NED", "ENU", "NWU")
+AXES: Final = ("x", "y", "z")
+STANDARD_GRAVITY: Final = 9.80665
+
+
+@dataclass(frozen=True)
+class Metadata:
+    """Metadata of a log.
+
+    Parameters
+    ----------
+    frame : {"NED", "ENU", "NWU"}
+        Reference frame of attitude, position and field.
+    gravity : float
+        Magnitude of gravity, m/s^2.
+    mag_reference : tuple of 3 floats, optional
+        Earth's field in the reference frame, uT.
+    rig_axis : {"x", "y", "z"}, optional
+        Body axis about which a one-axis rig turns.
+    sensor : str, optional
+        Free text.
+    noise : dict
+        White noise standard deviation for "acc" (m/s^2), "gyr" (rad/s), "mag" (uT).
+    extra : dict
+        Everything else that stood there; kept when the log is written.
+    """
+
+    frame: Frame = "NED"
+    gravity: float = STANDARD_GRAVITY
+    mag_reference: tuple[float, float, float] | None = None
+    rig_axis: Literal["x", "y", "z"] | None = None
+    sensor: str | None = None
+    noise: dict[str, float] = field(default_factory=dict)
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any], file: str | Path | None = None) -> Metadata:
+        """Check the values and make metadata of them.
+
+        Parameters
+        ----------
+        values : mapping
+            Keys as in the file; None counts as absent, unknown keys go to `extra`.
+        file : str or Path, optional
+            File to name in errors.
+
+        Raises
+        ------
+        InputError
+            A value cannot be; the key is named.
+        """
+        known: dict[str, Any] = {}
+        extra: dict[str, Any] = {}
+        for key, value in values.items():
+            if key == "extra" and isinstance(value, Mapping):
+                extra.update(value)
+            elif key not in KNOWN:
+                extra[key] = value
+            elif value is not None:
+                known[key] = _CHECKS[key](value, file)
+        return cls(**known, extra=extra)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Values as plain numbers, text, lists and dicts, without what is absent."""
+        values: dict[str, Any] = dict(self.extra)
+        values |= {"frame": self.frame, "gravity": self.gravity}
+        if self.mag_reference is not None:
+            values["mag_reference"] = list(self.mag_reference)
+        if self.rig_axis is not None:
+            values["rig_axis"] = self.rig_axis
+        if self.sensor is not None:
+            values["sensor"] = self.sensor
+        if self.noise:
+            values["noise"] = dict(self.noise)
+        return values
+
+    def to_json(self) -> str:
+        """Text for the Parquet schema."""
+        return json.dumps(self.to_mapping())
+
+
+def mapping_from_json(text: str | bytes, file: Path) -> dict[str, Any]:
+    """Read metadata that is kept as JSON inside a log file."""
+    try:
+        values = json.loads(text)
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"the metadata are not valid JSON ({error})", file=file, column="imufit") from None
+    if not isinstance(values, dict):
+        raise InputError("the metadata are not a JSON object", file=file, column="imufit")
+    return values
+
+
+def sidecar_path(path: Path) -> Path:
+    """Place of the sidecar of a log: the same name with the suffix ``.toml``."""
+    return path.with_suffix(".toml")
+
+
+def read_sidecar(path: Path) -> dict[str, Any]:
+    """Read the sidecar of the log at `path`; empty when there is none."""
+    sidecar = sidecar_path(path)
+    if not sidecar.is_file():
+        return {}
+    try:
+        return tomllib.loads(sidecar.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"not valid TOML ({error})", file=sidecar, remedy="Correct it or move it away.") from None
+
+
+def read_metadata(path: Path, embedded: Mapping[str, Any]) -> Metadata:
+    """Metadata of the log at `path`: its own, key by key overruled by the sidecar."""
+    sidecar = read_sidecar(path)
+    if sidecar:
+        Metadata.from_mapping(sidecar, sidecar_path(path))
+    return Metadata.from_mapping({**embedded, **sidecar}, path)
+
+
+def write_sidecar(path: Path, metadata: Metadata) -> None:
+    """Write the sidecar of the log at `path`, over an older sidecar but not over another kind of TOML file."""
+    sidecar = sidecar_path(path)
+    if sidecar.exists():
+        older = read_sidecar(path)
+        if older and not KNOWN & older.keys():
+            raise InputError(
+                "this file is in the way: it is no log metadata, but the log's metadata would be written there",
+                file=sidecar,
+                remedy="Write the log under another name.",
+            )
+    sidecar.write_text(tomli_w.dumps(_without_none(metadata.to_mapping())), encoding="utf-8")
+
+
+def _without_none(value: Any) -> Any:
+    """Drop what TOML cannot hold."""
+    if isinstance(value, dict):
+        return {str(key): _without_none(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list | tuple):
+        return [_without_none(item) for item in value if item is not None]
+    return value
+
+
+def _number(value: Any) -> float | None:
+    """Return a finite number, or None when it is something else."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return float(value)
+
+
+def _frame(value: Any, file: str | Path | None) -> Frame:
+    if value not in FRAMES:
+        raise InputError(
+            f"metadata frame is {value!r}, which is no frame",
+            file=file,
+            column="frame",
+            remedy="Write NED, ENU or NWU.",
+        )
+    return cast(Frame, value)
+
+
+def _gravity(value: Any, file: str | Path | None) -> float:
+    number = _number(value)
+    if number is None or not 0.0 < number <= 30.0:
+        raise InputError(
+            f"metadata gravity is {value!r}, which is no gravity in m/s^2",
+            file=file,
+            column="gravity",
+            remedy=f"Write a number such as {STANDARD_GRAVITY}.",
+        )
+    return number
+
+
+def _mag_reference(value: Any, file: str | Path | None) -> tuple[float, ...]:
+    numbers = [_number(item) for item in value] if isinstance(value, list | tuple) else []
+    if len(numbers) != 3 or None in numbers:
+        raise InputError(
+            f"metadata mag_reference is {value!r}, not three numbers",
+            file=file,
+            column="mag_reference",
+            remedy="Write [x, y, z] in uT, in the reference frame.",
+        )
+    return tuple(cast(list[float], numbers))
+
+
+def _rig_axis(value: Any, file: str | Path | None) -> str:
+    if value not in AXES:
+        raise InputError(
+            f"metadata rig_axis is {value!r}, which is no body axis",
+            file=file,
+            column="rig_axis",
+            remedy='Write "x", "y" or "z".',
+        )
+    return str(value)
+
+
+def _sensor(value: Any, file: str | Path | None) -> str:
+    if not isinstance(value, str):
+        raise InputError(
+            f"metadata sensor is {value!r}, not text", file=file, column="sensor", remedy="Put it in quotes."
+        )
+    return value
+
+
+def _noise(value: Any, file: str | Path | None) -> dict[str, float]:
+    remedy = "Write a table such as {acc = 0.02, gyr = 0.001, mag = 0.5}, in m/s^2, rad/s and uT."
+    if not isinstance(value, Mapping):
+        raise InputError(f"metadata noise is {value!r}, not a table", file=file, column="noise", remedy=remedy)
+    for sensor, deviation in value.items():
+        if sensor not in ("acc", "gyr", "mag"):
+            raise InputError(f"metadata noise names the sensor {sensor!r}", file=file, column="noise", remedy=remedy)
+        number = _number(deviation)
+        if number is None or number < 0.0:
+            raise InputError(
+                f"metadata noise.{sensor} is {deviation!r}, which is no standard deviation",
+                file=file,
+                column="noise",
+                remedy=remedy,
+            )
+    return {str(sensor): float(deviation) for sensor, deviation in value.items()}
+
+
+_CHECKS: Final = {
+    "frame": _frame,
+    "gravity": _gravity,
+    "mag_reference": _mag_reference,
+    "rig_axis": _rig_axis,
+    "sensor": _sensor,
+    "noise": _noise,
+}
+KNOWN: Final = frozenset(item.name for item in fields(Metadata)) - {"extra"}

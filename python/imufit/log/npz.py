@@ -1,0 +1,177 @@
+"""Logs as NPZ: one array a column, read piece by piece from the archive."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, Final
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from imufit.errors import InputError
+from imufit.log.columns import GROUPS
+from imufit.log.metadata import Metadata, mapping_from_json, write_sidecar
+
+_BATCH: Final = 65_536
+_METADATA: Final = "metadata"
+_BROKEN: Final = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, OSError)
+
+
+@dataclass(frozen=True)
+class _Member:
+    """One array of the archive; `column` picks one of an (n, k) array, else it is None."""
+
+    name: str
+    dtype: np.dtype[Any]
+    width: int
+    column: int
+
+
+class NpzSource:
+    """An NPZ file as a source of blocks.
+
+    Columns are arrays (n,) under their own names, or groups (n, 3) and (n, 4) named ``acc``, ``gyr``, ``mag``,
+    ``ref_q`` and ``ref_p``.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.notes: tuple[str, ...] = ()
+        self.embedded: Mapping[str, Any] = {}
+        self._members: dict[str, _Member] = {}
+        self.n = 0
+        lengths: dict[str, int] = {}
+        try:
+            with zipfile.ZipFile(path) as archive:
+                for entry in archive.namelist():
+                    with archive.open(entry) as file:
+                        self._add(entry, file, lengths)
+        except InputError:
+            raise
+        except _BROKEN:
+            raise self._unreadable() from None
+        self.names: tuple[str, ...] = tuple(self._members)
+        self.n = lengths.get("t", max(lengths.values(), default=0))
+        for name, length in lengths.items():
+            if length != self.n:
+                raise InputError(
+                    f"the array has {length} rows, but the log has {self.n}",
+                    file=path,
+                    column=name,
+                    remedy="Write one row a sample.",
+                )
+
+    def _add(self, entry: str, file: IO[bytes], lengths: dict[str, int]) -> None:
+        name = entry.removesuffix(".npy")
+        shape, fortran, dtype = _header(file)
+        if dtype.kind not in "fiubUS":
+            kind = "Python objects" if dtype.hasobject else f"values of type {dtype}"
+            raise InputError(
+                f"the array holds {kind}", file=self._path, column=name, remedy="Save it as numbers or text."
+            )
+        if shape == ():
+            if name == _METADATA:
+                text = str(np.frombuffer(file.read(dtype.itemsize), dtype)[0])
+                self.embedded = mapping_from_json(text, self._path)
+            return
+        columns = GROUPS.get(name, ())
+        if len(shape) == 1:
+            self._members[name] = _Member(entry, dtype, 1, 0)
+        elif len(shape) == 2 and shape[1] == len(columns) and not fortran:
+            for i, column in enumerate(columns):
+                self._members[column] = _Member(entry, dtype, shape[1], i)
+        else:
+            wanted = f"(n, {len(columns)}) in C order" if columns else "(n,)"
+            raise InputError(
+                f"the array has shape {shape}, but {wanted} is wanted",
+                file=self._path,
+                column=name,
+                remedy=f"Save np.ascontiguousarray({name}).",
+            )
+        lengths[name] = int(shape[0])
+
+    def _unreadable(self) -> InputError:
+        with self._path.open("rb") as file:
+            start = file.read(2)
+        if start == b"PK":
+            return InputError("the file is cut off or damaged", file=self._path, remedy="Copy or record it again.")
+        return InputError("this is not an NPZ file", file=self._path, remedy="Check the suffix.")
+
+    def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
+        """Give the named columns block by block."""
+        yield from self.blocks(columns)
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
+        """Give the named columns block by block."""
+        members = {self._members[name].name: self._members[name] for name in columns}
+        try:
+            with zipfile.ZipFile(self._path) as archive, ExitStack() as stack:
+                files = {entry: stack.enter_context(archive.open(entry)) for entry in members}
+                for file in files.values():
+                    _header(file)
+                for start in range(0, self.n, _BATCH):
+                    rows = min(_BATCH, self.n - start)
+                    pieces = {entry: _read(files[entry], member, rows) for entry, member in members.items()}
+                    columns_of = {name: self._members[name] for name in columns}
+                    yield start, rows, {name: _array(pieces[m.name][:, m.column]) for name, m in columns_of.items()}
+        except InputError:
+            raise
+        except _BROKEN:
+            raise self._unreadable() from None
+
+    def line_of(self, row: int) -> int | None:
+        """Binary files have no lines."""
+        return None
+
+
+def _header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Read shape, order and type of an array, and stop at its first value."""
+    version = npy.read_magic(file)
+    return npy.read_array_header_1_0(file) if version == (1, 0) else npy.read_array_header_2_0(file)
+
+
+def _read(file: IO[bytes], member: _Member, rows: int) -> NDArray[Any]:
+    size = rows * member.width * member.dtype.itemsize
+    data = file.read(size)
+    if len(data) != size:
+        raise EOFError
+    return np.frombuffer(data, member.dtype).reshape(rows, member.width)
+
+
+def _array(column: NDArray[Any]) -> NDArray[Any]:
+    if column.dtype.kind in "US":
+        return column.astype(str).astype(object)
+    return column.astype(np.float64)
+
+
+def write_npz(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metadata) -> None:
+    """Write columns as NPZ, and the metadata into it and to the sidecar.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    table : mapping
+        Columns: (n,) float64, or (n,) object for text with None where there is none.
+    metadata : Metadata
+        Goes to the 0-d array ``metadata`` as JSON and to the sidecar.
+    """
+    if _METADATA in table:
+        raise InputError(
+            "an NPZ log cannot hold a column of that name", file=path, column=_METADATA, remedy="Rename it."
+        )
+    write_sidecar(path, metadata)
+    arrays = {**table, _METADATA: np.array(metadata.to_json())}
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        for name, column in arrays.items():
+            array = (
+                np.array(["" if cell is None else cell for cell in column], str) if column.dtype == object else column
+            )
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                npy.write_array(file, np.asarray(array, order="C"), allow_pickle=False)

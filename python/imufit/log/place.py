@@ -1,0 +1,44 @@
+"""Where a row of a log comes from, for messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from imufit.errors import InputError
+
+
+@dataclass(frozen=True)
+class Place:
+    """Names the file, and for text files the line, of a row.
+
+    Parameters
+    ----------
+    file : Path or None
+        File concerned; None for tables in memory.
+    line_of : callable, optional
+        Gives the line in the file (from 1) of a data row (from 0).
+    """
+
+    file: Path | None = None
+    line_of: Callable[[int], int | None] | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the file for notes."""
+        return "log" if self.file is None else self.file.name
+
+    def error(
+        self, problem: str, *, row: int | None = None, column: str | None = None, remedy: str | None = None
+    ) -> InputError:
+        """Make the error for this place; raise it yourself."""
+        line = self.line_of(row) if self.line_of is not None and row is not None else None
+        return InputError(
+            problem,
+            file=self.file or "log",
+            row=None if row is None else int(row),
+            column=column,
+            remedy=remedy,
+            line=line,
+        )

@@ -1,0 +1,85 @@
+"""What every file format offers, and which format a file has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from numpy.typing import NDArray
+
+from imufit.errors import InputError
+from imufit.log.csv import CsvSource
+from imufit.log.npz import NpzSource
+from imufit.log.parquet import ParquetSource
+
+TEXT_SUFFIXES: Final = (".csv", ".txt", ".tsv", ".dat", ".log")
+SUFFIXES: Final = (".parquet", ".npz", *TEXT_SUFFIXES)
+
+Block = tuple[int, int, dict[str, NDArray[Any]]]
+"""First row, number of rows, and columns: (n,) float64 for numbers, (n,) object for text."""
+
+
+class Source(Protocol):
+    """A table in a file, read block by block as often as wanted."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Columns of the file."""
+        ...
+
+    @property
+    def n(self) -> int:
+        """Number of rows; for text files known after the first `scan`."""
+        ...
+
+    @property
+    def embedded(self) -> Mapping[str, Any]:
+        """Metadata inside the file."""
+        ...
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was noticed on reading."""
+        ...
+
+    def scan(self, columns: Sequence[str]) -> Iterator[Block]:
+        """First pass over the file, with the named columns only (the time)."""
+        ...
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[Block]:
+        """Pass over the file, with the named columns."""
+        ...
+
+    def line_of(self, row: int) -> int | None:
+        """Line of the file, from 1, of a data row; None for binary files."""
+        ...
+
+
+def open_source(path: Path) -> Source:
+    """Open a log file by its suffix.
+
+    Raises
+    ------
+    InputError
+        The file is missing, empty, a directory or of no known format.
+    """
+    if path.is_dir():
+        raise InputError(f"{path} is a directory, not a log", file=path, remedy="Name a file in it.")
+    if not path.exists():
+        raise InputError(f"there is no file {path}", file=path, remedy="Check the name.")
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(
+            f"the suffix {suffix or '(none)'} is not a log's",
+            file=path,
+            remedy=f"Logs are {', '.join(SUFFIXES)}; imufit convert makes one of other formats.",
+        )
+    try:
+        if path.stat().st_size == 0:
+            raise InputError("the file is empty (0 bytes)", file=path, remedy="Record or copy it again.")
+        if suffix == ".parquet":
+            return ParquetSource(path)
+        return NpzSource(path) if suffix == ".npz" else CsvSource(path)
+    except OSError as error:
+        raise InputError(f"the file cannot be read ({error.strerror or error})", file=path) from None

@@ -1,0 +1,177 @@
+"""Logs from files: whole, or chunk by chunk in flat memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from imufit.log.assemble import fields_of, time_of
+from imufit.log.foreign import plan_columns
+from imufit.log.log import Chunk, Log, check_chunk_size, concatenate
+from imufit.log.metadata import Metadata, read_metadata
+from imufit.log.place import Place
+from imufit.log.source import open_source
+from imufit.log.time_order import TimeRepair, TimeScan
+from imufit.log.unit_check import HEAD, check_units
+
+STREAM_ABOVE: Final = 256 << 20
+"""File size in bytes above which a log is streamed unless told otherwise."""
+
+
+class LogStream:
+    """A log that stays on disk and is read chunk by chunk.
+
+    Opening it reads the time stamps and the first rows, so that order and units are checked before any work begins.
+    The other checks are made row by row as the chunks are read.
+
+    Parameters
+    ----------
+    path : str or Path
+        Log file.
+    mapping : mapping, optional
+        Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
+    """
+
+    def __init__(self, path: str | Path, mapping: Mapping[str, str] | None = None) -> None:
+        self._path = Path(path)
+        self._source = open_source(self._path)
+        self._place = Place(self._path, self._source.line_of)
+        self._plan = plan_columns(self._source.names, mapping, self._place)
+        self._metadata = read_metadata(self._path, self._source.embedded)
+        self._repair = self._scan()
+        head = self._head()
+        odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin)
+        self._columns = head.columns
+        notes = (*self._source.notes, *self._plan.notes, self._repair.note, *odd)
+        if "ref_angle" in self._columns and "ref_qw" not in self._columns:
+            notes = (*notes, f"{self._place.name}: ref_angle makes no reference without the metadata rig_axis")
+        self._notes = tuple(note for note in notes if note)
+
+    def _scan(self) -> TimeRepair:
+        scan, time = TimeScan(self._place), self._plan.time
+        for start, rows, block in self._source.scan([time.source] if time.source is not None else []):
+            scan.add(time_of(self._plan, block, start, rows, self._place))
+        if self._source.n == 0:
+            raise self._place.error("the file has a header but no rows", remedy="Record or copy it again.")
+        return scan.finish()
+
+    def _head(self) -> Log:
+        pieces: list[Log] = []
+        rows = 0
+        for piece in self.pieces():
+            pieces.append(piece)
+            rows += piece.n
+            if rows >= HEAD:
+                break
+        return concatenate(pieces).rows(0, HEAD)
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return self._source.n
+
+    @property
+    def metadata(self) -> Metadata:
+        """Frame, gravity, field, rig axis, noise."""
+        return self._metadata
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Contract columns that are there."""
+        return self._columns
+
+    @property
+    def path(self) -> Path:
+        """File of the log."""
+        return self._path
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What reading noticed or changed."""
+        return self._notes
+
+    def pieces(self) -> Iterator[Log]:
+        """Give the checked rows in blocks of whatever size the file offers."""
+        for start, rows, block in self._source.blocks(self._plan.sources):
+            fields = fields_of(
+                self._plan, block, start, rows, repair=self._repair, metadata=self._metadata, place=self._place
+            )
+            yield Log(**fields, metadata=self._metadata, path=self._path)
+
+    def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:
+        """Cut into chunks of `rows` rows with up to `margin` rows more on either side."""
+        check_chunk_size(rows, margin)
+        for chunk in _cut(self.pieces(), rows, margin):
+            yield replace(chunk, log=replace(chunk.log, notes=self._notes))
+
+    def read(self) -> Log:
+        """Whole log in memory."""
+        return replace(concatenate(list(self.pieces())), notes=self._notes)
+
+    def __repr__(self) -> str:
+        return f"LogStream({self._path.name}: {self.n} rows; {', '.join(self._columns)}; {self._metadata.frame})"
+
+
+def _cut(pieces: Iterable[Log], rows: int, margin: int) -> Iterator[Chunk]:
+    """Cut a sequence of pieces into chunks with margins, holding no more rows than that takes."""
+    held: list[Log] = []
+    first = start = total = 0  # row of the first held one, of the next chunk, after the last held one
+    for piece in pieces:
+        held.append(piece)
+        total += piece.n
+        if total < start + rows + margin:
+            continue
+        log = concatenate(held)
+        while total >= start + rows + margin:
+            yield _chunk(log, first, start, start + rows, margin)
+            start += rows
+        keep = max(first, start - margin)
+        held = [log.rows(keep - first, log.n)]
+        first = keep
+    if held:
+        log = concatenate(held)
+        for begin in range(start, total, rows):
+            yield _chunk(log, first, begin, min(begin + rows, total), margin)
+
+
+def _chunk(log: Log, first: int, start: int, stop: int, margin: int) -> Chunk:
+    low, high = max(0, start - margin - first), min(stop + margin - first, log.n)
+    return Chunk(log.rows(low, high), start, start - first - low, stop - first - low)
+
+
+def open_log(path: str | Path, mapping: Mapping[str, str] | None = None, stream: bool | None = None) -> Log | LogStream:
+    """Open a log file, in memory or as a stream.
+
+    Parameters
+    ----------
+    path : str or Path
+        Parquet, NPZ or text file.
+    mapping : mapping, optional
+        Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
+    stream : bool, optional
+        Whether to leave the log on disk; None does so above 256 MB.
+    """
+    log = LogStream(path, mapping)
+    if stream is None:
+        stream = log.path.stat().st_size > STREAM_ABOVE
+    return log if stream else log.read()
+
+
+def read(path: str | Path, mapping: Mapping[str, str] | None = None) -> Log:
+    """Read a log file into memory.
+
+    Parameters
+    ----------
+    path : str or Path
+        Parquet, NPZ or text file.
+    mapping : mapping, optional
+        Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
+
+    Raises
+    ------
+    InputError
+        The file cannot be used; the message names row, column and remedy.
+    """
+    return LogStream(path, mapping).read()

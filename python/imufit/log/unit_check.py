@@ -1,0 +1,240 @@
+"""Units that cannot be: specific force in g, rates in deg/s, flux density in gauss, time in milliseconds.
+
+Each rule refuses only what is unmistakable. A sensor that merely reads oddly passes.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.log.metadata import Metadata
+from imufit.log.place import Place
+
+HEAD: Final = 200_000
+"""Rows from the start of the log on which units are judged."""
+
+Array = NDArray[np.float64]
+
+_ACC_UNITS: Final = (
+    (1.0, "g", "g"),
+    (1000.0, "milli-g", "mg"),
+    *((float(c), f"raw counts of {c} LSB/g", f"{c} LSB/g") for c in (16384, 8192, 4096, 2048)),
+)
+_DEG: Final = np.pi / 180.0
+_GYR_UNITS: Final = (
+    (_DEG, "deg/s", "deg/s"),
+    (1e-3 * _DEG, "milli-deg/s", "mdps"),
+    *((_DEG / c, f"raw counts of {c:g} LSB/(deg/s)", f"{c:g} LSB/(deg/s)") for c in (131.0, 65.5, 32.8, 16.4)),
+)
+_OTHER_UNIT: Final = 0.03
+"""Noise pulls the ratio of rates towards zero, but not as far as this in rad/s."""
+_MAG_UNITS: Final = (
+    (0.2, 0.7, "gauss", "G"),
+    (200.0, 700.0, "milligauss", "mG"),
+    (2e4, 7e4, "nT", "nT"),
+    (2e-5, 7e-5, "T", "T"),
+)
+
+
+def check_units(
+    t: Array,
+    sensors: Mapping[str, Array | None],
+    metadata: Metadata,
+    place: Place,
+    origin: Mapping[str, str] | None = None,
+) -> list[str]:
+    """Refuse a log whose readings are unmistakably in another unit.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Time, s.
+    sensors : mapping
+        ``acc``, ``gyr``, ``mag`` (n, 3) and ``ref_q`` (n, 4), or None for those that are absent.
+    metadata : Metadata
+        Gives the magnitude of the field, where known.
+    place : Place
+        To name the file in errors.
+    origin : mapping, optional
+        Column of the file for each column of the log, to word the remedy.
+
+    Returns
+    -------
+    list of str
+        Notes on what is odd but possible.
+
+    Raises
+    ------
+    InputError
+        The unit is another one; it is named, with the mapping that converts it.
+    """
+    acc, gyr, mag, ref_q = (sensors.get(name) for name in ("acc", "gyr", "mag", "ref_q"))
+    notes: list[str] = []
+    origin = origin or {}
+    _check_time(t, gyr, place, origin)
+    if acc is not None:
+        notes += _check_acc(acc, place, origin)
+    if gyr is not None:
+        _check_gyr(t, gyr, [v for v in (acc, mag) if v is not None], ref_q, place=place, origin=origin)
+    if mag is not None:
+        notes += _check_mag(mag, metadata, place, origin)
+    return notes
+
+
+def _check_time(t: Array, gyr: Array | None, place: Place, origin: Mapping[str, str]) -> None:
+    """Whole numbers far apart are ticks of a finer clock when nothing could be sampled so slowly."""
+    if t.size < 20 or np.any(t != np.floor(t)):
+        return
+    dt = float(np.median(np.diff(t)))
+    if dt < 2.0:
+        return
+    unit = "ms" if dt < 1e3 else "us" if dt < 5e5 else "ns"
+    if unit == "ms":
+        rate = np.linalg.norm(gyr - np.nanmedian(gyr, axis=0), axis=1) if gyr is not None else np.empty(0)
+        rate = rate[np.isfinite(rate)]
+        # radians turned from one sample to the next: a log sampled so coarsely would show nothing
+        if rate.size < 20 or np.quantile(rate, 0.99) * dt < 2.0:
+            return
+    raise place.error(
+        f"the time steps are whole numbers around {dt:g}, which looks like {unit}, not s",
+        column="t",
+        remedy="Use --map " + shlex.quote(f"t={origin.get('t', 't')}[{unit}]"),
+    )
+
+
+def rest_norm(acc: Array, rows: int = 50) -> float:
+    """Median norm of an (n, 3) sensor in the quietest tenth of the windows of 50 rows; NaN without any."""
+    norm = np.linalg.norm(acc, axis=1)
+    complete = np.isfinite(norm)
+    acc, norm = acc[complete], norm[complete]
+    if norm.size < 2 * rows:
+        return float(np.median(norm)) if norm.size else float("nan")
+    windows = norm.size // rows
+    shaped = acc[: windows * rows].reshape(windows, rows, 3)
+    spread = np.sqrt(np.sum(np.var(shaped, axis=1), axis=1))
+    size = np.median(norm[: windows * rows].reshape(windows, rows), axis=1)
+    quiet = np.argsort(spread / np.maximum(size, 1e-12))[: max(1, windows // 10)]
+    return float(np.median(size[quiet]))
+
+
+def _check_acc(acc: Array, place: Place, origin: Mapping[str, str]) -> list[str]:
+    norm = rest_norm(acc)
+    overall = float(np.nanmedian(np.linalg.norm(acc, axis=1))) if np.isfinite(norm) else norm
+    for size, words, unit in _ACC_UNITS:
+        if abs(norm / size - 1.0) < 0.15 and overall < 3.0 * size:
+            raise place.error(
+                f"at rest the norm of acc is {norm:.4g}, which looks like {words}, not m/s^2",
+                column="acc_x",
+                remedy=_use_map("acc", unit, origin),
+            )
+    if np.isfinite(norm) and not 5.0 < norm < 20.0:
+        return [f"{place.name}: at rest the norm of acc is {norm:.4g} m/s^2, far from 9.8: check its unit"]
+    return []
+
+
+def _check_gyr(
+    t: Array, gyr: Array, vectors: list[Array], ref_q: Array | None, *, place: Place, origin: Mapping[str, str]
+) -> None:
+    ratios = [(_rate_ratio(t, gyr, ref_q), "the reference attitude turns")] if ref_q is not None else []
+    ratios += [(_field_ratio(t, gyr, v), "the field in the other sensors turns") for v in vectors]
+    for ratio, who in ratios:
+        if ratio > 0.2:
+            return
+        if ratio < _OTHER_UNIT:
+            _, words, unit = min(_GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
+            raise place.error(
+                f"{who} at {ratio:.3g} of the rate in gyr, which looks like {words}, not rad/s",
+                column="gyr_x",
+                remedy=_use_map("gyr", unit, origin),
+            )
+    norm = np.linalg.norm(gyr, axis=1)
+    norm = norm[np.isfinite(norm)]
+    high = float(np.quantile(norm, 0.99)) if norm.size else 0.0
+    if high > 100.0:
+        words, unit = ("deg/s", "deg/s") if high < 4500.0 else ("raw counts", "131 LSB/(deg/s)")
+        raise place.error(
+            f"gyr reaches {high:.4g}, more than any sensor in rad/s: it looks like {words}",
+            column="gyr_x",
+            remedy=_use_map("gyr", unit, origin),
+        )
+
+
+def _rate_ratio(t: Array, gyr: Array, ref_q: Array) -> float:
+    """Rate of the reference over the rate in gyr, over rows that turn; NaN where too few do."""
+    step = max(1, int(np.ceil(0.05 / max(float(np.median(np.diff(t))), 1e-6)))) if t.size > 2 else 1
+    if t.size < 20 * step:
+        return float("nan")
+    dot = np.abs(np.sum(ref_q[step:] * ref_q[:-step], axis=1))
+    turned = 2.0 * np.arccos(np.clip(dot, 0.0, 1.0))
+    reference = turned / (t[step:] - t[:-step])
+    measured = np.linalg.norm(0.5 * (gyr[step:] + gyr[:-step]), axis=1)
+    moving = np.isfinite(reference) & np.isfinite(measured) & (turned > 0.01) & (reference > 0.2) & (measured > 0.0)
+    if np.count_nonzero(moving) < 20:
+        return float("nan")
+    return float(np.median(reference[moving] / measured[moving]))
+
+
+def _field_ratio(t: Array, gyr: Array, field: Array) -> float:
+    """Factor by which gyr explains the turning of a field fixed in space; NaN unless it explains it clearly.
+
+    A constant vector u seen from a body that turns at w obeys du/dt = -w x u, up to the gyro's offset.
+    """
+    complete = np.isfinite(gyr).all(axis=1) & np.isfinite(field).all(axis=1)
+    t, gyr, field = t[complete], gyr[complete], field[complete]
+    if t.size < 200:
+        return float("nan")
+    rows = max(1, int(np.ceil(0.1 / max(float(np.median(np.diff(t))), 1e-6))))
+    blocks = t.size // rows
+    if blocks < 20:
+        return float("nan")
+    t, w, u = (a[: blocks * rows].reshape(blocks, rows, -1).mean(axis=1) for a in (t, gyr, field))
+    u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-30)
+    dt = t[2:] - t[:-2]
+    steady = (dt[:, 0] < 5.0 * np.median(dt)) & (dt[:, 0] > 0.0)
+    change = ((u[2:] - u[:-2]) / dt)[steady]
+    w, u = w[1:-1][steady], u[1:-1][steady]
+    design = np.stack([-np.cross(w, u), *(-np.cross(np.broadcast_to(e, u.shape), u) for e in np.eye(3))], axis=-1)
+    a, b = design.reshape(-1, 4), change.reshape(-1)
+    scale = np.linalg.norm(a, axis=0)
+    if b.size < 60 or not np.all(scale > 0.0):
+        return float("nan")
+    solution, *_ = np.linalg.lstsq(a / scale, b, rcond=None)
+    offset, *_ = np.linalg.lstsq((a / scale)[:, 1:], b, rcond=None)
+    total = max(float(np.sum(b**2)), 1e-30)
+    unexplained = float(np.sum((b - a @ (solution / scale)) ** 2)) / total
+    by_offset_alone = float(np.sum((b - (a / scale)[:, 1:] @ offset) ** 2)) / total
+    clear = unexplained < 0.4 and by_offset_alone - unexplained > 0.3 and solution[0] > 0.0
+    return float(solution[0] / scale[0]) if clear else float("nan")
+
+
+def _check_mag(mag: Array, metadata: Metadata, place: Place, origin: Mapping[str, str]) -> list[str]:
+    norm = np.linalg.norm(mag, axis=1)
+    complete = np.isfinite(norm) & (norm > 0.0)
+    if not complete.any():
+        return []
+    size = float(np.median(norm[complete]))
+    if metadata.mag_reference is not None and 0.2 < size / max(math.hypot(*metadata.mag_reference), 1e-9) < 5.0:
+        return []
+    for low, high, words, unit in _MAG_UNITS:
+        if not low <= size <= high:
+            continue
+        if unit == "mG" and np.linalg.norm(np.mean(mag[complete] / norm[complete, None], axis=0)) > 0.95:
+            # never turned, or iron beside the sensor outweighs the field: it may well be uT
+            return [f"{place.name}: the norm of mag is {size:.4g} uT: iron beside the sensor, or is it milligauss?"]
+        raise place.error(
+            f"the norm of mag is {size:.4g}, which looks like {words}, not uT",
+            column="mag_x",
+            remedy=_use_map("mag", unit, origin),
+        )
+    return []
+
+
+def _use_map(sensor: str, unit: str, origin: Mapping[str, str]) -> str:
+    columns = [f"{sensor}_{axis}" for axis in "xyz"]
+    return "Use --map " + shlex.quote(",".join(f"{column}={origin.get(column, column)}[{unit}]" for column in columns))

@@ -1,0 +1,225 @@
+"""Units of foreign logs: what they measure and how they become SI (and uT)."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.errors import InputError
+from imufit.log.columns import GROUPS
+from imufit.log.metadata import STANDARD_GRAVITY
+
+_G: Final = STANDARD_GRAVITY
+_DEG: Final = math.pi / 180.0
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """The line from a foreign number to SI: ``factor * x + offset``.
+
+    Parameters
+    ----------
+    factor : float
+        SI units per foreign unit, with the sign.
+    offset : float
+        SI value at a foreign zero.
+    """
+
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def apply(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Convert an (n,) array; the identity returns it untouched."""
+        if self.factor != 1.0:
+            values = values * self.factor
+        return values + self.offset if self.offset else values
+
+
+# name: (quantity, SI per unit, SI at zero)
+_UNITS: Final[dict[str, tuple[str, float, float]]] = {
+    "s": ("time", 1.0, 0.0),
+    "ms": ("time", 1e-3, 0.0),
+    "us": ("time", 1e-6, 0.0),
+    "ns": ("time", 1e-9, 0.0),
+    "m/s^2": ("specific force", 1.0, 0.0),
+    "g": ("specific force", _G, 0.0),
+    "mg": ("specific force", 1e-3 * _G, 0.0),
+    "ug": ("specific force", 1e-6 * _G, 0.0),
+    "rad/s": ("angular rate", 1.0, 0.0),
+    "mrad/s": ("angular rate", 1e-3, 0.0),
+    "deg/s": ("angular rate", _DEG, 0.0),
+    "mdeg/s": ("angular rate", 1e-3 * _DEG, 0.0),
+    "rpm": ("angular rate", math.pi / 30.0, 0.0),
+    "uT": ("magnetic flux density", 1.0, 0.0),
+    "nT": ("magnetic flux density", 1e-3, 0.0),
+    "mT": ("magnetic flux density", 1e3, 0.0),
+    "T": ("magnetic flux density", 1e6, 0.0),
+    "G": ("magnetic flux density", 100.0, 0.0),
+    "mG": ("magnetic flux density", 0.1, 0.0),
+    "degC": ("temperature", 1.0, 0.0),
+    "K": ("temperature", 1.0, -273.15),
+    "degF": ("temperature", 5.0 / 9.0, -160.0 / 9.0),
+    "rad": ("angle", 1.0, 0.0),
+    "deg": ("angle", _DEG, 0.0),
+    "m": ("length", 1.0, 0.0),
+    "cm": ("length", 1e-2, 0.0),
+    "mm": ("length", 1e-3, 0.0),
+}
+_SPELLINGS: Final = {
+    "sec": "s",
+    "seconds": "s",
+    "m/s2": "m/s^2",
+    "m/s/s": "m/s^2",
+    "m/sec^2": "m/s^2",
+    "gee": "g",
+    "gs": "g",
+    "dps": "deg/s",
+    "deg/sec": "deg/s",
+    "mdps": "mdeg/s",
+    "rad/sec": "rad/s",
+    "gauss": "G",
+    "Gs": "G",
+    "mgauss": "mG",
+    "milligauss": "mG",
+    "tesla": "T",
+    "C": "degC",
+    "F": "degF",
+    "degrees": "deg",
+    "radians": "rad",
+}
+_QUANTITIES: Final = {
+    "t": "time",
+    **dict.fromkeys(GROUPS["acc"], "specific force"),
+    **dict.fromkeys(GROUPS["gyr"], "angular rate"),
+    **dict.fromkeys(GROUPS["mag"], "magnetic flux density"),
+    "temp": "temperature",
+    **dict.fromkeys(GROUPS["ref_q"], "unit quaternion"),
+    **dict.fromkeys(GROUPS["ref_p"], "length"),
+    "ref_angle": "angle",
+}
+_NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+
+
+def lookup(text: str) -> tuple[str, float, float] | None:
+    """Quantity, SI per unit and SI at zero of a unit; None when the text names no unit."""
+    letters: dict[str, str | int | None] = {"²": "^2", "µ": "u", "μ": "u", "°": "deg", " ": "", "·": "*"}
+    name = text.strip().translate(str.maketrans(letters))
+    name = name.replace("degree/", "deg/").replace("degrees/", "deg/").replace("**", "^")
+    for candidate in (name, _SPELLINGS.get(name, "")):
+        if candidate in _UNITS:
+            return _UNITS[candidate]
+    folded = {key for key in (*_UNITS, *_SPELLINGS) if key.lower() == name.lower()}
+    quantities = {_UNITS[_SPELLINGS.get(key, key)] for key in folded}
+    return quantities.pop() if len(quantities) == 1 else None
+
+
+def conversion(target: str, unit: str) -> Conversion:
+    """Conversion of a column given in `unit` to the SI unit of the column `target`.
+
+    Parameters
+    ----------
+    target : str
+        Column of the log; a name without fixed meaning takes any unit.
+    unit : str
+        ``g``, ``deg/s``, ..., ``16384 LSB/g``, ``0.061 mg/LSB``, ``*0.0005`` (a bare factor), ``100 Hz`` (row numbers
+        or ticks to seconds), or empty for SI.
+
+    Raises
+    ------
+    InputError
+        The unit is unknown or measures something else.
+    """
+    text = unit.strip()
+    if not text:
+        return Conversion()
+    if found := re.fullmatch(rf"\*\s*({_NUMBER})", text):
+        return Conversion(float(found[1]))
+    if found := re.fullmatch(rf"({_NUMBER})\s*Hz", text, re.IGNORECASE):
+        return Conversion(1.0 / _positive(float(found[1]), target, unit))
+    scale, inner = 1.0, text
+    if found := re.fullmatch(rf"({_NUMBER})\s*(?:LSB|counts?|digits?)\s*(?:/|per)\s*(.+)", text, re.IGNORECASE):
+        scale, inner = 1.0 / _positive(float(found[1]), target, unit), found[2]
+    elif found := re.fullmatch(rf"({_NUMBER})\s*(.+?)\s*(?:/|per)\s*(?:LSB|count|digit)", text, re.IGNORECASE):
+        scale, inner = float(found[1]), found[2]
+    known = lookup(_without_parentheses(inner))
+    if known is None:
+        raise InputError(
+            f"the unit [{unit}] is not known",
+            column=target,
+            remedy=f"Known are {', '.join(_UNITS)}, [16384 LSB/g] and a bare factor such as [*0.0005].",
+        )
+    quantity, factor, offset = known
+    wanted = _QUANTITIES.get(target)
+    if wanted is not None and quantity != wanted:
+        raise InputError(f"[{unit}] is a unit of {quantity}, but {target} is {wanted}", column=target)
+    return Conversion(factor * scale, offset)
+
+
+def _positive(number: float, target: str, unit: str) -> float:
+    if number == 0.0:
+        raise InputError(f"the unit [{unit}] divides by zero", column=target)
+    return number
+
+
+def _without_parentheses(text: str) -> str:
+    text = text.strip()
+    return text[1:-1] if text.startswith("(") and text.endswith(")") else text
+
+
+def unit_in_header(name: str, target: str) -> str:
+    """Find the unit that a column name carries in trailing brackets, as in ``Time (s)``; empty when it carries none."""
+    found = re.search(r"(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\)[^()]*)?)\))\s*$", name)
+    if not found:
+        return ""
+    square, text = found[1] is not None, found[1] if found[1] is not None else found[2]
+    try:
+        conversion(target, text)
+    except InputError:
+        if square or lookup(_without_parentheses(text)) is not None:
+            raise
+        return ""
+    return text
+
+
+def parse_mapping(*texts: str) -> dict[str, str]:
+    """Read column mappings as they are given on the command line.
+
+    Parameters
+    ----------
+    *texts : str
+        Each ``target=source``, or several of them with commas between: ``acc_x=-AccX[g]``. In front of the source
+        column a sign may stand, behind it a unit in brackets.
+
+    Returns
+    -------
+    dict
+        Source text for each target column.
+
+    Raises
+    ------
+    InputError
+        A text has no ``=``, or a target is given twice.
+    """
+    mapping: dict[str, str] = {}
+    for part in (part for text in texts for part in _split(text)):
+        target, equals, source = part.partition("=")
+        target, source = target.strip(), source.strip()
+        if not equals or not target or not source:
+            raise InputError(
+                f"the mapping {part!r} does not read TARGET=SOURCE", remedy="Write for example acc_x=AccX[g]."
+            )
+        if target in mapping:
+            raise InputError(f"column {target} is mapped twice", column=target)
+        mapping[target] = source
+    return mapping
+
+
+def _split(text: str) -> Iterator[str]:
+    """Split at the commas that are followed by another ``name=``."""
+    yield from (part for part in re.split(r",(?=\s*[A-Za-z_]\w*\s*=)", text) if part.strip())

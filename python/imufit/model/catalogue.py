@@ -1,0 +1,89 @@
+"""Every effect there is: the built-in ones, the user's, and those of a log's own columns."""
+
+from __future__ import annotations
+
+import difflib
+import runpy
+from collections.abc import Iterable
+from pathlib import Path
+
+from imufit import _imufit
+from imufit.errors import InputError
+from imufit.model.effect import registered
+from imufit.results import EffectCard
+
+COLUMN = ".column:"
+
+
+def effects() -> dict[str, _imufit.Effect]:
+    """Built-in effects, then the user's, by id."""
+    return {**{effect.id: effect for effect in _imufit.built_in_effects()}, **registered()}
+
+
+def column_effects(names: Iterable[str], sensors: Iterable[str]) -> dict[str, _imufit.Effect]:
+    """Effects of a log's own columns on its sensors, by id."""
+    ids = [f"{sensor}{COLUMN}{name}" for name in names for sensor in sensors]
+    found = {effect_id: _imufit.find_effect(effect_id) for effect_id in ids}
+    return {effect_id: effect for effect_id, effect in found.items() if effect is not None}
+
+
+def find_effect(effect_id: str) -> _imufit.Effect:
+    """The effect with this id.
+
+    Raises
+    ------
+    InputError
+        There is none; the message names the nearest.
+    """
+    effect = effects().get(effect_id) or (_imufit.find_effect(effect_id) if COLUMN in effect_id else None)
+    if effect is None:
+        near = difflib.get_close_matches(effect_id, list(effects()), n=1, cutoff=0.4)
+        remedy = f"Did you mean {near[0]}?" if near else "imufit explain lists all effects."
+        raise InputError(f"there is no effect {effect_id}", remedy=remedy)
+    return effect
+
+
+def card_of(effect: _imufit.Effect) -> EffectCard:
+    """The card of an effect."""
+    sensors = effect.sensors
+    return EffectCard(
+        id=effect.id,
+        sensor=sensors[0] if len(sensors) == 1 else effect.id.split(".", 1)[0],
+        parameters=tuple(effect.parameters),
+        **effect.words,
+    )
+
+
+def catalogue() -> list[EffectCard]:
+    """Cards of all effects that do not depend on a log's own columns."""
+    return [card_of(effect) for effect in effects().values()]
+
+
+def explain(effect_id: str) -> EffectCard:
+    """The card of one effect: physics, formula, typical size, signature, rivals, the experiment that confirms it.
+
+    Raises
+    ------
+    InputError
+        There is no such effect.
+    """
+    return card_of(find_effect(effect_id))
+
+
+def load_effects(path: str | Path) -> list[str]:
+    """Run a Python file that defines effects with ``@imufit.effect``; return the ids it added.
+
+    Raises
+    ------
+    InputError
+        The file is missing or defines no effect. Exceptions of the file itself come out unchanged.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(f"there is no file {file}", file=file, remedy="Check the name.")
+    before = set(registered())
+    runpy.run_path(str(file))
+    added = [effect_id for effect_id in registered() if effect_id not in before]
+    if not added:
+        raise InputError("the file defines no new effect", file=file, remedy="Use the decorator @imufit.effect(...).")
+    return added

@@ -1,0 +1,176 @@
+"""The ten-line way to write an effect of one's own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit import _imufit
+from imufit.errors import InputError
+
+Array = NDArray[np.float64]
+
+SENSORS = ("acc", "gyr", "mag")
+
+_registered: dict[str, _imufit.Effect] = {}
+
+
+@dataclass(frozen=True)
+class Window:
+    """Rows that an effect's function is asked about: ideal readings and covariates, SI units, body frame.
+
+    Attributes
+    ----------
+    t : ndarray
+        (n,) time, s.
+    t_start : float
+        Time of the log's first row, s.
+    omega, alpha : ndarray
+        (n, 3) ideal angular rate, rad/s, and angular acceleration, rad/s^2.
+    f, m : ndarray
+        (n, 3) ideal specific force, m/s^2, and magnetic flux density, uT.
+    x : ndarray
+        (n, 3) the quantity that the effect's stage acts on: the sensor's ideal reading plus earlier effects of the model.
+    temperature : ndarray or None
+        (n,) sensor temperature less its mean over the log, K.
+    columns : mapping of str to ndarray
+        (n,) every other column of the log.
+    """
+
+    t: Array
+    t_start: float
+    omega: Array
+    alpha: Array
+    f: Array
+    m: Array
+    x: Array
+    temperature: Array | None
+    columns: Mapping[str, Array]
+
+    def column(self, name: str) -> Array:
+        """One of the log's own columns, (n,).
+
+        Raises
+        ------
+        KeyError
+            The log has no such column.
+        """
+        if name not in self.columns:
+            raise KeyError(f"the log has no column {name}; it has {', '.join(self.columns) or 'none of its own'}")
+        return self.columns[name]
+
+
+Function = Callable[[Window], Any]
+F = TypeVar("F", bound=Function)
+
+
+def effect(
+    effect_id: str,
+    *,
+    parameters: Mapping[str, str] | Sequence[str],
+    sensor: str | None = None,
+    explanation: str = "",
+    typical: float | Mapping[str, float] | None = None,
+    needs: Sequence[str] = (),
+    name: str | None = None,
+    formula: str = "",
+    signature: str = "",
+    mistaken_for: str = "",
+    confirm: str = "",
+    stage: str = "offset",
+) -> Callable[[F], F]:
+    """Make an effect out of a function that returns d reading / d parameters; it is then fitted and ranked like the built-in ones.
+
+    Parameters
+    ----------
+    effect_id : str
+        Such as ``gyr.fan``: the sensor's prefix, a dot, a name.
+    parameters : mapping of str to str, or sequence of str
+        Name of each parameter and its SI unit.
+    sensor : str, optional
+        ``acc``, ``gyr`` or ``mag``; by default the prefix of the id.
+    explanation : str, optional
+        The physics in a sentence, shown by ``diagnose`` and ``explain``.
+    typical : float or mapping of str to float, optional
+        Size that the parameters typically have, in their units.
+    needs : sequence of str, optional
+        Columns of the log without which the effect is not offered.
+    name, formula, signature, mistaken_for, confirm : str, optional
+        More words for the effect's card.
+    stage : str, optional
+        ``offset`` (adds to the reading, default), ``gain`` (acts on the sensor's quantity ``w.x``) or ``input``
+        (changes the quantity that reaches the sensing element).
+
+    Returns
+    -------
+    callable
+        Decorator; the function itself is returned unchanged. It takes a :class:`Window` and returns (n, 3) for one
+        parameter or (n, 3, p) for p of them.
+
+    Raises
+    ------
+    InputError
+        The id, a parameter or the sensor cannot be.
+    """
+    prefix = effect_id.split(".", 1)[0] if sensor is None else sensor
+    if not re.fullmatch(r"[A-Za-z]\w*\.[A-Za-z]\w*", effect_id):
+        raise InputError(f"effect id {effect_id!r} is not SENSOR.NAME", remedy="Write for instance gyr.fan.")
+    if prefix not in SENSORS:
+        raise InputError(f"effect {effect_id}: sensor {prefix!r} is unknown", remedy=f"Use one of {', '.join(SENSORS)}.")
+    if _imufit.find_effect(effect_id) is not None:
+        raise InputError(f"effect {effect_id} is built in", remedy="Choose another name.")
+    units = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters, "1")
+    if not units:
+        raise InputError(f"effect {effect_id} has no parameter", remedy="Name at least one with its unit.")
+    sizes = dict(typical) if isinstance(typical, Mapping) else dict.fromkeys(units, typical)
+
+    def decorate(function: F) -> F:
+        words = {
+            "name": name or effect_id.split(".", 1)[1].replace("_", " "),
+            "physics": explanation or (function.__doc__ or "").strip().split("\n")[0],
+            "formula": formula,
+            "signature": signature,
+            "mistaken_for": mistaken_for,
+            "confirm": confirm,
+        }
+        columns = [(key, unit, sizes.get(key)) for key, unit in units.items()]
+        _registered[effect_id] = _imufit.python_effect(
+            effect_id, prefix, columns, words, stage, list(needs), _call(effect_id, function, len(columns))
+        )
+        return function
+
+    return decorate
+
+
+def _call(effect_id: str, function: Function, count: int) -> Callable[[dict[str, Any]], Array]:
+    """Wrap the user's function so that the core always gets (n, 3, p) float64."""
+
+    def columns(window: dict[str, Any]) -> Array:
+        n = len(window["t"])
+        values = np.asarray(function(Window(**window)), dtype=np.float64)
+        if values.shape == (n, 3) and count == 1:
+            values = values[:, :, None]
+        if values.shape != (n, 3, count):
+            wanted = f"({n}, 3)" if count == 1 else f"({n}, 3, {count})"
+            raise InputError(
+                f"effect {effect_id} returned shape {values.shape} for {n} rows",
+                remedy=f"Return d reading / d parameter as {wanted}.",
+            )
+        return np.ascontiguousarray(values)
+
+    return columns
+
+
+def registered() -> dict[str, _imufit.Effect]:
+    """User-written effects by id, in the order of their definition."""
+    return dict(_registered)
+
+
+def forget(effect_id: str) -> None:
+    """Take a user-written effect out of the catalogue again."""
+    _registered.pop(effect_id, None)

@@ -1,0 +1,30 @@
+"""What the loop hands back: frozen results that print, plot, and turn into JSON, data frames and HTML.
+
+Every ``ratio`` and held-out value is residual RMS over noise floor: 1.0 is at the floor.
+"""
+
+from imufit.results.addition import Addition
+from imufit.results.comparison import ChannelResidual, Comparison, Panel, Spectrum, Where
+from imufit.results.diagnosis import Candidate, Diagnosis, Rival, Unexplained
+from imufit.results.effect_card import EffectCard
+from imufit.results.ladder import Ladder, Step
+from imufit.results.parameter import Parameter
+from imufit.results.table import Table
+
+__all__ = [
+    "Addition",
+    "Candidate",
+    "ChannelResidual",
+    "Comparison",
+    "Diagnosis",
+    "EffectCard",
+    "Ladder",
+    "Panel",
+    "Parameter",
+    "Rival",
+    "Spectrum",
+    "Step",
+    "Table",
+    "Unexplained",
+    "Where",
+]

@@ -1,0 +1,111 @@
+"""An effect added: the error before, expected and after."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from imufit.figures import quantity
+from imufit.results.json_value import json_value
+from imufit.results.parameter import Parameter, by_effect, by_name, parameter_frame, parameter_table, plot_parameters
+from imufit.results.table import Table, html, page
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+SURPRISE = 0.2
+
+
+def surprise(before: float, expected: float, after: float) -> str:
+    """Sentence of warning where the realised drop differs from the expected one by more than 20 %; else empty."""
+    drop, realised = before - expected, before - after
+    if not (math.isfinite(drop) and math.isfinite(realised)) or abs(drop) < 0.02:
+        return ""
+    if abs(realised - drop) <= SURPRISE * abs(drop):
+        return ""
+    return (
+        f"The error fell by {quantity.ratio(realised)} where {quantity.ratio(drop)} was expected: "
+        "the effect is not linear here, or another effect is missing besides."
+    )
+
+
+@dataclass(frozen=True)
+class Addition:
+    """One step of the loop.
+
+    Attributes
+    ----------
+    effect : str
+        The effect that was added.
+    before, expected, after : float
+        Residual over noise floor before, as predicted, and as realised.
+    held_out : bool
+        Whether these were judged on data not used for fitting.
+    parameters : tuple of Parameter
+        Fitted parameters.
+    model : tuple of str
+        Effects of the new model.
+    fit : Any
+        The new fit.
+    """
+
+    effect: str
+    before: float
+    expected: float
+    after: float
+    held_out: bool
+    parameters: tuple[Parameter, ...]
+    model: tuple[str, ...]
+    fit: Any = field(default=None, repr=False, compare=False)
+
+    @property
+    def own_parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the added effect alone."""
+        return tuple(item for item in self.parameters if item.effect == self.effect)
+
+    @property
+    def sentence(self) -> str:
+        """The step in a sentence."""
+        kind = "held-out error" if self.held_out else "error on the fitted data"
+        return (
+            f"{self.effect} added: the {kind} went from {quantity.ratio(self.before)} to {quantity.ratio(self.after)} "
+            f"times the noise floor (expected {quantity.ratio(self.expected)})."
+        )
+
+    @property
+    def warning(self) -> str:
+        """What to know where the drop was not the expected one; else empty."""
+        return surprise(self.before, self.expected, self.after)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of `add`; all parameters of the model by effect besides."""
+        return {
+            "effect": self.effect,
+            "before": json_value(self.before),
+            "expected": json_value(self.expected),
+            "after": json_value(self.after),
+            "held_out": bool(self.held_out),
+            "parameters": by_name(self.own_parameters),
+            "model": list(self.model),
+            "model_parameters": by_effect(self.parameters),
+        }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per parameter, SI units."""
+        return parameter_frame(self.parameters)
+
+    def plot(self) -> Figure:
+        """Fitted parameters beside their typical sizes."""
+        return plot_parameters(self.parameters)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Parameters of the new model."""
+        return (parameter_table(self.parameters, "Parameters of the new model"),)
+
+    def _repr_html_(self) -> str:
+        return html([self.sentence, self.warning], self.tables())
+
+    def __str__(self) -> str:
+        return page([self.sentence, self.warning], self.tables())

@@ -1,0 +1,313 @@
+"""Where the model fails: by channel, by covariate, by segment, by frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.figures import quantity
+from imufit.results.json_value import json_value
+from imufit.results.table import Table, html, page
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class ChannelResidual:
+    """Residual (measured - modelled) of one channel over the whole log.
+
+    Attributes
+    ----------
+    channel : str
+        For instance ``gyr_x``.
+    rms, mean, noise_floor : float
+        In `unit`.
+    ratio : float
+        RMS over noise floor.
+    unit : str
+        SI unit.
+    n : int
+        Samples used.
+    """
+
+    channel: str
+    rms: float
+    mean: float
+    noise_floor: float
+    ratio: float
+    unit: str
+    n: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of one channel."""
+        names = ("rms", "mean", "noise_floor", "ratio", "unit", "n")
+        return {name: json_value(getattr(self, name)) for name in names}
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Binned residual of one channel against one covariate.
+
+    Attributes
+    ----------
+    channel, covariate, channel_unit, covariate_unit : str
+        Names and SI units.
+    centre, mean, band : ndarray
+        (k,) centre of each bin in the covariate's unit; mean residual and half width of its 95 % band in the channel's.
+    noise_floor : float
+        Noise of one sample, channel's unit.
+    share : float
+        Fraction of the excess variance that the covariate explains.
+    """
+
+    channel: str
+    covariate: str
+    channel_unit: str
+    covariate_unit: str
+    centre: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    band: NDArray[np.float64]
+    noise_floor: float
+    share: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON with the arrays as lists."""
+        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per bin: centre, mean, band."""
+        import pandas as pd  # noqa: PLC0415
+
+        return pd.DataFrame({"centre": self.centre, "mean": self.mean, "band": self.band})
+
+    def plot(self) -> Figure:
+        """Draw this panel alone."""
+        return plot_panels((self,))
+
+
+def plot_panels(panels: Sequence[Panel], limit: int = 12) -> Figure:
+    """Draw the worst panels side by side."""
+    from imufit.figures.residuals import residual_panels  # noqa: PLC0415
+
+    return residual_panels(panels, limit=limit)
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Density of one channel's residual.
+
+    Attributes
+    ----------
+    channel, unit : str
+        Name and unit of the density.
+    frequency, density : ndarray
+        (k,) Hz and `unit`.
+    floor : float
+        Density of the noise floor, `unit`.
+    """
+
+    channel: str
+    unit: str
+    frequency: NDArray[np.float64]
+    density: NDArray[np.float64]
+    floor: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON with the arrays as lists."""
+        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per frequency: frequency, density."""
+        import pandas as pd  # noqa: PLC0415
+
+        return pd.DataFrame({"frequency": self.frequency, "density": self.density})
+
+    def plot(self) -> Figure:
+        """Draw this spectrum alone."""
+        from imufit.figures.spectrum import residual_spectra  # noqa: PLC0415
+
+        return residual_spectra([self])
+
+
+@dataclass(frozen=True)
+class Where:
+    """A covariate that explains part of a channel's excess.
+
+    Attributes
+    ----------
+    channel, covariate : str
+        Names.
+    share : float
+        Fraction of the excess variance over the noise floor.
+    t_start, t_end : float
+        Where in time most of it lies, s.
+    """
+
+    channel: str
+    covariate: str
+    share: float
+    t_start: float
+    t_end: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of one line."""
+        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+
+    def __str__(self) -> str:
+        return (
+            f"{self.channel} depends on {self.covariate}: {quantity.share(self.share)} of its excess, "
+            f"most of it at {quantity.span(self.t_start, self.t_end)}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A model held against a log.
+
+    Attributes
+    ----------
+    n : int
+        Rows.
+    duration_s : float
+        Length of the log, s.
+    model : tuple of str
+        Effects of the model; empty is the ideal sensor.
+    channels : tuple of ChannelResidual
+        Residual by channel.
+    sensors : dict
+        Ratio by sensor.
+    attitude : dict or None
+        Attitude errors in degrees, where the log allows them.
+    where : tuple of Where
+        Covariates that explain the excess, largest share first.
+    panels : tuple of Panel
+        Residual against covariates.
+    spectra : tuple of Spectrum
+        Residual by frequency.
+    segments : tuple
+        (t_start, t_end, channel, ratio), worst first.
+    notes : tuple of str
+        What the reader should know about these figures.
+    """
+
+    n: int
+    duration_s: float
+    model: tuple[str, ...]
+    channels: tuple[ChannelResidual, ...]
+    sensors: dict[str, float]
+    attitude: dict[str, float] | None
+    where: tuple[Where, ...]
+    panels: tuple[Panel, ...]
+    spectra: tuple[Spectrum, ...]
+    segments: tuple[tuple[float, float, str, float], ...]
+    notes: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """The result in one or two sentences."""
+        name = " + ".join(self.model) or "the ideal sensor"
+        if not self.channels:
+            return f"No channel of this log can be held against {name}."
+        worst = max(self.channels, key=lambda channel: channel.ratio if np.isfinite(channel.ratio) else -1.0)
+        text = f"With {name}, {worst.channel} stands at {quantity.ratio(worst.ratio)} times its noise floor"
+        text += ", the worst of the channels." if len(self.channels) > 1 else "."
+        if worst.ratio > 1.02:
+            causes = [where for where in self.where if where.channel == worst.channel]
+            cause = causes[0] if causes else self.where[0] if self.where else None
+            text += f" {cause}." if cause else ""
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of `compare`; worst segments and notes besides."""
+        return {
+            "n": int(self.n),
+            "duration_s": json_value(self.duration_s),
+            "model": list(self.model),
+            "channels": {channel.channel: channel.to_dict() for channel in self.channels},
+            "sensors": {name: {"ratio": json_value(ratio)} for name, ratio in self.sensors.items()},
+            "attitude": json_value(self.attitude),
+            "where": [where.to_dict() for where in self.where],
+            "segments": [
+                {
+                    "t_start": json_value(t_start),
+                    "t_end": json_value(t_end),
+                    "channel": channel,
+                    "ratio": json_value(ratio),
+                }
+                for t_start, t_end, channel, ratio in self.segments
+            ],
+            "notes": list(self.notes),
+        }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per channel, SI units."""
+        import pandas as pd  # noqa: PLC0415
+
+        columns = ["channel", "rms", "mean", "noise_floor", "ratio", "unit", "n"]
+        return pd.DataFrame([[getattr(item, name) for name in columns] for item in self.channels], columns=columns)
+
+    def plot(self) -> Figure:
+        """Residual against the covariates, worst first."""
+        return plot_panels(self.panels)
+
+    def plot_spectra(self) -> Figure:
+        """Spectrum of the residual over its noise floor."""
+        from imufit.figures.spectrum import residual_spectra  # noqa: PLC0415
+
+        return residual_spectra(self.spectra)
+
+    def channel_table(self) -> Table:
+        """Residual by channel in shown units."""
+        rows = tuple(
+            (
+                item.channel,
+                quantity.ratio(item.ratio),
+                quantity.quantity(item.rms, item.unit),
+                quantity.quantity(item.mean, item.unit),
+                quantity.quantity(item.noise_floor, item.unit),
+                f"{item.n}",
+            )
+            for item in self.channels
+        )
+        header = ("channel", ">over floor", ">residual RMS", ">mean", ">noise floor", ">samples")
+        return Table("Residual by channel (measured - modelled)", header, rows)
+
+    def where_table(self, limit: int = 10) -> Table:
+        """Covariates that explain the excess."""
+        rows = tuple(
+            (item.channel, item.covariate, quantity.share(item.share), quantity.span(item.t_start, item.t_end))
+            for item in self.where[:limit]
+        )
+        return Table("What the excess depends on", ("channel", "covariate", ">share", ">mostly at"), rows)
+
+    def segment_table(self, limit: int = 5) -> Table:
+        """Worst segments."""
+        rows = tuple(
+            (quantity.span(t_start, t_end), channel, quantity.ratio(ratio))
+            for t_start, t_end, channel, ratio in self.segments[:limit]
+        )
+        return Table("Worst segments", (">time", "channel", ">over floor"), rows)
+
+    def attitude_table(self) -> Table:
+        """Attitude errors, where there are any."""
+        rows = tuple(
+            (name.removesuffix("_deg").replace("_", " "), f"{quantity.number(value)} deg")
+            for name, value in (self.attitude or {}).items()
+        )
+        return Table("Attitude error", ("", ">RMSE"), rows)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Every table, most important first."""
+        return (self.channel_table(), self.where_table(), self.segment_table(), self.attitude_table())
+
+    def _repr_html_(self) -> str:
+        return html([self.sentence, *self.notes], self.tables())
+
+    def __str__(self) -> str:
+        return page([self.sentence, *self.notes], self.tables())

@@ -1,0 +1,296 @@
+"""Which effect is missing: ranked candidates, rivals, and what no effect explains."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from imufit.figures import quantity
+from imufit.results.json_value import json_value
+from imufit.results.parameter import Parameter, by_name, in_words
+from imufit.results.table import Table, html, page
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+VERDICTS = {
+    "adequate": "Nothing that this log can show is missing.",
+    "missing": "One effect is missing and stands out.",
+    "ambiguous": "Something is missing, and two or more effects explain it equally well in this log.",
+    "unknown": "Something is missing that no effect of the catalogue explains.",
+}
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An effect that looks much the same in this log.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    correlation : float
+        Canonical correlation with the candidate, given the model.
+    """
+
+    effect: str
+    correlation: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of one rival."""
+        return {"effect": self.effect, "correlation": json_value(self.correlation)}
+
+    def __str__(self) -> str:
+        return f"{self.effect} ({quantity.number(self.correlation, 2)})"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect and what adding it would bring.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    p_value : float
+        Adjusted for all candidates tried.
+    expected_ratio : float
+        Expected residual over noise floor with the effect.
+    held_out_before, held_out_after : float
+        Held-out residual over noise floor without and with it.
+    gain, gain_error : float
+        Held-out gain and its standard error.
+    parameters : tuple of Parameter
+        Predicted parameters.
+    confounded_with : tuple of Rival
+        Effects that this log hardly tells apart from it.
+    explanation : str
+        The physics and the figures in a sentence.
+    status : str
+        ``passed``, ``not significant`` or ``not testable here``.
+    minimal_detectable : dict
+        Smallest detectable (value, unit) by parameter.
+    """
+
+    effect: str
+    p_value: float
+    expected_ratio: float
+    held_out_before: float
+    held_out_after: float
+    gain: float
+    gain_error: float
+    parameters: tuple[Parameter, ...]
+    confounded_with: tuple[Rival, ...]
+    explanation: str
+    status: str
+    minimal_detectable: dict[str, tuple[float, str]]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of one candidate; gain, status and smallest detectable sizes besides."""
+        return {
+            "effect": self.effect,
+            "p_value": json_value(self.p_value),
+            "expected_ratio": json_value(self.expected_ratio),
+            "held_out_before": json_value(self.held_out_before),
+            "held_out_after": json_value(self.held_out_after),
+            "parameters": by_name(self.parameters),
+            "confounded_with": [rival.to_dict() for rival in self.confounded_with],
+            "explanation": self.explanation,
+            "gain": json_value(self.gain),
+            "gain_error": json_value(self.gain_error),
+            "status": self.status,
+            "minimal_detectable": {
+                name: {"value": json_value(value), "unit": unit}
+                for name, (value, unit) in self.minimal_detectable.items()
+            },
+        }
+
+    @property
+    def smallest_detectable(self) -> str:
+        """Smallest sizes that this log would have shown, on one line."""
+        by_size: dict[str, list[str]] = {}
+        for name, (value, unit) in self.minimal_detectable.items():
+            by_size.setdefault(quantity.quantity(value, unit), []).append(name)
+        if len(by_size) == 1 and len(self.minimal_detectable) > 1:
+            return f"each {next(iter(by_size))}"
+        if len(by_size) > 3:
+            sizes = [(value, unit) for value, unit in self.minimal_detectable.values() if math.isfinite(value)]
+            if sizes and len({unit for _, unit in sizes}) == 1:
+                unit = sizes[0][1]
+                return f"{quantity.quantity(min(sizes)[0], unit)} to {quantity.quantity(max(sizes)[0], unit)}"
+        return ", ".join(f"{' '.join(names)} {size}" for size, names in by_size.items()) or "-"
+
+    def __str__(self) -> str:
+        return (
+            f"{self.effect}: held-out error {quantity.ratio(self.held_out_before)} -> "
+            f"{quantity.ratio(self.held_out_after)}, p {quantity.p_value(self.p_value)}. {self.explanation}"
+        )
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """A dependence that no named effect explains.
+
+    Attributes
+    ----------
+    channel, covariate : str
+        What depends on what.
+    share : float
+        Fraction of the excess variance.
+    shape : str
+        For instance ``V-shaped``.
+    t_start, t_end : float
+        Where in time, s.
+    """
+
+    channel: str
+    covariate: str
+    share: float
+    shape: str
+    t_start: float
+    t_end: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of one dependence."""
+        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+
+    def __str__(self) -> str:
+        shape = f", {self.shape}" if self.shape else ""
+        return f"{self.channel} depends on {self.covariate}{shape}: {quantity.share(self.share)} of its excess"
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Verdict over all candidate effects.
+
+    Attributes
+    ----------
+    verdict : str
+        ``adequate``, ``missing``, ``ambiguous`` or ``unknown``.
+    best : str or None
+        The effect that stands out.
+    ambiguous_with : tuple of str
+        Effects that explain the data equally well here.
+    candidates : tuple of Candidate
+        Best first.
+    unexplained : tuple of Unexplained
+        What no effect explains.
+    model : tuple of str
+        Effects that the model has.
+    experiment : str or None
+        What to record next to tell the rivals apart.
+    sentence : str
+        The result in words.
+    notes : tuple of str
+        What the reader should know about these figures.
+    """
+
+    verdict: str
+    best: str | None
+    ambiguous_with: tuple[str, ...]
+    candidates: tuple[Candidate, ...]
+    unexplained: tuple[Unexplained, ...]
+    model: tuple[str, ...]
+    experiment: str | None
+    sentence: str
+    notes: tuple[str, ...]
+
+    @property
+    def best_candidate(self) -> Candidate | None:
+        """The candidate named by `best`."""
+        return next((item for item in self.candidates if item.effect == self.best), None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of `diagnose`; model, experiment, sentence and notes besides."""
+        return {
+            "verdict": self.verdict,
+            "best": self.best,
+            "ambiguous_with": list(self.ambiguous_with),
+            "candidates": [candidate.to_dict() for candidate in self.candidates],
+            "unexplained": [item.to_dict() for item in self.unexplained],
+            "model": list(self.model),
+            "experiment": self.experiment,
+            "sentence": self.sentence,
+            "notes": list(self.notes),
+        }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per candidate, best first."""
+        import pandas as pd  # noqa: PLC0415
+
+        columns = [
+            "effect",
+            "status",
+            "p_value",
+            "held_out_before",
+            "held_out_after",
+            "expected_ratio",
+            "gain",
+            "gain_error",
+        ]
+        return pd.DataFrame([[getattr(item, name) for name in columns] for item in self.candidates], columns=columns)
+
+    def plot(self) -> Figure:
+        """Draw the expected held-out error of the ranked candidates."""
+        from imufit.figures.candidates import candidate_bars  # noqa: PLC0415
+
+        titles = {
+            "ambiguous": f"{' and '.join(self.ambiguous_with)} explain this log equally well",
+            "unknown": "No effect takes away enough of the held-out error to be the cause",
+        }
+        return candidate_bars(
+            [item.effect for item in self.candidates],
+            before=[item.held_out_before for item in self.candidates],
+            after=[item.held_out_after for item in self.candidates],
+            error=[item.gain_error for item in self.candidates],
+            status=[item.status for item in self.candidates],
+            sentence=titles.get(self.verdict, ""),
+        )
+
+    def candidate_table(self, limit: int = 10) -> Table:
+        """Ranked candidates in shown units."""
+        rows = tuple(
+            (
+                item.effect,
+                f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}",
+                quantity.p_value(item.p_value),
+                in_words(item.parameters, 2) if item.status == "passed" else "-",
+                item.smallest_detectable,
+                ", ".join(str(rival) for rival in item.confounded_with[:2]) or "-",
+                item.status,
+            )
+            for item in self.candidates[:limit]
+        )
+        header = ("effect", "held-out error", ">p", "predicted", "smallest detectable", "rivals", "status")
+        return Table("Candidates, best first", header, rows)
+
+    def unexplained_table(self) -> Table:
+        """Dependences without a named cause."""
+        rows = tuple(
+            (
+                item.channel,
+                item.covariate,
+                item.shape or "-",
+                quantity.share(item.share),
+                quantity.span(item.t_start, item.t_end),
+            )
+            for item in self.unexplained
+        )
+        return Table("Not explained by any effect", ("channel", "covariate", "shape", ">share", ">mostly at"), rows)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Every table, most important first."""
+        return (self.candidate_table(), self.unexplained_table())
+
+    def sentences(self) -> list[str]:
+        """Verdict, result, next experiment and notes."""
+        experiment = f"Next: {self.experiment}" if self.experiment else ""
+        return [f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}", experiment, *self.notes]
+
+    def _repr_html_(self) -> str:
+        return html(self.sentences(), self.tables())
+
+    def __str__(self) -> str:
+        return page(self.sentences(), self.tables())

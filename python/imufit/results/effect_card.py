@@ -1,0 +1,102 @@
+"""An effect's card: what a person wants to know before adding it."""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from imufit.figures import quantity
+from imufit.results.json_value import json_value
+from imufit.results.table import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class EffectCard:
+    """Description of one effect of the catalogue.
+
+    Attributes
+    ----------
+    id, sensor, name : str
+        For instance ``gyr.g_sensitivity``, ``gyr``, ``g-sensitivity``.
+    physics, formula : str
+        Cause in a sentence; what it adds to the ideal reading.
+    parameters : tuple
+        (name, SI unit, typical size or None) each.
+    signature, mistaken_for, confirm : str
+        How it shows in a residual, what looks like it, and the experiment that settles it.
+    """
+
+    id: str
+    sensor: str
+    name: str
+    physics: str
+    formula: str
+    parameters: tuple[tuple[str, str, float | None], ...]
+    signature: str
+    mistaken_for: str
+    confirm: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of the card."""
+        texts = ("id", "sensor", "name", "physics", "formula")
+        return {
+            **{name: getattr(self, name) for name in texts},
+            "parameters": {
+                name: {"unit": unit, "typical": json_value(typical)} for name, unit, typical in self.parameters
+            },
+            **{name: getattr(self, name) for name in ("signature", "mistaken_for", "confirm")},
+        }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per parameter."""
+        import pandas as pd  # noqa: PLC0415
+
+        return pd.DataFrame(list(self.parameters), columns=["name", "unit", "typical"])
+
+    @property
+    def typical_sizes(self) -> str:
+        """Typical sizes on one line; equal ones stand together."""
+        sizes: dict[str, list[str]] = {}
+        for name, unit, typical in self.parameters:
+            shown = quantity.quantity(typical, unit) if typical is not None else f"in {quantity.shown_unit(unit)[1]}"
+            sizes.setdefault(shown, []).append(name)
+        if len(sizes) == 1 and len(self.parameters) > 1:
+            shown, names = next(iter(sizes.items()))
+            return f"{' '.join(names)}, each {shown}"
+        return "; ".join(f"{' '.join(names)}: {size}" for size, names in sizes.items())
+
+    def lines(self) -> tuple[tuple[str, str], ...]:
+        """Heading and text of each part of the card."""
+        parts = (
+            ("physics", self.physics),
+            ("formula", self.formula),
+            ("typical size", self.typical_sizes),
+            ("signature", self.signature),
+            ("mistaken for", self.mistaken_for),
+            ("confirm by", self.confirm),
+        )
+        return tuple((heading, text) for heading, text in parts if text)
+
+    def table(self) -> Table:
+        """Lay the card out as a table of two columns."""
+        return Table(f"{self.id}: {self.name}", ("", ""), self.lines())
+
+    def _repr_html_(self) -> str:
+        left = 'style="text-align:left"'
+        rows = "".join(
+            f"<tr><th {left}>{escape(heading)}</th><td {left}>{escape(text)}</td></tr>"
+            for heading, text in self.lines()
+        )
+        return f"<p><b>{escape(self.id)}: {escape(self.name)}</b></p><table>{rows}</table>"
+
+    def __str__(self) -> str:
+        paragraphs = (
+            textwrap.fill(text, 100, initial_indent=f"  {heading:<14}", subsequent_indent=" " * 16)
+            for heading, text in self.lines()
+        )
+        return "\n".join([f"{self.id}: {self.name}", *paragraphs])

@@ -1,0 +1,174 @@
+"""The ladder: effects added one by one until nothing is missing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from imufit.figures import quantity
+from imufit.results.addition import surprise
+from imufit.results.comparison import Comparison
+from imufit.results.diagnosis import VERDICTS, Diagnosis
+from imufit.results.json_value import json_value
+from imufit.results.parameter import by_effect
+from imufit.results.table import Table, html, page
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Step:
+    """One effect added.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    before, expected, after : float
+        Held-out residual over noise floor before, as predicted, and as realised.
+    training : float
+        The same after the step, on the data used for fitting.
+    """
+
+    effect: str
+    before: float
+    expected: float
+    after: float
+    training: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of one step; training error besides."""
+        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+
+    def __str__(self) -> str:
+        return (
+            f"+ {self.effect}: {quantity.ratio(self.before)} -> {quantity.ratio(self.after)} "
+            f"(expected {quantity.ratio(self.expected)})"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Ladder:
+    """The whole loop on one log.
+
+    Attributes
+    ----------
+    steps : tuple of Step
+        In the order of the additions.
+    model : tuple of str
+        Effects of the final model.
+    verdict : str
+        Verdict after the last step.
+    ratio_start, ratio_end : float
+        Held-out residual over noise floor before the first and after the last step.
+    attitude : dict or None
+        ``before_deg`` and ``after_deg``, where the log allows them.
+    diagnosis : Diagnosis
+        After the last step.
+    comparison_start, comparison_end : Comparison or None
+        First and last model against the log.
+    first : Diagnosis or None
+        Before the first step.
+    fit : Any
+        The final fit.
+    sentence : str
+        The result in words.
+    """
+
+    steps: tuple[Step, ...]
+    model: tuple[str, ...]
+    verdict: str
+    ratio_start: float
+    ratio_end: float
+    attitude: dict[str, float] | None
+    diagnosis: Diagnosis
+    comparison_start: Comparison | None = None
+    comparison_end: Comparison | None = None
+    first: Diagnosis | None = None
+    fit: Any = field(default=None, repr=False)
+    sentence: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of `ladder`; rivals, what is unexplained, experiment, sentence and parameters besides."""
+        return {
+            "steps": [step.to_dict() for step in self.steps],
+            "model": list(self.model),
+            "verdict": self.verdict,
+            "ratio_start": json_value(self.ratio_start),
+            "ratio_end": json_value(self.ratio_end),
+            "attitude": json_value(self.attitude),
+            "ambiguous_with": list(self.diagnosis.ambiguous_with),
+            "unexplained": [item.to_dict() for item in self.diagnosis.unexplained],
+            "experiment": self.diagnosis.experiment,
+            "sentence": self.sentence,
+            "parameters": by_effect(getattr(self.fit, "parameters", ()) or ()),
+        }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per step."""
+        import pandas as pd  # noqa: PLC0415
+
+        columns = ["effect", "before", "expected", "after", "training"]
+        return pd.DataFrame([[getattr(item, name) for name in columns] for item in self.steps], columns=columns)
+
+    def plot(self) -> Figure:
+        """Waterfall of the held-out error."""
+        from imufit.figures.waterfall import waterfall  # noqa: PLC0415
+
+        return waterfall(
+            [step.effect for step in self.steps],
+            before=[step.before for step in self.steps],
+            expected=[step.expected for step in self.steps],
+            after=[step.after for step in self.steps],
+            training=[step.training for step in self.steps],
+            start=self.ratio_start,
+        )
+
+    def step_table(self) -> Table:
+        """Before, expected and after of each step beside the noise floor."""
+        rows = tuple(
+            (
+                f"+ {step.effect}",
+                quantity.ratio(step.before),
+                quantity.ratio(step.expected),
+                quantity.ratio(step.after),
+                "1.00",
+                quantity.ratio(step.training),
+            )
+            for step in self.steps
+        )
+        header = ("step", ">before", ">expected", ">after", ">noise floor", ">training")
+        return Table("Held-out error over noise floor", header, rows)
+
+    def warnings(self) -> list[str]:
+        """List the steps whose drop was not the expected one."""
+        texts = ((step.effect, surprise(step.before, step.expected, step.after)) for step in self.steps)
+        return [f"{effect}: {text}" for effect, text in texts if text]
+
+    def tables(self) -> tuple[Table, ...]:
+        """Every table, most important first."""
+        return (self.step_table(), self.diagnosis.unexplained_table())
+
+    def sentences(self) -> list[str]:
+        """Verdict, result, attitude, warnings, next experiment."""
+        experiment = f"Next: {self.diagnosis.experiment}" if self.diagnosis.experiment else ""
+        result = (
+            f"Held-out error {quantity.ratio(self.ratio_start)} -> {quantity.ratio(self.ratio_end)} "
+            f"times the noise floor with {' + '.join(self.model) or 'the ideal sensor'}."
+        )
+        attitude = ""
+        if self.attitude:
+            words = (
+                f"{name.removesuffix('_deg')} {quantity.number(value)} deg" for name, value in self.attitude.items()
+            )
+            attitude = f"Attitude error: {', '.join(words)}."
+        verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
+        return [verdict, result, attitude, *self.warnings(), experiment]
+
+    def _repr_html_(self) -> str:
+        return html(self.sentences(), self.tables())
+
+    def __str__(self) -> str:
+        return page(self.sentences(), self.tables())

@@ -1,0 +1,136 @@
+"""A fitted parameter with its error, unit and typical size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from imufit.figures import quantity
+from imufit.results.json_value import json_value
+from imufit.results.table import Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of one effect.
+
+    Attributes
+    ----------
+    effect, name : str
+        For instance ``gyr.bias`` and ``x``.
+    value, standard_error : float
+        In `unit`.
+    unit : str
+        SI unit.
+    typical : float or None
+        Size that is usual for such sensors, same unit.
+    """
+
+    effect: str
+    name: str
+    value: float
+    standard_error: float
+    unit: str
+    typical: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of one parameter: value, standard error, unit, typical size."""
+        return {
+            "value": json_value(self.value),
+            "standard_error": json_value(self.standard_error),
+            "unit": self.unit,
+            "typical": json_value(self.typical),
+        }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row."""
+        return parameter_frame((self,))
+
+    def plot(self) -> Figure:
+        """Value beside the typical size."""
+        return plot_parameters((self,))
+
+    def _repr_html_(self) -> str:
+        return parameter_table((self,)).html()
+
+    def __str__(self) -> str:
+        return f"{self.effect} {self.name} = {quantity.with_error(self.value, self.standard_error, self.unit)}"
+
+
+def by_name(parameters: Iterable[Parameter]) -> dict[str, dict[str, Any]]:
+    """JSON of one effect's parameters by their name."""
+    return {parameter.name: parameter.to_dict() for parameter in parameters}
+
+
+def by_effect(parameters: Iterable[Parameter]) -> dict[str, dict[str, dict[str, Any]]]:
+    """JSON of a model's parameters by effect and name."""
+    effects: dict[str, dict[str, dict[str, Any]]] = {}
+    for parameter in parameters:
+        effects.setdefault(parameter.effect, {})[parameter.name] = parameter.to_dict()
+    return effects
+
+
+def in_lines(parameters: Sequence[Parameter], limit: int = 3) -> list[str]:
+    """Write the parameters that stand out most from their errors, one each, and how many more there are."""
+    if not parameters:
+        return ["-"]
+
+    def weight(parameter: Parameter) -> float:
+        if not (parameter.standard_error > 0.0 and math.isfinite(parameter.value)):
+            return 0.0
+        return abs(parameter.value / parameter.standard_error)
+
+    chosen = sorted(parameters, key=weight, reverse=True)[:limit]
+    lines = [
+        f"{item.name} {quantity.with_error(item.value, item.standard_error, item.unit)}"
+        for item in parameters
+        if item in chosen
+    ]
+    rest = len(parameters) - len(chosen)
+    return [*lines, *([f"and {rest} more"] if rest else [])]
+
+
+def in_words(parameters: Sequence[Parameter], limit: int = 3) -> str:
+    """Write the parameters that stand out most from their errors on one line."""
+    return ", ".join(in_lines(parameters, limit)).replace(", and ", " and ")
+
+
+def parameter_table(parameters: Iterable[Parameter], title: str = "") -> Table:
+    """Values in the shown units beside their typical sizes."""
+    rows = tuple(
+        (
+            item.effect,
+            item.name,
+            quantity.with_error(item.value, item.standard_error, item.unit),
+            quantity.quantity(item.typical, item.unit),
+        )
+        for item in parameters
+    )
+    return Table(title, ("effect", "parameter", "value", "typical size"), rows)
+
+
+def parameter_frame(parameters: Iterable[Parameter]) -> pd.DataFrame:
+    """Parameters as a data frame in SI units."""
+    import pandas as pd  # noqa: PLC0415
+
+    columns = ["effect", "name", "value", "standard_error", "unit", "typical"]
+    return pd.DataFrame([[getattr(item, name) for name in columns] for item in parameters], columns=columns)
+
+
+def plot_parameters(parameters: Sequence[Parameter]) -> Figure:
+    """Figure of the parameters over their typical sizes."""
+    from imufit.figures.parameters import parameter_sizes  # noqa: PLC0415
+
+    return parameter_sizes(
+        [f"{item.effect} {item.name}" for item in parameters],
+        [item.value for item in parameters],
+        [item.standard_error for item in parameters],
+        [math.nan if item.typical is None else item.typical for item in parameters],
+        [item.unit for item in parameters],
+    )

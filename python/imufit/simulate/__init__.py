@@ -1,0 +1,40 @@
+"""Synthetic logs in which each effect is done physically, so that what an analysis finds can be judged.
+
+A motion with exact derivatives (`SCENARIOS`) carries sensors with random errors (`Noise`); effects (`INJECTIONS`) are
+done to them as nature would: a late sensor is read earlier on the motion, a displaced one is carried elsewhere on the
+body. Nothing here uses the model that is fitted to such logs.
+"""
+
+from imufit.simulate.grade import Grade, ParameterGrade, grade
+from imufit.simulate.hidden import OBSERVABLE, hidden
+from imufit.simulate.injections import INJECTIONS, Injection, injection
+from imufit.simulate.noise import Noise, SensorNoise
+from imufit.simulate.scenarios import SCENARIOS, Scenario
+from imufit.simulate.sealed import Truth, seal, sealed_path, unseal
+from imufit.simulate.simulation import Simulation, simulate
+from imufit.simulate.size import SIZES
+from imufit.simulate.truth import Kinematics, Trajectory
+
+__all__ = [
+    "INJECTIONS",
+    "OBSERVABLE",
+    "SCENARIOS",
+    "SIZES",
+    "Grade",
+    "Injection",
+    "Kinematics",
+    "Noise",
+    "ParameterGrade",
+    "Scenario",
+    "SensorNoise",
+    "Simulation",
+    "Trajectory",
+    "Truth",
+    "grade",
+    "hidden",
+    "injection",
+    "seal",
+    "sealed_path",
+    "simulate",
+    "unseal",
+]

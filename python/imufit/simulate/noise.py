@@ -1,0 +1,147 @@
+"""Random errors of the sensors, the reference and the clock, and the times at which samples are really taken."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from imufit.simulate.environment import stream
+from imufit.simulate.motion import Array
+from imufit.simulate.truth import rotation_about
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Random errors of one sensor, the same for its three axes, in the sensor's unit.
+
+    Attributes
+    ----------
+    white : standard deviation of the white noise of one sample.
+    coloured : standard deviation of first-order autoregressive noise on top of it; 0 = none.
+    correlation_time : time (s) in which the correlation of the coloured noise falls to 1/e.
+    random_walk : growth of the bias per square root of a second; 0 = none.
+    resolution : step between two values that the sensor can output; 0 = none.
+    """
+
+    white: float
+    coloured: float = 0.0
+    correlation_time: float = 0.2
+    random_walk: float = 0.0
+    resolution: float = 0.0
+
+    def draw(self, rng: np.random.Generator, t: Array) -> Array:
+        """Return noise (n, 3) for samples at times `t` (s), without the rounding."""
+        noise = self.white * rng.standard_normal((t.size, 3))
+        gaps = np.diff(t, prepend=t[0])
+        if self.coloured > 0.0:
+            keep = float(np.exp(-np.median(gaps[1:]) / self.correlation_time)) if t.size > 1 else 0.0
+            drive = self.coloured * rng.standard_normal((t.size, 3))
+            drive[1:] *= np.sqrt(1.0 - keep**2)
+            noise += lfilter([1.0], [1.0, -keep], drive, axis=0)
+        if self.random_walk > 0.0:
+            steps = self.random_walk * np.sqrt(gaps)[:, None] * rng.standard_normal((t.size, 3))
+            noise += np.cumsum(steps, axis=0)
+        return noise
+
+    def rounded(self, reading: Array) -> Array:
+        """Return the reading as the sensor's digits show it."""
+        return reading if self.resolution == 0.0 else np.round(reading / self.resolution) * self.resolution
+
+
+def _mpu6050_acc() -> SensorNoise:
+    return SensorNoise(0.02)
+
+
+def _mpu6050_gyr() -> SensorNoise:
+    return SensorNoise(float(np.radians(0.05)))
+
+
+def _hmc5883l() -> SensorNoise:
+    return SensorNoise(0.3)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """All random errors of a log.
+
+    The defaults are white noise such as an MPU6050 with its 44 Hz filter and an HMC5883L show at 100 Hz: 0.02 m/s^2,
+    0.05 deg/s and 0.3 uT per sample; nothing else.
+
+    Attributes
+    ----------
+    acc, gyr, mag : the sensors (m/s^2, rad/s, uT).
+    temperature, temperature_resolution : of the thermometer, K.
+    attitude_deg : white error of the reference attitude about each axis, standard deviation in degrees.
+    position : white error of the reference position along each axis, standard deviation in m.
+    jitter : standard deviation (s) by which samples are taken, and stamped, off the even grid.
+    dropped : fraction of rows that are lost.
+    mag_rate : output rate of the magnetometer, Hz; rows between its samples hold NaN. None = that of the log.
+    """
+
+    acc: SensorNoise = field(default_factory=_mpu6050_acc)
+    gyr: SensorNoise = field(default_factory=_mpu6050_gyr)
+    mag: SensorNoise = field(default_factory=_hmc5883l)
+    temperature: float = 0.02
+    temperature_resolution: float = 0.0
+    attitude_deg: float = 0.0
+    position: float = 0.0
+    jitter: float = 0.0
+    dropped: float = 0.0
+    mag_rate: float | None = None
+
+    @classmethod
+    def realistic(cls) -> Noise:
+        """Return the defaults with colour, wandering bias, 16 bit steps, jitter, lost rows, a slow magnetometer."""
+        plain = cls()
+        return cls(
+            acc=replace(plain.acc, coloured=0.006, random_walk=2e-4, resolution=9.80665 / 8192),
+            gyr=replace(plain.gyr, coloured=2.5e-4, random_walk=1e-5, resolution=float(np.radians(1 / 65.5))),
+            mag=replace(plain.mag, coloured=0.1, correlation_time=0.5, resolution=0.092),
+            temperature=0.03,
+            temperature_resolution=1 / 340,
+            attitude_deg=0.03,
+            position=2e-4,
+            jitter=3e-4,
+            dropped=0.002,
+            mag_rate=50.0,
+        )
+
+    def sensor(self, name: str) -> SensorNoise:
+        """Return the noise of sensor `name`: "acc", "gyr" or "mag"."""
+        return {"acc": self.acc, "gyr": self.gyr, "mag": self.mag}[name]
+
+    def white(self) -> dict[str, float]:
+        """Return the standard deviation of the white noise for each sensor, in its unit."""
+        return {name: self.sensor(name).white for name in ("acc", "gyr", "mag")}
+
+
+def sampling_times(noise: Noise, seed: int, duration: float, rate: float) -> Array:
+    """Return the times (n,), s, at which samples are taken: an even grid from 0, jittered, with some rows lost."""
+    rng = stream(seed, "sampling times")
+    t = np.arange(round(duration * rate)) / rate
+    if noise.jitter > 0.0:
+        t = t + np.clip(noise.jitter * rng.standard_normal(t.size), -0.4 / rate, 0.4 / rate)
+    if noise.dropped > 0.0:
+        kept = rng.random(t.size) >= noise.dropped
+        kept[:1] = True
+        t = t[kept]
+    return t
+
+
+def magnetometer_rows(noise: Noise, t: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Return which rows (n,) hold a new sample of the magnetometer."""
+    if noise.mag_rate is None:
+        return np.ones(t.size, dtype=np.bool_)
+    count = np.floor(t * noise.mag_rate + 0.25)
+    return np.diff(count, prepend=-np.inf) > 0.0
+
+
+def noisy_attitude(rotation: Array, noise: Noise, rng: np.random.Generator) -> Array:
+    """Return reference attitudes (n, 3, 3), each turned by a random error in the body frame."""
+    if noise.attitude_deg == 0.0:
+        return rotation
+    error = np.radians(noise.attitude_deg) * rng.standard_normal((rotation.shape[0], 3))
+    angle = np.linalg.norm(error, axis=1)
+    return np.asarray(rotation @ rotation_about(error / angle[:, None], angle), dtype=np.float64)

@@ -1,0 +1,85 @@
+"""What was done to a simulated log, and how it is kept beside the log without being read by accident."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import zlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+HEADER = "imufit sealed truth, format 1: what was done to this log; `imufit reveal LOG` opens it"
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What a simulated log holds.
+
+    Attributes
+    ----------
+    scenario, seed : the motion and its random seed.
+    effects : each injected effect with its parameters, SI units; empty = the sensors are perfect but for noise.
+    sizes : for each effect, its root mean square over the white noise of the sensor that it affects most.
+    label : the name of the size that was asked for, such as "large"; empty where the parameters were given.
+    """
+
+    scenario: str
+    seed: int
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    label: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return a JSON object that `from_json` reads."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Truth:
+        """Return the truth written by `to_json`."""
+        return cls(
+            scenario=str(data["scenario"]),
+            seed=int(data["seed"]),
+            effects={e: {n: float(v) for n, v in p.items()} for e, p in data["effects"].items()},
+            sizes={e: float(v) for e, v in data["sizes"].items()},
+            label=str(data["label"]),
+        )
+
+
+def sealed_path(log_path: str | Path) -> Path:
+    """Return where the truth of a log is kept: beside it, with `.sealed` added to its name."""
+    path = Path(log_path)
+    return path.with_name(path.name + ".sealed")
+
+
+def seal(truth: Truth, log_path: str | Path) -> Path:
+    """Write `truth` beside the log `log_path`, unreadable at a glance, and return the path of what was written."""
+    packed = base64.b64encode(zlib.compress(json.dumps(truth.to_json()).encode(), 9)).decode()
+    lines = [packed[i : i + 76] for i in range(0, len(packed), 76)]
+    path = sealed_path(log_path)
+    path.write_text("\n".join([HEADER, *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def unseal(log_path: str | Path) -> Truth:
+    """Return the truth of the log `log_path`.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is none beside the log.
+    ValueError
+        If the file beside the log is not one written by `seal`.
+    """
+    path = sealed_path(log_path)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: there is no sealed truth beside this log")
+    try:
+        header, *lines = path.read_text(encoding="utf-8").splitlines() or [""]
+        if not header.startswith("imufit sealed truth, format 1"):
+            raise ValueError("header")
+        return Truth.from_json(json.loads(zlib.decompress(base64.b64decode("".join(lines), validate=True))))
+    except (ValueError, KeyError, TypeError, AttributeError, binascii.Error, zlib.error) as error:
+        raise ValueError(f"{path}: not a sealed truth of format 1, or damaged") from error

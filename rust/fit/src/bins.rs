@@ -1,0 +1,90 @@
+//! Bins of every covariate, in which the residual is averaged: any dependence shows there, whatever its shape.
+
+use imufit_model::sensor_model::Evaluation;
+
+/// Bins per covariate, at most.
+pub const BINS: usize = 12;
+
+/// Covariates that every log has, before the log's own columns.
+const FIXED: [&str; 9] = ["t", "temp", "f_x", "f_y", "f_z", "omega_x", "omega_y", "omega_z", "omega_norm"];
+
+/// Edges of the bins of every covariate.
+#[derive(Clone, Debug)]
+pub struct Bins {
+    /// Covariate names: `t`, `temp`, `f_x` ... `omega_norm`, then the log's own columns.
+    pub names: Vec<String>,
+    /// Inner edges, increasing; empty where a covariate does not vary.
+    pub edges: Vec<Vec<f64>>,
+}
+
+impl Bins {
+    /// Names of the covariates of a log with these columns of its own.
+    pub fn covariate_names(own: &[String]) -> Vec<String> {
+        FIXED.iter().map(|s| (*s).to_string()).chain(own.iter().cloned()).collect()
+    }
+
+    /// Unit of a covariate; empty for the log's own columns.
+    pub fn unit(name: &str) -> &'static str {
+        match name {
+            "t" => "s",
+            "temp" => "degC",
+            "f_x" | "f_y" | "f_z" => "m/s^2",
+            "omega_x" | "omega_y" | "omega_z" | "omega_norm" => "rad/s",
+            _ => "",
+        }
+    }
+
+    /// Bins of equal count from samples of each covariate.
+    pub fn new(own: &[String], samples: &mut [Vec<f64>]) -> Self {
+        let edges = samples
+            .iter_mut()
+            .map(|sample| {
+                sample.sort_unstable_by(f64::total_cmp);
+                let mut edges: Vec<f64> = Vec::new();
+                for k in 1..BINS {
+                    if sample.len() < 4 * BINS {
+                        break;
+                    }
+                    let edge = sample[k * sample.len() / BINS];
+                    // A covariate that rests on one value gets no bin of width zero.
+                    if edge > sample[0] && edges.last().is_none_or(|e| edge > *e) {
+                        edges.push(edge);
+                    }
+                }
+                edges
+            })
+            .collect();
+        Self { names: Self::covariate_names(own), edges }
+    }
+
+    /// Bin of each row for one covariate; `usize::MAX` where the covariate is not known.
+    pub fn assign(&self, covariate: usize, t: &[f64], evaluation: &Evaluation, out: &mut Vec<usize>) {
+        out.clear();
+        let ideal = &evaluation.ideal;
+        let edges = &self.edges[covariate];
+        let mut put = |v: f64| {
+            out.push(if v.is_finite() { edges.partition_point(|e| *e <= v) } else { usize::MAX });
+        };
+        match covariate {
+            0 => t.iter().for_each(|v| put(*v)),
+            1 => match &evaluation.temperature {
+                // Edges are in degC; the evaluation holds the difference to the mean.
+                Some(temperature) => temperature.iter().for_each(|v| put(*v)),
+                None => t.iter().for_each(|_| put(f64::NAN)),
+            },
+            2..=4 => ideal.f.axis(covariate - 2).iter().for_each(|v| put(*v)),
+            5..=7 => ideal.omega.axis(covariate - 5).iter().for_each(|v| put(*v)),
+            8 => (0..t.len()).for_each(|i| put(ideal.omega.row(i).norm())),
+            _ => evaluation.covariates[covariate - FIXED.len()].iter().for_each(|v| put(*v)),
+        }
+    }
+
+    /// Shifts the temperature bins so that they apply to the difference to the mean.
+    pub fn centre_temperature(&mut self, mean: f64) {
+        if mean.is_finite() {
+            for e in &mut self.edges[1] {
+                *e -= mean;
+            }
+        }
+    }
+}

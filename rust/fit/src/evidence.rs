@@ -1,0 +1,254 @@
+//! Evidence: for each block of time and each channel the Gram matrix of `[columns of every effect | residual]`.
+//!
+//! Whitened where the noise is coloured, and additive: windows, chunks and logs of one layout sum up. From it alone
+//! come fits, standard errors, held-out errors and the rank of every candidate, without another look at the log.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use imufit_model::effect::EffectError;
+use imufit_model::facts::{LOOKBACK, LogFacts};
+use imufit_model::sensor::Sensor;
+use imufit_model::sensor_model::{Evaluation, SensorModel};
+use imufit_model::window::Window;
+use nalgebra::{DMatrix, DMatrixView};
+use rayon::prelude::*;
+
+use crate::bins::Bins;
+use crate::whitening::Filter;
+
+/// Rows worked on at a time: their columns stay in the cache.
+const PART: usize = 2048;
+/// Consecutive samples further apart than this many sample intervals are a gap, which no filter reaches across.
+const GAP: f64 = 1.75;
+
+/// What one evidence is taken for: the same layout must underlie all that is added up.
+#[derive(Clone)]
+pub struct Layout {
+    /// Effects and candidates with the parameters around which columns are taken.
+    pub model: SensorModel,
+    /// Facts of the log.
+    pub facts: LogFacts,
+    /// Bins of the covariates, temperature less its mean.
+    pub bins: Bins,
+    /// Number of blocks of equal row count.
+    pub blocks: usize,
+    /// Whitening filter of each channel.
+    pub filters: Vec<Filter>,
+}
+
+impl Layout {
+    /// Block that a row of the log belongs to.
+    pub fn block(&self, row: usize) -> usize {
+        (row * self.blocks / self.facts.n.max(1)).min(self.blocks.saturating_sub(1))
+    }
+
+    /// Row at which a block starts.
+    fn block_start(&self, block: usize) -> usize {
+        (block * self.facts.n).div_ceil(self.blocks)
+    }
+}
+
+/// Evidence of one channel in one block. Width w = number of active columns + 1; the residual is the last.
+#[derive(Clone, Debug)]
+pub struct ChannelBlock {
+    /// Number of samples.
+    pub n: usize,
+    /// Gram matrix (w x w).
+    pub gram: DMatrix<f64>,
+    /// Number of samples in each bin of each covariate.
+    pub bin_count: Vec<Vec<f64>>,
+    /// Sums of columns and residual in each bin (bins x w, row by row) of each covariate.
+    pub bin_sum: Vec<Vec<f64>>,
+}
+
+impl ChannelBlock {
+    fn new(width: usize, bins: &Bins) -> Self {
+        Self {
+            n: 0,
+            gram: DMatrix::zeros(width, width),
+            bin_count: bins.edges.iter().map(|e| vec![0.0; if e.is_empty() { 0 } else { e.len() + 1 }]).collect(),
+            bin_sum: bins.edges.iter().map(|e| vec![0.0; if e.is_empty() { 0 } else { (e.len() + 1) * width }]).collect(),
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.n += other.n;
+        self.gram += &other.gram;
+        for (a, b) in self.bin_count.iter_mut().zip(&other.bin_count).chain(self.bin_sum.iter_mut().zip(&other.bin_sum)) {
+            for (x, y) in a.iter_mut().zip(b) {
+                *x += y;
+            }
+        }
+    }
+
+    /// Sum of squared residuals.
+    pub fn residual_square(&self) -> f64 {
+        let last = self.gram.nrows() - 1;
+        self.gram[(last, last)]
+    }
+}
+
+type Blocks = BTreeMap<(usize, usize), ChannelBlock>;
+
+/// Evidence of a log, or of a part of it.
+#[derive(Clone)]
+pub struct Evidence {
+    /// What it was taken for.
+    pub layout: Arc<Layout>,
+    blocks: Blocks,
+}
+
+/// Rows of a sensor that can be used, within an evaluated window.
+pub struct Samples {
+    /// Rows with a finite reading, reference and columns.
+    pub rows: Vec<usize>,
+    /// For each of them the number of gapless samples that lead up to it.
+    pub run: Vec<usize>,
+}
+
+impl Samples {
+    /// Usable samples of one sensor.
+    pub fn new(sensor: Sensor, evaluation: &Evaluation, t: &[f64], dt: f64) -> Self {
+        let channels: Vec<_> =
+            (0..3).filter_map(|axis| evaluation.channels[3 * sensor.index() + axis].as_ref()).collect();
+        let mut usable = vec![channels.len() == 3; t.len()];
+        for column in channels.iter().flat_map(|c| c.columns.iter().chain(std::iter::once(&c.residual))) {
+            for (u, v) in usable.iter_mut().zip(column) {
+                *u &= v.is_finite();
+            }
+        }
+        let rows: Vec<usize> = (0..t.len()).filter(|i| usable[*i]).collect();
+        let mut run = vec![0; rows.len()];
+        for k in 1..rows.len() {
+            run[k] = if t[rows[k]] - t[rows[k - 1]] <= GAP * dt { run[k - 1] + 1 } else { 0 };
+        }
+        Self { rows, run }
+    }
+
+    /// Samples whose row is at least `core` and that have `order` gapless samples before them, none of them too far back.
+    pub fn with_past(&self, core: usize, order: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..self.rows.len()).filter(move |&k| {
+            self.rows[k] >= core && self.run[k] >= order && self.rows[k] - self.rows[k - order] <= LOOKBACK
+        })
+    }
+}
+
+impl Evidence {
+    /// Empty evidence.
+    pub fn new(layout: Arc<Layout>) -> Self {
+        Self { layout, blocks: Blocks::new() }
+    }
+
+    /// Adds the core rows of a window. Rows before them are used as past of the whitening filter.
+    pub fn add(&mut self, window: &Window) -> Result<(), EffectError> {
+        let starts: Vec<usize> = (window.begin..window.end).step_by(PART).collect();
+        let layout = &self.layout;
+        let parts: Vec<Result<Blocks, EffectError>> = starts
+            .into_par_iter()
+            .map(|begin| take(layout, &window.part(begin, (begin + PART).min(window.end), layout.facts.margin())))
+            .collect();
+        // Summed in the order of time, so that the result does not depend on the number of threads.
+        for part in parts {
+            self.absorb(part?);
+        }
+        Ok(())
+    }
+
+    fn absorb(&mut self, part: Blocks) {
+        for (key, block) in part {
+            match self.blocks.entry(key) {
+                std::collections::btree_map::Entry::Occupied(mut e) => e.get_mut().add(&block),
+                std::collections::btree_map::Entry::Vacant(e) => {
+                    e.insert(block);
+                }
+            }
+        }
+    }
+
+    /// Adds evidence of other rows taken for the same layout.
+    pub fn merge(&mut self, other: Self) {
+        self.absorb(other.blocks);
+    }
+
+    /// Evidence of a channel in a block; `None` where it has no sample.
+    pub fn get(&self, block: usize, channel: usize) -> Option<&ChannelBlock> {
+        self.blocks.get(&(block, channel))
+    }
+
+    /// Number of samples of a channel.
+    pub fn count(&self, channel: usize) -> usize {
+        (0..self.layout.blocks).filter_map(|b| self.get(b, channel)).map(|b| b.n).sum()
+    }
+}
+
+/// Evidence of one part of a window.
+fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
+    let back = if layout.filters.iter().any(|f| !f.is_empty()) { LOOKBACK } else { 0 };
+    let core = window.begin;
+    let window = window.with_core(core.saturating_sub(back), window.end);
+    let evaluation = layout.model.evaluate(&window, &layout.facts)?;
+    let t = &window.t[window.begin..window.end];
+    let mut assigned = vec![Vec::new(); layout.bins.names.len()];
+    for (covariate, rows) in assigned.iter_mut().enumerate() {
+        if !layout.bins.edges[covariate].is_empty() {
+            layout.bins.assign(covariate, t, &evaluation, rows);
+        }
+    }
+    let mut out = Blocks::new();
+    let (mut by_column, mut by_row) = (Vec::new(), Vec::new());
+    for sensor in Sensor::ALL {
+        let order = (0..3).map(|a| layout.filters[3 * sensor.index() + a].len()).max().unwrap_or(0);
+        let samples = Samples::new(sensor, &evaluation, t, layout.facts.sensor_dt[sensor.index()]);
+        let kept: Vec<usize> = samples.with_past(core - window.begin, order).collect();
+        if kept.is_empty() {
+            continue;
+        }
+        let row_of = |k: usize| window.offset + window.begin + samples.rows[k];
+        for channel in 3 * sensor.index()..3 * sensor.index() + 3 {
+            let Some(columns) = &evaluation.channels[channel] else { continue };
+            let width = columns.columns.len() + 1;
+            let n = kept.len();
+            by_column.clear();
+            let filter = &layout.filters[channel];
+            for column in columns.columns.iter().chain(std::iter::once(&columns.residual)) {
+                by_column.extend(kept.iter().map(|&k| {
+                    filter.iter().enumerate().fold(column[samples.rows[k]], |v, (j, a)| v - a * column[samples.rows[k - 1 - j]])
+                }));
+            }
+            by_row.clear();
+            by_row.resize(n * width, 0.0);
+            for (c, column) in by_column.chunks_exact(n).enumerate() {
+                for (i, v) in column.iter().enumerate() {
+                    by_row[i * width + c] = *v;
+                }
+            }
+            let mut first = 0;
+            while first < n {
+                let block = layout.block(row_of(kept[first]));
+                let next = layout.block_start(block + 1);
+                let last = first + kept[first..].partition_point(|k| row_of(*k) < next || block + 1 == layout.blocks);
+                let target = out.entry((block, channel)).or_insert_with(|| ChannelBlock::new(width, &layout.bins));
+                target.n += last - first;
+                let rows = DMatrixView::from_slice(&by_row[first * width..last * width], width, last - first);
+                let columns = DMatrixView::from_slice_with_strides(&by_column[first..], last - first, width, 1, n);
+                target.gram.gemm(1.0, &rows, &columns, 1.0);
+                for (covariate, assigned) in assigned.iter().enumerate().filter(|(_, a)| !a.is_empty()) {
+                    for i in first..last {
+                        let bin = assigned[samples.rows[kept[i]]];
+                        if bin == usize::MAX {
+                            continue;
+                        }
+                        target.bin_count[covariate][bin] += 1.0;
+                        let sums = &mut target.bin_sum[covariate][bin * width..(bin + 1) * width];
+                        for (s, v) in sums.iter_mut().zip(&by_row[i * width..(i + 1) * width]) {
+                            *s += v;
+                        }
+                    }
+                }
+                first = last;
+            }
+        }
+    }
+    Ok(out)
+}

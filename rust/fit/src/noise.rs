@@ -1,0 +1,58 @@
+//! Noise of the residual: autocovariance and spectrum, from which whitening filters come.
+
+use imufit_model::effect::EffectError;
+use imufit_model::facts::LOOKBACK;
+use imufit_model::sensor::{CHANNELS, Sensor};
+use imufit_model::window::Window;
+
+use crate::evidence::{Layout, Samples};
+use crate::whitening::MAX_ORDER;
+
+/// Autocovariances of the residual left by given parameters (all of them, candidates too), summed over windows.
+#[derive(Clone, Debug)]
+pub struct Autocovariance {
+    /// Sum of products at each lag, per channel.
+    sums: Vec<[f64; MAX_ORDER + 1]>,
+    /// Number of products at each lag, per channel.
+    counts: Vec<[usize; MAX_ORDER + 1]>,
+}
+
+impl Default for Autocovariance {
+    fn default() -> Self {
+        Self { sums: vec![[0.0; MAX_ORDER + 1]; CHANNELS], counts: vec![[0; MAX_ORDER + 1]; CHANNELS] }
+    }
+}
+
+impl Autocovariance {
+    /// Adds the core rows of a window: the residual less the columns times `step`.
+    pub fn add(&mut self, window: &Window, layout: &Layout, step: &[f64]) -> Result<(), EffectError> {
+        let core = window.begin;
+        let window = window.with_core(core.saturating_sub(LOOKBACK), window.end);
+        let evaluation = layout.model.evaluate(&window, &layout.facts)?;
+        let t = &window.t[window.begin..window.end];
+        for sensor in Sensor::ALL {
+            let samples = Samples::new(sensor, &evaluation, t, layout.facts.sensor_dt[sensor.index()]);
+            for channel in 3 * sensor.index()..3 * sensor.index() + 3 {
+                let Some(columns) = &evaluation.channels[channel] else { continue };
+                let residual = columns.residual_after(&layout.model.active()[channel], step);
+                for k in samples.with_past(core - window.begin, 0) {
+                    let now = residual[samples.rows[k]];
+                    for lag in 0..=MAX_ORDER.min(samples.run[k]) {
+                        if samples.rows[k] - samples.rows[k - lag] > LOOKBACK {
+                            break;
+                        }
+                        self.sums[channel][lag] += now * residual[samples.rows[k - lag]];
+                        self.counts[channel][lag] += 1;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Autocovariance of a channel, lag 0 first, and its number of samples.
+    pub fn of_channel(&self, channel: usize) -> (Vec<f64>, usize) {
+        let values = self.sums[channel].iter().zip(&self.counts[channel]).map(|(s, n)| s / (*n).max(1) as f64).collect();
+        (values, self.counts[channel][0])
+    }
+}

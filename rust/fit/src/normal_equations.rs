@@ -1,0 +1,132 @@
+//! Normal equations: scaled Cholesky solution and covariance.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// Gram matrix, right-hand side and sum of squares of a weighted least-squares problem.
+#[derive(Clone, Debug)]
+pub struct NormalEquations {
+    /// X^T X (p x p).
+    pub gram: DMatrix<f64>,
+    /// X^T y.
+    pub right: DVector<f64>,
+    /// y^T y.
+    pub square: f64,
+    /// Number of observations.
+    pub n: f64,
+}
+
+/// A factorised system.
+pub struct Solved {
+    factor: Cholesky<f64, Dyn>,
+    scale: DVector<f64>,
+    /// The solution.
+    pub solution: DVector<f64>,
+}
+
+/// Prior precision added to a unit diagonal: enough to carry the solution over combinations that the data leave open.
+const RIDGE: f64 = 1e-10;
+
+impl NormalEquations {
+    /// Zero equations of `p` parameters.
+    pub fn zeros(p: usize) -> Self {
+        Self { gram: DMatrix::zeros(p, p), right: DVector::zeros(p), square: 0.0, n: 0.0 }
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.right.len()
+    }
+
+    /// Adds `factor` times other equations.
+    pub fn add(&mut self, other: &Self, factor: f64) {
+        self.gram.zip_apply(&other.gram, |a, b| *a += factor * b);
+        self.right.axpy(factor, &other.right, 1.0);
+        self.square += factor * other.square;
+        self.n += factor * other.n;
+    }
+
+    /// Equations in new parameters `beta = basis * gamma`.
+    #[must_use]
+    pub fn reduced(&self, basis: &DMatrix<f64>) -> Self {
+        Self {
+            gram: basis.tr_mul(&(&self.gram * basis)),
+            right: basis.tr_mul(&self.right),
+            square: self.square,
+            n: self.n,
+        }
+    }
+
+    /// Equations of some of the parameters.
+    #[must_use]
+    pub fn selected(&self, parameters: &[usize]) -> Self {
+        Self {
+            gram: self.gram.select_rows(parameters).select_columns(parameters),
+            right: self.right.select_rows(parameters),
+            square: self.square,
+            n: self.n,
+        }
+    }
+
+    /// Solves the equations with a prior of zero mean and the given precisions; `None` if that fails.
+    pub fn solve(&self, precision: &DVector<f64>) -> Option<Solved> {
+        let p = self.parameters();
+        let mut scaled = self.gram.clone();
+        for j in 0..p {
+            scaled[(j, j)] += precision[j];
+        }
+        let scale = DVector::from_fn(p, |j, _| {
+            let d = scaled[(j, j)];
+            if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 }
+        });
+        for j in 0..p {
+            for i in 0..p {
+                scaled[(i, j)] *= scale[i] * scale[j];
+            }
+        }
+        for j in 0..p {
+            scaled[(j, j)] = scaled[(j, j)].max(1.0) + RIDGE;
+        }
+        let factor = Cholesky::new(scaled)?;
+        let mut solution = self.right.component_mul(&scale);
+        factor.solve_mut(&mut solution);
+        solution.component_mul_assign(&scale);
+        solution.iter().all(|v| v.is_finite()).then_some(Solved { factor, scale, solution })
+    }
+
+    /// Sum of squared residuals at given parameters.
+    pub fn residual_square(&self, beta: &DVector<f64>) -> f64 {
+        self.square - 2.0 * self.right.dot(beta) + beta.dot(&(&self.gram * beta))
+    }
+}
+
+impl Solved {
+    /// Covariance of the solution for observations of unit variance.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let mut c = self.factor.inverse();
+        let p = self.scale.len();
+        for j in 0..p {
+            for i in 0..p {
+                c[(i, j)] *= self.scale[i] * self.scale[j];
+            }
+        }
+        c
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_of_very_different_size_are_solved_to_full_precision() {
+        let x = DMatrix::from_fn(50, 3, |i, j| [1.0, 1e-6 * (i as f64).sin(), 1e5 * (0.3 * i as f64).cos()][j]);
+        let truth = DVector::from_vec(vec![2.0, -3e6, 4e-5]);
+        let y = &x * &truth;
+        let equations = NormalEquations { gram: x.tr_mul(&x), right: x.tr_mul(&y), square: y.dot(&y), n: 50.0 };
+        let solved = equations.solve(&DVector::zeros(3)).expect("determined");
+        for j in 0..3 {
+            assert!((solved.solution[j] / truth[j] - 1.0).abs() < 1e-8);
+        }
+        assert!(equations.residual_square(&solved.solution).abs() < 1e-6 * equations.square);
+    }
+}

@@ -1,0 +1,191 @@
+//! First pass over a log: what has to be known of the whole before evidence is taken.
+
+use imufit_model::bandwidth::Bandwidth;
+use imufit_model::facts::LogFacts;
+use imufit_model::sensor::Sensor;
+use imufit_model::window::Window;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use crate::bins::Bins;
+
+/// Rows looked at more closely, at most.
+const SAMPLES: usize = 8192;
+/// Rows on which the width of the reference polynomial is judged, at most.
+const BANDWIDTH_SAMPLES: usize = 2048;
+
+/// What the caller knows before the first pass.
+#[derive(Clone, Debug)]
+pub struct Given {
+    /// Number of rows of the log.
+    pub n: usize,
+    /// Gravity in the reference frame, m/s^2.
+    pub gravity: Vector3<f64>,
+    /// Reference field, uT, if known.
+    pub field: Option<Vector3<f64>>,
+    /// Names of the covariates.
+    pub covariates: Vec<String>,
+}
+
+/// Running sums of the first pass.
+#[derive(Clone, Debug)]
+pub struct Survey {
+    given: Given,
+    t_first: f64,
+    t_last: f64,
+    steps: Vec<f64>,
+    sensor_steps: [Vec<f64>; 3],
+    counts: [usize; 3],
+    temperature: (f64, usize),
+    covariates: Vec<(f64, usize)>,
+    field: (Vector3<f64>, usize),
+    attitude_width: Bandwidth,
+    position_width: Bandwidth,
+    has_position: bool,
+    samples: Vec<Vec<f64>>,
+}
+
+/// Middle of a sample; NaN if empty.
+fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+impl Survey {
+    /// An empty survey.
+    pub fn new(given: Given) -> Self {
+        let axes = Bins::covariate_names(&given.covariates).len();
+        Self {
+            t_first: f64::NAN,
+            t_last: f64::NAN,
+            steps: Vec::new(),
+            sensor_steps: Default::default(),
+            counts: [0; 3],
+            temperature: (0.0, 0),
+            covariates: vec![(0.0, 0); given.covariates.len()],
+            field: (Vector3::zeros(), 0),
+            attitude_width: Bandwidth::of_attitude(),
+            position_width: Bandwidth::of_position(),
+            has_position: false,
+            samples: vec![Vec::new(); axes],
+            given,
+        }
+    }
+
+    fn sampled(&self, row: usize, most: usize) -> bool {
+        row.is_multiple_of(self.given.n.div_ceil(most).max(1))
+    }
+
+    /// Adds the core rows of a window.
+    pub fn add(&mut self, window: &Window) {
+        let core = window.begin..window.end;
+        if core.is_empty() {
+            return;
+        }
+        if self.t_first.is_nan() {
+            self.t_first = window.t[window.begin];
+        }
+        self.t_last = window.t[window.end - 1];
+        for sensor in Sensor::ALL {
+            let Some(y) = window.reading(sensor) else { continue };
+            let mut last: Option<f64> = None;
+            for i in core.clone().filter(|i| y[3 * i..3 * i + 3].iter().all(|v| v.is_finite())) {
+                self.counts[sensor.index()] += 1;
+                if let Some(before) = last
+                    && self.sampled(window.offset + i, SAMPLES)
+                {
+                    self.sensor_steps[sensor.index()].push(window.t[i] - before);
+                }
+                last = Some(window.t[i]);
+            }
+        }
+        for i in core.clone() {
+            let row = window.offset + i;
+            if i > 0 && self.sampled(row, SAMPLES) {
+                self.steps.push(window.t[i] - window.t[i - 1]);
+            }
+            if let Some(v) = window.temperature.map(|t| t[i]).filter(|v| v.is_finite()) {
+                self.temperature.0 += v;
+                self.temperature.1 += 1;
+            }
+            for (sum, column) in self.covariates.iter_mut().zip(&window.covariates) {
+                if column[i].is_finite() {
+                    sum.0 += column[i];
+                    sum.1 += 1;
+                }
+            }
+            if let (Some(q), Some(m)) = (window.attitude, window.reading(Sensor::Mag)) {
+                let (q, m) = (&q[4 * i..4 * i + 4], Vector3::new(m[3 * i], m[3 * i + 1], m[3 * i + 2]));
+                if q.iter().all(|v| v.is_finite()) && m.iter().all(|v| v.is_finite()) {
+                    let q = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
+                    self.field.0 += q * m;
+                    self.field.1 += 1;
+                }
+            }
+            if self.sampled(row, SAMPLES) {
+                let at = |s: Sensor, a: usize| window.reading(s).map_or(f64::NAN, |y| y[3 * i + a]);
+                let rate = Vector3::new(at(Sensor::Gyr, 0), at(Sensor::Gyr, 1), at(Sensor::Gyr, 2));
+                let fixed = [
+                    window.t[i], window.temperature.map_or(f64::NAN, |t| t[i]),
+                    at(Sensor::Acc, 0), at(Sensor::Acc, 1), at(Sensor::Acc, 2),
+                    rate.x, rate.y, rate.z, rate.norm(),
+                ];
+                let values = fixed.into_iter().chain(window.covariates.iter().map(|c| c[i]));
+                for (sample, value) in self.samples.iter_mut().zip(values) {
+                    if value.is_finite() {
+                        sample.push(value);
+                    }
+                }
+            }
+        }
+        let rows = |s: &Self| core.clone().filter(|i| s.sampled(window.offset + i, BANDWIDTH_SAMPLES)).collect::<Vec<_>>();
+        let rows = rows(self);
+        self.attitude_width.add(window, rows.iter().copied());
+        if let Some(p) = window.position {
+            self.has_position |= core.clone().any(|i| p[3 * i].is_finite());
+            self.position_width.add(window, rows.into_iter());
+        }
+    }
+
+    /// The facts, and the bins of every covariate.
+    pub fn finish(mut self) -> (LogFacts, Bins) {
+        let mean = |(sum, n): (f64, usize)| if n == 0 { f64::NAN } else { sum / n as f64 };
+        let estimated = self.given.field.is_none() && self.field.1 > 0;
+        let field = self.given.field.unwrap_or_else(|| {
+            if self.field.1 > 0 { self.field.0 / self.field.1 as f64 } else { Vector3::zeros() }
+        });
+        let dt = median(&mut self.steps);
+        let facts = LogFacts {
+            n: self.given.n,
+            t_start: self.t_first,
+            t_end: self.t_last,
+            dt,
+            gravity: self.given.gravity,
+            field,
+            field_estimated: estimated,
+            temperature_mean: mean(self.temperature),
+            covariate_means: self.covariates.iter().map(|c| mean(*c)).collect(),
+            sensors: std::array::from_fn(|s| {
+                self.counts[s] > 0 && (s != Sensor::Mag.index() || self.given.field.is_some() || estimated)
+            }),
+            sensor_dt: std::array::from_fn(|s| {
+                let step = median(&mut self.sensor_steps[s]);
+                if step.is_finite() { step } else { dt }
+            }),
+            has_temperature: self.temperature.1 > 0,
+            attitude_smoothing: self.attitude_width.choose(),
+            position_smoothing: self.has_position.then(|| self.position_width.choose()),
+            reference_dt: self.attitude_width.spacing().unwrap_or(dt),
+            covariates: self.given.covariates.clone(),
+        };
+        let bins = Bins::new(&self.given.covariates, &mut self.samples);
+        (facts, bins)
+    }
+
+    /// How the widths of the reference polynomials compare: noise and excess differences (attitude, position).
+    pub fn widths(&self) -> (&Bandwidth, &Bandwidth) {
+        (&self.attitude_width, &self.position_width)
+    }
+}

@@ -1,0 +1,167 @@
+//! What a residual depends on, whatever the shape: a few orthogonal contrasts over the bins of each covariate.
+
+use imufit_fit::evidence::Evidence;
+use imufit_fit::normal_equations::NormalEquations;
+use imufit_model::sensor::CHANNELS;
+use nalgebra::{DMatrix, DVector};
+
+use crate::held_out::{self, HeldOut};
+use crate::problem::{Problem, Question};
+use crate::screening;
+
+/// Contrasts over the bins: polynomials of the bin's rank up to this degree.
+pub const CONTRASTS: usize = 5;
+
+/// How a channel's residual depends on a covariate.
+#[derive(Clone, Debug)]
+pub struct Dependence {
+    /// Channel index.
+    pub channel: usize,
+    /// Covariate index of the bins.
+    pub covariate: usize,
+    /// p-value over blocks.
+    pub p_value: f64,
+    /// Held-out gain in units of the noise variance.
+    pub gain: f64,
+    /// Fitted contrasts, degree 0 (the constant) left out of the shape.
+    pub shape: Vec<f64>,
+}
+
+/// Orthonormal polynomials over bin ranks, constant included; at most as many as bins.
+fn contrasts(bins: usize) -> DMatrix<f64> {
+    let m = (CONTRASTS + 1).min(bins);
+    let mut q = DMatrix::zeros(bins, m);
+    for k in 0..m {
+        let mut v = DVector::from_fn(bins, |i, _| (2.0 * i as f64 / (bins.max(2) - 1) as f64 - 1.0).powi(k as i32));
+        for j in 0..k {
+            let c = q.column(j).dot(&v);
+            v -= q.column(j) * c;
+        }
+        let norm = v.norm();
+        q.set_column(k, &(v / norm));
+    }
+    q
+}
+
+/// Equations of the model's parameters and the contrasts of one covariate in one channel.
+fn question(problem: &Problem, evidence: &Evidence, model: &[usize], channel: usize, covariate: usize) -> Option<Question> {
+    let bins = evidence.layout.bins.edges[covariate].len() + 1;
+    if bins < 2 {
+        return None;
+    }
+    let q = contrasts(bins);
+    let (p, m) = (model.len(), q.ncols());
+    let weight = problem.weights[channel];
+    let active = &evidence.layout.model.active()[channel];
+    let width = active.len() + 1;
+    let mut white = Vec::with_capacity(problem.blocks());
+    for (b, equations) in problem.white.iter().enumerate() {
+        let inner = equations.selected(model);
+        let mut out = NormalEquations::zeros(p + m);
+        out.gram.view_mut((0, 0), (p, p)).copy_from(&inner.gram);
+        out.right.rows_mut(0, p).copy_from(&inner.right);
+        (out.square, out.n) = (inner.square, inner.n);
+        if let Some(block) = evidence.get(b, channel) {
+            let (counts, sums) = (&block.bin_count[covariate], &block.bin_sum[covariate]);
+            for bin in 0..bins {
+                for i in 0..m {
+                    let qi = weight * q[(bin, i)];
+                    for j in 0..m {
+                        out.gram[(p + i, p + j)] += qi * counts[bin] * q[(bin, j)];
+                    }
+                    for (k, parameter) in model.iter().enumerate() {
+                        if let Ok(a) = active.binary_search(parameter) {
+                            let v = qi * sums[bin * width + a];
+                            out.gram[(p + i, k)] += v;
+                            out.gram[(k, p + i)] += v;
+                        }
+                    }
+                    out.right[p + i] += qi * sums[bin * width + width - 1];
+                }
+            }
+        }
+        white.push(out);
+    }
+    let mut total = NormalEquations::zeros(p + m);
+    white.iter().for_each(|b| total.add(b, 1.0));
+    let mut precision = DVector::zeros(p + m);
+    for (k, j) in model.iter().enumerate() {
+        precision[k] = problem.precision(*j);
+    }
+    for i in 0..m {
+        // Weak: a contrast that stands out a hundredfold is as good as free.
+        precision[p + i] = 1e-4 * total.gram[(p + i, p + i)].max(1e-300);
+    }
+    Some(Question { raw: white.clone(), white, precision, model: p })
+}
+
+/// Expected drop of the whitened sum of squares over all data: a quick look before the full test.
+fn drop(question: &Question) -> f64 {
+    let total = question.total();
+    let without = question.without_candidate();
+    let plain = without.total();
+    match (question.solve(&total), without.solve(&plain)) {
+        (Some(with), Some(alone)) => plain.residual_square(&alone) - total.residual_square(&with),
+        _ => 0.0,
+    }
+}
+
+/// Tests every channel against every covariate on top of the model; best held-out gain first. Only what could be significant at `alpha` is worked out.
+pub fn test(problem: &Problem, evidence: &Evidence, model: &[usize], base: &HeldOut, channels: &[usize]) -> (Vec<Dependence>, usize) {
+    let covariates = evidence.layout.bins.names.len();
+    let mut tried = 0;
+    let mut found = Vec::new();
+    for &channel in channels.iter().filter(|c| **c < CHANNELS && problem.weights[**c] > 0.0) {
+        for covariate in 0..covariates {
+            let Some(q) = question(problem, evidence, model, channel, covariate) else { continue };
+            tried += 1;
+            if drop(&q) < 25.0 {
+                continue;
+            }
+            let with = held_out::held_out(&q);
+            let (gain, _) = held_out::gain(base, &with);
+            if gain <= 0.0 {
+                continue;
+            }
+            let p_value = screening::p_value(&q);
+            let shape = q.solve(&q.total()).map_or_else(Vec::new, |b| b.rows(model.len() + 1, b.len() - model.len() - 1).iter().copied().collect());
+            found.push(Dependence { channel, covariate, p_value, gain, shape });
+        }
+    }
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    (found, tried)
+}
+
+/// A word for a shape from its contrasts (degree 1 first).
+pub fn shape_name(shape: &[f64]) -> &'static str {
+    let total: f64 = shape.iter().map(|c| c * c).sum();
+    let share = |k: usize| shape.get(k).map_or(0.0, |c| c * c) / total.max(f64::MIN_POSITIVE);
+    if share(0) > 0.9 {
+        "rising or falling steadily"
+    } else if share(1) + share(3) > 0.8 {
+        if share(3) > 0.02 { "V-shaped" } else { "parabolic" }
+    } else if share(0) + share(2) > 0.8 {
+        "S-shaped"
+    } else {
+        "irregular"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contrasts_are_orthonormal_and_name_their_shape() {
+        let q = contrasts(12);
+        assert!((q.transpose() * &q - DMatrix::identity(6, 6)).norm() < 1e-10);
+        let project = |f: fn(f64) -> f64| -> Vec<f64> {
+            let v = DVector::from_fn(12, |i, _| f(2.0 * i as f64 / 11.0 - 1.0));
+            q.tr_mul(&v).iter().skip(1).copied().collect()
+        };
+        assert_eq!(shape_name(&project(|x| 3.0 * x)), "rising or falling steadily");
+        assert_eq!(shape_name(&project(f64::abs)), "V-shaped");
+        assert_eq!(shape_name(&project(|x| x * x)), "parabolic");
+        assert_eq!(shape_name(&project(|x| x * x * x)), "S-shaped");
+    }
+}

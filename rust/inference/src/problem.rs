@@ -1,0 +1,157 @@
+//! The least-squares problem of a whole log, block by block, in units of its noise.
+
+use imufit_fit::evidence::Evidence;
+use imufit_fit::normal_equations::NormalEquations;
+use imufit_model::sensor::CHANNELS;
+use nalgebra::{DMatrix, DVector};
+
+use crate::saturated::assemble;
+
+/// Evidence in the form that every question is asked of.
+pub struct Problem {
+    /// Whitened equations of each block over all parameters; observations have unit variance.
+    pub white: Vec<NormalEquations>,
+    /// Unwhitened equations; residuals are in units of the noise floor.
+    pub raw: Vec<NormalEquations>,
+    /// Plausible size of each parameter: three times what is typical, or what would be seen with a hundredfold margin.
+    pub plausible: DVector<f64>,
+    /// Weight of each channel in `white`.
+    pub weights: [f64; CHANNELS],
+}
+
+/// Parameters that a question is about: those of the model, then the reduced ones of a candidate.
+pub struct Question {
+    /// Whitened equations per block.
+    pub white: Vec<NormalEquations>,
+    /// Unwhitened equations per block.
+    pub raw: Vec<NormalEquations>,
+    /// Prior precision of each parameter.
+    pub precision: DVector<f64>,
+    /// How many parameters belong to the model.
+    pub model: usize,
+}
+
+/// Plausible sizes are this many times the typical ones.
+const PLAUSIBLE: f64 = 3.0;
+/// A parameter without typical size is given one at which its effect would stand out by this factor.
+const STANDING_OUT: f64 = 100.0;
+
+impl Problem {
+    /// From whitened and unwhitened evidence, the variance of whitened residuals and the noise floors.
+    pub fn new(white: &Evidence, raw: &Evidence, variance: &[f64; CHANNELS], floors: &[f64; CHANNELS]) -> Self {
+        let weights = variance.map(|v| if v > 0.0 && v.is_finite() { 1.0 / v } else { 0.0 });
+        let raw_weights = floors.map(|f| if f > 0.0 && f.is_finite() { 1.0 / (f * f) } else { 0.0 });
+        let blocks = white.layout.blocks;
+        let white_blocks: Vec<_> = (0..blocks).map(|b| assemble(white, b, &weights)).collect();
+        let raw_blocks: Vec<_> = (0..blocks).map(|b| assemble(raw, b, &raw_weights)).collect();
+        let p = white.layout.model.parameters();
+        let mut plausible = DVector::zeros(p);
+        for slot in white.layout.model.slots() {
+            for (k, card) in slot.effect.card().parameters.iter().enumerate() {
+                let j = slot.first + k;
+                let information: f64 = white_blocks.iter().map(|b| b.gram[(j, j)]).sum();
+                plausible[j] = match card.typical {
+                    Some(typical) => PLAUSIBLE * typical,
+                    None if information > 0.0 => STANDING_OUT / information.sqrt(),
+                    None => 0.0,
+                };
+            }
+        }
+        Self { white: white_blocks, raw: raw_blocks, plausible, weights }
+    }
+
+    /// Number of blocks.
+    pub fn blocks(&self) -> usize {
+        self.white.len()
+    }
+
+    /// Prior precision of a parameter: weak, so that it only decides where the data do not.
+    pub fn precision(&self, parameter: usize) -> f64 {
+        let size = self.plausible[parameter];
+        if size > 0.0 { 0.01 / (size * size) } else { f64::MAX.sqrt() }
+    }
+
+    /// Whitened equations of the whole log for some parameters.
+    pub fn total(&self, parameters: &[usize]) -> NormalEquations {
+        let mut total = NormalEquations::zeros(parameters.len());
+        for block in &self.white {
+            total.add(&block.selected(parameters), 1.0);
+        }
+        total
+    }
+
+    /// Directions in which a candidate can be told from the model: columns of a matrix over the candidate's parameters, each
+    /// scaled to a plausible size. None where it cannot be seen at all.
+    pub fn directions(&self, model: &[usize], candidate: &[usize]) -> DMatrix<f64> {
+        let all: Vec<usize> = model.iter().chain(candidate).copied().collect();
+        let total = self.total(&all);
+        let (p, m) = (model.len(), candidate.len());
+        let own = total.gram.view((p, p), (m, m)).into_owned();
+        let mut schur = own.clone();
+        if p > 0 {
+            let mut inner = total.selected(&(0..p).collect::<Vec<_>>());
+            let cross = total.gram.view((0, p), (p, m)).into_owned();
+            let precision = DVector::from_iterator(p, model.iter().map(|j| self.precision(*j)));
+            for k in 0..m {
+                inner.right = cross.column(k).into_owned();
+                if let Some(solved) = inner.solve(&precision) {
+                    let projected = cross.tr_mul(&solved.solution);
+                    let column = schur.column(k) - projected;
+                    schur.set_column(k, &column);
+                }
+            }
+        }
+        let scale = DVector::from_iterator(m, candidate.iter().map(|j| self.plausible[*j]));
+        let scaled = DMatrix::from_fn(m, m, |i, j| 0.5 * (schur[(i, j)] + schur[(j, i)]) * scale[i] * scale[j]);
+        let size: f64 = (0..m).map(|j| own[(j, j)] * scale[j] * scale[j]).sum();
+        let eigen = scaled.symmetric_eigen();
+        let kept: Vec<usize> =
+            (0..m).filter(|k| eigen.eigenvalues[*k] > 1.0 && eigen.eigenvalues[*k] > 1e-8 * size).collect();
+        DMatrix::from_fn(m, kept.len(), |i, k| scale[i] * eigen.eigenvectors[(i, kept[k])])
+    }
+
+    /// The question of a candidate (in the given directions) on top of a model.
+    pub fn question(&self, model: &[usize], candidate: &[usize], directions: &DMatrix<f64>) -> Question {
+        let all: Vec<usize> = model.iter().chain(candidate).copied().collect();
+        let (p, m) = (model.len(), directions.ncols());
+        let mut basis = DMatrix::zeros(all.len(), p + m);
+        for j in 0..p {
+            basis[(j, j)] = 1.0;
+        }
+        basis.view_mut((p, p), (candidate.len(), m)).copy_from(directions);
+        let reduce = |blocks: &[NormalEquations]| blocks.iter().map(|b| b.selected(&all).reduced(&basis)).collect();
+        let mut precision = DVector::from_element(p + m, 1.0);
+        for (k, j) in model.iter().enumerate() {
+            precision[k] = self.precision(*j);
+        }
+        Question { white: reduce(&self.white), raw: reduce(&self.raw), precision, model: p }
+    }
+}
+
+impl Question {
+    /// The question without the candidate.
+    #[must_use]
+    pub fn without_candidate(&self) -> Self {
+        let kept: Vec<usize> = (0..self.model).collect();
+        Self {
+            white: self.white.iter().map(|b| b.selected(&kept)).collect(),
+            raw: self.raw.iter().map(|b| b.selected(&kept)).collect(),
+            precision: self.precision.rows(0, self.model).into_owned(),
+            model: self.model,
+        }
+    }
+
+    /// Sum over blocks.
+    pub fn total(&self) -> NormalEquations {
+        let mut total = NormalEquations::zeros(self.precision.len());
+        for block in &self.white {
+            total.add(block, 1.0);
+        }
+        total
+    }
+
+    /// Solution from the whitened equations given.
+    pub fn solve(&self, equations: &NormalEquations) -> Option<DVector<f64>> {
+        equations.solve(&self.precision).map(|s| s.solution)
+    }
+}

@@ -1,0 +1,159 @@
+//! Adequate, missing, ambiguous or unknown: the only place where this is decided.
+
+use imufit_fit::evidence::Evidence;
+use imufit_model::sensor::CHANNELS;
+use imufit_model::sensor_model::Slot;
+use rayon::prelude::*;
+
+use crate::confounding;
+use crate::dependence::{self, Dependence};
+use crate::problem::Problem;
+use crate::screening::{self, Screened, parameters_of};
+
+/// Chance of any false alarm over all candidates tried.
+pub const ALPHA: f64 = 0.01;
+/// A named effect must explain this share of what depends on anything in its sensors, or the answer is "unknown".
+const NAMED_SHARE: f64 = 0.8;
+/// A rival recovers at least this share of the best candidate's gain.
+const RIVAL_SHARE: f64 = 0.5;
+/// Steps looked ahead to see whether named effects together explain the residual.
+const LOOK_AHEAD: usize = 10;
+
+/// The four answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Nothing that the data can show is missing.
+    Adequate,
+    /// One effect stands out.
+    Missing,
+    /// Two or more effects explain the data equally well here.
+    Ambiguous,
+    /// Something is missing that no effect of the catalogue explains.
+    Unknown,
+}
+
+impl Kind {
+    /// The word used in results.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Adequate => "adequate",
+            Self::Missing => "missing",
+            Self::Ambiguous => "ambiguous",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+/// Answer to "which effect is missing?"
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// The answer.
+    pub kind: Kind,
+    /// Slot of the best candidate that passed.
+    pub best: Option<usize>,
+    /// Slots of candidates that explain the data as well.
+    pub rivals: Vec<usize>,
+    /// Every candidate, best held-out gain first, those that passed before those that did not.
+    pub screened: Vec<Screened>,
+    /// p-values adjusted for all candidates tried, in the order of `screened`.
+    pub adjusted: Vec<f64>,
+    /// Correlation of each passing candidate's signal with the others': (slot, slot, correlation).
+    pub correlations: Vec<(usize, usize, f64)>,
+    /// Dependences that no named effect explains.
+    pub unexplained: Vec<Dependence>,
+    /// Slots that forward selection would add, one after the other.
+    pub path: Vec<usize>,
+}
+
+fn indices(slots: &[Slot], chosen: &[usize]) -> Vec<usize> {
+    let mut parameters = parameters_of(chosen.iter().map(|s| &slots[*s]));
+    parameters.sort_unstable();
+    parameters
+}
+
+/// Screens all candidates on top of a model: those that passed first, each group by held-out gain.
+fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> (Vec<Screened>, Vec<f64>) {
+    let fitted = indices(slots, model);
+    let base = screening::base(problem, &fitted);
+    let mut screened: Vec<Screened> = candidates
+        .par_iter()
+        .map(|s| screening::screen(problem, &fitted, &base, *s, &indices(slots, &[*s])))
+        .collect();
+    let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
+    let passed = |s: &Screened| s.p_value * tried <= ALPHA && s.gain > 0.0;
+    screened.sort_by(|a, b| passed(b).cmp(&passed(a)).then(b.testable.cmp(&a.testable)).then(b.gain.total_cmp(&a.gain)));
+    let adjusted = screened.iter().map(|s| (s.p_value * tried).min(1.0)).collect();
+    (screened, adjusted)
+}
+
+fn passes(s: &Screened, adjusted: f64) -> bool {
+    s.testable && adjusted <= ALPHA && s.gain > 0.0
+}
+
+/// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from.
+pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidates: &[usize]) -> Verdict {
+    let slots = evidence.layout.model.slots();
+    let (screened, adjusted) = screen_all(problem, slots, model, candidates);
+    let passing: Vec<&Screened> = screened.iter().zip(&adjusted).filter(|(s, a)| passes(s, **a)).map(|(s, _)| s).collect();
+    let best = passing.first().map(|s| s.slot);
+
+    let mut path = Vec::new();
+    let mut stack = model.to_vec();
+    let mut next = best;
+    while let Some(slot) = next {
+        path.push(slot);
+        stack.push(slot);
+        if path.len() >= LOOK_AHEAD {
+            break;
+        }
+        let left: Vec<usize> = candidates.iter().copied().filter(|c| !stack.contains(c)).collect();
+        let (again, p) = screen_all(problem, slots, &stack, &left);
+        next = again.first().filter(|s| passes(s, p[0])).map(|s| s.slot);
+    }
+
+    let fitted = indices(slots, &stack);
+    let channels: Vec<usize> = (0..CHANNELS).collect();
+    let base = screening::base(problem, &fitted);
+    let (mut unexplained, tried) = dependence::test(problem, evidence, &fitted, &base, &channels);
+    unexplained.retain(|d| d.p_value * tried as f64 <= ALPHA);
+
+    let mut rivals = Vec::new();
+    let mut correlations = Vec::new();
+    if let Some(first) = passing.first() {
+        let fitted = indices(slots, model);
+        let own = indices(slots, &[first.slot]);
+        let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
+        for other in passing.iter().skip(1) {
+            let theirs = indices(slots, &[other.slot]);
+            let beta: Vec<f64> = first.parameters.iter().map(|p| p.0).collect();
+            let c = confounding::correlation(problem, &fitted, &own, &beta, &theirs);
+            correlations.push((first.slot, other.slot, c));
+            if other.gain >= RIVAL_SHARE * first.gain
+                && confounding::p_value_given(problem, &fitted, &theirs, &own) * tried > ALPHA
+            {
+                rivals.push(other.slot);
+            }
+        }
+    }
+
+    let kind = match passing.first() {
+        None if unexplained.is_empty() => Kind::Adequate,
+        None => Kind::Unknown,
+        Some(first) => {
+            let sensors = slots[first.slot].effect.sensors();
+            let left = unexplained
+                .iter()
+                .filter(|d| sensors.iter().any(|s| s.index() == d.channel / 3))
+                .map(|d| d.gain)
+                .fold(0.0, f64::max);
+            if first.gain < NAMED_SHARE * (first.gain + left) {
+                Kind::Unknown
+            } else if rivals.is_empty() {
+                Kind::Missing
+            } else {
+                Kind::Ambiguous
+            }
+        }
+    };
+    Verdict { kind, best, rivals, screened, adjusted, correlations, unexplained, path }
+}

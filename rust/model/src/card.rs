@@ -1,0 +1,63 @@
+//! What an effect says of itself: ids, units and the words that help text, documents and explanations are made of.
+
+/// One parameter of an effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Name within the effect: `x`, `xy`, `tau`, ...
+    pub name: String,
+    /// SI unit.
+    pub unit: String,
+    /// Size that low-cost sensors typically show; `None` if nobody can tell.
+    pub typical: Option<f64>,
+}
+
+/// Where in the chain from truth to reading an effect acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// The reference itself is changed before ideal readings are taken.
+    Reference,
+    /// Changes the quantity that reaches the sensing element.
+    Input,
+    /// Turns the quantity into a reading: acts on what the stages before left.
+    Gain,
+    /// Adds to the reading whatever the quantity is.
+    Offset,
+}
+
+/// Description of an effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Card {
+    /// Fixed id such as `gyr.g_sensitivity`.
+    pub id: String,
+    /// What it is called in a sentence.
+    pub name: String,
+    /// Where it acts.
+    pub stage: Stage,
+    /// Its parameters in order.
+    pub parameters: Vec<Parameter>,
+    /// The physical cause in a sentence.
+    pub physics: String,
+    /// What it adds to the ideal reading.
+    pub formula: String,
+    /// What it looks like in the residual.
+    pub signature: String,
+    /// What it is mistaken for.
+    pub mistaken_for: String,
+    /// The experiment that confirms it.
+    pub confirm: String,
+}
+
+/// Parameter names of a 3-vector.
+pub const VECTOR: [&str; 3] = ["x", "y", "z"];
+/// Parameter names of a 3x3 matrix without its diagonal, row by row.
+pub const OFF_DIAGONAL: [&str; 6] = ["xy", "xz", "yx", "yz", "zx", "zy"];
+/// Parameter names of a full 3x3 matrix, row by row.
+pub const MATRIX: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
+
+/// Parameters of equal unit and size.
+pub fn parameters(names: &[&str], unit: &str, typical: f64) -> Vec<Parameter> {
+    names
+        .iter()
+        .map(|name| Parameter { name: (*name).to_string(), unit: unit.to_string(), typical: Some(typical) })
+        .collect()
+}

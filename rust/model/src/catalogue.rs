@@ -1,0 +1,40 @@
+//! THE list of built-in effects, one line each. What it is made of, an effect says itself in its card.
+
+use std::sync::Arc;
+
+use crate::effect::Effect;
+use crate::effects::{bias, covariate, field, g_sensitivity, iron, lever_arm, misalignment, reference, scale, temperature};
+use crate::sensor::Sensor;
+
+/// Every built-in effect that does not depend on the log's own columns.
+pub fn built_in() -> Vec<Arc<dyn Effect>> {
+    vec![
+        Arc::new(bias::bias(Sensor::Acc)),
+        Arc::new(scale::scale(Sensor::Acc)),
+        Arc::new(misalignment::misalignment(Sensor::Acc)),
+        Arc::new(lever_arm::lever_arm()),
+        Arc::new(temperature::bias_temperature(Sensor::Acc)),
+        Arc::new(bias::bias(Sensor::Gyr)),
+        Arc::new(scale::scale(Sensor::Gyr)),
+        Arc::new(misalignment::misalignment(Sensor::Gyr)),
+        Arc::new(g_sensitivity::g_sensitivity()),
+        Arc::new(temperature::bias_temperature(Sensor::Gyr)),
+        Arc::new(iron::hard_iron()),
+        Arc::new(iron::soft_iron()),
+        Arc::new(field::field_reference()),
+        Arc::new(reference::alignment()),
+        Arc::new(reference::delay()),
+    ]
+}
+
+/// The effect of a log's own column from its id such as `mag.column:motor_current`.
+pub fn column_effect(id: &str) -> Option<Arc<dyn Effect>> {
+    let (sensor, column) = id.split_once(".column:")?;
+    let sensor = Sensor::from_prefix(sensor)?;
+    (!column.is_empty()).then(|| Arc::new(covariate::column(sensor, column)) as Arc<dyn Effect>)
+}
+
+/// The built-in effect with this id.
+pub fn find(id: &str) -> Option<Arc<dyn Effect>> {
+    built_in().into_iter().find(|e| e.card().id == id).or_else(|| column_effect(id))
+}

@@ -1,0 +1,145 @@
+//! The trait behind every effect, built in or written by a user, and the contract that fitting relies on.
+
+use nalgebra::UnitQuaternion;
+
+use crate::card::Card;
+use crate::facts::LogFacts;
+use crate::ideal::{Ideal, ReferenceChange};
+use crate::sensor::Sensor;
+use crate::triple::Triple;
+
+/// What an effect sees: the rows of a window with ideal readings and covariates.
+#[derive(Clone, Copy)]
+pub struct Rows<'a> {
+    /// Constants of the whole log.
+    pub facts: &'a LogFacts,
+    /// Time, s (n).
+    pub t: &'a [f64],
+    /// Ideal readings, reference effects applied.
+    pub ideal: &'a Ideal,
+    /// Quantity that the stage acts on: ideal reading plus the effects of the stages before.
+    pub x: &'a Triple,
+    /// Sensor temperature less its mean over the log, K (n); NaN where not known.
+    pub temperature: Option<&'a [f64]>,
+    /// Covariates in the order of `facts.covariates` (n each); NaN where not known.
+    pub covariates: &'a [Vec<f64>],
+}
+
+impl Rows<'_> {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// True without rows.
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
+    /// Attitude of one row.
+    pub fn attitude(&self, row: usize) -> &UnitQuaternion<f64> {
+        &self.ideal.attitude[row]
+    }
+}
+
+/// Columns of the design matrix that an effect fills: d reading / d parameter for one sensor, by parameter and axis.
+#[derive(Default)]
+pub struct Columns {
+    n: usize,
+    parameters: usize,
+    data: Vec<Vec<f64>>,
+    active: Vec<bool>,
+}
+
+impl Columns {
+    /// Empties the columns for `parameters` parameters and `n` rows.
+    pub fn reset(&mut self, n: usize, parameters: usize) {
+        self.n = n;
+        self.parameters = parameters;
+        self.active.clear();
+        self.active.resize(3 * parameters, false);
+        if self.data.len() < 3 * parameters {
+            self.data.resize_with(3 * parameters, Vec::new);
+        }
+    }
+
+    /// The column of one parameter on one axis, zero when first asked for. A column that is never asked for is zero.
+    pub fn column(&mut self, parameter: usize, axis: usize) -> &mut [f64] {
+        let k = 3 * parameter + axis;
+        if !self.active[k] {
+            self.active[k] = true;
+            self.data[k].clear();
+            self.data[k].resize(self.n, 0.0);
+        }
+        &mut self.data[k]
+    }
+
+    /// Fills one column from a source column.
+    pub fn set(&mut self, parameter: usize, axis: usize, values: impl Iterator<Item = f64>) {
+        let k = 3 * parameter + axis;
+        self.active[k] = true;
+        self.data[k].clear();
+        self.data[k].extend(values);
+        self.data[k].resize(self.n, 0.0);
+    }
+
+    /// A column that was asked for; `None` = zero.
+    pub fn get(&self, parameter: usize, axis: usize) -> Option<&[f64]> {
+        let k = 3 * parameter + axis;
+        self.active.get(k).copied().unwrap_or(false).then(|| self.data[k].as_slice())
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.parameters
+    }
+}
+
+/// What goes wrong inside an effect.
+#[derive(Debug, thiserror::Error)]
+pub enum EffectError {
+    /// The effect needs a column that the log does not have.
+    #[error("effect {effect} needs the column {column}, which the log does not have")]
+    MissingColumn {
+        /// Id of the effect.
+        effect: String,
+        /// Name of the column.
+        column: String,
+    },
+    /// A user's function failed; the original exception travels in the binding.
+    #[error("effect {effect}: {message}")]
+    User {
+        /// Id of the effect.
+        effect: String,
+        /// What it said.
+        message: String,
+    },
+    /// The effect broke its contract.
+    #[error("effect {effect}: {message}")]
+    Contract {
+        /// Id of the effect.
+        effect: String,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+/// One physical cause of readings that differ from the ideal ones.
+pub trait Effect: Send + Sync {
+    /// Its description.
+    fn card(&self) -> &Card;
+
+    /// Sensors whose readings it touches.
+    fn sensors(&self) -> &[Sensor];
+
+    /// Why it cannot be offered for this log; `None` if it can.
+    fn not_testable(&self, facts: &LogFacts) -> Option<String>;
+
+    /// Columns d reading / d parameter of `sensor`, at the given parameter values.
+    fn columns(&self, rows: &Rows, sensor: Sensor, parameters: &[f64], out: &mut Columns) -> Result<(), EffectError>;
+
+    /// What the effect does to the reference; only for [`crate::card::Stage::Reference`], whose value lies there.
+    fn reference_change(&self, _parameters: &[f64]) -> ReferenceChange {
+        ReferenceChange::default()
+    }
+}

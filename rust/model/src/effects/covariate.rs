@@ -1,0 +1,64 @@
+//! Any other column of the log acts on a sensor.
+
+use super::Words;
+use crate::card::{Card, Parameter, Stage, VECTOR};
+use crate::effect::{Columns, Effect, EffectError, Rows};
+use crate::facts::LogFacts;
+use crate::sensor::Sensor;
+
+/// `acc.column:NAME`, `gyr.column:NAME`, `mag.column:NAME`.
+pub struct Covariate {
+    card: Card,
+    sensor: [Sensor; 1],
+    column: String,
+}
+
+/// The effect of column `name` on a sensor.
+pub fn column(sensor: Sensor, name: &str) -> Covariate {
+    let words = Words {
+        name: &format!("influence of {name} on the {}", sensor.name()),
+        physics: &format!("something that {name} measures (a supply, a current, a load) shifts the reading of the {}", sensor.name()),
+        formula: &format!("c ({name} - mean of {name})"),
+        signature: &format!("the residual follows {name}"),
+        mistaken_for: "whatever else changed together with that column",
+        confirm: &format!("change {name} on purpose while the sensor lies still"),
+    };
+    let parameters = VECTOR
+        .iter()
+        .map(|v| Parameter { name: (*v).to_string(), unit: format!("{}/{name}", sensor.unit()), typical: None })
+        .collect();
+    Covariate {
+        card: words.card(format!("{}.column:{name}", sensor.prefix()), Stage::Offset, parameters),
+        sensor: [sensor],
+        column: name.to_string(),
+    }
+}
+
+impl Effect for Covariate {
+    fn card(&self) -> &Card {
+        &self.card
+    }
+
+    fn sensors(&self) -> &[Sensor] {
+        &self.sensor
+    }
+
+    fn not_testable(&self, facts: &LogFacts) -> Option<String> {
+        if !facts.sensors[self.sensor[0].index()] {
+            return Some(format!("the log has no {}", self.sensor[0].name()));
+        }
+        facts.covariate(&self.column).is_none().then(|| format!("the log has no column {}", self.column))
+    }
+
+    fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
+        let k = rows.facts.covariate(&self.column).ok_or_else(|| EffectError::MissingColumn {
+            effect: self.card.id.clone(),
+            column: self.column.clone(),
+        })?;
+        let mean = rows.facts.covariate_means[k];
+        for axis in 0..3 {
+            out.set(axis, axis, rows.covariates[k].iter().map(|v| v - mean));
+        }
+        Ok(())
+    }
+}

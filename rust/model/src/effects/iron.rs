@@ -1,0 +1,52 @@
+//! Iron that moves with the magnetometer.
+
+use super::{Linear, Needs, Words, matrix};
+use crate::card::{MATRIX, Stage, VECTOR, parameters};
+use crate::effect::{Columns, Rows};
+use crate::sensor::Sensor;
+
+fn fill_hard(rows: &Rows, out: &mut Columns) {
+    for axis in 0..3 {
+        out.set(axis, axis, std::iter::repeat_n(1.0, rows.len()));
+    }
+}
+
+fn fill_soft(rows: &Rows, out: &mut Columns) {
+    matrix(rows.x, out);
+}
+
+/// `mag.hard_iron`. HMC5883L boards show some to some tens of uT.
+pub fn hard_iron() -> Linear {
+    let words = Words {
+        name: "hard iron",
+        physics: "magnetised parts that turn with the sensor (screws, batteries, speakers) add a constant field, on top of the sensor's own offset",
+        formula: "b",
+        signature: "a constant field residual in the body frame, whatever the attitude",
+        mistaken_for: "mag.field_reference when the attitude hardly changes, a magnet in the room (that one changes with the place)",
+        confirm: "turn the sensor through all attitudes far from iron: the readings lie on a sphere whose centre is b",
+    };
+    Linear {
+        card: words.card("mag.hard_iron".to_string(), Stage::Offset, parameters(&VECTOR, "uT", 20.0)),
+        sensor: [Sensor::Mag],
+        needs: Needs::Sensor,
+        fill: fill_hard,
+    }
+}
+
+/// `mag.soft_iron`.
+pub fn soft_iron() -> Linear {
+    let words = Words {
+        name: "soft iron",
+        physics: "unmagnetised iron that turns with the sensor bends the field lines, and the three sensing bridges differ in gain and direction",
+        formula: "S m, full 3x3",
+        signature: "the residual is proportional to the field in body axes: it turns over with the sensor",
+        mistaken_for: "ref.alignment (its part of S is antisymmetric and shows in the other sensors too), mag.hard_iron when few attitudes are visited",
+        confirm: "turn the sensor through all attitudes far from iron: the readings lie on an ellipsoid instead of a sphere",
+    };
+    Linear {
+        card: words.card("mag.soft_iron".to_string(), Stage::Gain, parameters(&MATRIX, "1", 0.05)),
+        sensor: [Sensor::Mag],
+        needs: Needs::Sensor,
+        fill: fill_soft,
+    }
+}

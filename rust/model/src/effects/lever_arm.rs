@@ -1,0 +1,42 @@
+//! The accelerometer does not sit where the reference position is taken.
+
+use super::{Linear, Needs, Words};
+use crate::card::{Stage, VECTOR, parameters};
+use crate::effect::{Columns, Rows};
+use crate::sensor::Sensor;
+use nalgebra::Vector3;
+
+fn fill(rows: &Rows, out: &mut Columns) {
+    // omega x (omega x r) + alpha x r = ([omega]^2 + [alpha]) r
+    for parameter in 0..3 {
+        let unit = Vector3::ith(parameter, 1.0);
+        for axis in 0..3 {
+            out.column(parameter, axis);
+        }
+        for row in 0..rows.len() {
+            let (omega, alpha) = (rows.ideal.omega.row(row), rows.ideal.alpha.row(row));
+            let a = omega.cross(&omega.cross(&unit)) + alpha.cross(&unit);
+            for axis in 0..3 {
+                out.column(parameter, axis)[row] = a[axis];
+            }
+        }
+    }
+}
+
+/// `acc.lever_arm`.
+pub fn lever_arm() -> Linear {
+    let words = Words {
+        name: "lever arm",
+        physics: "the accelerometer sits away from the point whose position the reference gives, so rotation accelerates it",
+        formula: "omega x (omega x r) + domega/dt x r",
+        signature: "nothing at rest; the residual grows with the square of the rate and with the angular acceleration",
+        mistaken_for: "vibration rectification, ref.delay of the position, a gyroscope scale error seen through a filter",
+        confirm: "spin at a constant rate about each axis: the reading away from the axis is r omega^2",
+    };
+    Linear {
+        card: words.card("acc.lever_arm".to_string(), Stage::Input, parameters(&VECTOR, "m", 0.05)),
+        sensor: [Sensor::Acc],
+        needs: Needs::Sensor,
+        fill,
+    }
+}

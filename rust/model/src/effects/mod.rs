@@ -1,0 +1,105 @@
+//! One physical cause each. A new one is a file or function here and a line in [`crate::catalogue`].
+
+pub mod bias;
+pub mod covariate;
+pub mod field;
+pub mod g_sensitivity;
+pub mod iron;
+pub mod lever_arm;
+pub mod misalignment;
+pub mod reference;
+pub mod scale;
+pub mod temperature;
+
+use crate::card::{Card, Parameter, Stage};
+use crate::effect::{Columns, Effect, EffectError, Rows};
+use crate::facts::LogFacts;
+use crate::sensor::Sensor;
+
+/// Fills the columns of one sensor.
+pub type Fill = fn(&Rows, &mut Columns);
+
+/// What most effects need before they can be tested.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Needs {
+    /// Nothing but the sensor.
+    Sensor,
+    /// A thermometer.
+    Temperature,
+}
+
+/// An effect on one sensor, linear in its parameters: a description and a function that fills its columns.
+pub struct Linear {
+    /// Description.
+    pub card: Card,
+    /// The sensor, as a slice of one.
+    pub sensor: [Sensor; 1],
+    /// What the log must have.
+    pub needs: Needs,
+    /// Fills the columns.
+    pub fill: Fill,
+}
+
+impl Effect for Linear {
+    fn card(&self) -> &Card {
+        &self.card
+    }
+
+    fn sensors(&self) -> &[Sensor] {
+        &self.sensor
+    }
+
+    fn not_testable(&self, facts: &LogFacts) -> Option<String> {
+        if !facts.sensors[self.sensor[0].index()] {
+            return Some(format!("the log has no {}", self.sensor[0].name()));
+        }
+        (self.needs == Needs::Temperature && !facts.has_temperature).then(|| "the log has no column temp".to_string())
+    }
+
+    fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
+        (self.fill)(rows, out);
+        Ok(())
+    }
+}
+
+/// Words of a card, in the order physics, formula, signature, mistaken for, confirm.
+pub struct Words<'a> {
+    /// What it is called.
+    pub name: &'a str,
+    /// Physical cause.
+    pub physics: &'a str,
+    /// What it adds.
+    pub formula: &'a str,
+    /// What it looks like.
+    pub signature: &'a str,
+    /// Rivals.
+    pub mistaken_for: &'a str,
+    /// Experiment.
+    pub confirm: &'a str,
+}
+
+impl Words<'_> {
+    /// The card with these words.
+    pub fn card(&self, id: String, stage: Stage, parameters: Vec<Parameter>) -> Card {
+        Card {
+            id,
+            stage,
+            parameters,
+            name: self.name.to_string(),
+            physics: self.physics.to_string(),
+            formula: self.formula.to_string(),
+            signature: self.signature.to_string(),
+            mistaken_for: self.mistaken_for.to_string(),
+            confirm: self.confirm.to_string(),
+        }
+    }
+}
+
+/// Fills a full 3x3 matrix effect: parameter (row, column) multiplies `x[column]` on axis `row`.
+pub(crate) fn matrix(x: &crate::triple::Triple, out: &mut Columns) {
+    for row in 0..3 {
+        for column in 0..3 {
+            out.set(3 * row + column, row, x.axis(column).iter().copied());
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! What is known of a log as a whole before its evidence is taken.
+
+use nalgebra::Vector3;
+
+use crate::smoothing::Smoothing;
+
+/// Rows before a window that a whitening filter may look back on.
+pub const LOOKBACK: usize = 128;
+
+/// Facts of a log that its effects and its reference kinematics need: constants over all windows.
+#[derive(Clone, Debug)]
+pub struct LogFacts {
+    /// Number of rows.
+    pub n: usize,
+    /// Time of the first row, s.
+    pub t_start: f64,
+    /// Time of the last row, s.
+    pub t_end: f64,
+    /// Median time between rows, s.
+    pub dt: f64,
+    /// Gravity in the reference frame, m/s^2 (points down).
+    pub gravity: Vector3<f64>,
+    /// Magnetic flux density in the reference frame, uT; zero without a magnetometer.
+    pub field: Vector3<f64>,
+    /// True if `field` was estimated from this log, so that it has to be fitted along.
+    pub field_estimated: bool,
+    /// Mean sensor temperature, degC.
+    pub temperature_mean: f64,
+    /// Names of the covariates.
+    pub covariates: Vec<String>,
+    /// Mean of each covariate.
+    pub covariate_means: Vec<f64>,
+    /// Sensors that the log has.
+    pub sensors: [bool; 3],
+    /// Median time between samples of each sensor, s (a slow magnetometer has more than `dt`).
+    pub sensor_dt: [f64; 3],
+    /// True if the log has a thermometer.
+    pub has_temperature: bool,
+    /// How the reference attitude is differentiated.
+    pub attitude_smoothing: Smoothing,
+    /// How the reference position is differentiated; `None` without position.
+    pub position_smoothing: Option<Smoothing>,
+    /// Median time between reference samples, s.
+    pub reference_dt: f64,
+}
+
+impl LogFacts {
+    /// Rows around a window that its derivatives, held columns and whitening filters may need.
+    pub fn margin(&self) -> usize {
+        let widest = self.attitude_smoothing.half_width.max(self.position_smoothing.map_or(0, |s| s.half_width));
+        let reach = 2.0 * (widest as f64 + 4.0) * (self.reference_dt / self.dt).max(1.0);
+        let reach = if reach.is_finite() { reach as usize } else { 0 };
+        reach + crate::window::HOLD_ROWS + LOOKBACK
+    }
+
+    /// Index of a covariate by its name.
+    pub fn covariate(&self, name: &str) -> Option<usize> {
+        self.covariates.iter().position(|c| c == name)
+    }
+}

@@ -1,0 +1,307 @@
+//! Kinematics of the body from the reference attitude and position, at any time.
+//!
+//! Around each time the attitude is written R(t) = R_c exp(phi(t)) with R_c the nearest knot; phi is a local polynomial
+//! ([`crate::smoothing`]), so that omega = J_r(phi) dphi/dt with the right Jacobian J_r of SO(3).
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use crate::smoothing::{self, Derivatives, LocalFit, Smoothing};
+use crate::window::Window;
+
+/// State of the body at one time.
+#[derive(Clone, Copy, Debug)]
+pub struct Kinematics {
+    /// Attitude, body to reference frame.
+    pub attitude: UnitQuaternion<f64>,
+    /// Angular rate in the body frame, rad/s.
+    pub omega: Vector3<f64>,
+    /// Angular acceleration in the body frame, rad/s^2.
+    pub alpha: Vector3<f64>,
+    /// Acceleration in the reference frame, m/s^2 (zero without a reference position).
+    pub acceleration: Vector3<f64>,
+    /// Jerk in the reference frame, m/s^3.
+    pub jerk: Vector3<f64>,
+}
+
+/// Times and row numbers of the rows that carry a reference, cut into segments without gaps.
+struct Knots {
+    t: Vec<f64>,
+    row: Vec<usize>,
+    segment: Vec<(usize, usize)>,
+}
+
+impl Knots {
+    fn new(window: &Window, known: impl Fn(usize) -> bool, spacing: Option<f64>) -> Self {
+        let row: Vec<usize> = (0..window.len())
+            .filter(|&i| known(i) && window.reference_exact.is_none_or(|e| e[i] > 0.5))
+            .collect();
+        let t: Vec<f64> = row.iter().map(|&i| window.t[i]).collect();
+        let widest = MAX_GAP * spacing.unwrap_or_else(|| median_step(&t));
+        let mut segment = vec![(0, 0); t.len()];
+        let mut first = 0;
+        for k in 0..t.len() {
+            if k + 1 == t.len() || t[k + 1] - t[k] > widest {
+                segment[first..=k].fill((first, k + 1));
+                first = k + 1;
+            }
+        }
+        Self { t, row, segment }
+    }
+
+    /// Range of knots for a fit around `at`; `None` where the reference does not reach far enough on both sides.
+    fn around(&self, at: f64, half_width: usize, hint: &mut usize) -> Option<(usize, usize, usize)> {
+        let n = self.t.len();
+        if n == 0 {
+            return None;
+        }
+        let mut k = (*hint).min(n - 1);
+        while k + 1 < n && self.t[k + 1] <= at {
+            k += 1;
+        }
+        while k > 0 && self.t[k] > at {
+            k -= 1;
+        }
+        *hint = k;
+        if k + 1 < n && self.t[k + 1] - at < at - self.t[k] {
+            k += 1;
+        }
+        let (first, last) = self.segment[k];
+        if k < first + half_width || k + half_width >= last {
+            return None;
+        }
+        // Between two segments the nearest knot may lie far away.
+        let reach = 0.75 * (self.t[k + 1.min(last - 1 - k)] - self.t[k - 1.min(k - first)]);
+        ((at - self.t[k]).abs() <= reach).then_some((k, k - half_width, k + half_width + 1))
+    }
+}
+
+/// Median step between times; zero if there are none.
+fn median_step(t: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// A gap in the reference is a step of more than this many median steps.
+const MAX_GAP: f64 = 4.5;
+
+/// Weights of the last fit, kept while the knots have the same spacing.
+#[derive(Default)]
+struct WeightCache {
+    offsets: Vec<f64>,
+    weights: [Vec<f64>; 4],
+}
+
+impl WeightCache {
+    fn get(&mut self, t: &[f64], at: f64, degree: usize) -> Option<&[Vec<f64>; 4]> {
+        let tolerance = 1e-9 * (t[t.len() - 1] - t[0]);
+        let same = self.offsets.len() == t.len()
+            && self.offsets.iter().zip(t).all(|(o, v)| (v - at - o).abs() <= tolerance);
+        if !same {
+            self.offsets.clear();
+            self.weights = LocalFit::new(t, at, degree)?.weights();
+            self.offsets.extend(t.iter().map(|v| v - at));
+        }
+        Some(&self.weights)
+    }
+}
+
+/// One local fit of a whole window: knots, values around each, weights.
+pub struct LocalReference<'a> {
+    window: &'a Window<'a>,
+    knots: Knots,
+    hint: usize,
+    cache: WeightCache,
+    values: Vec<[f64; 3]>,
+}
+
+fn quaternion_at(column: &[f64], row: usize) -> UnitQuaternion<f64> {
+    let q = &column[4 * row..4 * row + 4];
+    UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]))
+}
+
+impl<'a> LocalReference<'a> {
+    /// Attitude knots of a window; `None` without a reference attitude. `spacing` is the usual time between knots,
+    /// taken from the window if not given.
+    pub fn attitude(window: &'a Window<'a>, spacing: Option<f64>) -> Option<Self> {
+        let q = window.attitude?;
+        let known = |i: usize| q[4 * i..4 * i + 4].iter().all(|v| v.is_finite());
+        Some(Self::new(window, Knots::new(window, known, spacing)))
+    }
+
+    /// Position knots of a window; `None` without a reference position.
+    pub fn position(window: &'a Window<'a>, spacing: Option<f64>) -> Option<Self> {
+        let p = window.position?;
+        let known = |i: usize| p[3 * i..3 * i + 3].iter().all(|v| v.is_finite());
+        Some(Self::new(window, Knots::new(window, known, spacing)))
+    }
+
+    /// Median time between the knots.
+    pub fn spacing(&self) -> f64 {
+        median_step(&self.knots.t)
+    }
+
+    fn new(window: &'a Window<'a>, knots: Knots) -> Self {
+        Self { window, knots, hint: 0, cache: WeightCache::default(), values: Vec::new() }
+    }
+
+    /// Collects the attitudes around `at` as rotation vectors from the nearest knot; the nearest knot's attitude, the times.
+    fn rotations(&mut self, at: f64, half_width: usize) -> Option<(UnitQuaternion<f64>, usize, usize)> {
+        let column = self.window.attitude?;
+        let (k, first, last) = self.knots.around(at, half_width, &mut self.hint)?;
+        let centre = quaternion_at(column, self.knots.row[k]);
+        let back = centre.inverse();
+        self.values.clear();
+        for j in first..last {
+            let phi = (back * quaternion_at(column, self.knots.row[j])).scaled_axis();
+            // Past this angle the rotation vector is about to wrap around.
+            if phi.norm_squared() > 2.8 * 2.8 {
+                return None;
+            }
+            self.values.push([phi.x, phi.y, phi.z]);
+        }
+        Some((centre, first, last))
+    }
+
+    fn positions(&mut self, at: f64, half_width: usize) -> Option<(usize, usize)> {
+        let column = self.window.position?;
+        let (_, first, last) = self.knots.around(at, half_width, &mut self.hint)?;
+        self.values.clear();
+        // The first value is taken off so that large coordinates keep their digits.
+        let origin = 3 * self.knots.row[first];
+        for j in first..last {
+            let i = 3 * self.knots.row[j];
+            self.values.push([
+                column[i] - column[origin],
+                column[i + 1] - column[origin + 1],
+                column[i + 2] - column[origin + 2],
+            ]);
+        }
+        Some((first, last))
+    }
+
+    /// Derivatives of the rotation vector around `at`, and the attitude it starts from.
+    pub fn rotation_derivatives(&mut self, at: f64, s: Smoothing) -> Option<(UnitQuaternion<f64>, Derivatives)> {
+        let (centre, first, last) = self.rotations(at, s.half_width)?;
+        let weights = self.cache.get(&self.knots.t[first..last], at, s.degree)?;
+        Some((centre, smoothing::apply(weights, &self.values)))
+    }
+
+    /// Derivatives of the position around `at`; the value itself is relative to an arbitrary origin.
+    pub fn position_derivatives(&mut self, at: f64, s: Smoothing) -> Option<Derivatives> {
+        let (first, last) = self.positions(at, s.half_width)?;
+        let weights = self.cache.get(&self.knots.t[first..last], at, s.degree)?;
+        Some(smoothing::apply(weights, &self.values))
+    }
+
+    /// A fit around `at` with its values, for judging how wide the polynomial may be.
+    pub fn local_fit(&mut self, at: f64, s: Smoothing, of_attitude: bool) -> Option<(LocalFit, Vec<[f64; 3]>)> {
+        let (first, last) = if of_attitude {
+            let (_, first, last) = self.rotations(at, s.half_width)?;
+            (first, last)
+        } else {
+            self.positions(at, s.half_width)?
+        };
+        Some((LocalFit::new(&self.knots.t[first..last], at, s.degree)?, self.values.clone()))
+    }
+}
+
+/// omega and alpha from a rotation vector and its derivatives.
+fn rates(phi: Vector3<f64>, d: Vector3<f64>, dd: Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    // J_r = 1 - a [phi] + b [phi]^2 with a, b as series in s = |phi|^2 (|phi| is at most half a knot's turn).
+    let s = phi.norm_squared();
+    let a = 0.5 - s / 24.0 + s * s / 720.0 - s * s * s / 40320.0;
+    let b = 1.0 / 6.0 - s / 120.0 + s * s / 5040.0 - s * s * s / 362_880.0;
+    let s_rate = 2.0 * phi.dot(&d);
+    let a_rate = s_rate * (-1.0 / 24.0 + s / 360.0 - s * s / 13440.0);
+    let b_rate = s_rate * (-1.0 / 120.0 + s / 2520.0 - s * s / 120_960.0);
+    let jacobian = |v: &Vector3<f64>| v - a * phi.cross(v) + b * phi.cross(&phi.cross(v));
+    let omega = jacobian(&d);
+    let pd = phi.cross(&d);
+    let alpha = jacobian(&dd) - a_rate * pd + b_rate * phi.cross(&pd) + b * d.cross(&pd);
+    (omega, alpha)
+}
+
+/// Kinematics at `t[i] + shift` for each core row of the window; `None` in a row where the reference does not tell.
+pub fn kinematics(
+    window: &Window,
+    attitude: Smoothing,
+    position: Option<Smoothing>,
+    spacing: Option<f64>,
+    shift: f64,
+) -> Vec<Option<Kinematics>> {
+    let mut rotation = LocalReference::attitude(window, spacing);
+    let mut translation = position.and_then(|s| LocalReference::position(window, spacing).map(|r| (r, s)));
+    (window.begin..window.end)
+        .map(|i| {
+            let at = window.t[i] + shift;
+            let (centre, d) = rotation.as_mut()?.rotation_derivatives(at, attitude)?;
+            let phi = Vector3::from(d[0]);
+            let (omega, alpha) = rates(phi, Vector3::from(d[1]), Vector3::from(d[2]));
+            let (acceleration, jerk) = match translation.as_mut() {
+                None => (Vector3::zeros(), Vector3::zeros()),
+                Some((reference, s)) => {
+                    let d = reference.position_derivatives(at, *s)?;
+                    (Vector3::from(d[2]), Vector3::from(d[3]))
+                }
+            };
+            let attitude = centre * UnitQuaternion::from_scaled_axis(phi);
+            Some(Kinematics { attitude, omega, alpha, acceleration, jerk })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::smoothing::NARROWEST;
+
+    /// Two sines about fixed axes one after the other: omega and alpha are known in closed form.
+    fn truth(t: f64) -> (UnitQuaternion<f64>, Vector3<f64>, Vector3<f64>) {
+        let (w1, w2) = (2.0 * std::f64::consts::PI * 2.0, 2.0 * std::f64::consts::PI * 1.3);
+        let (a, da, dda) = (0.3 * (w1 * t).sin(), 0.3 * w1 * (w1 * t).cos(), -0.3 * w1 * w1 * (w1 * t).sin());
+        let (b, db, ddb) = (0.5 * (w2 * t).cos(), -0.5 * w2 * (w2 * t).sin(), -0.5 * w2 * w2 * (w2 * t).cos());
+        let q = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), a) * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), b);
+        // omega = x db + Rx(b)^T z da
+        let z = Vector3::new(0.0, b.sin(), b.cos());
+        let dz = Vector3::new(0.0, b.cos(), -b.sin()) * db;
+        (q, Vector3::x() * db + z * da, Vector3::x() * ddb + z * dda + dz * da)
+    }
+
+    #[test]
+    fn rate_and_angular_acceleration_of_a_two_hertz_motion_are_exact_to_a_millionth() {
+        let n = 400;
+        let t: Vec<f64> = (0..n).map(|i| f64::from(i) * 0.01).collect();
+        let q: Vec<f64> = t.iter().flat_map(|v| { let q = truth(*v).0; [q.w, q.i, q.j, q.k] }).collect();
+        let window = Window {
+            t: &t, readings: [None; 3], temperature: None, attitude: Some(&q), position: None, reference_exact: None,
+            covariates: vec![], offset: 0, begin: 0, end: n as usize,
+        };
+        for shift in [0.0, 0.0037] {
+            let mut worst = (0.0_f64, 0.0_f64);
+            let k = kinematics(&window, NARROWEST, None, None, shift);
+            for (i, k) in k.iter().enumerate().skip(5).take(n as usize - 10) {
+                let k = k.expect("inside");
+                let (_, omega, alpha) = truth(t[i] + shift);
+                worst.0 = worst.0.max((k.omega - omega).norm());
+                worst.1 = worst.1.max((k.alpha - alpha).norm());
+            }
+            assert!(worst.0 < 1e-6 * 5.0 && worst.1 < 1e-5 * 60.0, "{worst:?}");
+        }
+        assert!(kinematics(&window, NARROWEST, None, None, 0.0)[3].is_none());
+    }
+
+    #[test]
+    fn nothing_is_invented_across_a_gap_in_the_reference() {
+        let t: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.01).collect();
+        let mut q: Vec<f64> = t.iter().flat_map(|v| { let q = truth(*v).0; [q.w, q.i, q.j, q.k] }).collect();
+        q[4 * 100..4 * 120].fill(f64::NAN);
+        let window = Window {
+            t: &t, readings: [None; 3], temperature: None, attitude: Some(&q), position: None, reference_exact: None,
+            covariates: vec![], offset: 0, begin: 0, end: 200,
+        };
+        let k = kinematics(&window, NARROWEST, None, None, 0.0);
+        assert!((97..123).all(|i| k[i].is_none()));
+        assert!(k[90].is_some() && k[130].is_some());
+    }
+}

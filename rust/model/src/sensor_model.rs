@@ -1,0 +1,253 @@
+//! A stack of effects on top of the ideal readings: prediction, residual and columns of the design matrix.
+
+use std::sync::Arc;
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::card::Stage;
+use crate::effect::{Columns, Effect, EffectError, Rows};
+use crate::facts::LogFacts;
+use crate::ideal::{Ideal, ReferenceChange};
+use crate::sensor::{CHANNELS, Sensor};
+use crate::triple::Triple;
+use crate::window::{Window, held};
+
+/// An effect with its parameters and its place among all parameters.
+#[derive(Clone)]
+pub struct Slot {
+    /// The effect.
+    pub effect: Arc<dyn Effect>,
+    /// Present values; zero for a candidate.
+    pub parameters: Vec<f64>,
+    /// True if the effect is part of the model; false for a candidate that is only asked for its columns.
+    pub in_model: bool,
+    /// Index of its first parameter among all parameters.
+    pub first: usize,
+}
+
+/// Effects of the model and candidates, each parameter with a fixed place.
+#[derive(Clone)]
+pub struct SensorModel {
+    slots: Vec<Slot>,
+    parameters: usize,
+    /// Parameters whose column can differ from zero, per channel.
+    active: Vec<Vec<usize>>,
+}
+
+/// Columns and residual of one channel over the rows of a window.
+#[derive(Clone, Debug, Default)]
+pub struct ChannelColumns {
+    /// One column per active parameter, in the order of [`SensorModel::active`].
+    pub columns: Vec<Vec<f64>>,
+    /// Measured less modelled; NaN where there is no sample or no reference.
+    pub residual: Vec<f64>,
+}
+
+impl ChannelColumns {
+    /// Residual after a step of all parameters, of which `active` are the channel's own.
+    pub fn residual_after(&self, active: &[usize], step: &[f64]) -> Vec<f64> {
+        let mut residual = self.residual.clone();
+        for (column, parameter) in self.columns.iter().zip(active) {
+            if step[*parameter] != 0.0 {
+                for (r, c) in residual.iter_mut().zip(column) {
+                    *r -= step[*parameter] * c;
+                }
+            }
+        }
+        residual
+    }
+}
+
+/// What a model says of the core rows of a window.
+pub struct Evaluation {
+    /// Ideal readings the model started from.
+    pub ideal: Ideal,
+    /// Columns and residual of each channel; `None` for a sensor that the log does not have.
+    pub channels: Vec<Option<ChannelColumns>>,
+    /// Covariates with slow columns held, in the order of the facts.
+    pub covariates: Vec<Vec<f64>>,
+    /// Temperature less its mean.
+    pub temperature: Option<Vec<f64>>,
+}
+
+impl SensorModel {
+    /// A model of the given effects (with parameters) and candidates.
+    pub fn new(
+        effects: Vec<(Arc<dyn Effect>, Vec<f64>)>,
+        candidates: Vec<Arc<dyn Effect>>,
+        facts: &LogFacts,
+    ) -> Result<Self, EffectError> {
+        let mut slots = Vec::new();
+        let mut first = 0;
+        for (effect, parameters) in effects {
+            let count = effect.card().parameters.len();
+            if parameters.len() != count {
+                let message = format!("takes {count} parameters, got {}", parameters.len());
+                return Err(EffectError::Contract { effect: effect.card().id.clone(), message });
+            }
+            slots.push(Slot { effect, parameters, in_model: true, first });
+            first += count;
+        }
+        for effect in candidates {
+            let count = effect.card().parameters.len();
+            slots.push(Slot { effect, parameters: vec![0.0; count], in_model: false, first });
+            first += count;
+        }
+        let mut model = Self { slots, parameters: first, active: vec![Vec::new(); CHANNELS] };
+        model.find_active(facts)?;
+        Ok(model)
+    }
+
+    /// The effects in order.
+    pub fn slots(&self) -> &[Slot] {
+        &self.slots
+    }
+
+    /// Number of parameters of all effects.
+    pub fn parameters(&self) -> usize {
+        self.parameters
+    }
+
+    /// Parameters whose column can differ from zero, per channel.
+    pub fn active(&self) -> &[Vec<usize>] {
+        &self.active
+    }
+
+    /// Sets the parameters of the model's effects from a vector over all parameters.
+    pub fn set_parameters(&mut self, values: &[f64]) {
+        for slot in self.slots.iter_mut().filter(|s| s.in_model) {
+            let n = slot.parameters.len();
+            slot.parameters.copy_from_slice(&values[slot.first..slot.first + n]);
+        }
+    }
+
+    /// Which columns can be non-zero at all is asked once, on four made-up rows.
+    fn find_active(&mut self, facts: &LogFacts) -> Result<(), EffectError> {
+        let mut ideal = Ideal::default();
+        for i in 0..4 {
+            let v = Vector3::new(0.3, -0.7, 1.1) * (1.0 + f64::from(i));
+            for triple in [
+                &mut ideal.omega, &mut ideal.alpha, &mut ideal.f, &mut ideal.f_rate, &mut ideal.m, &mut ideal.m_rate,
+            ] {
+                triple.push(&v);
+            }
+            ideal.attitude.push(UnitQuaternion::from_scaled_axis(v * 0.1));
+        }
+        let t: Vec<f64> = (0..4).map(|i| facts.t_start + facts.dt * f64::from(i)).collect();
+        let ones = vec![1.0, 2.0, -1.0, 0.5];
+        let covariates = vec![ones.clone(); facts.covariates.len()];
+        let mut columns = Columns::default();
+        for sensor in Sensor::ALL.into_iter().filter(|s| facts.sensors[s.index()]) {
+            let rows = Rows {
+                facts, t: &t, ideal: &ideal, x: &ideal.f, temperature: Some(&ones), covariates: &covariates,
+            };
+            for slot in self.slots.iter().filter(|s| s.effect.sensors().contains(&sensor)) {
+                columns.reset(4, slot.parameters.len());
+                slot.effect.columns(&rows, sensor, &slot.parameters, &mut columns)?;
+                for axis in 0..3 {
+                    let list = &mut self.active[3 * sensor.index() + axis];
+                    list.extend((0..slot.parameters.len()).filter(|p| columns.get(*p, axis).is_some()).map(|p| slot.first + p));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What the model's reference effects do to the reference.
+    pub fn reference_change(&self) -> ReferenceChange {
+        self.slots
+            .iter()
+            .filter(|s| s.in_model && s.effect.card().stage == Stage::Reference)
+            .fold(ReferenceChange::default(), |change, s| change.and(s.effect.reference_change(&s.parameters)))
+    }
+
+    /// Residual and columns over the core rows of a window.
+    pub fn evaluate(&self, window: &Window, facts: &LogFacts) -> Result<Evaluation, EffectError> {
+        let ideal = Ideal::new(window, facts, &self.reference_change());
+        let core = window.begin..window.end;
+        let temperature: Option<Vec<f64>> = window
+            .temperature
+            .map(|t| core.clone().map(|i| held(t, i) - facts.temperature_mean).collect());
+        let covariates: Vec<Vec<f64>> =
+            window.covariates.iter().map(|c| core.clone().map(|i| held(c, i)).collect()).collect();
+        let mut channels: Vec<Option<ChannelColumns>> = vec![None; CHANNELS];
+        for sensor in Sensor::ALL {
+            let Some(reading) = window.reading(sensor) else { continue };
+            let rows = Rows {
+                facts,
+                t: &window.t[core.clone()],
+                ideal: &ideal,
+                x: &ideal.f,
+                temperature: temperature.as_deref(),
+                covariates: &covariates,
+            };
+            let (modelled, columns) = self.predict(rows, sensor)?;
+            for (axis, columns) in columns.into_iter().enumerate() {
+                let residual = core
+                    .clone()
+                    .zip(modelled.axis(axis))
+                    .map(|(i, value)| reading[3 * i + axis] - value)
+                    .collect();
+                channels[3 * sensor.index() + axis] = Some(ChannelColumns { columns, residual });
+            }
+        }
+        Ok(Evaluation { ideal, channels, covariates, temperature })
+    }
+
+    /// Residual of each channel over the core rows of a window after a step of all parameters.
+    pub fn residuals(&self, window: &Window, facts: &LogFacts, step: &[f64]) -> Result<Vec<Option<Vec<f64>>>, EffectError> {
+        let evaluation = self.evaluate(window, facts)?;
+        Ok(evaluation
+            .channels
+            .into_iter()
+            .zip(&self.active)
+            .map(|(channel, active)| channel.map(|c| c.residual_after(active, step)))
+            .collect())
+    }
+
+    /// Modelled readings of one sensor and the columns of its three channels, stage after stage.
+    fn predict(&self, rows: Rows, sensor: Sensor) -> Result<(Triple, [Vec<Vec<f64>>; 3]), EffectError> {
+        let n = rows.len();
+        let mut x = match sensor {
+            Sensor::Acc => rows.ideal.f.clone(),
+            Sensor::Gyr => rows.ideal.omega.clone(),
+            Sensor::Mag => rows.ideal.m.clone(),
+        };
+        let mut out: [Vec<Vec<f64>>; 3] =
+            std::array::from_fn(|axis| vec![Vec::new(); self.active[3 * sensor.index() + axis].len()]);
+        let mut columns = Columns::default();
+        for stage in [Stage::Reference, Stage::Input, Stage::Gain, Stage::Offset] {
+            let mut after: Option<Triple> = None;
+            for slot in &self.slots {
+                if slot.effect.card().stage != stage || !slot.effect.sensors().contains(&sensor) {
+                    continue;
+                }
+                columns.reset(n, slot.parameters.len());
+                let rows = Rows { x: &x, ..rows };
+                slot.effect.columns(&rows, sensor, &slot.parameters, &mut columns)?;
+                for axis in 0..3 {
+                    let list = &self.active[3 * sensor.index() + axis];
+                    let from = list.partition_point(|p| *p < slot.first);
+                    for (k, p) in list.iter().enumerate().skip(from).take_while(|(_, p)| **p < slot.first + slot.parameters.len()) {
+                        let value = slot.parameters[p - slot.first];
+                        let column = columns.get(p - slot.first, axis);
+                        // The value of a reference effect is in the ideal readings already.
+                        if slot.in_model && value != 0.0 && stage != Stage::Reference
+                            && let Some(column) = column
+                        {
+                            let target = &mut after.get_or_insert_with(|| x.clone()).0[axis];
+                            for (t, c) in target.iter_mut().zip(column) {
+                                *t += value * c;
+                            }
+                        }
+                        out[axis][k] = column.map_or_else(|| vec![0.0; n], <[f64]>::to_vec);
+                    }
+                }
+            }
+            if let Some(after) = after {
+                x = after;
+            }
+        }
+        Ok((x, out))
+    }
+}

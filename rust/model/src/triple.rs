@@ -1,0 +1,41 @@
+//! Three columns of equal length: one vector quantity over the rows of a window.
+
+use nalgebra::Vector3;
+
+/// x, y and z of a vector quantity, each contiguous over the rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Triple(pub [Vec<f64>; 3]);
+
+impl Triple {
+    /// `n` rows of zeros.
+    pub fn zeros(n: usize) -> Self {
+        Self([vec![0.0; n], vec![0.0; n], vec![0.0; n]])
+    }
+
+    /// Appends a row.
+    pub fn push(&mut self, v: &Vector3<f64>) {
+        for axis in 0..3 {
+            self.0[axis].push(v[axis]);
+        }
+    }
+
+    /// Vector of one row.
+    pub fn row(&self, i: usize) -> Vector3<f64> {
+        Vector3::new(self.0[0][i], self.0[1][i], self.0[2][i])
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.0[0].len()
+    }
+
+    /// True without rows.
+    pub fn is_empty(&self) -> bool {
+        self.0[0].is_empty()
+    }
+
+    /// One axis.
+    pub fn axis(&self, axis: usize) -> &[f64] {
+        &self.0[axis]
+    }
+}

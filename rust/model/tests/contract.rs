@@ -1,0 +1,70 @@
+//! Every built-in effect keeps the contract that fitting relies on.
+#![allow(clippy::expect_used, clippy::unwrap_used, missing_docs)]
+
+use imufit_model::catalogue;
+use imufit_model::contract::check;
+use imufit_model::facts::LogFacts;
+use imufit_model::smoothing::NARROWEST;
+use imufit_model::window::Window;
+use nalgebra::{UnitQuaternion, Vector3};
+
+#[test]
+fn every_built_in_effect_keeps_the_contract() {
+    let n = 300_usize;
+    let t: Vec<f64> = (0..n).map(|i| 5.0 + i as f64 * 0.01).collect();
+    let attitude: Vec<f64> = t
+        .iter()
+        .flat_map(|t| {
+            let q = UnitQuaternion::from_euler_angles((1.3 * t).sin(), 0.7 * (2.1 * t).cos(), 0.9 * t);
+            [q.w, q.i, q.j, q.k]
+        })
+        .collect();
+    let position: Vec<f64> = t.iter().flat_map(|t| [(2.0 * t).sin(), (3.0 * t).cos() * 0.3, 0.1 * t]).collect();
+    let reading = vec![0.1; 3 * n];
+    let temperature: Vec<f64> = t.iter().map(|t| 30.0 + t.sin()).collect();
+    let current: Vec<f64> = t.iter().map(|t| (5.0 * t).sin() + 2.0).collect();
+    let window = Window {
+        t: &t,
+        readings: [Some(&reading); 3],
+        temperature: Some(&temperature),
+        attitude: Some(&attitude),
+        position: Some(&position),
+        reference_exact: None,
+        covariates: vec![&current],
+        offset: 0,
+        begin: 0,
+        end: n,
+    };
+    let facts = LogFacts {
+        n,
+        t_start: t[0],
+        t_end: t[n - 1],
+        dt: 0.01,
+        gravity: Vector3::new(0.0, 0.0, 9.80665),
+        field: Vector3::new(20.0, 0.0, 44.0),
+        field_estimated: false,
+        temperature_mean: 30.0,
+        covariates: vec!["motor_current".into()],
+        covariate_means: vec![2.0],
+        sensors: [true; 3],
+        sensor_dt: [0.01; 3],
+        has_temperature: true,
+        attitude_smoothing: NARROWEST,
+        position_smoothing: Some(NARROWEST),
+        reference_dt: 0.01,
+    };
+    let mut effects = catalogue::built_in();
+    for sensor in ["acc", "gyr", "mag"] {
+        effects.push(catalogue::find(&format!("{sensor}.column:motor_current")).unwrap());
+    }
+    for effect in &effects {
+        let zero = vec![0.0; effect.card().parameters.len()];
+        let typical: Vec<f64> =
+            effect.card().parameters.iter().enumerate().map(|(k, p)| p.typical.unwrap_or(0.3) * (1.0 - 0.3 * k as f64)).collect();
+        for at in [zero, typical] {
+            if let Err(e) = check(effect, &at, &window, &facts) {
+                panic!("{e}");
+            }
+        }
+    }
+}

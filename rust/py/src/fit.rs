@@ -1,0 +1,204 @@
+//! Passes over a log: survey, evidence, noise.
+
+use std::sync::Arc;
+
+use imufit_attitude::Frame;
+use imufit_fit::evidence::{Evidence, Layout};
+use imufit_fit::noise::Autocovariance;
+use imufit_fit::survey::{Given, Survey};
+use imufit_fit::whitening::filter_from_autocovariance;
+use imufit_model::sensor::CHANNELS;
+use imufit_model::sensor_model::SensorModel;
+use nalgebra::Vector3;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::errors::{from_effect, value_error};
+use crate::model::{PyEffect, PyFacts};
+use crate::window::ChunkArrays;
+
+/// First pass over a log.
+#[pyclass(name = "Survey", module = "imufit._imufit")]
+pub struct PySurvey(Survey);
+
+#[pymethods]
+impl PySurvey {
+    #[new]
+    #[pyo3(signature = (n, frame, gravity, mag_reference, covariates))]
+    fn new(n: usize, frame: &str, gravity: f64, mag_reference: Option<[f64; 3]>, covariates: Vec<String>) -> PyResult<Self> {
+        let frame: Frame = frame.parse().map_err(value_error)?;
+        Ok(Self(Survey::new(Given {
+            n,
+            gravity: -frame.up() * gravity,
+            field: mag_reference.map(Vector3::from),
+            covariates,
+        })))
+    }
+
+    /// Adds the core rows of a chunk.
+    fn add(&mut self, py: Python<'_>, chunk: &Bound<'_, PyDict>) -> PyResult<()> {
+        let arrays = ChunkArrays::new(chunk)?;
+        let window = arrays.window()?;
+        py.detach(|| self.0.add(&window));
+        Ok(())
+    }
+
+    /// Mean square difference of neighbouring reference widths over what noise explains: (attitude, position).
+    fn widths(&self) -> (Vec<f64>, Vec<f64>) {
+        let (attitude, position) = self.0.widths();
+        (attitude.excess(), position.excess())
+    }
+
+    /// The facts of the log.
+    fn finish(&self) -> PyFacts {
+        let (attitude, position) = self.0.widths();
+        let (attitude_noise, position_noise) = (attitude.noise(), position.noise());
+        let (facts, mut bins) = self.0.clone().finish();
+        bins.centre_temperature(facts.temperature_mean);
+        PyFacts { facts, bins, attitude_noise, position_noise }
+    }
+}
+
+/// Gram matrices of every effect's columns and the residual, block by block.
+#[pyclass(name = "Evidence", module = "imufit._imufit")]
+pub struct PyEvidence(pub Evidence);
+
+#[pymethods]
+impl PyEvidence {
+    /// `effects` with their parameters are the model; `candidates` are asked for their columns only.
+    #[new]
+    fn new(
+        facts: &PyFacts,
+        effects: Vec<(PyRef<'_, PyEffect>, Vec<f64>)>,
+        candidates: Vec<PyRef<'_, PyEffect>>,
+        blocks: usize,
+        filters: Vec<Vec<f64>>,
+    ) -> PyResult<Self> {
+        if blocks < 2 || filters.len() != CHANNELS {
+            return Err(value_error(format!("need at least 2 blocks and {CHANNELS} filters")));
+        }
+        let effects = effects.into_iter().map(|(e, p)| (e.0.clone(), p)).collect();
+        let candidates = candidates.into_iter().map(|e| e.0.clone()).collect();
+        let model = SensorModel::new(effects, candidates, &facts.facts).map_err(from_effect)?;
+        let layout = Layout { model, facts: facts.facts.clone(), bins: facts.bins.clone(), blocks, filters };
+        Ok(Self(Evidence::new(Arc::new(layout))))
+    }
+
+    /// Adds the core rows of a chunk.
+    fn add(&mut self, py: Python<'_>, chunk: &Bound<'_, PyDict>) -> PyResult<()> {
+        let arrays = ChunkArrays::new(chunk)?;
+        let window = arrays.window()?;
+        py.detach(|| self.0.add(&window)).map_err(from_effect)
+    }
+
+    /// Adds evidence of other rows, taken for the same layout.
+    fn merge(&mut self, other: &Self) -> PyResult<()> {
+        let (a, b) = (&self.0.layout, &other.0.layout);
+        if a.blocks != b.blocks || a.model.active() != b.model.active() || a.filters != b.filters {
+            return Err(value_error("evidence of different layouts cannot be added"));
+        }
+        self.0.merge(other.0.clone());
+        Ok(())
+    }
+
+    /// Empty evidence of the same layout with other whitening filters.
+    fn with_filters(&self, filters: Vec<Vec<f64>>) -> PyResult<Self> {
+        if filters.len() != CHANNELS {
+            return Err(value_error(format!("need {CHANNELS} filters")));
+        }
+        let mut layout = (*self.0.layout).clone();
+        layout.filters = filters;
+        Ok(Self(Evidence::new(Arc::new(layout))))
+    }
+
+    #[getter]
+    fn blocks(&self) -> usize {
+        self.0.layout.blocks
+    }
+
+    /// Number of samples of a channel.
+    fn count(&self, channel: usize) -> usize {
+        self.0.count(channel)
+    }
+
+    /// Parameters whose columns can be non-zero in a channel.
+    fn active(&self, channel: usize) -> Vec<usize> {
+        self.0.layout.model.active()[channel].clone()
+    }
+
+    /// Gram matrix of `[columns | residual]` of a channel, summed over all blocks or of one block; None without samples.
+    #[pyo3(signature = (channel, block=None))]
+    fn gram<'py>(&self, py: Python<'py>, channel: usize, block: Option<usize>) -> Option<Bound<'py, PyArray2<f64>>> {
+        let blocks: Vec<usize> = block.map_or_else(|| (0..self.0.layout.blocks).collect(), |b| vec![b]);
+        let mut parts = blocks.into_iter().filter_map(|b| self.0.get(b, channel));
+        let first = parts.next()?.gram.clone();
+        let sum = parts.fold(first, |s, b| s + &b.gram);
+        let n = sum.nrows();
+        Some(PyArray2::from_owned_array(py, numpy::ndarray::Array2::from_shape_fn((n, n), |(i, j)| sum[(i, j)])))
+    }
+}
+
+/// Residual of each channel over the core rows of a chunk, after a step of all parameters; None for a sensor that the log has not.
+#[pyfunction]
+fn evaluate<'py>(
+    py: Python<'py>,
+    evidence: &PyEvidence,
+    chunk: &Bound<'py, PyDict>,
+    step: Vec<f64>,
+) -> PyResult<Vec<Option<Bound<'py, PyArray1<f64>>>>> {
+    let layout = &evidence.0.layout;
+    if step.len() != layout.model.parameters() {
+        return Err(value_error("step must have one number per parameter"));
+    }
+    let arrays = ChunkArrays::new(chunk)?;
+    let window = arrays.window()?;
+    let residuals = py.detach(|| layout.model.residuals(&window, &layout.facts, &step)).map_err(from_effect)?;
+    Ok(residuals.into_iter().map(|r| r.map(|r| PyArray1::from_vec(py, r))).collect())
+}
+
+/// Autocovariances of the residual, from which whitening filters come.
+#[pyclass(name = "Autocovariance", module = "imufit._imufit")]
+pub struct PyAutocovariance(Autocovariance);
+
+#[pymethods]
+impl PyAutocovariance {
+    #[new]
+    fn new() -> Self {
+        Self(Autocovariance::default())
+    }
+
+    /// Adds the core rows of a chunk: the residual of the evidence's layout less its columns times `step`.
+    fn add(&mut self, py: Python<'_>, chunk: &Bound<'_, PyDict>, evidence: &PyEvidence, step: Vec<f64>) -> PyResult<()> {
+        if step.len() != evidence.0.layout.model.parameters() {
+            return Err(value_error("step must have one number per parameter"));
+        }
+        let arrays = ChunkArrays::new(chunk)?;
+        let window = arrays.window()?;
+        py.detach(|| self.0.add(&window, &evidence.0.layout, &step)).map_err(from_effect)
+    }
+
+    /// Whitening filter of each channel; empty where the residual is white.
+    fn filters(&self) -> Vec<Vec<f64>> {
+        (0..CHANNELS)
+            .map(|channel| {
+                let (covariance, n) = self.0.of_channel(channel);
+                filter_from_autocovariance(&covariance, n)
+            })
+            .collect()
+    }
+
+    /// Autocovariance of a channel, lag 0 first.
+    fn of_channel(&self, channel: usize) -> Vec<f64> {
+        self.0.of_channel(channel).0
+    }
+}
+
+/// Registers this file's part of the module.
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_class::<PySurvey>()?;
+    m.add_class::<PyEvidence>()?;
+    m.add_class::<PyAutocovariance>()?;
+    m.add_function(wrap_pyfunction!(evaluate, m)?)?;
+    Ok(())
+}

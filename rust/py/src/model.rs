@@ -1,0 +1,244 @@
+//! Effects and facts of a log.
+
+use std::sync::Arc;
+
+use imufit_fit::bins::Bins;
+use imufit_model::card::{Card, Parameter, Stage};
+use imufit_model::catalogue;
+use imufit_model::contract;
+use imufit_model::effect::Effect;
+use imufit_model::facts::LogFacts;
+use imufit_model::sensor::Sensor;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::errors::{from_effect, value_error};
+use crate::python_effect::PythonEffect;
+use crate::window::ChunkArrays;
+
+/// One effect of the catalogue, built in or a user's.
+#[pyclass(name = "Effect", frozen, module = "imufit._imufit")]
+pub struct PyEffect(pub Arc<dyn Effect>);
+
+#[pymethods]
+impl PyEffect {
+    #[getter]
+    fn id(&self) -> String {
+        self.0.card().id.clone()
+    }
+
+    /// Prefixes of the sensors it touches.
+    #[getter]
+    fn sensors(&self) -> Vec<&'static str> {
+        self.0.sensors().iter().map(|s| s.prefix()).collect()
+    }
+
+    /// Its parameters: (name, unit, typical size or None).
+    #[getter]
+    fn parameters(&self) -> Vec<(String, String, Option<f64>)> {
+        self.0.card().parameters.iter().map(|p| (p.name.clone(), p.unit.clone(), p.typical)).collect()
+    }
+
+    /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new values.
+    #[getter]
+    fn nonlinear(&self) -> bool {
+        self.0.card().stage == Stage::Reference
+    }
+
+    /// Stage at which it acts: reference, input, gain or offset.
+    #[getter]
+    fn stage(&self) -> &'static str {
+        match self.0.card().stage {
+            Stage::Reference => "reference",
+            Stage::Input => "input",
+            Stage::Gain => "gain",
+            Stage::Offset => "offset",
+        }
+    }
+
+    /// Words of the card: name, physics, formula, signature, mistaken_for, confirm.
+    #[getter]
+    fn words<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let card = self.0.card();
+        let out = PyDict::new(py);
+        for (key, value) in [
+            ("name", &card.name), ("physics", &card.physics), ("formula", &card.formula),
+            ("signature", &card.signature), ("mistaken_for", &card.mistaken_for), ("confirm", &card.confirm),
+        ] {
+            out.set_item(key, value)?;
+        }
+        Ok(out)
+    }
+
+    /// Why it cannot be offered for a log; None if it can.
+    fn not_testable(&self, facts: &PyFacts) -> Option<String> {
+        self.0.not_testable(&facts.facts)
+    }
+
+    /// Checks the contract on the core rows of a chunk: finite, agrees with a difference quotient, independent of how rows are cut.
+    fn check(&self, chunk: &Bound<'_, PyDict>, facts: &PyFacts, at: Vec<f64>) -> PyResult<()> {
+        let arrays = ChunkArrays::new(chunk)?;
+        let window = arrays.window()?;
+        let py = chunk.py();
+        py.detach(|| contract::check(&self.0, &at, &window, &facts.facts)).map_err(from_effect)
+    }
+}
+
+/// What is known of a log as a whole.
+#[pyclass(name = "Facts", frozen, module = "imufit._imufit")]
+#[derive(Clone)]
+pub struct PyFacts {
+    pub facts: LogFacts,
+    pub bins: Bins,
+    pub attitude_noise: f64,
+    pub position_noise: f64,
+}
+
+#[pymethods]
+impl PyFacts {
+    #[getter]
+    fn n(&self) -> usize {
+        self.facts.n
+    }
+
+    /// Rows that a chunk should carry on each side of its core.
+    #[getter]
+    fn margin(&self) -> usize {
+        self.facts.margin()
+    }
+
+    #[getter]
+    fn t_start(&self) -> f64 {
+        self.facts.t_start
+    }
+
+    #[getter]
+    fn t_end(&self) -> f64 {
+        self.facts.t_end
+    }
+
+    #[getter]
+    fn dt(&self) -> f64 {
+        self.facts.dt
+    }
+
+    #[getter]
+    fn field(&self) -> [f64; 3] {
+        self.facts.field.into()
+    }
+
+    #[getter]
+    fn field_estimated(&self) -> bool {
+        self.facts.field_estimated
+    }
+
+    #[getter]
+    fn temperature_mean(&self) -> f64 {
+        self.facts.temperature_mean
+    }
+
+    #[getter]
+    fn has_temperature(&self) -> bool {
+        self.facts.has_temperature
+    }
+
+    #[getter]
+    fn sensors(&self) -> Vec<&'static str> {
+        Sensor::ALL.iter().filter(|s| self.facts.sensors[s.index()]).map(|s| s.prefix()).collect()
+    }
+
+    #[getter]
+    fn covariate_means(&self) -> std::collections::BTreeMap<String, f64> {
+        self.facts.covariates.iter().cloned().zip(self.facts.covariate_means.iter().copied()).collect()
+    }
+
+    /// Degree and half width of the polynomial through the reference attitude.
+    #[getter]
+    fn attitude_smoothing(&self) -> (usize, usize) {
+        (self.facts.attitude_smoothing.degree, self.facts.attitude_smoothing.half_width)
+    }
+
+    /// Degree and half width of the polynomial through the reference position; None without position.
+    #[getter]
+    fn position_smoothing(&self) -> Option<(usize, usize)> {
+        self.facts.position_smoothing.map(|s| (s.degree, s.half_width))
+    }
+
+    /// White noise of the reference: attitude in rad, position in m.
+    #[getter]
+    fn reference_noise(&self) -> (f64, f64) {
+        (self.attitude_noise, self.position_noise)
+    }
+
+    /// The same facts with the temperature and covariate means of the log that a model was fitted on.
+    #[pyo3(signature = (temperature_mean=None, covariate_means=None))]
+    fn with_means(&self, temperature_mean: Option<f64>, covariate_means: Option<std::collections::BTreeMap<String, f64>>) -> Self {
+        let mut out = self.clone();
+        if let Some(mean) = temperature_mean {
+            out.bins.centre_temperature(mean - out.facts.temperature_mean);
+            out.facts.temperature_mean = mean;
+        }
+        for (name, mean) in covariate_means.unwrap_or_default() {
+            if let Some(k) = out.facts.covariate(&name) {
+                out.facts.covariate_means[k] = mean;
+            }
+        }
+        out
+    }
+}
+
+#[pyfunction]
+fn built_in_effects() -> Vec<PyEffect> {
+    catalogue::built_in().into_iter().map(PyEffect).collect()
+}
+
+#[pyfunction]
+fn find_effect(id: &str) -> Option<PyEffect> {
+    catalogue::find(id).map(PyEffect)
+}
+
+/// An effect made of a Python function that returns d reading / d parameters, (n, 3, p).
+#[pyfunction]
+#[pyo3(signature = (id, sensor, parameters, words, stage, needs, function))]
+fn python_effect(
+    id: String,
+    sensor: &str,
+    parameters: Vec<(String, String, Option<f64>)>,
+    words: &Bound<'_, PyDict>,
+    stage: &str,
+    needs: Vec<String>,
+    function: Py<PyAny>,
+) -> PyResult<PyEffect> {
+    let sensor = Sensor::from_prefix(sensor).ok_or_else(|| value_error(format!("sensor is {sensor:?}: pass acc, gyr or mag")))?;
+    let stage = match stage {
+        "input" => Stage::Input,
+        "gain" => Stage::Gain,
+        "offset" => Stage::Offset,
+        other => return Err(value_error(format!("stage is {other:?}: pass input, gain or offset"))),
+    };
+    let word = |key: &str| -> PyResult<String> {
+        words.get_item(key)?.map_or_else(|| Ok(String::new()), |v| v.extract())
+    };
+    let card = Card {
+        name: word("name")?,
+        physics: word("physics")?,
+        formula: word("formula")?,
+        signature: word("signature")?,
+        mistaken_for: word("mistaken_for")?,
+        confirm: word("confirm")?,
+        id,
+        stage,
+        parameters: parameters.into_iter().map(|(name, unit, typical)| Parameter { name, unit, typical }).collect(),
+    };
+    Ok(PyEffect(Arc::new(PythonEffect { card, sensor: [sensor], needs, function })))
+}
+
+/// Registers this file's part of the module.
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_class::<PyEffect>()?;
+    m.add_class::<PyFacts>()?;
+    m.add_function(wrap_pyfunction!(built_in_effects, m)?)?;
+    m.add_function(wrap_pyfunction!(find_effect, m)?)?;
+    m.add_function(wrap_pyfunction!(python_effect, m)?)?;
+    Ok(())
+}

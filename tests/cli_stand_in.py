@@ -1,0 +1,129 @@
+"""An engine with hand-made results behind the command line, so that its tests are about the command line."""
+
+import json
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+from imufit.cli import engine
+from imufit.cli.app import main
+from imufit.simulate import Grade, ParameterGrade
+from loop_results import BIAS, addition, card, comparison, diagnosis, ladder
+
+
+class Fit:
+    """A fit that hands out the hand-made results."""
+
+    parameters = BIAS
+    ratio = 1.52
+
+    def compare(self, log, progress):
+        progress(1, 1, "compare")
+        return comparison()
+
+    def diagnose(self, log, progress):
+        return diagnosis()
+
+    def add(self, effect, log, progress):
+        result = addition()
+        object.__setattr__(result, "fit", self)
+        return result
+
+    def to_dict(self):
+        return {"model": ["gyr.bias"]}
+
+    def save(self, path):
+        path.write_text("saved")
+
+
+class Truth:
+    """What was done to the log."""
+
+    scenario, seed = "handheld", 3
+    effects: ClassVar = {"gyr.g_sensitivity": {"xx": 3.6e-5}}
+    sizes: ClassVar = {"gyr.g_sensitivity": 3.0}
+
+    def to_json(self):
+        return {"effects": self.effects}
+
+
+class Study:
+    """The blind protocol's result."""
+
+    def to_dict(self):
+        return {"correct": True}
+
+    def __str__(self):
+        return "3 of 3 right"
+
+
+class Replay:
+    """A replay of one filter with errors and one without."""
+
+    def to_dict(self):
+        return {"n": 100, "skipped": {"gap": 2}, "filters": {"mahony": {"total_deg": 1.5}, "gyro": None}}
+
+    def to_log(self):
+        return "log"
+
+
+def install(monkeypatch):
+    """Put the stand-in behind the command line and return the list of calls it gets."""
+    calls = []
+
+    def note(name, result):
+        def function(*args, **kwargs):
+            calls.append((name, args, kwargs))
+            return result
+
+        monkeypatch.setattr(engine, name, function)
+
+    ladder_result = ladder()
+    object.__setattr__(ladder_result, "fit", Fit())
+    found = ParameterGrade("gyr.g_sensitivity", "xx", 3.6e-5, 3.5e-5, 1e-6)
+    mark = Grade("right", ("gyr.g_sensitivity",), ("gyr.g_sensitivity",), (found,))
+    simulation = SimpleNamespace(t=np.arange(200) / 100.0, truth=Truth())
+    model = SimpleNamespace(fit=lambda log, progress: Fit())
+    for name, result in (
+        ("open_log", "opened"),
+        ("sensor_model", model),
+        ("ladder", ladder_result),
+        ("explain", card()),
+        ("load_effects", None),
+        ("replay", Replay()),
+        ("scenarios", {"handheld": "By hand.", "turntable": "A table."}),
+        ("injections", ["gyr.bias", "gyr.g_sensitivity"]),
+        ("simulate", simulation),
+        ("hidden", simulation),
+        ("unseal", Truth()),
+        ("grade_answer", mark),
+        ("grade_blind", Study()),
+    ):
+        note(name, result)
+    ids = ("gyr.g_sensitivity", "gyr.bias", "gyr.scale", "acc.bias", "mag.hard_iron")
+    cards = [type(card())(**{**vars(card()), "id": each}) for each in ids]
+    note("catalogue", cards)
+
+    def write(value, path):
+        path.write_text("log")
+        return path.with_name(path.name + ".sealed")
+
+    monkeypatch.setattr(engine, "save_simulation", write)
+    monkeypatch.setattr(engine, "write_log", write)
+    return calls
+
+
+def run(capsys, *arguments):
+    """Run a command; return exit code, standard output and the lines of standard error."""
+    code = main([str(argument) for argument in arguments])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err.splitlines()
+
+
+def strict_json(text):
+    """Parse JSON that has neither NaN nor infinity."""
+
+    def refuse(name):
+        raise ValueError(name)
+
+    return json.loads(text, parse_constant=refuse)

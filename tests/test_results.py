@@ -1,0 +1,175 @@
+"""Results turn into strict JSON, data frames, text, HTML and figures."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from imufit.figures import quantity
+from imufit.figures.waterfall import waterfall
+from imufit.results import Addition, Parameter, Table
+from loop_results import G_SENSITIVITY, addition, card, comparison, diagnosis, ladder
+from matplotlib.figure import Figure
+
+EVERY = [comparison(), diagnosis(), diagnosis("ambiguous"), diagnosis("unknown"), addition(), ladder(), ladder(False)]
+
+
+def strict(value):
+    """JSON round trip that accepts neither NaN nor infinity."""
+    return json.loads(json.dumps(value, allow_nan=False))
+
+
+@pytest.mark.parametrize("result", EVERY, ids=lambda result: type(result).__name__)
+def test_every_result_is_strict_json_text_html_frame_and_figure(result):
+    assert strict(result.to_dict()) == result.to_dict()
+    assert len(str(result)) > 40
+    assert result._repr_html_().startswith("<div>")
+    assert len(result.to_dataframe()) >= 0
+    assert isinstance(result.plot(), Figure)
+
+
+def test_compare_json_has_the_published_keys_and_null_for_nan():
+    value = strict(comparison().to_dict())
+    assert {"n", "duration_s", "model", "channels", "sensors", "attitude", "where"} <= set(value)
+    assert value["channels"]["gyr_z"]["ratio"] is None
+    assert {"rms", "mean", "noise_floor", "ratio", "unit"} <= set(value["channels"]["acc_x"])
+    assert value["sensors"]["gyr"] == {"ratio": 1.38}
+    assert value["where"][0] == {
+        "channel": "gyr_x",
+        "covariate": "acc_y",
+        "share": 0.63,
+        "t_start": 120.0,
+        "t_end": 900.0,
+    }
+
+
+def test_diagnose_json_has_the_published_keys():
+    value = strict(diagnosis().to_dict())
+    assert {"verdict", "best", "ambiguous_with", "candidates", "unexplained"} <= set(value)
+    best = value["candidates"][0]
+    assert best["effect"] == value["best"] == "gyr.g_sensitivity"
+    assert best["parameters"]["xx"]["unit"] == "rad/s/(m/s^2)"
+    assert set(best["parameters"]["xx"]) >= {"value", "standard_error", "unit"}
+    assert best["confounded_with"] == [{"effect": "gyr.misalignment", "correlation": 0.31}]
+    assert value["candidates"][-1]["p_value"] is None
+    assert strict(diagnosis("unknown").to_dict())["unexplained"][0]["shape"] == "V-shaped"
+
+
+def test_add_and_ladder_json_have_the_published_keys():
+    value = strict(addition().to_dict())
+    assert {"effect", "before", "expected", "after", "held_out", "parameters", "model"} <= set(value)
+    assert set(value["parameters"]) == {item.name for item in G_SENSITIVITY}
+    assert value["model_parameters"]["gyr.bias"]["x"]["value"] == 0.01
+    value = strict(ladder().to_dict())
+    assert {"steps", "model", "verdict", "ratio_start", "ratio_end", "attitude"} <= set(value)
+    assert set(value["steps"][0]) >= {"effect", "before", "expected", "after"}
+    assert value["attitude"] == {"before_deg": 3.2, "after_deg": 0.41}
+
+
+def test_numpy_scalars_become_plain_numbers():
+    step = Addition("gyr.bias", np.float64(2.0), np.float32(1.5), math.inf, np.True_, (), ("gyr.bias",))
+    assert strict(step.to_dict())["before"] == 2.0
+    assert step.to_dict()["after"] is None
+    assert step.to_dict()["held_out"] is True
+
+
+def test_a_drop_far_from_the_expected_one_is_said():
+    assert Addition("gyr.bias", 3.0, 1.5, 2.5, True, (), ()).warning
+    assert not Addition("gyr.bias", 3.0, 1.5, 1.4, True, (), ()).warning
+    assert "acc.cubic" in str(ladder()) or "gyr.bias_temperature:" in str(ladder())
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "unit", "shown"),
+    [
+        (
+            math.radians(0.02) / 9.80665,
+            math.radians(0.0004) / 9.80665,
+            "rad/s/(m/s^2)",
+            "0.02000 ± 0.00040 deg/s per g",
+        ),
+        (0.0123, 0.0011, "1", "1.23 ± 0.11 %"),
+        (0.5, 0.0, "m/s^2", "0.500 m/s²"),
+        (0.01, math.nan, "s", "0.0100 s"),
+        (2.0, 0.5, "uT", "2.00 ± 0.50 µT"),
+    ],
+)
+def test_values_are_shown_in_the_units_people_use(value, error, unit, shown):
+    assert quantity.with_error(value, error, unit) == shown
+
+
+DEG = 180.0 / math.pi
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "shown"),
+    [
+        ("rad/s", DEG, "deg/s"),
+        ("rad", DEG, "deg"),
+        ("rad/s^2", DEG, "deg/s²"),
+        ("(rad/s)/K", DEG, "deg/s/K"),
+        ("(rad/s)/(m/s^2)", DEG * 9.80665, "deg/s per g"),
+        ("rad/s/(m/s^2)", DEG * 9.80665, "deg/s per g"),
+        ("(m/s^2)/K", 1.0, "m/s²/K"),
+        ("m/s^2", 1.0, "m/s²"),
+        ("1/K", 100.0, "%/K"),
+        ("1/(rad/s)", 100.0 / DEG, "%/(deg/s)"),
+        ("(rad/s)/(rad/s)^2", 1.0 / DEG, "deg/s/(deg/s)²"),
+        ("(rad/s)/sqrt(Hz)", DEG, "deg/s/√Hz"),
+        ("uT/A", 1.0, "µT/A"),
+        ("1", 100.0, "%"),
+        ("s", 1.0, "s"),
+        ("rad s/m", 1.0, "rad s/m"),
+    ],
+)
+def test_shown_unit_converts_the_number_with_the_unit(unit, factor, shown):
+    assert quantity.shown_unit(unit)[0] == pytest.approx(factor)
+    assert quantity.shown_unit(unit)[1] == shown
+
+
+def test_missing_numbers_are_dashes():
+    assert [quantity.ratio(None), quantity.share(math.nan), quantity.p_value(math.inf), quantity.number(None)] == [
+        "-"
+    ] * 4
+
+
+def test_text_table_aligns_and_html_table_escapes():
+    table = Table("T", ("name", ">value"), (("a<b", "1"), ("c", "10")))
+    assert str(table).splitlines()[-1] == "c        10"
+    assert "a&lt;b" in table.html()
+
+
+def test_card_prints_its_parts_and_equal_typical_sizes_once():
+    text = str(card())
+    assert text.startswith("gyr.g_sensitivity: g-sensitivity")
+    assert text.count("deg/s per g") == 1
+    assert card().to_dict()["parameters"]["xy"] == {"unit": "rad/s/(m/s^2)", "typical": 3e-5}
+
+
+def test_smallest_detectable_sizes_that_are_equal_stand_once():
+    assert diagnosis().candidates[0].smallest_detectable == "each 0.00281 deg/s per g"
+
+
+def test_waterfall_is_logarithmic_only_where_the_fall_is_large():
+    assert ladder().plot().axes[0].get_yscale() == "log"
+    small = waterfall(["gyr.bias"], before=[1.6], expected=[1.1], after=[1.1], training=[1.0], start=1.6)
+    assert small.axes[0].get_yscale() == "linear"
+    assert small.axes[0].get_ylim()[0] == 0.0
+
+
+def test_figures_have_a_sentence_for_a_title():
+    assert "from 1.52 to 1.03" in diagnosis().plot().axes[0].get_title(loc="left")
+    assert "beyond chance" in diagnosis("adequate").plot().axes[0].get_title(loc="left")
+    assert "equally well" in diagnosis("ambiguous").plot().axes[0].get_title(loc="left")
+    assert "No effect takes away enough" in diagnosis("unknown").plot().axes[0].get_title(loc="left")
+    assert "63 %" in comparison().plot().get_suptitle()
+    assert "plausible" in Parameter("gyr.bias", "x", 0.01, 1e-4, "rad/s", 0.02).plot().axes[0].get_title(loc="left")
+
+
+def test_figures_survive_results_without_numbers():
+    lonely = Parameter("gyr.bias", "x", math.nan, math.nan, "rad/s", None)
+    assert isinstance(lonely.plot(), Figure)
+    panel = comparison().panels[0]
+    empty = type(panel)("gyr_x", "t", "rad/s", "s", np.full(3, np.nan), np.full(3, np.nan), np.zeros(3), 0.0, math.nan)
+    assert isinstance(empty.plot(), Figure)
+    empty.plot().canvas.draw()
