@@ -28,6 +28,7 @@ from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
 from imufit.log import Log
+from imufit.progress import Progress, silent
 
 Array = NDArray[np.float64]
 Settings = Mapping[str, Mapping[str, float]]
@@ -43,7 +44,7 @@ SETTINGS: Final[dict[str, dict[str, _imufit._Setting]]] = {
 }
 """The settings of each filter, and of the rules for gaps and free fall: default, unit, meaning."""
 
-DEFAULT_FILTERS: Final = ("gyro", "triad", "mahony")
+DEFAULT_FILTERS: Final[tuple[str, ...]] = ("gyro", "triad", "mahony")
 
 _ERRORS: Final = ("total", "heading", "inclination", "roll", "pitch", "yaw", "sd")
 
@@ -143,9 +144,10 @@ class Replay:
 
 def replay(
     log: Log,
-    filters: Sequence[str] | None = None,
+    filters: Sequence[str] | None = DEFAULT_FILTERS,
     settings: Settings | None = None,
     initial: ArrayLike | Rotation | str | None = None,
+    progress: Progress = silent,
 ) -> Replay:
     """Attitude for every row of a log by each of several filters.
 
@@ -154,13 +156,16 @@ def replay(
     log : Log
         n rows with the sensors that the filters need.
     filters : sequence of str, optional
-        Names out of `FILTERS`. Without it: those of gyro, triad and mahony for which the log has the sensors.
+        Names out of `FILTERS`; a named filter without its sensor is refused. Without it: those of gyro, triad and
+        mahony for which the log has the sensors. None or an empty sequence: every filter for which it has them.
     settings : mapping of mappings, optional
         ``{"mahony": {"k_p": 1.0}, "replay": {"max_gap": 0.5}}``: filter (or "replay"), name and value as in
         `SETTINGS`. Without `max_gap` a gap is a step longer than 1 s and than ten usual steps of the log.
     initial : (4,) array, Rotation, "vectors" or "reference", optional
         Attitude at the first row, scalar first, body to reference frame; or where to take it from. Without it the
         rules at the head of this module apply.
+    progress : callable, optional
+        Called with (filters done, filters in all, what is being done).
 
     Returns
     -------
@@ -189,7 +194,8 @@ def replay(
     attitude: dict[str, Array] = {}
     errors: dict[str, Errors | None] = {}
     skipped: dict[str, int] = {}
-    for name in names:
+    for done, name in enumerate(names):
+        progress(done, len(names), f"filter {name}")
         running = _imufit.Filter(
             name,
             frame=log.metadata.frame,
@@ -203,6 +209,7 @@ def replay(
         attitude[name], reasons = running.run(log.t, **sensors)
         errors[name] = _errors(attitude[name], log.ref_q, counted)
         skipped = {reason: max(skipped.get(reason, 0), reasons.get(reason, 0)) for reason in (*skipped, *reasons)}
+    progress(len(names), len(names), "replayed")
     return Replay(log, attitude, errors, skipped, field)
 
 
@@ -233,11 +240,11 @@ def _present(column: Array | None) -> Array | None:
 
 
 def _choose(filters: Sequence[str] | None, sensors: Mapping[str, Array | None]) -> tuple[str, ...]:
-    if filters is None:
-        there = {name for name, column in sensors.items() if column is not None}
-        return tuple(name for name in DEFAULT_FILTERS if there.issuperset(_DESCRIPTIONS[name]["needs"]))
     if isinstance(filters, str):
         return (filters,)
+    if filters is DEFAULT_FILTERS or not filters:
+        there = {name for name, column in sensors.items() if column is not None}
+        return tuple(name for name in filters or FILTERS if there.issuperset(_DESCRIPTIONS[name]["needs"]))
     return tuple(dict.fromkeys(filters))
 
 
