@@ -42,7 +42,7 @@ def test_the_default_filters_follow_the_reference() -> None:
     assert result.skipped == {}
 
 
-def test_json_is_as_the_contract_says() -> None:
+def test_json_has_the_fixed_keys() -> None:
     value = json.loads(json.dumps(replay(made_log()).to_dict(), allow_nan=False))
     assert list(value) == ["n", "skipped", "filters"]
     assert value["n"] == 2000
@@ -146,6 +146,8 @@ def test_what_cannot_be_replayed_is_refused() -> None:
     log = made_log(mag=False, reference=False)
     with pytest.raises(ValueError, match="triad needs mag"):
         replay(log, ["triad"])
+    with pytest.raises(ValueError, match="the log has mag, from which no filter"):
+        replay(Log.from_arrays(log.t, mag=np.ones((log.n, 3))))
     with pytest.raises(ValueError, match="is unknown"):
         replay(log, ["nonsense"])
     with pytest.raises(ValueError, match="no such filter"):

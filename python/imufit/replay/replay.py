@@ -244,7 +244,11 @@ def _choose(filters: Sequence[str] | None, sensors: Mapping[str, Array | None]) 
         return (filters,)
     if filters is DEFAULT_FILTERS or not filters:
         there = {name for name, column in sensors.items() if column is not None}
-        return tuple(name for name in filters or FILTERS if there.issuperset(_DESCRIPTIONS[name]["needs"]))
+        chosen = tuple(name for name in filters or FILTERS if there.issuperset(_DESCRIPTIONS[name]["needs"]))
+        if not chosen:
+            held = " and ".join(sorted(there)) or "no sensor"
+            raise ValueError(f"the log has {held}, from which no filter gives an attitude: record acc or gyr as well")
+        return chosen
     return tuple(dict.fromkeys(filters))
 
 
