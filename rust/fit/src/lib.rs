@@ -7,5 +7,6 @@ pub mod bins;
 pub mod evidence;
 pub mod noise;
 pub mod normal_equations;
+pub mod reference_width;
 pub mod survey;
 pub mod whitening;

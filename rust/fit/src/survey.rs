@@ -7,6 +7,7 @@ use imufit_model::window::Window;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::bins::Bins;
+use crate::reference_width::{self, SampledRow, SampledRows};
 
 /// Rows looked at more closely, at most.
 const SAMPLES: usize = 8192;
@@ -41,7 +42,20 @@ pub struct Survey {
     attitude_width: Bandwidth,
     position_width: Bandwidth,
     has_position: bool,
+    width_rows: SampledRows,
     samples: Vec<Vec<f64>>,
+}
+
+/// A sensor's reading at a row and its change from two rows before to two rows after; NaN where not known.
+fn around(window: &Window, sensor: Sensor, row: usize) -> (Vector3<f64>, Vector3<f64>) {
+    let at = |i: usize| match window.reading(sensor) {
+        Some(y) if i < window.len() => Vector3::new(y[3 * i], y[3 * i + 1], y[3 * i + 2]),
+        _ => Vector3::repeat(f64::NAN),
+    };
+    if row < 2 {
+        return (at(row), Vector3::repeat(f64::NAN));
+    }
+    (at(row), at(row + 2) - at(row - 2))
 }
 
 /// Middle of a sample; NaN if empty.
@@ -69,6 +83,7 @@ impl Survey {
             attitude_width: Bandwidth::of_attitude(),
             position_width: Bandwidth::of_position(),
             has_position: false,
+            width_rows: SampledRows::new(),
             samples: vec![Vec::new(); axes],
             given,
         }
@@ -140,11 +155,17 @@ impl Survey {
                 }
             }
         }
-        let rows = |s: &Self| core.clone().filter(|i| s.sampled(window.offset + i, BANDWIDTH_SAMPLES)).collect::<Vec<_>>();
-        let rows = rows(self);
+        let rows: Vec<usize> = core.filter(|i| self.sampled(window.offset + i, BANDWIDTH_SAMPLES)).collect();
+        for &i in &rows {
+            if let Some(q) = window.attitude.map(|q| &q[4 * i..4 * i + 4]).filter(|q| q.iter().all(|v| v.is_finite())) {
+                let attitude = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
+                let (rate, force) = (around(window, Sensor::Gyr, i), around(window, Sensor::Acc, i));
+                self.width_rows.insert(window.offset + i, SampledRow { rate, force, attitude });
+            }
+        }
         self.attitude_width.add(window, rows.iter().copied());
         if let Some(p) = window.position {
-            self.has_position |= core.clone().any(|i| p[3 * i].is_finite());
+            self.has_position |= rows.iter().any(|i| p[3 * i].is_finite());
             self.position_width.add(window, rows.into_iter());
         }
     }
@@ -157,6 +178,10 @@ impl Survey {
             if self.field.1 > 0 { self.field.0 / self.field.1 as f64 } else { Vector3::zeros() }
         });
         let dt = median(&mut self.steps);
+        let attitude_smoothing = reference_width::of_attitude(&self.attitude_width, &self.width_rows);
+        let position_smoothing = self.has_position.then(|| {
+            reference_width::of_position(&self.position_width, &self.attitude_width, attitude_smoothing, &self.width_rows)
+        });
         let facts = LogFacts {
             n: self.given.n,
             t_start: self.t_first,
@@ -175,8 +200,8 @@ impl Survey {
                 if step.is_finite() { step } else { dt }
             }),
             has_temperature: self.temperature.1 > 0,
-            attitude_smoothing: self.attitude_width.choose(),
-            position_smoothing: self.has_position.then(|| self.position_width.choose()),
+            attitude_smoothing,
+            position_smoothing,
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),
             covariates: self.given.covariates.clone(),
         };

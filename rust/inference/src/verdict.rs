@@ -80,14 +80,15 @@ fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[
         .map(|s| screening::screen(problem, &fitted, &base, *s, &indices(slots, &[*s])))
         .collect();
     let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
-    let passed = |s: &Screened| s.p_value * tried <= ALPHA && s.gain > 0.0;
+    let passed = |s: &Screened| passes(s, s.p_value * tried);
     screened.sort_by(|a, b| passed(b).cmp(&passed(a)).then(b.testable.cmp(&a.testable)).then(b.gain.total_cmp(&a.gain)));
     let adjusted = screened.iter().map(|s| (s.p_value * tried).min(1.0)).collect();
     (screened, adjusted)
 }
 
-fn passes(s: &Screened, adjusted: f64) -> bool {
-    s.testable && adjusted <= ALPHA && s.gain > 0.0
+/// True if a candidate passed: no chance finding, and it lowers the held-out error, whitened and as it stands.
+pub fn passes(s: &Screened, adjusted: f64) -> bool {
+    s.testable && adjusted <= ALPHA && s.gain > 0.0 && s.held_out.1 < s.held_out.0
 }
 
 /// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from.

@@ -31,6 +31,8 @@ const GROUPS: [f64; 5] = [0.3, 0.7, 0.9, 0.97, 1.0];
 /// Two widths agree if the mean square of their difference is at most this much above what noise explains, plus three times its own scatter.
 const TOLERANCE: f64 = 1.1;
 const SCATTER: f64 = 3.0;
+/// The reference's noise buries the sensor if a wider polynomial lowers the unexplained mean square by this factor.
+const BURIED: f64 = 2.0;
 /// The width whose second derivative tells how lively a row is.
 const LIVELY: usize = 4;
 
@@ -41,6 +43,10 @@ struct Sample {
     difference: [f64; WIDTHS.len()],
     gain: [f64; WIDTHS.len()],
     own_gain: [f64; WIDTHS.len()],
+    /// The derivative and the one above it, per width.
+    values: [[f64; 3]; WIDTHS.len()],
+    above: [[f64; 3]; WIDTHS.len()],
+    row: usize,
     widths: usize,
 }
 
@@ -86,7 +92,8 @@ impl Bandwidth {
                 self.noise_freedom += freedom;
             }
             let zero = [0.0; WIDTHS.len()];
-            let mut sample = Sample { lively: 0.0, difference: zero, gain: zero, own_gain: zero, widths: 0 };
+            let none = [[f64::NAN; 3]; WIDTHS.len()];
+            let mut sample = Sample { lively: 0.0, difference: zero, gain: zero, own_gain: zero, values: none, above: none, row: window.offset + row, widths: 0 };
             let mut last: Option<(usize, Vec<f64>, [f64; 3])> = None;
             for (k, width) in WIDTHS.iter().enumerate() {
                 let Some((fit, values)) = reference.local_fit(at, *width, self.of_attitude) else { break };
@@ -103,8 +110,10 @@ impl Bandwidth {
                 let weights = all[self.order].clone();
                 let value = combine(&weights);
                 sample.own_gain[k] = weights.iter().map(|w| w * w).sum();
+                sample.values[k] = value;
+                sample.above[k] = combine(&all[self.order + 1]);
                 if k <= LIVELY {
-                    sample.lively = combine(&all[self.order + 1]).iter().map(|v| v * v).sum();
+                    sample.lively = sample.above[k].iter().map(|v| v * v).sum();
                 }
                 if let Some((half, narrow, before)) = &last {
                     let margin = width.half_width - half;
@@ -174,9 +183,29 @@ impl Bandwidth {
             .collect()
     }
 
-    /// The width to use: one narrower than the widest that still agrees with its neighbour.
-    pub fn choose(&self) -> Smoothing {
+    /// Index of the width that the reference alone allows: one narrower than the widest that still agrees with its neighbour.
+    fn allowed(&self) -> usize {
         let agreeing = self.excess().iter().take_while(|excess| **excess <= TOLERANCE).count();
-        WIDTHS[if agreeing == WIDTHS.len() - 1 { agreeing } else { agreeing.saturating_sub(1) }]
+        if agreeing == WIDTHS.len() - 1 { agreeing } else { agreeing.saturating_sub(1) }
+    }
+
+    /// The width to use. Where the noise of the reference is not white (interpolated, quantised, filtered), its neighbours
+    /// never agree and the reference alone would ask for the narrowest width, whose noise buries the sensor. So the sensor is asked too:
+    /// `error[k]` is the mean square of what it leaves unexplained of the derivative at width `k`.
+    /// Only where that falls by more than [`BURIED`] is a wider one taken, one narrower than the best.
+    pub fn choose(&self, error: &[f64]) -> Smoothing {
+        let allowed = self.allowed();
+        let best = (0..error.len()).filter(|k| error[*k].is_finite()).min_by(|a, b| error[*a].total_cmp(&error[*b]));
+        match best {
+            Some(best) if best > allowed && error.get(allowed).is_none_or(|e| *e > BURIED * error[best]) => {
+                WIDTHS[(best - 1).max(allowed)]
+            }
+            _ => WIDTHS[allowed],
+        }
+    }
+
+    /// For every width the rows sampled with the derivative and the one above it.
+    pub fn sampled(&self, width: usize) -> impl Iterator<Item = (usize, [f64; 3], [f64; 3])> + '_ {
+        self.samples.iter().filter(move |s| s.widths > width).map(move |s| (s.row, s.values[width], s.above[width]))
     }
 }
