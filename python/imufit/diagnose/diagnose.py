@@ -24,8 +24,6 @@ ALPHA = 0.01
 POWER = 0.84
 """Standard errors beyond the threshold at which an effect is seen with 80 % power."""
 
-STATUS = {True: "passed", False: "not significant"}
-
 
 def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     """Rank every effect that is not in the model by held-out error, and decide.
@@ -98,10 +96,18 @@ def _candidate(item: dict[str, Any], effect: _imufit.Effect, rivals: list[Rival]
         parameters=parameters,
         confounded_with=tuple(sorted(rivals, key=lambda rival: -rival.correlation)),
         explanation="",
-        status=STATUS[item["passed"]] if item["testable"] else "not testable here",
+        status=_status(item),
         minimal_detectable=detectable,
     )
     return replace(candidate, explanation=sentences.explanation(card_of(effect), candidate))
+
+
+def _status(item: dict[str, Any]) -> str:
+    if not item["testable"]:
+        return "not testable here"
+    if item["passed"]:
+        return "passed"
+    return "not significant" if item["stable"] else "differs between halves"
 
 
 def _unexplained(analysis: Analysis, step: Any, found: list[dict[str, Any]]) -> tuple[Unexplained, ...]:

@@ -9,9 +9,11 @@ from imufit.fit import Fit
 from imufit.log import LogSource
 from imufit.model import SensorModel
 from imufit.progress import Progress
-from imufit.results import Diagnosis, Ladder, Step
+from imufit.results import Candidate, Diagnosis, Ladder, Step
 
 MAX_STEPS = 12
+MATTERS = 0.002
+"""Share of the held-out error that an effect must take away to be added beside something unknown."""
 
 
 def ladder(log: LogSource, model: SensorModel | None = None, progress: Progress | None = None) -> Ladder:
@@ -73,8 +75,16 @@ def next_effect(diagnosis: Diagnosis) -> str | None:
     """The effect to add next: the best that passed and that nothing else in the catalogue explains as well."""
     if diagnosis.verdict == "adequate":
         return None
+    if diagnosis.verdict == "unknown":
+        # Beside what nothing explains, only effects that matter are taken up.
+        return next((c.effect for c in diagnosis.candidates if c.status == "passed" and _matters(c)), None)
     unsure = {diagnosis.best, *diagnosis.ambiguous_with} if diagnosis.verdict == "ambiguous" else set()
     return next((c.effect for c in diagnosis.candidates if c.status == "passed" and c.effect not in unsure), None)
+
+
+def _matters(candidate: Candidate) -> bool:
+    before, after = candidate.held_out_before, candidate.held_out_after
+    return before - after >= MATTERS * before
 
 
 def _sentence(start: float, end: float, steps: list[Step], diagnosis: Diagnosis) -> str:

@@ -110,15 +110,24 @@ class Analysis:
         white, variance = self.raw, self.raw_variance
         if any(self.filters):
             white = self.passes.evidence(self.raw.with_filters(self.filters), self.facts, "whitening the evidence")
-            _, variance = _imufit.saturate(white)
+            if self.problem is None:
+                _, variance = _imufit.saturate(white)
+            else:
+                variance = self.variance
         problem = _imufit.Problem(white, self.raw, variance, self.floors)
         return replace(self, white=white, variance=variance, problem=problem)
 
-    def around(self, model: SensorModel, nuisance: Mapping[str, list[float]]) -> Analysis:
-        """Evidence of the same log around other parameter values or another stack of effects."""
+    def around(
+        self, model: SensorModel, nuisance: Mapping[str, list[float]], *, with_candidates: bool = True
+    ) -> Analysis:
+        """Evidence of the same log around other parameter values or another stack of effects.
+
+        Without candidates it is quicker to take, and enough for the next iteration of a fit.
+        """
         known = {**self.candidates, **dict(zip(self.model.effects, (e for e, _ in self.model.stack()), strict=True))}
         candidates = {key: effect for key, effect in known.items() if key not in model.effects and key not in nuisance}
-        raw = _empty(self.facts, model, nuisance, candidates, [[] for _ in CHANNELS])
+        asked = candidates if with_candidates else {}
+        raw = _empty(self.facts, model, nuisance, asked, [[] for _ in CHANNELS])
         self.passes.evidence(raw, self.facts, "taking evidence")
         moved = replace(self, model=model, nuisance=dict(nuisance), candidates=candidates, raw=raw)
         return moved._whitened()
@@ -178,10 +187,10 @@ class Analysis:
         return SensorModel(self.model.effects, parameters, constants=kept, standard_errors=errors), nuisance
 
     def converged(self, estimate: Estimate) -> bool:
-        """True if no parameter still moves by more than a hundredth of its standard error."""
+        """True if no parameter still moves by more than a tenth of its standard error."""
         present = [*(v for _, v in self.model.stack()), *self.nuisance.values()]
         return all(
-            bool(np.all(np.abs(estimate.values[slot] - present[slot]) <= 0.01 * estimate.errors[slot]))
+            bool(np.all(np.abs(estimate.values[slot] - present[slot]) <= 0.1 * estimate.errors[slot]))
             for slot in estimate.values
         )
 
@@ -197,9 +206,12 @@ class Analysis:
         analysis, estimate = self, self.estimate()
         if analysis.linear:
             return analysis, estimate
-        for _ in range(MAX_ITERATIONS):
-            if analysis.converged(estimate):
-                break
+        iterations = 0
+        while iterations < MAX_ITERATIONS and not analysis.converged(estimate):
+            analysis = analysis.around(*analysis.moved_to(estimate), with_candidates=False)
+            estimate = analysis.estimate()
+            iterations += 1
+        if iterations:
             analysis = analysis.around(*analysis.moved_to(estimate))
             estimate = analysis.estimate()
         return analysis, estimate

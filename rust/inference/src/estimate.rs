@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::jackknife;
 use crate::problem::Problem;
 
 /// Fitted steps of a model's parameters.
@@ -18,6 +19,17 @@ pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
     let total = problem.total_without_drift(model);
     let precision = DVector::from_iterator(model.len(), model.iter().map(|j| 0.01 * problem.precision(*j)));
     let solved = total.solve(&precision)?;
-    let covariance = solved.covariance();
+    let mut covariance = solved.covariance();
+    // Where the blocks scatter more than whitened noise does, they are believed.
+    let question = problem.question(model, &[], &DMatrix::zeros(0, 0));
+    if let Some(blocks) = jackknife::scatter(&question) {
+        for j in 0..model.len() {
+            let factor = (blocks[j] / covariance[(j, j)]).max(1.0).sqrt();
+            for k in 0..model.len() {
+                covariance[(j, k)] *= factor;
+                covariance[(k, j)] *= factor;
+            }
+        }
+    }
     Some(Estimate { step: solved.solution, covariance })
 }

@@ -20,13 +20,11 @@ pub struct Jackknife {
 /// Smallest number of blocks beyond the number of parameters for which a p-value is given.
 const SPARE_BLOCKS: usize = 4;
 
-/// Jackknife over blocks, neighbouring blocks taken together `group` at a time.
-pub fn jackknife(question: &Question, group: usize) -> Option<Jackknife> {
+/// Estimates with one block left out each time, neighbouring blocks taken together `group` at a time; blocks without samples (a gap in the log) are
+/// no evidence and are not counted.
+fn left_out(question: &Question, group: usize) -> Option<Vec<DVector<f64>>> {
     let total = question.total();
-    let estimate = question.solve(&total)?;
-    let m = estimate.len() - question.model;
-    // Blocks without samples (a gap in the log) are no evidence.
-    let groups: Vec<NormalEquations> = question
+    question
         .white
         .chunks(group)
         .map(|chunk| {
@@ -35,16 +33,36 @@ pub fn jackknife(question: &Question, group: usize) -> Option<Jackknife> {
             sum
         })
         .filter(|b| b.n > 0.0)
-        .collect();
-    let count = groups.len();
+        .map(|block| {
+            let mut without = total.clone();
+            without.add(&block, -1.0);
+            question.solve(&without)
+        })
+        .collect()
+}
+
+/// Jackknife variance of every parameter of a question.
+pub fn scatter(question: &Question) -> Option<DVector<f64>> {
+    let estimates = left_out(question, 1)?;
+    let b = estimates.len() as f64;
+    let first = estimates.first()?;
+    let mean: DVector<f64> = estimates.iter().fold(DVector::zeros(first.len()), |s, v| s + v) / b;
+    let sum: DVector<f64> = estimates.iter().fold(DVector::zeros(first.len()), |s, v| {
+        let d = v - &mean;
+        s + d.component_mul(&d)
+    });
+    Some(sum * ((b - 1.0) / b))
+}
+
+/// Jackknife over blocks, neighbouring blocks taken together `group` at a time.
+pub fn jackknife(question: &Question, group: usize) -> Option<Jackknife> {
+    let estimate = question.solve(&question.total())?;
+    let m = estimate.len() - question.model;
+    let left_out: Vec<DVector<f64>> =
+        left_out(question, group)?.iter().map(|v| v.rows(question.model, m).into_owned()).collect();
+    let count = left_out.len();
     if m == 0 || count < m + SPARE_BLOCKS {
         return None;
-    }
-    let mut left_out = Vec::with_capacity(count);
-    for block in &groups {
-        let mut without = total.clone();
-        without.add(block, -1.0);
-        left_out.push(question.solve(&without)?.rows(question.model, m).into_owned());
     }
     let b = count as f64;
     let mean: DVector<f64> = left_out.iter().fold(DVector::zeros(m), |s, v| s + v) / b;

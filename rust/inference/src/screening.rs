@@ -1,11 +1,12 @@
 //! Every candidate asked the same question: how much would it lower the held-out error, and can that be chance?
 
+use imufit_fit::normal_equations::NormalEquations;
 use imufit_model::sensor_model::Slot;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::held_out::{self, HeldOut};
-use crate::jackknife;
+use crate::jackknife::{self, Jackknife};
 use crate::problem::{Problem, Question};
 
 /// Answer for one candidate.
@@ -29,6 +30,8 @@ pub struct Screened {
     pub directions: DMatrix<f64>,
     /// True if it has directions and blocks enough.
     pub testable: bool,
+    /// False if the two halves of the log disagree about it.
+    pub stable: bool,
 }
 
 /// Parameter indices of slots.
@@ -59,6 +62,41 @@ pub fn p_value_with_drift(question: &Question) -> f64 {
     ChiSquared::new(m as f64).map_or(1.0, |d| if square.is_finite() { d.sf(square.max(0.0)) } else { 1.0 })
 }
 
+/// Halves may differ by this much of the effect, squared.
+const HALVES: f64 = 0.1;
+/// ... or by this many standard deviations of what chance gives.
+const HALVES_CHANCE: f64 = 5.0;
+
+/// True if the two halves of the log give the same parameters of the candidate: within chance, or within a third of the effect
+/// in the directions that both halves can see. An effect is a property of the sensor; what differs from one half to the other is something else.
+fn halves_agree(question: &Question, whole: &Jackknife) -> bool {
+    let p = question.model;
+    let m = whole.estimate.len() - p;
+    let middle = question.white.len() / 2;
+    let solve = |blocks: &[NormalEquations]| {
+        let mut sum = NormalEquations::zeros(question.precision.len());
+        blocks.iter().for_each(|b| sum.add(b, 1.0));
+        let solved = sum.solve(&question.precision)?;
+        let covariance = solved.covariance().view((p, p), (m, m)).into_owned();
+        Some((solved.solution.rows(p, m).into_owned(), covariance))
+    };
+    let (Some((first, c1)), Some((second, c2))) = (solve(&question.white[..middle]), solve(&question.white[middle..])) else {
+        return true;
+    };
+    let Some(information) = Cholesky::new(&c1 + &c2) else { return true };
+    let size = |v: &DVector<f64>| v.dot(&information.solve(v));
+    // How much more the blocks scatter than whitened noise would.
+    let scatter = question
+        .total()
+        .solve(&question.precision)
+        .and_then(|s| Cholesky::new(s.covariance().view((p, p), (m, m)).into_owned()))
+        .map_or(1.0, |c| (c.solve(&whole.covariance).trace() / m as f64).max(1.0));
+    let difference = size(&(&first - &second));
+    let mf = m as f64;
+    let beta = whole.estimate.rows(p, m).into_owned();
+    difference <= scatter * (mf + HALVES_CHANCE * (2.0 * mf).sqrt()) || difference <= HALVES * size(&beta)
+}
+
 /// Screens one candidate on top of the model's parameters.
 pub fn screen(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, candidate: &[usize]) -> Screened {
     let directions = problem.directions(model, candidate);
@@ -71,6 +109,7 @@ pub fn screen(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, c
         expected_ratio: base.ratio,
         parameters: vec![(0.0, f64::NAN); candidate.len()],
         testable: directions.ncols() > 0,
+        stable: true,
         directions,
     };
     if !out.testable {
@@ -86,6 +125,9 @@ pub fn screen(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, c
     (out.gain, out.gain_error) = held_out::gain(base, &with);
     out.held_out.1 = with.ratio;
     let m = out.directions.ncols();
+    if out.p_value < CLEARLY_CHANCE {
+        out.stable = halves_agree(&question, &fine);
+    }
     let beta = fine.estimate.rows(question.model, m).into_owned();
     let values: DVector<f64> = &out.directions * &beta;
     let covariance = &out.directions * &fine.covariance * out.directions.transpose();

@@ -86,9 +86,14 @@ fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[
     (screened, adjusted)
 }
 
-/// True if a candidate passed: no chance finding, and it lowers the held-out error, whitened and as it stands.
-pub fn passes(s: &Screened, adjusted: f64) -> bool {
+/// True if a candidate is no chance finding and lowers the held-out error, whitened and as it stands.
+fn significant(s: &Screened, adjusted: f64) -> bool {
     s.testable && adjusted <= ALPHA && s.gain > 0.0 && s.held_out.1 < s.held_out.0
+}
+
+/// True if a candidate is significant and both halves of the log agree about it.
+pub fn passes(s: &Screened, adjusted: f64) -> bool {
+    significant(s, adjusted) && s.stable
 }
 
 /// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from.
@@ -138,7 +143,7 @@ pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidate
     }
 
     let kind = match passing.first() {
-        None if unexplained.is_empty() => Kind::Adequate,
+        None if unexplained.is_empty() && !screened.iter().zip(&adjusted).any(|(s, a)| significant(s, *a)) => Kind::Adequate,
         None => Kind::Unknown,
         Some(first) => {
             let sensors = slots[first.slot].effect.sensors();

@@ -8,8 +8,9 @@ use crate::reference::LocalReference;
 use crate::smoothing::{NARROWEST, Smoothing};
 use crate::window::Window;
 
-/// The widths tried, narrowest first.
-pub const WIDTHS: [Smoothing; 10] = [
+/// The widths tried, narrowest first. The last ones follow no motion that a sensor could: they are for references that shake near
+/// half their own sampling rate, and only the sensor can ask for them.
+pub const WIDTHS: [Smoothing; 13] = [
     NARROWEST,
     Smoothing { degree: 8, half_width: 6 },
     Smoothing { degree: 6, half_width: 6 },
@@ -20,7 +21,13 @@ pub const WIDTHS: [Smoothing; 10] = [
     Smoothing { degree: 6, half_width: 27 },
     Smoothing { degree: 6, half_width: 36 },
     Smoothing { degree: 6, half_width: 48 },
+    Smoothing { degree: 2, half_width: 1 },
+    Smoothing { degree: 2, half_width: 2 },
+    Smoothing { degree: 2, half_width: 4 },
 ];
+
+/// Number of widths that the reference alone may choose from.
+const ORDERED: usize = 10;
 
 const NOISE_FIT: Smoothing = Smoothing { degree: 8, half_width: 5 };
 
@@ -47,7 +54,7 @@ struct Sample {
     values: [[f64; 3]; WIDTHS.len()],
     above: [[f64; 3]; WIDTHS.len()],
     row: usize,
-    widths: usize,
+    reached: [bool; WIDTHS.len()],
 }
 
 /// Sampled rows and the noise of the reference.
@@ -93,10 +100,10 @@ impl Bandwidth {
             }
             let zero = [0.0; WIDTHS.len()];
             let none = [[f64::NAN; 3]; WIDTHS.len()];
-            let mut sample = Sample { lively: 0.0, difference: zero, gain: zero, own_gain: zero, values: none, above: none, row: window.offset + row, widths: 0 };
+            let mut sample = Sample { lively: 0.0, difference: zero, gain: zero, own_gain: zero, values: none, above: none, row: window.offset + row, reached: [false; WIDTHS.len()] };
             let mut last: Option<(usize, Vec<f64>, [f64; 3])> = None;
             for (k, width) in WIDTHS.iter().enumerate() {
-                let Some((fit, values)) = reference.local_fit(at, *width, self.of_attitude) else { break };
+                let Some((fit, values)) = reference.local_fit(at, *width, self.of_attitude) else { continue };
                 let all = fit.weights();
                 let combine = |weights: &[f64]| {
                     let mut value = [0.0; 3];
@@ -115,7 +122,7 @@ impl Bandwidth {
                 if k <= LIVELY {
                     sample.lively = sample.above[k].iter().map(|v| v * v).sum();
                 }
-                if let Some((half, narrow, before)) = &last {
+                if let Some((half, narrow, before)) = last.as_ref().filter(|_| k < ORDERED) {
                     let margin = width.half_width - half;
                     let gain: f64 = weights
                         .iter()
@@ -128,7 +135,7 @@ impl Bandwidth {
                     sample.gain[k] = 3.0 * gain;
                     sample.difference[k] = (0..3).map(|a| (value[a] - before[a]).powi(2)).sum::<f64>();
                 }
-                sample.widths = k + 1;
+                sample.reached[k] = true;
                 last = Some((width.half_width, weights, value));
             }
             self.samples.push(sample);
@@ -148,7 +155,7 @@ impl Bandwidth {
     /// Noise of the derivative at a width, per component: rad/s of the angular rate or m/s^2 of the acceleration.
     pub fn derivative_noise(&self, width: Smoothing) -> f64 {
         let Some(k) = WIDTHS.iter().position(|w| *w == width) else { return 0.0 };
-        let gains: Vec<f64> = self.samples.iter().filter(|s| s.widths > k).map(|s| s.own_gain[k]).collect();
+        let gains: Vec<f64> = self.samples.iter().filter(|s| s.reached[k]).map(|s| s.own_gain[k]).collect();
         if gains.is_empty() { 0.0 } else { self.noise() * (gains.iter().sum::<f64>() / gains.len() as f64).sqrt() }
     }
 
@@ -158,17 +165,17 @@ impl Bandwidth {
         let variance = self.noise().powi(2);
         let mut order: Vec<&Sample> = self.samples.iter().collect();
         order.sort_by(|a, b| a.lively.total_cmp(&b.lively));
-        (1..WIDTHS.len())
+        (1..ORDERED)
             .map(|k| {
-                let reached = order.iter().filter(|s| s.widths > k).count();
-                if reached == 0 || 2 * reached < order.iter().filter(|s| s.widths > 1).count() {
+                let reached = order.iter().filter(|s| s.reached[k]).count();
+                if reached == 0 || 2 * reached < order.iter().filter(|s| s.reached[1]).count() {
                     return f64::INFINITY;
                 }
                 let mut first = 0;
                 let mut worst = 0.0_f64;
                 for share in GROUPS {
                     let last = (share * order.len() as f64).round() as usize;
-                    let group: Vec<&&Sample> = order[first..last].iter().filter(|s| s.widths > k).collect();
+                    let group: Vec<&&Sample> = order[first..last].iter().filter(|s| s.reached[k]).collect();
                     first = last;
                     if group.is_empty() {
                         continue;
@@ -186,7 +193,7 @@ impl Bandwidth {
     /// Index of the width that the reference alone allows: one narrower than the widest that still agrees with its neighbour.
     fn allowed(&self) -> usize {
         let agreeing = self.excess().iter().take_while(|excess| **excess <= TOLERANCE).count();
-        if agreeing == WIDTHS.len() - 1 { agreeing } else { agreeing.saturating_sub(1) }
+        if agreeing == ORDERED - 1 { agreeing } else { agreeing.saturating_sub(1) }
     }
 
     /// The width to use. Where the noise of the reference is not white (interpolated, quantised, filtered), its neighbours
@@ -198,7 +205,7 @@ impl Bandwidth {
         let best = (0..error.len()).filter(|k| error[*k].is_finite()).min_by(|a, b| error[*a].total_cmp(&error[*b]));
         match best {
             Some(best) if best > allowed && error.get(allowed).is_none_or(|e| *e > BURIED * error[best]) => {
-                WIDTHS[(best - 1).max(allowed)]
+                WIDTHS[if best < ORDERED { (best - 1).max(allowed) } else { best }]
             }
             _ => WIDTHS[allowed],
         }
@@ -206,6 +213,6 @@ impl Bandwidth {
 
     /// For every width the rows sampled with the derivative and the one above it.
     pub fn sampled(&self, width: usize) -> impl Iterator<Item = (usize, [f64; 3], [f64; 3])> + '_ {
-        self.samples.iter().filter(move |s| s.widths > width).map(move |s| (s.row, s.values[width], s.above[width]))
+        self.samples.iter().filter(move |s| s.reached[width]).map(move |s| (s.row, s.values[width], s.above[width]))
     }
 }
