@@ -107,7 +107,9 @@ def _status(item: dict[str, Any]) -> str:
         return "not testable here"
     if item["passed"]:
         return "passed"
-    return "not significant" if item["stable"] else "differs between halves"
+    if not item["stable"]:
+        return "differs between halves"
+    return "not significant" if item["plausible"] else "implausible size"
 
 
 def _unexplained(analysis: Analysis, step: Any, found: list[dict[str, Any]]) -> tuple[Unexplained, ...]:

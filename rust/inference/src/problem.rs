@@ -16,6 +16,8 @@ pub struct Problem {
     pub raw: Vec<NormalEquations>,
     /// Plausible size of each parameter: three times what is typical, or what would be seen with a hundredfold margin.
     pub plausible: DVector<f64>,
+    /// True where that comes from a typical size.
+    pub typical: Vec<bool>,
     /// Weight of each channel in `white`.
     pub weights: [f64; CHANNELS],
     /// Block sums of every channel, for zeros that wander.
@@ -51,10 +53,12 @@ impl Problem {
         let raw_blocks: Vec<_> = (0..blocks).map(|b| assemble(raw, b, &raw_weights)).collect();
         let p = white.layout.model.parameters();
         let mut plausible = DVector::zeros(p);
+        let mut typical = vec![false; p];
         for slot in white.layout.model.slots() {
             for (k, card) in slot.effect.card().parameters.iter().enumerate() {
                 let j = slot.first + k;
                 let information: f64 = white_blocks.iter().map(|b| b.gram[(j, j)]).sum();
+                typical[j] = card.typical.is_some();
                 plausible[j] = match card.typical {
                     Some(typical) => PLAUSIBLE * typical,
                     None if information > 0.0 => STANDING_OUT / information.sqrt(),
@@ -63,7 +67,7 @@ impl Problem {
             }
         }
         let sums = drift::channel_sums(white, &weights);
-        Self { white: white_blocks, raw: raw_blocks, plausible, weights, sums }
+        Self { white: white_blocks, raw: raw_blocks, plausible, typical, weights, sums }
     }
 
     /// Number of blocks.

@@ -32,6 +32,8 @@ pub struct Screened {
     pub testable: bool,
     /// False if the two halves of the log disagree about it.
     pub stable: bool,
+    /// False if a parameter lies far beyond what such sensors can have.
+    pub plausible: bool,
 }
 
 /// Parameter indices of slots.
@@ -62,12 +64,14 @@ pub fn p_value_with_drift(question: &Question) -> f64 {
     ChiSquared::new(m as f64).map_or(1.0, |d| if square.is_finite() { d.sf(square.max(0.0)) } else { 1.0 })
 }
 
+/// No sensor has an effect this many times larger than what is plausible: something else looks like it.
+const BEYOND: f64 = 7.0;
 /// Halves may differ by this much of the effect, squared.
-const HALVES: f64 = 0.1;
+const HALVES: f64 = 0.5;
 /// ... or by this many standard deviations of what chance gives.
 const HALVES_CHANCE: f64 = 5.0;
 
-/// True if the two halves of the log give the same parameters of the candidate: within chance, or within a third of the effect
+/// True if the two halves of the log give the same parameters of the candidate: within chance, or by less than 0.7 of the effect
 /// in the directions that both halves can see. An effect is a property of the sensor; what differs from one half to the other is something else.
 fn halves_agree(question: &Question, whole: &Jackknife) -> bool {
     let p = question.model;
@@ -110,6 +114,7 @@ pub fn screen(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, c
         parameters: vec![(0.0, f64::NAN); candidate.len()],
         testable: directions.ncols() > 0,
         stable: true,
+        plausible: true,
         directions,
     };
     if !out.testable {
@@ -132,6 +137,10 @@ pub fn screen(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, c
     let values: DVector<f64> = &out.directions * &beta;
     let covariance = &out.directions * &fine.covariance * out.directions.transpose();
     out.parameters = (0..candidate.len()).map(|j| (values[j], covariance[(j, j)].max(0.0).sqrt())).collect();
+    out.plausible = candidate.iter().zip(&out.parameters).all(|(j, (value, error))| {
+        let limit = BEYOND * problem.plausible[*j];
+        !problem.typical[*j] || value.abs() - 3.0 * error <= limit
+    });
     let (mut square, mut n) = (0.0, 0.0);
     for block in &question.raw {
         square += block.residual_square(&fine.estimate).max(0.0);

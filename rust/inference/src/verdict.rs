@@ -91,9 +91,9 @@ fn significant(s: &Screened, adjusted: f64) -> bool {
     s.testable && adjusted <= ALPHA && s.gain > 0.0 && s.held_out.1 < s.held_out.0
 }
 
-/// True if a candidate is significant and both halves of the log agree about it.
+/// True if a candidate is significant, of a size that sensors have, and both halves of the log agree about it.
 pub fn passes(s: &Screened, adjusted: f64) -> bool {
-    significant(s, adjusted) && s.stable
+    significant(s, adjusted) && s.stable && s.plausible
 }
 
 /// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from.

@@ -93,6 +93,7 @@ impl PyProblem {
             item.set_item("expected_ratio", s.expected_ratio)?;
             item.set_item("testable", s.testable)?;
             item.set_item("stable", s.stable)?;
+            item.set_item("plausible", s.plausible)?;
             item.set_item("passed", verdict::passes(s, *p))?;
             item.set_item("parameters", s.parameters.clone())?;
             list.append(item)?;
