@@ -20,7 +20,7 @@ from imufit.results import Candidate, Diagnosis, Parameter, Rival, Unexplained
 if TYPE_CHECKING:
     from imufit.fit import Fit
 
-ALPHA = 0.01
+ALPHA = 0.003
 POWER = 0.84
 """Standard errors beyond the threshold at which an effect is seen with 80 % power."""
 

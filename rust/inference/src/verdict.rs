@@ -11,7 +11,7 @@ use crate::problem::Problem;
 use crate::screening::{self, Screened, parameters_of};
 
 /// Chance of any false alarm over all candidates tried.
-pub const ALPHA: f64 = 0.01;
+pub const ALPHA: f64 = 0.003;
 /// A named effect must explain this share of what depends on anything in its sensors, or the answer is "unknown".
 const NAMED_SHARE: f64 = 0.8;
 /// A rival recovers at least this share of the best candidate's gain.

@@ -38,6 +38,8 @@ const GROUPS: [f64; 5] = [0.3, 0.7, 0.9, 0.97, 1.0];
 /// Two widths agree if the mean square of their difference is at most this much above what noise explains, plus three times its own scatter.
 const TOLERANCE: f64 = 1.1;
 const SCATTER: f64 = 3.0;
+/// Share of the rows that a width must reach.
+const REACH: f64 = 0.9;
 /// The reference's noise buries the sensor if a wider polynomial lowers the unexplained mean square by this factor.
 const BURIED: f64 = 2.0;
 /// The width whose second derivative tells how lively a row is.
@@ -160,15 +162,14 @@ impl Bandwidth {
     }
 
     /// Mean square difference of each width to the next narrower one, over what noise explains: the worst group of rows,
-    /// less what scatter allows that group. Infinite for a width that most rows cannot have.
+    /// less what scatter allows that group. Infinite for a width that loses too many rows.
     pub fn excess(&self) -> Vec<f64> {
         let variance = self.noise().powi(2);
         let mut order: Vec<&Sample> = self.samples.iter().collect();
         order.sort_by(|a, b| a.lively.total_cmp(&b.lively));
         (1..ORDERED)
             .map(|k| {
-                let reached = order.iter().filter(|s| s.reached[k]).count();
-                if reached == 0 || 2 * reached < order.iter().filter(|s| s.reached[1]).count() {
+                if order.is_empty() || !self.reaches(k) {
                     return f64::INFINITY;
                 }
                 let mut first = 0;
@@ -202,13 +203,31 @@ impl Bandwidth {
     /// Only where that falls by more than [`BURIED`] is a wider one taken, one narrower than the best.
     pub fn choose(&self, error: &[f64]) -> Smoothing {
         let allowed = self.allowed();
-        let best = (0..error.len()).filter(|k| error[*k].is_finite()).min_by(|a, b| error[*a].total_cmp(&error[*b]));
+        let best = (0..error.len()).filter(|k| error[*k].is_finite() && self.reaches(*k)).min_by(|a, b| error[*a].total_cmp(&error[*b]));
         match best {
             Some(best) if best > allowed && error.get(allowed).is_none_or(|e| *e > BURIED * error[best]) => {
                 WIDTHS[if best < ORDERED { (best - 1).max(allowed) } else { best }]
             }
             _ => WIDTHS[allowed],
         }
+    }
+
+    /// Width for the derivatives above the first of the attitude and the second of the position, which only enter columns (a delay, a
+    /// lever arm). Noise in a column shrinks its parameter, so up to two steps more of smoothing are taken wherever the reference is noisy at all.
+    pub fn for_columns(&self, width: Smoothing) -> Smoothing {
+        match WIDTHS[..ORDERED].iter().position(|w| *w == width) {
+            Some(k) if k > 0 => {
+                let last = (k + 2).min(ORDERED - 1);
+                (k..=last).rev().find(|j| self.reaches(*j)).map_or(width, |j| WIDTHS[j])
+            }
+            _ => width,
+        }
+    }
+
+    /// True if a width leaves nearly all rows with a reference: in a short log a wide polynomial would lose its ends.
+    fn reaches(&self, width: usize) -> bool {
+        let reached = |k: usize| self.samples.iter().filter(|s| s.reached[k]).count() as f64;
+        reached(width) >= REACH * reached(0)
     }
 
     /// For every width the rows sampled with the derivative and the one above it.

@@ -40,6 +40,10 @@ pub struct LogFacts {
     pub attitude_smoothing: Smoothing,
     /// How the reference position is differentiated; `None` without position.
     pub position_smoothing: Option<Smoothing>,
+    /// How the attitude is differentiated where a derivative above the first only enters columns.
+    pub attitude_columns: Smoothing,
+    /// The same for derivatives of the position above the second.
+    pub position_columns: Option<Smoothing>,
     /// Median time between reference samples, s.
     pub reference_dt: f64,
 }
@@ -47,7 +51,8 @@ pub struct LogFacts {
 impl LogFacts {
     /// Rows around a window that its derivatives, held columns and whitening filters may need.
     pub fn margin(&self) -> usize {
-        let widest = self.attitude_smoothing.half_width.max(self.position_smoothing.map_or(0, |s| s.half_width));
+        let widths = [Some(self.attitude_smoothing), Some(self.attitude_columns), self.position_smoothing, self.position_columns];
+        let widest = widths.iter().flatten().map(|s| s.half_width).max().unwrap_or(0);
         let reach = 2.0 * (widest as f64 + 4.0) * (self.reference_dt / self.dt).max(1.0);
         let reach = if reach.is_finite() { reach as usize } else { 0 };
         reach + crate::window::HOLD_ROWS + LOOKBACK

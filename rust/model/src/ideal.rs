@@ -5,7 +5,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::facts::LogFacts;
-use crate::reference::{self, Kinematics};
+use crate::reference::{self, Kinematics, Widths};
 use crate::triple::Triple;
 use crate::window::Window;
 
@@ -63,8 +63,10 @@ impl Ideal {
         let spacing = Some(facts.reference_dt);
         let rows = reference::kinematics(
             window,
-            facts.attitude_smoothing,
-            facts.position_smoothing,
+            Widths { value: facts.attitude_smoothing, columns: facts.attitude_columns },
+            facts
+                .position_smoothing
+                .map(|value| Widths { value, columns: facts.position_columns.unwrap_or(value) }),
             spacing,
             change.delay,
         );

@@ -222,27 +222,50 @@ fn rates(phi: Vector3<f64>, d: Vector3<f64>, dd: Vector3<f64>) -> (Vector3<f64>,
     (omega, alpha)
 }
 
+/// Polynomials for one reference quantity.
+#[derive(Clone, Copy, Debug)]
+pub struct Widths {
+    /// For the ideal readings themselves.
+    pub value: Smoothing,
+    /// For the derivatives that only enter columns.
+    pub columns: Smoothing,
+}
+
 /// Kinematics at `t[i] + shift` for each core row of the window; `None` in a row where the reference does not tell.
 pub fn kinematics(
     window: &Window,
-    attitude: Smoothing,
-    position: Option<Smoothing>,
+    attitude: Widths,
+    position: Option<Widths>,
     spacing: Option<f64>,
     shift: f64,
 ) -> Vec<Option<Kinematics>> {
     let mut rotation = LocalReference::attitude(window, spacing);
-    let mut translation = position.and_then(|s| LocalReference::position(window, spacing).map(|r| (r, s)));
+    let mut translation = position.and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w.value)));
+    // Derivatives that only enter columns come from a wider polynomial; it needs a cache of its own.
+    let wider = |w: Widths| Some(w.columns).filter(|c| *c != w.value);
+    let mut smooth_rotation =
+        wider(attitude).and_then(|w| LocalReference::attitude(window, spacing).map(|r| (r, w)));
+    let mut smooth_translation =
+        position.and_then(wider).and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w)));
     (window.begin..window.end)
         .map(|i| {
             let at = window.t[i] + shift;
-            let (centre, d) = rotation.as_mut()?.rotation_derivatives(at, attitude)?;
+            let (centre, d) = rotation.as_mut()?.rotation_derivatives(at, attitude.value)?;
             let phi = Vector3::from(d[0]);
-            let (omega, alpha) = rates(phi, Vector3::from(d[1]), Vector3::from(d[2]));
+            let (omega, mut alpha) = rates(phi, Vector3::from(d[1]), Vector3::from(d[2]));
+            if let Some((reference, width)) = smooth_rotation.as_mut() {
+                let (_, d) = reference.rotation_derivatives(at, *width)?;
+                alpha = rates(Vector3::from(d[0]), Vector3::from(d[1]), Vector3::from(d[2])).1;
+            }
             let (acceleration, jerk) = match translation.as_mut() {
                 None => (Vector3::zeros(), Vector3::zeros()),
                 Some((reference, s)) => {
                     let d = reference.position_derivatives(at, *s)?;
-                    (Vector3::from(d[2]), Vector3::from(d[3]))
+                    let jerk = match smooth_translation.as_mut() {
+                        None => d[3],
+                        Some((reference, width)) => reference.position_derivatives(at, *width)?[3],
+                    };
+                    (Vector3::from(d[2]), Vector3::from(jerk))
                 }
             };
             let attitude = centre * UnitQuaternion::from_scaled_axis(phi);
@@ -279,7 +302,7 @@ mod tests {
         };
         for shift in [0.0, 0.0037] {
             let mut worst = (0.0_f64, 0.0_f64);
-            let k = kinematics(&window, NARROWEST, None, None, shift);
+            let k = kinematics(&window, Widths { value: NARROWEST, columns: NARROWEST }, None, None, shift);
             for (i, k) in k.iter().enumerate().skip(5).take(n as usize - 10) {
                 let k = k.expect("inside");
                 let (_, omega, alpha) = truth(t[i] + shift);
@@ -288,7 +311,7 @@ mod tests {
             }
             assert!(worst.0 < 1e-6 * 5.0 && worst.1 < 1e-5 * 60.0, "{worst:?}");
         }
-        assert!(kinematics(&window, NARROWEST, None, None, 0.0)[3].is_none());
+        assert!(kinematics(&window, Widths { value: NARROWEST, columns: NARROWEST }, None, None, 0.0)[3].is_none());
     }
 
     #[test]
@@ -300,7 +323,7 @@ mod tests {
             t: &t, readings: [None; 3], temperature: None, attitude: Some(&q), position: None, reference_exact: None,
             covariates: vec![], offset: 0, begin: 0, end: 200,
         };
-        let k = kinematics(&window, NARROWEST, None, None, 0.0);
+        let k = kinematics(&window, Widths { value: NARROWEST, columns: NARROWEST }, None, None, 0.0);
         assert!((97..123).all(|i| k[i].is_none()));
         assert!(k[90].is_some() && k[130].is_some());
     }

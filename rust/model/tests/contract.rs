@@ -51,6 +51,8 @@ fn every_built_in_effect_keeps_the_contract() {
         has_temperature: true,
         attitude_smoothing: NARROWEST,
         position_smoothing: Some(NARROWEST),
+        attitude_columns: NARROWEST,
+        position_columns: Some(NARROWEST),
         reference_dt: 0.01,
     };
     let mut effects = catalogue::built_in();
