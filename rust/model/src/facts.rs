@@ -47,7 +47,10 @@ pub struct LogFacts {
 impl LogFacts {
     /// Rows around a window that its derivatives, held columns and whitening filters may need.
     pub fn margin(&self) -> usize {
-        let widest = self.attitude_smoothing.half_width.max(self.position_smoothing.map_or(0, |s| s.half_width));
+        let widest = self
+            .attitude_smoothing
+            .half_width
+            .max(self.position_smoothing.map_or(0, |s| s.half_width));
         let reach = 2.0 * (widest as f64 + 4.0) * (self.reference_dt / self.dt).max(1.0);
         let reach = if reach.is_finite() { reach as usize } else { 0 };
         reach + crate::window::HOLD_ROWS + LOOKBACK

@@ -26,7 +26,13 @@ pub struct PySurvey(Survey);
 impl PySurvey {
     #[new]
     #[pyo3(signature = (n, frame, gravity, mag_reference, covariates))]
-    fn new(n: usize, frame: &str, gravity: f64, mag_reference: Option<[f64; 3]>, covariates: Vec<String>) -> PyResult<Self> {
+    fn new(
+        n: usize,
+        frame: &str,
+        gravity: f64,
+        mag_reference: Option<[f64; 3]>,
+        covariates: Vec<String>,
+    ) -> PyResult<Self> {
         let frame: Frame = frame.parse().map_err(value_error)?;
         Ok(Self(Survey::new(Given {
             n,
@@ -56,7 +62,12 @@ impl PySurvey {
         let (attitude_noise, position_noise) = (attitude.noise(), position.noise());
         let (facts, mut bins) = self.0.clone().finish();
         bins.centre_temperature(facts.temperature_mean);
-        PyFacts { facts, bins, attitude_noise, position_noise }
+        PyFacts {
+            facts,
+            bins,
+            attitude_noise,
+            position_noise,
+        }
     }
 }
 
@@ -81,7 +92,13 @@ impl PyEvidence {
         let effects = effects.into_iter().map(|(e, p)| (e.0.clone(), p)).collect();
         let candidates = candidates.into_iter().map(|e| e.0.clone()).collect();
         let model = SensorModel::new(effects, candidates, &facts.facts).map_err(from_effect)?;
-        let layout = Layout { model, facts: facts.facts.clone(), bins: facts.bins.clone(), blocks, filters };
+        let layout = Layout {
+            model,
+            facts: facts.facts.clone(),
+            bins: facts.bins.clone(),
+            blocks,
+            filters,
+        };
         Ok(Self(Evidence::new(Arc::new(layout))))
     }
 
@@ -135,7 +152,10 @@ impl PyEvidence {
         let first = parts.next()?.gram.clone();
         let sum = parts.fold(first, |s, b| s + &b.gram);
         let n = sum.nrows();
-        Some(PyArray2::from_owned_array(py, numpy::ndarray::Array2::from_shape_fn((n, n), |(i, j)| sum[(i, j)])))
+        Some(PyArray2::from_owned_array(
+            py,
+            numpy::ndarray::Array2::from_shape_fn((n, n), |(i, j)| sum[(i, j)]),
+        ))
     }
 }
 
@@ -153,8 +173,13 @@ fn evaluate<'py>(
     }
     let arrays = ChunkArrays::new(chunk)?;
     let window = arrays.window()?;
-    let residuals = py.detach(|| layout.model.residuals(&window, &layout.facts, &step)).map_err(from_effect)?;
-    Ok(residuals.into_iter().map(|r| r.map(|r| PyArray1::from_vec(py, r))).collect())
+    let residuals = py
+        .detach(|| layout.model.residuals(&window, &layout.facts, &step))
+        .map_err(from_effect)?;
+    Ok(residuals
+        .into_iter()
+        .map(|r| r.map(|r| PyArray1::from_vec(py, r)))
+        .collect())
 }
 
 /// Autocovariances of the residual, from which whitening filters come.
@@ -169,13 +194,20 @@ impl PyAutocovariance {
     }
 
     /// Adds the core rows of a chunk: the residual of the evidence's layout less its columns times `step`.
-    fn add(&mut self, py: Python<'_>, chunk: &Bound<'_, PyDict>, evidence: &PyEvidence, step: Vec<f64>) -> PyResult<()> {
+    fn add(
+        &mut self,
+        py: Python<'_>,
+        chunk: &Bound<'_, PyDict>,
+        evidence: &PyEvidence,
+        step: Vec<f64>,
+    ) -> PyResult<()> {
         if step.len() != evidence.0.layout.model.parameters() {
             return Err(value_error("step must have one number per parameter"));
         }
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
-        py.detach(|| self.0.add(&window, &evidence.0.layout, &step)).map_err(from_effect)
+        py.detach(|| self.0.add(&window, &evidence.0.layout, &step))
+            .map_err(from_effect)
     }
 
     /// Whitening filter of each channel; empty where the residual is white.

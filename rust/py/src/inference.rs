@@ -19,11 +19,16 @@ fn saturate<'py>(py: Python<'py>, evidence: &PyEvidence) -> PyResult<(Bound<'py,
     let fitted = py
         .detach(|| saturated::fit_all(&evidence.0))
         .ok_or_else(|| value_error("the normal equations cannot be solved: the log holds no usable samples"))?;
-    Ok((PyArray1::from_slice(py, fitted.step.as_slice()), fitted.variance.to_vec()))
+    Ok((
+        PyArray1::from_slice(py, fitted.step.as_slice()),
+        fitted.variance.to_vec(),
+    ))
 }
 
 fn nine(name: &str, values: &[f64]) -> PyResult<[f64; CHANNELS]> {
-    values.try_into().map_err(|_| value_error(format!("{name} must have {CHANNELS} numbers")))
+    values
+        .try_into()
+        .map_err(|_| value_error(format!("{name} must have {CHANNELS} numbers")))
 }
 
 /// Evidence of a log, whitened and not, ready to be asked.
@@ -39,11 +44,22 @@ pub struct PyProblem {
 impl PyProblem {
     /// `variance`: of the whitened residual per channel; `floors`: noise floor per channel.
     #[new]
-    fn new(py: Python<'_>, white: &PyEvidence, raw: &PyEvidence, variance: Vec<f64>, floors: Vec<f64>) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        white: &PyEvidence,
+        raw: &PyEvidence,
+        variance: Vec<f64>,
+        floors: Vec<f64>,
+    ) -> PyResult<Self> {
         let (variance, floors) = (nine("variance", &variance)?, nine("floors", &floors)?);
         let (white, raw) = (white.0.clone(), raw.0.clone());
         let problem = py.detach(|| Problem::new(&white, &raw, &variance, &floors));
-        Ok(Self { problem, white, raw, floors })
+        Ok(Self {
+            problem,
+            white,
+            raw,
+            floors,
+        })
     }
 
     /// Fits the slots given: step and standard error of each of their parameters, held-out and training ratio.
@@ -53,7 +69,12 @@ impl PyProblem {
             return Err(value_error("there is no such slot"));
         }
         let parameters = parameters_of(slots.iter().map(|s| &all[*s]));
-        let (fitted, base) = py.detach(|| (estimate::estimate(&self.problem, &parameters), screening::base(&self.problem, &parameters)));
+        let (fitted, base) = py.detach(|| {
+            (
+                estimate::estimate(&self.problem, &parameters),
+                screening::base(&self.problem, &parameters),
+            )
+        });
         let fitted = fitted.ok_or_else(|| value_error("the normal equations cannot be solved"))?;
         let mut step = DVector::zeros(self.white.layout.model.parameters());
         for (k, p) in parameters.iter().enumerate() {
@@ -73,7 +94,12 @@ impl PyProblem {
     }
 
     /// Which effect is missing from the model of slots `model`, among the slots `candidates`.
-    fn diagnose<'py>(&self, py: Python<'py>, model: Vec<usize>, candidates: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
+    fn diagnose<'py>(
+        &self,
+        py: Python<'py>,
+        model: Vec<usize>,
+        candidates: Vec<usize>,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let v = py.detach(|| verdict::decide(&self.problem, &self.white, &model, &candidates));
         let out = PyDict::new(py);
         out.set_item("verdict", v.kind.word())?;
@@ -136,10 +162,15 @@ impl PyProblem {
                 let item = PyDict::new(py);
                 item.set_item("channel", channel_name(p.channel))?;
                 item.set_item("covariate", &self.raw.layout.bins.names[p.covariate])?;
-                item.set_item("unit", imufit_fit::bins::Bins::unit(&self.raw.layout.bins.names[p.covariate]))?;
+                item.set_item(
+                    "unit",
+                    imufit_fit::bins::Bins::unit(&self.raw.layout.bins.names[p.covariate]),
+                )?;
                 let mut edges = self.raw.layout.bins.edges[p.covariate].clone();
                 if p.covariate == 1 {
-                    edges.iter_mut().for_each(|e| *e += self.raw.layout.facts.temperature_mean);
+                    edges
+                        .iter_mut()
+                        .for_each(|e| *e += self.raw.layout.facts.temperature_mean);
                 }
                 item.set_item("edges", PyArray1::from_vec(py, edges))?;
                 item.set_item("mean", PyArray1::from_slice(py, &p.mean))?;

@@ -36,7 +36,12 @@ impl PyEffect {
     /// Its parameters: (name, unit, typical size or None).
     #[getter]
     fn parameters(&self) -> Vec<(String, String, Option<f64>)> {
-        self.0.card().parameters.iter().map(|p| (p.name.clone(), p.unit.clone(), p.typical)).collect()
+        self.0
+            .card()
+            .parameters
+            .iter()
+            .map(|p| (p.name.clone(), p.unit.clone(), p.typical))
+            .collect()
     }
 
     /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new values.
@@ -62,8 +67,12 @@ impl PyEffect {
         let card = self.0.card();
         let out = PyDict::new(py);
         for (key, value) in [
-            ("name", &card.name), ("physics", &card.physics), ("formula", &card.formula),
-            ("signature", &card.signature), ("mistaken_for", &card.mistaken_for), ("confirm", &card.confirm),
+            ("name", &card.name),
+            ("physics", &card.physics),
+            ("formula", &card.formula),
+            ("signature", &card.signature),
+            ("mistaken_for", &card.mistaken_for),
+            ("confirm", &card.confirm),
         ] {
             out.set_item(key, value)?;
         }
@@ -80,7 +89,8 @@ impl PyEffect {
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
         let py = chunk.py();
-        py.detach(|| contract::check(&self.0, &at, &window, &facts.facts)).map_err(from_effect)
+        py.detach(|| contract::check(&self.0, &at, &window, &facts.facts))
+            .map_err(from_effect)
     }
 }
 
@@ -144,18 +154,30 @@ impl PyFacts {
 
     #[getter]
     fn sensors(&self) -> Vec<&'static str> {
-        Sensor::ALL.iter().filter(|s| self.facts.sensors[s.index()]).map(|s| s.prefix()).collect()
+        Sensor::ALL
+            .iter()
+            .filter(|s| self.facts.sensors[s.index()])
+            .map(|s| s.prefix())
+            .collect()
     }
 
     #[getter]
     fn covariate_means(&self) -> std::collections::BTreeMap<String, f64> {
-        self.facts.covariates.iter().cloned().zip(self.facts.covariate_means.iter().copied()).collect()
+        self.facts
+            .covariates
+            .iter()
+            .cloned()
+            .zip(self.facts.covariate_means.iter().copied())
+            .collect()
     }
 
     /// Degree and half width of the polynomial through the reference attitude.
     #[getter]
     fn attitude_smoothing(&self) -> (usize, usize) {
-        (self.facts.attitude_smoothing.degree, self.facts.attitude_smoothing.half_width)
+        (
+            self.facts.attitude_smoothing.degree,
+            self.facts.attitude_smoothing.half_width,
+        )
     }
 
     /// Degree and half width of the polynomial through the reference position; None without position.
@@ -172,7 +194,11 @@ impl PyFacts {
 
     /// The same facts with the temperature and covariate means of the log that a model was fitted on.
     #[pyo3(signature = (temperature_mean=None, covariate_means=None))]
-    fn with_means(&self, temperature_mean: Option<f64>, covariate_means: Option<std::collections::BTreeMap<String, f64>>) -> Self {
+    fn with_means(
+        &self,
+        temperature_mean: Option<f64>,
+        covariate_means: Option<std::collections::BTreeMap<String, f64>>,
+    ) -> Self {
         let mut out = self.clone();
         if let Some(mean) = temperature_mean {
             out.bins.centre_temperature(mean - out.facts.temperature_mean);
@@ -209,16 +235,16 @@ fn python_effect(
     needs: Vec<String>,
     function: Py<PyAny>,
 ) -> PyResult<PyEffect> {
-    let sensor = Sensor::from_prefix(sensor).ok_or_else(|| value_error(format!("sensor is {sensor:?}: pass acc, gyr or mag")))?;
+    let sensor = Sensor::from_prefix(sensor)
+        .ok_or_else(|| value_error(format!("sensor is {sensor:?}: pass acc, gyr or mag")))?;
     let stage = match stage {
         "input" => Stage::Input,
         "gain" => Stage::Gain,
         "offset" => Stage::Offset,
         other => return Err(value_error(format!("stage is {other:?}: pass input, gain or offset"))),
     };
-    let word = |key: &str| -> PyResult<String> {
-        words.get_item(key)?.map_or_else(|| Ok(String::new()), |v| v.extract())
-    };
+    let word =
+        |key: &str| -> PyResult<String> { words.get_item(key)?.map_or_else(|| Ok(String::new()), |v| v.extract()) };
     let card = Card {
         name: word("name")?,
         physics: word("physics")?,
@@ -228,9 +254,17 @@ fn python_effect(
         confirm: word("confirm")?,
         id,
         stage,
-        parameters: parameters.into_iter().map(|(name, unit, typical)| Parameter { name, unit, typical }).collect(),
+        parameters: parameters
+            .into_iter()
+            .map(|(name, unit, typical)| Parameter { name, unit, typical })
+            .collect(),
     };
-    Ok(PyEffect(Arc::new(PythonEffect { card, sensor: [sensor], needs, function })))
+    Ok(PyEffect(Arc::new(PythonEffect {
+        card,
+        sensor: [sensor],
+        needs,
+        function,
+    })))
 }
 
 /// Registers this file's part of the module.
