@@ -91,6 +91,6 @@ def _sentence(start: float, end: float, steps: list[Step], diagnosis: Diagnosis)
     if not steps:
         return diagnosis.sentence
     names = ", ".join(step.effect for step in steps)
-    return f"Adding {names} cut the held-out error from {start:.3f} to {end:.3f} of the noise floor. {diagnosis.sentence}"
-
-
+    return (
+        f"Adding {names} cut the held-out error from {start:.3f} to {end:.3f} of the noise floor. {diagnosis.sentence}"
+    )

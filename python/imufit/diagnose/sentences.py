@@ -40,7 +40,11 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
 
 
 def verdict(
-    word: str, best: Candidate | None, card: EffectCard | None, rivals: Sequence[str], unexplained: Sequence[Unexplained]
+    word: str,
+    best: Candidate | None,
+    card: EffectCard | None,
+    rivals: Sequence[str],
+    unexplained: Sequence[Unexplained],
 ) -> str:
     """The answer in a sentence or two."""
     left = ""
@@ -50,7 +54,11 @@ def verdict(
     if word == "adequate":
         return "Nothing that this log can show is missing: the residual is at its noise floor as far as can be told."
     if word == "unknown":
-        text = f"Something is missing that no effect of the catalogue explains: {left}." if left else "Something is missing."
+        text = (
+            f"Something is missing that no effect of the catalogue explains: {left}."
+            if left
+            else "Something is missing."
+        )
         if best is not None:
             text += f" {best.effect} would take a part of it, but not most."
         return text

@@ -102,7 +102,19 @@ class Analysis:
         filters = passes.autocovariance(raw, facts, step).filters()
         floors = _floors(log, raw_variance)
         analysis = cls(
-            passes, facts, model, nuisance, candidates, refused, raw, raw, None, raw_variance, raw_variance, floors, filters
+            passes,
+            facts,
+            model,
+            nuisance,
+            candidates,
+            refused,
+            raw,
+            raw,
+            None,
+            raw_variance,
+            raw_variance,
+            floors,
+            filters,
         )
         return analysis._whitened()
 
@@ -174,7 +186,11 @@ class Analysis:
             names = [name for name, _, _ in find_effect(ids[slot]).parameters]
             parameters[ids[slot]] = dict(zip(names, map(float, estimate.values[slot]), strict=True))
             errors[ids[slot]] = dict(zip(names, map(float, estimate.errors[slot]), strict=True))
-        nuisance = {ids[slot]: [float(v) for v in estimate.values[slot]] for slot in self.fitted_slots if ids[slot] in self.nuisance}
+        nuisance = {
+            ids[slot]: [float(v) for v in estimate.values[slot]]
+            for slot in self.fitted_slots
+            if ids[slot] in self.nuisance
+        }
         constants = {
             "temperature_mean": self.facts.temperature_mean if self.facts.has_temperature else None,
             "covariate_means": {

@@ -83,7 +83,9 @@ class Passes:
         """
         log, metadata = self.log, self.log.metadata
         if log.n < MIN_ROWS:
-            raise InputError(f"{log.n} rows are too few for a fit", file=log.path, remedy=f"Record at least {MIN_ROWS}.")
+            raise InputError(
+                f"{log.n} rows are too few for a fit", file=log.path, remedy=f"Record at least {MIN_ROWS}."
+            )
         survey = _imufit.Survey(
             log.n,
             metadata.frame,

@@ -121,7 +121,9 @@ def effect(
     if not re.fullmatch(r"[A-Za-z]\w*\.[A-Za-z]\w*", effect_id):
         raise InputError(f"effect id {effect_id!r} is not SENSOR.NAME", remedy="Write for instance gyr.fan.")
     if prefix not in SENSORS:
-        raise InputError(f"effect {effect_id}: sensor {prefix!r} is unknown", remedy=f"Use one of {', '.join(SENSORS)}.")
+        raise InputError(
+            f"effect {effect_id}: sensor {prefix!r} is unknown", remedy=f"Use one of {', '.join(SENSORS)}."
+        )
     if _imufit.find_effect(effect_id) is not None:
         raise InputError(f"effect {effect_id} is built in", remedy="Choose another name.")
     units = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters, "1")

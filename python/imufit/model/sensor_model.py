@@ -152,7 +152,9 @@ class SensorModel:
         try:
             document = tomllib.loads(file.read_text(encoding="utf-8"))
         except OSError as error:
-            raise InputError(f"the model cannot be read ({error.strerror})", file=file, remedy="Check the name.") from None
+            raise InputError(
+                f"the model cannot be read ({error.strerror})", file=file, remedy="Check the name."
+            ) from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise InputError(f"this is no TOML: {error}", file=file) from None
         if document.get("kind") != KIND:
