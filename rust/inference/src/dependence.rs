@@ -33,7 +33,7 @@ fn contrasts(bins: usize) -> DMatrix<f64> {
     let mut q = DMatrix::zeros(bins, m);
     for k in 0..m {
         let mut v = DVector::from_fn(bins, |i, _| {
-            (2.0 * i as f64 / (bins.max(2) - 1) as f64 - 1.0).powi(k as i32)
+            (2.0 * i as f64 / (bins.max(2) - 1) as f64 - 1.0).powf(k as f64)
         });
         for j in 0..k {
             let c = q.column(j).dot(&v);
@@ -91,7 +91,9 @@ fn question(
         white.push(out);
     }
     let mut total = NormalEquations::zeros(p + m);
-    white.iter().for_each(|b| total.add(b, 1.0));
+    for b in &white {
+        total.add(b, 1.0);
+    }
     let mut precision = DVector::zeros(p + m);
     for (k, j) in model.iter().enumerate() {
         precision[k] = problem.precision(*j);

@@ -29,7 +29,9 @@ fn left_out(question: &Question, group: usize) -> Option<Vec<DVector<f64>>> {
         .chunks(group)
         .map(|chunk| {
             let mut sum = NormalEquations::zeros(question.precision.len());
-            chunk.iter().for_each(|b| sum.add(b, 1.0));
+            for b in chunk {
+                sum.add(b, 1.0);
+            }
             sum
         })
         .filter(|b| b.n > 0.0)

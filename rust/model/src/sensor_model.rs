@@ -12,6 +12,9 @@ use crate::sensor::{CHANNELS, Sensor};
 use crate::triple::Triple;
 use crate::window::{Window, held};
 
+/// Columns of a sensor's three channels, in the order of their active parameters.
+type AxisColumns = [Vec<Vec<f64>>; 3];
+
 /// An effect with its parameters and its place among all parameters.
 #[derive(Clone)]
 pub struct Slot {
@@ -254,14 +257,14 @@ impl SensorModel {
     }
 
     /// Modelled readings of one sensor and the columns of its three channels, stage after stage.
-    fn predict(&self, rows: Rows, sensor: Sensor) -> Result<(Triple, [Vec<Vec<f64>>; 3]), EffectError> {
+    fn predict(&self, rows: Rows, sensor: Sensor) -> Result<(Triple, AxisColumns), EffectError> {
         let n = rows.len();
         let mut x = match sensor {
             Sensor::Acc => rows.ideal.f.clone(),
             Sensor::Gyr => rows.ideal.omega.clone(),
             Sensor::Mag => rows.ideal.m.clone(),
         };
-        let mut out: [Vec<Vec<f64>>; 3] =
+        let mut out: AxisColumns =
             std::array::from_fn(|axis| vec![Vec::new(); self.active[3 * sensor.index() + axis].len()]);
         let mut columns = Columns::default();
         for stage in [Stage::Reference, Stage::Input, Stage::Gain, Stage::Offset] {

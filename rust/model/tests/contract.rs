@@ -1,5 +1,5 @@
 //! Every built-in effect keeps the contract that fitting relies on.
-#![allow(clippy::expect_used, clippy::unwrap_used, missing_docs)]
+#![allow(missing_docs)]
 
 use imufit_model::catalogue;
 use imufit_model::contract::check;

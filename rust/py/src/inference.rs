@@ -168,9 +168,9 @@ impl PyProblem {
                 )?;
                 let mut edges = self.raw.layout.bins.edges[p.covariate].clone();
                 if p.covariate == 1 {
-                    edges
-                        .iter_mut()
-                        .for_each(|e| *e += self.raw.layout.facts.temperature_mean);
+                    for edge in &mut edges {
+                        *edge += self.raw.layout.facts.temperature_mean;
+                    }
                 }
                 item.set_item("edges", PyArray1::from_vec(py, edges))?;
                 item.set_item("mean", PyArray1::from_slice(py, &p.mean))?;
