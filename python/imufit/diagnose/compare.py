@@ -143,7 +143,7 @@ def _spectra(analysis: Analysis, step: Array) -> tuple[Spectrum, ...]:
 
 
 def notes(analysis: Analysis) -> tuple[str, ...]:
-    """What the reader should know about the figures of this log."""
+    """Return what the reader should know about the figures of this log."""
     out = list(analysis.passes.log.notes)
     stated = analysis.passes.log.metadata.noise
     for index, (floor, variance) in enumerate(zip(analysis.floors, analysis.raw_variance, strict=True)):

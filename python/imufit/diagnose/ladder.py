@@ -72,7 +72,7 @@ def ladder(log: LogSource, model: SensorModel | None = None, progress: Progress 
 
 
 def next_effect(diagnosis: Diagnosis) -> str | None:
-    """The effect to add next: the best that passed and that nothing else in the catalogue explains as well."""
+    """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well."""
     if diagnosis.verdict == "adequate":
         return None
     if diagnosis.verdict == "unknown":

@@ -110,7 +110,7 @@ class Analysis:
             refused,
             raw,
             raw,
-            None,
+            _imufit.Problem(raw, raw, raw_variance, floors),
             raw_variance,
             raw_variance,
             floors,
@@ -179,7 +179,7 @@ class Analysis:
         return Estimate(values, errors, result["full_step"], result["held_out"], result["training"])
 
     def moved_to(self, estimate: Estimate) -> tuple[SensorModel, dict[str, list[float]]]:
-        """The model and the unnamed effects with estimated parameters."""
+        """Return the model and the unnamed effects with estimated parameters."""
         ids = self.slots
         parameters, errors = {}, {}
         for slot in range(len(self.model.effects)):
@@ -203,7 +203,7 @@ class Analysis:
         return SensorModel(self.model.effects, parameters, constants=kept, standard_errors=errors), nuisance
 
     def converged(self, estimate: Estimate) -> bool:
-        """True if no parameter still moves by more than a tenth of its standard error."""
+        """Return whether no parameter still moves by more than a tenth of its standard error."""
         present = [*(v for _, v in self.model.stack()), *self.nuisance.values()]
         return all(
             bool(np.all(np.abs(estimate.values[slot] - present[slot]) <= 0.1 * estimate.errors[slot]))

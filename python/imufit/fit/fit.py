@@ -118,7 +118,7 @@ class Fit:
         return add(self.on(log, progress or silent), effect)
 
     def on(self, log: LogSource | None, progress: Progress) -> Fit:
-        """This fit if `log` is its own log, else the model refitted to `log`."""
+        """Return this fit if `log` is its own log, else the model refitted to `log`."""
         if log is None or log is self.log:
             return self
         return Fit.of(self.model, log, progress)

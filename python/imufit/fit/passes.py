@@ -33,7 +33,7 @@ def covariate_names(log: LogSource) -> list[str]:
 
 
 def chunk_arrays(chunk: Chunk, covariates: Sequence[str]) -> dict[str, Any]:
-    """A chunk as the compiled core takes it."""
+    """Return a chunk as the compiled core takes it."""
     log = chunk.log
     return {
         "t": log.t,

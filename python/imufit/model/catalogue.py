@@ -28,7 +28,7 @@ def column_effects(names: Iterable[str], sensors: Iterable[str]) -> dict[str, _i
 
 
 def find_effect(effect_id: str) -> _imufit.Effect:
-    """The effect with this id.
+    """Return the effect with this id.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def find_effect(effect_id: str) -> _imufit.Effect:
 
 
 def card_of(effect: _imufit.Effect) -> EffectCard:
-    """The card of an effect."""
+    """Return the card of an effect."""
     sensors = effect.sensors
     return EffectCard(
         id=effect.id,
@@ -60,7 +60,7 @@ def catalogue() -> list[EffectCard]:
 
 
 def explain(effect_id: str) -> EffectCard:
-    """The card of one effect: physics, formula, typical size, signature, rivals, the experiment that confirms it.
+    """Return the card of one effect: physics, formula, typical size, signature, rivals, what confirms it.
 
     Raises
     ------

@@ -35,7 +35,7 @@ class Window:
     f, m : ndarray
         (n, 3) ideal specific force, m/s^2, and magnetic flux density, uT.
     x : ndarray
-        (n, 3) the quantity that the effect's stage acts on: the sensor's ideal reading plus earlier effects of the model.
+        (n, 3) what the effect's stage acts on: the sensor's ideal reading plus earlier effects of the model.
     temperature : ndarray or None
         (n,) sensor temperature less its mean over the log, K.
     columns : mapping of str to ndarray
@@ -84,7 +84,7 @@ def effect(
     confirm: str = "",
     stage: str = "offset",
 ) -> Callable[[F], F]:
-    """Make an effect out of a function that returns d reading / d parameters; it is then fitted and ranked like the built-in ones.
+    """Make an effect out of a function that returns d reading / d parameters, fitted and ranked like a built-in one.
 
     Parameters
     ----------

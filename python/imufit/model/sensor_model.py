@@ -91,7 +91,7 @@ class SensorModel:
         )
 
     def with_effect(self, effect_id: str) -> SensorModel:
-        """The same model with one more effect, its parameters zero.
+        """Return the same model with one more effect, its parameters zero.
 
         Raises
         ------
@@ -193,7 +193,7 @@ def _values(effect: _imufit.Effect, given: Mapping[str, float]) -> list[float]:
 
 
 def model_of(ids: Iterable[str], like: SensorModel) -> SensorModel:
-    """A model of the effects `ids` with the parameters and constants of another where it has them."""
+    """Return a model of the effects `ids` with the parameters and constants of another where it has them."""
     chosen = list(ids)
     kept = {key: values for key, values in like.parameters.items() if key in chosen}
     return SensorModel(chosen, kept, constants=like.constants)
