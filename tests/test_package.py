@@ -4,9 +4,8 @@ import subprocess
 import sys
 from types import ModuleType
 
-import pytest
-
 import imufit
+import pytest
 
 
 def test_all_public_names_exist_and_are_listed():
