@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,7 +85,7 @@ def comparison(analysis: Analysis, step: Array) -> Comparison:
     )
 
 
-def _panel(item: dict[str, Any], floors: list[float], facts: _imufit.Facts) -> Panel:
+def _panel(item: Mapping[str, Any], floors: list[float], facts: _imufit.Facts) -> Panel:
     name = item["channel"]
     inner = item["edges"]
     width = np.diff(inner)
