@@ -1,11 +1,14 @@
 """What ``import imufit`` gives: every public name, loaded on first use, with no module in a function's place."""
 
+import ast
 import subprocess
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import imufit
 import pytest
+from imufit import _imufit
 
 
 def test_all_public_names_exist_and_are_listed():
@@ -43,3 +46,24 @@ def test_replay_and_simulate_are_modules():
 def test_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="'imufit' has no attribute 'nothing'"):
         _ = imufit.nothing
+
+
+def test_every_export_of_the_compiled_module_is_in_the_stub():
+    stub = ast.parse((Path(imufit.__file__).parent / "_imufit.pyi").read_text(encoding="utf-8"))
+    described: dict[str, ast.stmt] = {}
+    for node in stub.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            described[node.name] = node
+        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            described[node.target.id] = node
+    exported = {name for name in dir(_imufit) if not name.startswith("_")} | {"__version__"}
+    assert exported <= described.keys()
+    assert {name for name in described if not name.startswith("_")} <= exported
+    for name in exported:
+        node = described[name]
+        if isinstance(node, ast.ClassDef):
+            members = {m.name for m in node.body if isinstance(m, ast.FunctionDef)}
+            members |= {
+                m.target.id for m in node.body if isinstance(m, ast.AnnAssign) and isinstance(m.target, ast.Name)
+            }
+            assert {member for member in dir(getattr(_imufit, name)) if not member.startswith("_")} <= members

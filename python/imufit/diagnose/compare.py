@@ -29,7 +29,17 @@ OFF_FLOOR = 1.2
 
 
 def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
-    """Hold a fitted model against a log (default: its own), the parameters as they are."""
+    """Hold a fitted model against a log (default: its own), the parameters as they are.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fitted model.
+    log : Log or LogStream, optional
+        The log; None is the fit's own.
+    progress : callable
+        Called with (rows done, rows in all, what is being done).
+    """
     if log is None or log is fit.log:
         analysis, step = fit.analysis, fit.estimate.step
     else:

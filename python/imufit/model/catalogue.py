@@ -30,6 +30,11 @@ def column_effects(names: Iterable[str], sensors: Iterable[str]) -> dict[str, _i
 def find_effect(effect_id: str) -> _imufit.Effect:
     """Return the effect with this id.
 
+    Parameters
+    ----------
+    effect_id : str
+        Id such as ``gyr.g_sensitivity``.
+
     Raises
     ------
     InputError
@@ -62,6 +67,11 @@ def catalogue() -> list[EffectCard]:
 def explain(effect_id: str) -> EffectCard:
     """Return the card of one effect: physics, formula, typical size, signature, rivals, what confirms it.
 
+    Parameters
+    ----------
+    effect_id : str
+        Id such as ``gyr.g_sensitivity``.
+
     Raises
     ------
     InputError
@@ -72,6 +82,11 @@ def explain(effect_id: str) -> EffectCard:
 
 def load_effects(path: str | Path) -> list[str]:
     """Run a Python file that defines effects with ``@imufit.effect``; return the ids it added.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file. It is run: load only what you trust.
 
     Raises
     ------

@@ -55,6 +55,11 @@ class Window:
     def column(self, name: str) -> Array:
         """One of the log's own columns, (n,).
 
+        Parameters
+        ----------
+        name : str
+            Name of the column.
+
         Raises
         ------
         KeyError

@@ -93,6 +93,11 @@ class SensorModel:
     def with_effect(self, effect_id: str) -> SensorModel:
         """Return the same model with one more effect, its parameters zero.
 
+        Parameters
+        ----------
+        effect_id : str
+            Id such as ``gyr.g_sensitivity``.
+
         Raises
         ------
         InputError
@@ -127,7 +132,13 @@ class SensorModel:
         return Fit.of(self, log, progress)
 
     def save(self, path: str | Path) -> None:
-        """Write the model as a TOML file."""
+        """Write the model as a TOML file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that exists is replaced.
+        """
         document: dict[str, Any] = {"kind": KIND, "format": FORMAT, "effects": list(self.effects)}
         if self.constants:
             document["constants"] = self.constants
@@ -142,6 +153,11 @@ class SensorModel:
     @classmethod
     def load(cls, path: str | Path) -> SensorModel:
         """Read a model from its TOML file.
+
+        Parameters
+        ----------
+        path : str or Path
+            A file that :meth:`save` wrote, or one written by hand in its form.
 
         Raises
         ------

@@ -23,11 +23,14 @@ pub struct SampledRow {
 /// Sampled rows by row number.
 pub type SampledRows = HashMap<usize, SampledRow>;
 
+/// Target, columns with a value per axis, and columns that all axes share.
+type Regressed = (Vector3<f64>, Vec<Vector3<f64>>, Vec<f64>);
+
 /// Fewer rows than this decide nothing.
 const MIN_ROWS: usize = 200;
 
 /// Mean square of targets that remains after a regression on columns, axis by axis.
-fn unexplained(rows: &[(Vector3<f64>, Vec<Vector3<f64>>, Vec<f64>)]) -> f64 {
+fn unexplained(rows: &[Regressed]) -> f64 {
     if rows.len() < MIN_ROWS {
         return f64::NAN;
     }

@@ -77,7 +77,9 @@ pub struct PyEvidence(pub Evidence);
 
 #[pymethods]
 impl PyEvidence {
-    /// `effects` with their parameters are the model; `candidates` are asked for their columns only.
+    /// `effects` with their parameters are the model; `candidates` are asked for their columns only; `filters` has the
+    /// taps of
+    /// a whitening filter for each of the nine channels.
     #[new]
     fn new(
         facts: &PyFacts,
@@ -129,6 +131,7 @@ impl PyEvidence {
         Ok(Self(Evidence::new(Arc::new(layout))))
     }
 
+    /// Blocks of time that the evidence is kept in.
     #[getter]
     fn blocks(&self) -> usize {
         self.0.layout.blocks
@@ -144,7 +147,8 @@ impl PyEvidence {
         self.0.layout.model.active()[channel].clone()
     }
 
-    /// Gram matrix of `[columns | residual]` of a channel, summed over all blocks or of one block; None without samples.
+    /// Gram matrix (a + 1, a + 1) of `[columns | residual]` of a channel with its a active parameters, summed over all
+    /// blocks or of one block; None without samples.
     #[pyo3(signature = (channel, block=None))]
     fn gram<'py>(&self, py: Python<'py>, channel: usize, block: Option<usize>) -> Option<Bound<'py, PyArray2<f64>>> {
         let blocks: Vec<usize> = block.map_or_else(|| (0..self.0.layout.blocks).collect(), |b| vec![b]);
@@ -159,7 +163,9 @@ impl PyEvidence {
     }
 }
 
-/// Residual of each channel over the core rows of a chunk, after a step of all parameters; None for a sensor that the log has not.
+/// Residual of each of the nine channels over the core rows of a chunk, (rows,), SI units (magnetometer uT), after a
+/// step
+/// of all parameters, (p,); None for a sensor that the log has not.
 #[pyfunction]
 fn evaluate<'py>(
     py: Python<'py>,
@@ -210,7 +216,7 @@ impl PyAutocovariance {
             .map_err(from_effect)
     }
 
-    /// Whitening filter of each channel; empty where the residual is white.
+    /// Whitening filter of each of the nine channels, its taps; empty where the residual is white.
     fn filters(&self) -> Vec<Vec<f64>> {
         (0..CHANNELS)
             .map(|channel| {
@@ -220,7 +226,7 @@ impl PyAutocovariance {
             .collect()
     }
 
-    /// Autocovariance of a channel, lag 0 first.
+    /// Autocovariance of a channel, lag 0 first, in the square of its unit.
     fn of_channel(&self, channel: usize) -> Vec<f64> {
         self.0.of_channel(channel).0
     }

@@ -13,7 +13,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::errors::value_error;
 use crate::fit::PyEvidence;
 
-/// All effects fitted at once: (step of every parameter, residual variance per channel).
+/// All effects fitted at once: (step (p,) of every parameter, residual variance of each of the nine channels).
 #[pyfunction]
 fn saturate<'py>(py: Python<'py>, evidence: &PyEvidence) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<f64>)> {
     let fitted = py
@@ -42,7 +42,7 @@ pub struct PyProblem {
 
 #[pymethods]
 impl PyProblem {
-    /// `variance`: of the whitened residual per channel; `floors`: noise floor per channel.
+    /// `variance`: of the whitened residual of each of the nine channels; `floors`: their noise floors, in their units.
     #[new]
     fn new(
         py: Python<'_>,
@@ -62,7 +62,9 @@ impl PyProblem {
         })
     }
 
-    /// Fits the slots given: step and standard error of each of their parameters, held-out and training ratio.
+    /// Fits the slots given: step and standard error (k,) of each of their k parameters, SI units; full step (p,) of
+    /// all;
+    /// held-out and training residual RMS over noise floor.
     fn estimate<'py>(&self, py: Python<'py>, slots: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
         let all = self.white.layout.model.slots();
         if slots.iter().any(|s| *s >= all.len()) {
@@ -138,7 +140,8 @@ impl PyProblem {
         Ok(out)
     }
 
-    /// Residual at a step of all parameters: channels, blocks and binned panels.
+    /// Residual at a step (p,) of all parameters: RMS and mean by channel and block, and binned panels, in the
+    /// channels' units.
     fn residual<'py>(&self, py: Python<'py>, step: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
         if step.len() != self.raw.layout.model.parameters() {
             return Err(value_error("step must have one number per parameter"));

@@ -22,6 +22,7 @@ pub struct PyEffect(pub Arc<dyn Effect>);
 
 #[pymethods]
 impl PyEffect {
+    /// Its name in the catalogue, such as `gyr.bias`.
     #[getter]
     fn id(&self) -> String {
         self.0.card().id.clone()
@@ -44,7 +45,8 @@ impl PyEffect {
             .collect()
     }
 
-    /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new values.
+    /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new
+    /// values.
     #[getter]
     fn nonlinear(&self) -> bool {
         self.0.card().stage == Stage::Reference
@@ -84,7 +86,8 @@ impl PyEffect {
         self.0.not_testable(&facts.facts)
     }
 
-    /// Checks the contract on the core rows of a chunk: finite, agrees with a difference quotient, independent of how rows are cut.
+    /// Checks the contract on the core rows of a chunk: finite, agrees with a difference quotient, independent of how
+    /// rows are cut. `at` holds a value for each parameter.
     fn check(&self, chunk: &Bound<'_, PyDict>, facts: &PyFacts, at: Vec<f64>) -> PyResult<()> {
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
@@ -106,6 +109,7 @@ pub struct PyFacts {
 
 #[pymethods]
 impl PyFacts {
+    /// Rows of the log.
     #[getter]
     fn n(&self) -> usize {
         self.facts.n
@@ -117,41 +121,49 @@ impl PyFacts {
         self.facts.margin()
     }
 
+    /// Time of the first row, s.
     #[getter]
     fn t_start(&self) -> f64 {
         self.facts.t_start
     }
 
+    /// Time of the last row, s.
     #[getter]
     fn t_end(&self) -> f64 {
         self.facts.t_end
     }
 
+    /// Median time between rows, s.
     #[getter]
     fn dt(&self) -> f64 {
         self.facts.dt
     }
 
+    /// Magnetic flux density in the reference frame, (3,), uT; zero without a magnetometer.
     #[getter]
     fn field(&self) -> [f64; 3] {
         self.facts.field.into()
     }
 
+    /// True if `field` was estimated from this log, so that it has to be fitted along.
     #[getter]
     fn field_estimated(&self) -> bool {
         self.facts.field_estimated
     }
 
+    /// Mean sensor temperature, degC.
     #[getter]
     fn temperature_mean(&self) -> f64 {
         self.facts.temperature_mean
     }
 
+    /// True if the log has a thermometer.
     #[getter]
     fn has_temperature(&self) -> bool {
         self.facts.has_temperature
     }
 
+    /// Prefixes of the sensors that the log has.
     #[getter]
     fn sensors(&self) -> Vec<&'static str> {
         Sensor::ALL
@@ -161,6 +173,7 @@ impl PyFacts {
             .collect()
     }
 
+    /// Mean of each covariate by name, in its own unit.
     #[getter]
     fn covariate_means(&self) -> std::collections::BTreeMap<String, f64> {
         self.facts
@@ -213,17 +226,23 @@ impl PyFacts {
     }
 }
 
+/// The built-in effects that need no column of a log's own, in the order of the catalogue.
 #[pyfunction]
 fn built_in_effects() -> Vec<PyEffect> {
     catalogue::built_in().into_iter().map(PyEffect).collect()
 }
 
+/// The built-in effect with this id, `SENSOR.column:NAME` among them; None if there is none.
 #[pyfunction]
 fn find_effect(id: &str) -> Option<PyEffect> {
     catalogue::find(id).map(PyEffect)
 }
 
-/// An effect made of a Python function that returns d reading / d parameters, (n, 3, p).
+/// An effect made of a Python function that returns d reading / d parameters, (n, 3, p), float64, in SI units.
+///
+/// `parameters` are (name, unit, typical size or None); `words` the words of its card; `needs` the covariates that it
+/// reads.
+/// `function` gets a dict: t, t_start (s), omega, alpha, f, m, x (n, 3), temperature (n,) or None, columns by name.
 #[pyfunction]
 #[pyo3(signature = (id, sensor, parameters, words, stage, needs, function))]
 fn python_effect(

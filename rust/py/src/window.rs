@@ -32,7 +32,8 @@ fn number(chunk: &Bound<'_, PyDict>, key: &str) -> PyResult<usize> {
 }
 
 impl<'py> ChunkArrays<'py> {
-    /// Borrows the arrays of a chunk: t, acc, gyr, mag, temp, ref_q, ref_p, ref_exact, covariates (a list), offset, begin, end.
+    /// Borrows the arrays of a chunk: t, acc, gyr, mag, temp, ref_q, ref_p, ref_exact, covariates (a list), offset,
+    /// begin, end.
     pub fn new(chunk: &Bound<'py, PyDict>) -> PyResult<Self> {
         let t = Column::new(
             "t",
