@@ -94,7 +94,9 @@ fn halves_agree(question: &Question, whole: &Jackknife) -> bool {
     let middle = question.white.len() / 2;
     let solve = |blocks: &[NormalEquations]| {
         let mut sum = NormalEquations::zeros(question.precision.len());
-        blocks.iter().for_each(|b| sum.add(b, 1.0));
+        for b in blocks {
+            sum.add(b, 1.0);
+        }
         let solved = sum.solve(&question.precision)?;
         let covariance = solved.covariance().view((p, p), (m, m)).into_owned();
         Some((solved.solution.rows(p, m).into_owned(), covariance))

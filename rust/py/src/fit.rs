@@ -78,8 +78,7 @@ pub struct PyEvidence(pub Evidence);
 #[pymethods]
 impl PyEvidence {
     /// `effects` with their parameters are the model; `candidates` are asked for their columns only; `filters` has the
-    /// taps of
-    /// a whitening filter for each of the nine channels.
+    /// taps of a whitening filter for each of the nine channels.
     #[new]
     fn new(
         facts: &PyFacts,
@@ -164,8 +163,7 @@ impl PyEvidence {
 }
 
 /// Residual of each of the nine channels over the core rows of a chunk, (rows,), SI units (magnetometer uT), after a
-/// step
-/// of all parameters, (p,); None for a sensor that the log has not.
+/// step of all parameters, (p,); None for a sensor that the log has not.
 #[pyfunction]
 fn evaluate<'py>(
     py: Python<'py>,

@@ -63,8 +63,7 @@ impl PyProblem {
     }
 
     /// Fits the slots given: step and standard error (k,) of each of their k parameters, SI units; full step (p,) of
-    /// all;
-    /// held-out and training residual RMS over noise floor.
+    /// all; held-out and training residual RMS over noise floor.
     fn estimate<'py>(&self, py: Python<'py>, slots: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
         let all = self.white.layout.model.slots();
         if slots.iter().any(|s| *s >= all.len()) {
