@@ -56,5 +56,5 @@ $(DEPENDENCIES): pyproject.toml
 	touch $@
 
 $(STAMP): $(DEPENDENCIES) $(SOURCES)
-	. $(BIN)/activate && maturin develop --release --extras dev --quiet
+	. $(BIN)/activate && PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --extras dev --quiet
 	touch $@

@@ -241,7 +241,8 @@ fn find_effect(id: &str) -> Option<PyEffect> {
 /// An effect made of a Python function that returns d reading / d parameters, (n, 3, p), float64, in SI units.
 ///
 /// `parameters` are (name, unit, typical size or None); `words` the words of its card; `needs` the covariates that it
-/// reads. `function` gets a dict: t, t_start (s), omega, alpha, f, m, x (n, 3), temperature (n,) or None, columns by name.
+/// reads. `function` gets a dict: t, t_start (s), omega, alpha, f, m, x (n, 3), temperature (n,) or None,
+/// columns by name.
 #[pyfunction]
 #[pyo3(signature = (id, sensor, parameters, words, stage, needs, function))]
 fn python_effect(
