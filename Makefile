@@ -29,12 +29,13 @@ test-rust: ## Rust tests
 test-python: $(STAMP) ## Python tests
 	$(BIN)/python -m pytest -n 2
 
-lint: $(STAMP) ## Formatting, clippy, ruff, mypy, import layers
+lint: $(STAMP) ## Formatting, clippy, ruff, mypy, stubs, import layers
 	cargo fmt --all --check
 	cargo clippy $(CARGO_FLAGS) --all-targets -- -D warnings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest imufit._imufit
 	$(BIN)/lint-imports
 
 wheel: $(DEPENDENCIES) ## One abi3 wheel in dist/
@@ -55,5 +56,5 @@ $(DEPENDENCIES): pyproject.toml
 	touch $@
 
 $(STAMP): $(DEPENDENCIES) $(SOURCES)
-	. $(BIN)/activate && maturin develop --release --extras dev --quiet
+	. $(BIN)/activate && PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --extras dev --quiet
 	touch $@

@@ -1,9 +1,5 @@
 """Attitude errors, tables at the border, and the stub of the compiled module."""
 
-import ast
-from pathlib import Path
-
-import imufit
 import numpy as np
 import pytest
 from hypothesis import given
@@ -115,24 +111,3 @@ class TestBorder:
             is_attitude &= np.isfinite(q.sum(axis=1))
         assert np.isfinite(euler[is_attitude]).all()
         assert np.isnan(euler[~is_attitude]).all()
-
-
-def test_every_export_of_the_compiled_module_is_in_the_stub() -> None:
-    stub = ast.parse((Path(imufit.__file__).parent / "_imufit.pyi").read_text(encoding="utf-8"))
-    described: dict[str, ast.stmt] = {}
-    for node in stub.body:
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            described[node.name] = node
-        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
-            described[node.target.id] = node
-    exported = {name for name in dir(_imufit) if not name.startswith("_")} | {"__version__"}
-    assert exported <= described.keys()
-    assert {name for name in described if not name.startswith("_")} <= exported
-    for name in exported:
-        node = described[name]
-        if isinstance(node, ast.ClassDef):
-            members = {m.name for m in node.body if isinstance(m, ast.FunctionDef)}
-            members |= {
-                m.target.id for m in node.body if isinstance(m, ast.AnnAssign) and isinstance(m.target, ast.Name)
-            }
-            assert {member for member in dir(getattr(_imufit, name)) if not member.startswith("_")} <= members

@@ -1,16 +1,60 @@
 """imufit: find out which physical effect your inertial sensor model is missing, add it, and watch the error fall.
 
 Start with ``log = imufit.read("walk.parquet")`` and ``imufit.ladder(log)``.
+
+Names are loaded when they are first used, so that ``import imufit`` costs next to nothing.
 """
 
-from imufit import simulate
-from imufit._imufit import __version__
-from imufit.diagnose import ladder
-from imufit.errors import InputError
-from imufit.fit import Fit
-from imufit.log import Log, LogStream, open_log, read
-from imufit.model import SensorModel, Window, catalogue, effect, explain, load_effects
-from imufit.results import Addition, Comparison, Diagnosis, EffectCard, Ladder, Parameter
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from imufit import diagnose as diagnose
+    from imufit import errors as errors
+    from imufit import figures as figures
+    from imufit import fit as fit
+    from imufit import log as log
+    from imufit import model as model
+    from imufit import replay, simulate
+    from imufit import report as report
+    from imufit import results as results
+    from imufit._imufit import __version__
+    from imufit.diagnose.ladder import ladder
+    from imufit.errors import InputError
+    from imufit.fit import Fit
+    from imufit.log import Log, LogStream, open_log, read
+    from imufit.model.catalogue import catalogue, explain, load_effects
+    from imufit.model.effect import Window, effect
+    from imufit.model.sensor_model import SensorModel
+    from imufit.results import Addition, Comparison, Diagnosis, EffectCard, Ladder, Parameter
+else:
+    from importlib import import_module
+
+    _MODULES = ("diagnose", "errors", "figures", "fit", "log", "model", "replay", "report", "results", "simulate")
+    _HOMES = {
+        "_imufit": ("__version__",),
+        "diagnose": ("ladder",),
+        "errors": ("InputError",),
+        "fit": ("Fit",),
+        "log": ("Log", "LogStream", "open_log", "read"),
+        "model": ("SensorModel", "Window", "catalogue", "effect", "explain", "load_effects"),
+        "results": ("Addition", "Comparison", "Diagnosis", "EffectCard", "Ladder", "Parameter"),
+    }
+
+    def __getattr__(name: str) -> object:
+        """Load a public name on first use (PEP 562)."""
+        if name in _MODULES:
+            return import_module(f"{__name__}.{name}")
+        for home, names in _HOMES.items():
+            if name in names:
+                value = getattr(import_module(f"{__name__}.{home}"), name)
+                globals()[name] = value
+                return value
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+    def __dir__() -> list[str]:
+        """Return the public names, loaded or not."""
+        return sorted({*__all__, *_MODULES})
+
 
 __all__ = [
     "Addition",
@@ -33,5 +77,6 @@ __all__ = [
     "load_effects",
     "open_log",
     "read",
+    "replay",
     "simulate",
 ]

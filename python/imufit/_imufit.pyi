@@ -1,7 +1,7 @@
 """Types of the compiled module. One section for each file of the binding; tests compare it with the module."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypedDict
+from typing import Any, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,37 @@ from numpy.typing import NDArray
 _Array = NDArray[np.float64]
 _Numbers = Sequence[float] | _Array
 _Chunk = dict[str, Any]
+
+__all__ = [
+    "Autocovariance",
+    "Effect",
+    "Evidence",
+    "Facts",
+    "Filter",
+    "Problem",
+    "Survey",
+    "__version__",
+    "attitude_errors",
+    "attitude_rmse",
+    "built_in_effects",
+    "convert_frame",
+    "euler_from_quaternion",
+    "evaluate",
+    "filter_descriptions",
+    "find_effect",
+    "frame_vectors",
+    "matrix_from_quaternion_rows",
+    "python_effect",
+    "quaternion_from_euler",
+    "quaternion_from_matrix_rows",
+    "quaternion_from_rotation_vector",
+    "quaternion_product",
+    "replay_rules",
+    "rotate",
+    "rotate_back",
+    "rotation_vector_from_quaternion",
+    "saturate",
+]
 
 __version__: str
 
@@ -55,6 +86,7 @@ class _Description(TypedDict):
     needs: list[str]
     settings: dict[str, _Setting]
 
+@final
 class Filter:
     state: _Array
     def __new__(
@@ -81,6 +113,7 @@ def replay_rules() -> dict[str, _Setting]: ...
 
 # --- model
 
+@final
 class Effect:
     @property
     def id(self) -> str: ...
@@ -97,6 +130,7 @@ class Effect:
     def not_testable(self, facts: Facts) -> str | None: ...
     def check(self, chunk: _Chunk, facts: Facts, at: Sequence[float]) -> None: ...
 
+@final
 class Facts:
     @property
     def n(self) -> int: ...
@@ -144,6 +178,7 @@ def python_effect(
 
 # --- fit: nine channels, acc gyr mag by x y z
 
+@final
 class Survey:
     def __new__(
         cls, n: int, frame: str, gravity: float, mag_reference: Sequence[float] | None, covariates: Sequence[str]
@@ -152,6 +187,7 @@ class Survey:
     def widths(self) -> tuple[list[float], list[float]]: ...
     def finish(self) -> Facts: ...
 
+@final
 class Evidence:
     def __new__(
         cls,
@@ -170,6 +206,7 @@ class Evidence:
     def active(self, channel: int) -> list[int]: ...
     def gram(self, channel: int, block: int | None = None) -> _Array | None: ...
 
+@final
 class Autocovariance:
     def __new__(cls) -> Autocovariance: ...
     def add(self, chunk: _Chunk, evidence: Evidence, step: _Numbers) -> None: ...
@@ -178,12 +215,72 @@ class Autocovariance:
 
 def evaluate(evidence: Evidence, chunk: _Chunk, step: _Numbers) -> list[_Array | None]: ...
 
-# --- inference
+# --- inference: slots are effects in the order of the evidence; p-values are adjusted for all candidates tried
 
+class _Estimate(TypedDict):
+    parameters: list[int]
+    step: _Array
+    standard_error: _Array
+    full_step: _Array
+    held_out: float
+    training: float
+
+class _Screened(TypedDict):
+    slot: int
+    p_value: float
+    gain: float
+    gain_error: float
+    held_out_before: float
+    held_out_after: float
+    expected_ratio: float
+    testable: bool
+    stable: bool
+    passed: bool
+    parameters: list[tuple[float, float]]
+
+class _Dependence(TypedDict):
+    channel: str
+    covariate: str
+    gain: float
+    p_value: float
+    shape: str
+
+class _Verdict(TypedDict):
+    verdict: str
+    best: int | None
+    rivals: list[int]
+    path: list[int]
+    correlations: list[tuple[int, int, float]]
+    screened: list[_Screened]
+    unexplained: list[_Dependence]
+
+class _ChannelResidual(TypedDict):
+    channel: str
+    index: int
+    n: int
+    rms: float
+    mean: float
+    block_rms: _Array
+    stretch: tuple[int, int]
+
+class _Panel(TypedDict):
+    channel: str
+    covariate: str
+    unit: str
+    edges: _Array
+    mean: _Array
+    band: _Array
+    share: float
+
+class _Residual(TypedDict):
+    channels: list[_ChannelResidual]
+    panels: list[_Panel]
+
+@final
 class Problem:
     def __new__(cls, white: Evidence, raw: Evidence, variance: Sequence[float], floors: Sequence[float]) -> Problem: ...
-    def estimate(self, slots: Sequence[int]) -> dict[str, Any]: ...
-    def diagnose(self, model: Sequence[int], candidates: Sequence[int]) -> dict[str, Any]: ...
-    def residual(self, step: _Numbers) -> dict[str, Any]: ...
+    def estimate(self, slots: Sequence[int]) -> _Estimate: ...
+    def diagnose(self, model: Sequence[int], candidates: Sequence[int]) -> _Verdict: ...
+    def residual(self, step: _Numbers) -> _Residual: ...
 
 def saturate(evidence: Evidence) -> tuple[_Array, list[float]]: ...

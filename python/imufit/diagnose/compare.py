@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +29,17 @@ OFF_FLOOR = 1.2
 
 
 def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
-    """Hold a fitted model against a log (default: its own), the parameters as they are."""
+    """Hold a fitted model against a log (default: its own), the parameters as they are.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fitted model.
+    log : Log or LogStream, optional
+        The log; None is the fit's own.
+    progress : callable
+        Called with (rows done, rows in all, what is being done).
+    """
     if log is None or log is fit.log:
         analysis, step = fit.analysis, fit.estimate.step
     else:
@@ -84,7 +95,7 @@ def comparison(analysis: Analysis, step: Array) -> Comparison:
     )
 
 
-def _panel(item: dict[str, Any], floors: list[float], facts: _imufit.Facts) -> Panel:
+def _panel(item: Mapping[str, Any], floors: list[float], facts: _imufit.Facts) -> Panel:
     name = item["channel"]
     inner = item["edges"]
     width = np.diff(inner)
@@ -143,7 +154,7 @@ def _spectra(analysis: Analysis, step: Array) -> tuple[Spectrum, ...]:
 
 
 def notes(analysis: Analysis) -> tuple[str, ...]:
-    """What the reader should know about the figures of this log."""
+    """Return what the reader should know about the figures of this log."""
     out = list(analysis.passes.log.notes)
     stated = analysis.passes.log.metadata.noise
     for index, (floor, variance) in enumerate(zip(analysis.floors, analysis.raw_variance, strict=True)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -74,7 +74,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     )
 
 
-def _candidate(item: dict[str, Any], effect: _imufit.Effect, rivals: list[Rival], tested: int) -> Candidate:
+def _candidate(item: Mapping[str, Any], effect: _imufit.Effect, rivals: list[Rival], tested: int) -> Candidate:
     parameters = tuple(
         Parameter(effect.id, name, value, error, unit, typical)
         for (name, unit, typical), (value, error) in zip(effect.parameters, item["parameters"], strict=True)
@@ -102,7 +102,7 @@ def _candidate(item: dict[str, Any], effect: _imufit.Effect, rivals: list[Rival]
     return replace(candidate, explanation=sentences.explanation(card_of(effect), candidate))
 
 
-def _status(item: dict[str, Any]) -> str:
+def _status(item: Mapping[str, Any]) -> str:
     if not item["testable"]:
         return "not testable here"
     if item["passed"]:
@@ -112,7 +112,7 @@ def _status(item: dict[str, Any]) -> str:
     return "not significant" if item["plausible"] else "implausible size"
 
 
-def _unexplained(analysis: Analysis, step: Any, found: list[dict[str, Any]]) -> tuple[Unexplained, ...]:
+def _unexplained(analysis: Analysis, step: Any, found: Sequence[Mapping[str, Any]]) -> tuple[Unexplained, ...]:
     """Dependences that nothing in the catalogue explains, with their share of the excess and where in time it lies."""
     if not found:
         return ()

@@ -72,7 +72,7 @@ def ladder(log: LogSource, model: SensorModel | None = None, progress: Progress 
 
 
 def next_effect(diagnosis: Diagnosis) -> str | None:
-    """The effect to add next: the best that passed and that nothing else in the catalogue explains as well."""
+    """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well."""
     if diagnosis.verdict == "adequate":
         return None
     if diagnosis.verdict == "unknown":
@@ -91,6 +91,6 @@ def _sentence(start: float, end: float, steps: list[Step], diagnosis: Diagnosis)
     if not steps:
         return diagnosis.sentence
     names = ", ".join(step.effect for step in steps)
-    return f"Adding {names} cut the held-out error from {start:.3f} to {end:.3f} of the noise floor. {diagnosis.sentence}"
-
-
+    return (
+        f"Adding {names} cut the held-out error from {start:.3f} to {end:.3f} of the noise floor. {diagnosis.sentence}"
+    )

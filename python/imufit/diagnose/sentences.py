@@ -13,7 +13,7 @@ def _capital(text: str) -> str:
 
 
 def leading(parameters: Sequence[Parameter]) -> Parameter | None:
-    """The parameter that stands out most from its error."""
+    """Return the parameter that stands out most from its error."""
     known = [p for p in parameters if p.standard_error > 0]
     return max(known, key=lambda p: abs(p.value / p.standard_error), default=None)
 
@@ -21,7 +21,8 @@ def leading(parameters: Sequence[Parameter]) -> Parameter | None:
 def explanation(card: EffectCard, candidate: Candidate) -> str:
     """One candidate in a sentence: the physics, its size, what adding it should bring."""
     if candidate.status == "not testable here":
-        return f"{_capital(card.name)}: this log cannot show it (no such motion or temperature, or inside the model already)."
+        why = "no such motion or temperature, or inside the model already"
+        return f"{_capital(card.name)}: this log cannot show it ({why})."
     text = f"{_capital(card.name)}: {card.physics}." if card.physics else f"{_capital(card.name)}."
     top = leading(candidate.parameters)
     if top is not None:
@@ -42,9 +43,13 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
 
 
 def verdict(
-    word: str, best: Candidate | None, card: EffectCard | None, rivals: Sequence[str], unexplained: Sequence[Unexplained]
+    word: str,
+    best: Candidate | None,
+    card: EffectCard | None,
+    rivals: Sequence[str],
+    unexplained: Sequence[Unexplained],
 ) -> str:
-    """The answer in a sentence or two."""
+    """Give the answer in a sentence or two."""
     left = ""
     if unexplained:
         first = unexplained[0]
@@ -52,7 +57,11 @@ def verdict(
     if word == "adequate":
         return "Nothing that this log can show is missing: the residual is at its noise floor as far as can be told."
     if word == "unknown":
-        text = f"Something is missing that no effect of the catalogue explains: {left}." if left else "Something is missing."
+        text = (
+            f"Something is missing that no effect of the catalogue explains: {left}."
+            if left
+            else "Something is missing."
+        )
         if best is not None:
             text += f" {best.effect} would take a part of it, but not most."
         return text
@@ -68,7 +77,7 @@ def verdict(
 
 
 def experiment(best: EffectCard, rivals: Sequence[EffectCard]) -> str:
-    """What would separate candidates that this log cannot tell apart."""
+    """Say what would separate candidates that this log cannot tell apart."""
     parts = [f"for {card.id}, {card.confirm}" for card in (best, *rivals) if card.confirm]
     if not parts:
         return "Record a log with another motion, in more attitudes and over a wider range of temperature."

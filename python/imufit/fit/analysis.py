@@ -102,7 +102,19 @@ class Analysis:
         filters = passes.autocovariance(raw, facts, step).filters()
         floors = _floors(log, raw_variance)
         analysis = cls(
-            passes, facts, model, nuisance, candidates, refused, raw, raw, None, raw_variance, raw_variance, floors, filters
+            passes,
+            facts,
+            model,
+            nuisance,
+            candidates,
+            refused,
+            raw,
+            raw,
+            _imufit.Problem(raw, raw, raw_variance, floors),
+            raw_variance,
+            raw_variance,
+            floors,
+            filters,
         )
         return analysis._whitened()
 
@@ -167,14 +179,18 @@ class Analysis:
         return Estimate(values, errors, result["full_step"], result["held_out"], result["training"])
 
     def moved_to(self, estimate: Estimate) -> tuple[SensorModel, dict[str, list[float]]]:
-        """The model and the unnamed effects with estimated parameters."""
+        """Return the model and the unnamed effects with estimated parameters."""
         ids = self.slots
         parameters, errors = {}, {}
         for slot in range(len(self.model.effects)):
             names = [name for name, _, _ in find_effect(ids[slot]).parameters]
             parameters[ids[slot]] = dict(zip(names, map(float, estimate.values[slot]), strict=True))
             errors[ids[slot]] = dict(zip(names, map(float, estimate.errors[slot]), strict=True))
-        nuisance = {ids[slot]: [float(v) for v in estimate.values[slot]] for slot in self.fitted_slots if ids[slot] in self.nuisance}
+        nuisance = {
+            ids[slot]: [float(v) for v in estimate.values[slot]]
+            for slot in self.fitted_slots
+            if ids[slot] in self.nuisance
+        }
         constants = {
             "temperature_mean": self.facts.temperature_mean if self.facts.has_temperature else None,
             "covariate_means": {
@@ -187,7 +203,7 @@ class Analysis:
         return SensorModel(self.model.effects, parameters, constants=kept, standard_errors=errors), nuisance
 
     def converged(self, estimate: Estimate) -> bool:
-        """True if no parameter still moves by more than a tenth of its standard error."""
+        """Return whether no parameter still moves by more than a tenth of its standard error."""
         present = [*(v for _, v in self.model.stack()), *self.nuisance.values()]
         return all(
             bool(np.all(np.abs(estimate.values[slot] - present[slot]) <= 0.1 * estimate.errors[slot]))

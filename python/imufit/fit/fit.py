@@ -35,6 +35,8 @@ class Fit:
         The same on the data of the fit.
     analysis : Analysis
         Evidence of the log around the fitted parameters.
+    estimate : Estimate
+        Parameters, standard errors and held-out error that the evidence gives.
     """
 
     def __init__(self, analysis: Analysis, estimate: Estimate) -> None:
@@ -46,11 +48,27 @@ class Fit:
 
     @classmethod
     def of(cls, model: SensorModel, log: LogSource, progress: Progress | None = None) -> Fit:
-        """Fit a model to a log; see :meth:`imufit.SensorModel.fit`."""
+        """Fit a model to a log; see :meth:`imufit.SensorModel.fit`.
+
+        Parameters
+        ----------
+        model : SensorModel
+            Effects, and the values to start from.
+        log : Log or LogStream
+            With reference attitude.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+        """
         return cls(*Analysis.of(model, log, progress or silent).solved())
 
     def moved(self, model: SensorModel) -> Fit:
-        """Fit another stack of effects to the same log, starting from this one's values."""
+        """Fit another stack of effects to the same log, starting from this one's values.
+
+        Parameters
+        ----------
+        model : SensorModel
+            The other stack.
+        """
         return Fit(*self.analysis.around(model, self.unnamed).solved())
 
     @property
@@ -85,7 +103,12 @@ class Fit:
     def diagnose(self, log: LogSource | None = None, progress: Progress | None = None) -> Diagnosis:
         """Say which effect is missing from the model, judged on a log (default: its own); fitted parameters move along.
 
-        Parameters and errors as for :meth:`compare`.
+        Parameters
+        ----------
+        log : Log or LogStream, optional
+            With reference attitude.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
         """
         from imufit.diagnose.diagnose import diagnose  # noqa: PLC0415
 
@@ -118,13 +141,27 @@ class Fit:
         return add(self.on(log, progress or silent), effect)
 
     def on(self, log: LogSource | None, progress: Progress) -> Fit:
-        """This fit if `log` is its own log, else the model refitted to `log`."""
+        """Return this fit if `log` is its own log, else the model refitted to `log`.
+
+        Parameters
+        ----------
+        log : Log or LogStream, optional
+            The log in question; None is its own.
+        progress : callable
+            Called with (rows done, rows in all, what is being done).
+        """
         if log is None or log is self.log:
             return self
         return Fit.of(self.model, log, progress)
 
     def save(self, path: str | Path) -> None:
-        """Write the fitted model as a TOML file."""
+        """Write the fitted model as a TOML file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that exists is replaced.
+        """
         self.model.save(path)
 
     def to_dict(self) -> dict[str, Any]:

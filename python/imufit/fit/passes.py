@@ -33,7 +33,7 @@ def covariate_names(log: LogSource) -> list[str]:
 
 
 def chunk_arrays(chunk: Chunk, covariates: Sequence[str]) -> dict[str, Any]:
-    """A chunk as the compiled core takes it."""
+    """Return a chunk as the compiled core takes it."""
     log = chunk.log
     return {
         "t": log.t,
@@ -83,7 +83,9 @@ class Passes:
         """
         log, metadata = self.log, self.log.metadata
         if log.n < MIN_ROWS:
-            raise InputError(f"{log.n} rows are too few for a fit", file=log.path, remedy=f"Record at least {MIN_ROWS}.")
+            raise InputError(
+                f"{log.n} rows are too few for a fit", file=log.path, remedy=f"Record at least {MIN_ROWS}."
+            )
         survey = _imufit.Survey(
             log.n,
             metadata.frame,

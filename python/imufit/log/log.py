@@ -119,11 +119,23 @@ class Log:
         return np.zeros(self.n, np.bool_) if self.ref_q is None else ~np.isnan(self.ref_q[:, 0])
 
     def rows(self, start: int, stop: int) -> Self:
-        """Rows ``start <= row < stop`` as views on the same memory."""
+        """Rows ``start <= row < stop`` as views on the same memory.
+
+        Parameters
+        ----------
+        start, stop : int
+            First row, and the row after the last one, counted from 0.
+        """
         return self._picked(slice(start, stop))
 
     def select(self, mask: NDArray[np.bool_]) -> Self:
-        """Rows at which the (n,) mask is true, copied."""
+        """Rows at which the (n,) mask is true, copied.
+
+        Parameters
+        ----------
+        mask : ndarray of bool
+            (n,), true where a row is kept.
+        """
         mask = np.asarray(mask)
         if mask.dtype != np.bool_ or mask.shape != (self.n,):
             raise ValueError(f"mask has shape {mask.shape} and type {mask.dtype}; ({self.n},) and bool are wanted")
@@ -138,7 +150,13 @@ class Log:
         return replace(self, **picked, covariates=covariates, labels=labels)
 
     def with_reference(self, rotation: Rotation) -> Self:
-        """Return the log with another reference attitude: n rotations, body to reference frame."""
+        """Return the log with another reference attitude: n rotations, body to reference frame.
+
+        Parameters
+        ----------
+        rotation : scipy.spatial.transform.Rotation
+            n rotations, one for each row.
+        """
         return replace(self, ref_q=quaternions_from_rotation(rotation))
 
     def table(self) -> dict[str, NDArray[Any]]:
@@ -164,6 +182,11 @@ class Log:
 
         Reading it again gives the same log to the last bit, metadata included. CSV and NPZ have a sidecar
         ``NAME.toml`` for the metadata.
+
+        Parameters
+        ----------
+        path : str or Path
+            Ending in ``.parquet``, ``.npz`` or ``.csv``.
         """
         path = Path(path)
         suffix = path.suffix.lower()
@@ -180,7 +203,15 @@ class Log:
             raise InputError(f"{path} cannot be written ({error.strerror or error})", file=path) from None
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:
-        """Cut the log into chunks of `rows` rows with up to `margin` rows more on either side."""
+        """Cut the log into chunks of `rows` rows with up to `margin` rows more on either side.
+
+        Parameters
+        ----------
+        rows : int
+            Rows of a chunk's core.
+        margin : int
+            Rows of context on either side, fewer at the ends of the log.
+        """
         check_chunk_size(rows, margin)
         for start in range(0, self.n, rows):
             stop = min(start + rows, self.n)
@@ -325,7 +356,15 @@ class LogSource(Protocol):
         ...
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:
-        """Cut into chunks of `rows` rows with up to `margin` rows more on either side."""
+        """Cut into chunks of `rows` rows with up to `margin` rows more on either side.
+
+        Parameters
+        ----------
+        rows : int
+            Rows of a chunk's core.
+        margin : int
+            Rows of context on either side, fewer at the ends of the log.
+        """
         ...
 
 
@@ -336,7 +375,13 @@ def check_chunk_size(rows: int, margin: int) -> None:
 
 
 def concatenate(logs: Sequence[Log]) -> Log:
-    """Join parts of one log, in order; all have the same columns."""
+    """Join parts of one log, in order; all have the same columns.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        The parts; each begins after the one before it ends.
+    """
     first = logs[0]
     if len(logs) == 1:
         return first

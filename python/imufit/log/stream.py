@@ -101,7 +101,15 @@ class LogStream:
             yield Log(**fields, metadata=self._metadata, path=self._path)
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:
-        """Cut into chunks of `rows` rows with up to `margin` rows more on either side."""
+        """Cut into chunks of `rows` rows with up to `margin` rows more on either side.
+
+        Parameters
+        ----------
+        rows : int
+            Rows of a chunk's core.
+        margin : int
+            Rows of context on either side, fewer at the ends of the log.
+        """
         check_chunk_size(rows, margin)
         for chunk in _cut(self.pieces(), rows, margin):
             yield replace(chunk, log=replace(chunk.log, notes=self._notes))

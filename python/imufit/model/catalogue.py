@@ -28,7 +28,12 @@ def column_effects(names: Iterable[str], sensors: Iterable[str]) -> dict[str, _i
 
 
 def find_effect(effect_id: str) -> _imufit.Effect:
-    """The effect with this id.
+    """Return the effect with this id.
+
+    Parameters
+    ----------
+    effect_id : str
+        Id such as ``gyr.g_sensitivity``.
 
     Raises
     ------
@@ -44,7 +49,7 @@ def find_effect(effect_id: str) -> _imufit.Effect:
 
 
 def card_of(effect: _imufit.Effect) -> EffectCard:
-    """The card of an effect."""
+    """Return the card of an effect."""
     sensors = effect.sensors
     return EffectCard(
         id=effect.id,
@@ -60,7 +65,12 @@ def catalogue() -> list[EffectCard]:
 
 
 def explain(effect_id: str) -> EffectCard:
-    """The card of one effect: physics, formula, typical size, signature, rivals, the experiment that confirms it.
+    """Return the card of one effect: physics, formula, typical size, signature, rivals, what confirms it.
+
+    Parameters
+    ----------
+    effect_id : str
+        Id such as ``gyr.g_sensitivity``.
 
     Raises
     ------
@@ -72,6 +82,11 @@ def explain(effect_id: str) -> EffectCard:
 
 def load_effects(path: str | Path) -> list[str]:
     """Run a Python file that defines effects with ``@imufit.effect``; return the ids it added.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file. It is run: load only what you trust.
 
     Raises
     ------

@@ -35,7 +35,7 @@ class Window:
     f, m : ndarray
         (n, 3) ideal specific force, m/s^2, and magnetic flux density, uT.
     x : ndarray
-        (n, 3) the quantity that the effect's stage acts on: the sensor's ideal reading plus earlier effects of the model.
+        (n, 3) what the effect's stage acts on: the sensor's ideal reading plus earlier effects of the model.
     temperature : ndarray or None
         (n,) sensor temperature less its mean over the log, K.
     columns : mapping of str to ndarray
@@ -54,6 +54,11 @@ class Window:
 
     def column(self, name: str) -> Array:
         """One of the log's own columns, (n,).
+
+        Parameters
+        ----------
+        name : str
+            Name of the column.
 
         Raises
         ------
@@ -84,7 +89,7 @@ def effect(
     confirm: str = "",
     stage: str = "offset",
 ) -> Callable[[F], F]:
-    """Make an effect out of a function that returns d reading / d parameters; it is then fitted and ranked like the built-in ones.
+    """Make an effect out of a function that returns d reading / d parameters, fitted and ranked like a built-in one.
 
     Parameters
     ----------
@@ -121,7 +126,9 @@ def effect(
     if not re.fullmatch(r"[A-Za-z]\w*\.[A-Za-z]\w*", effect_id):
         raise InputError(f"effect id {effect_id!r} is not SENSOR.NAME", remedy="Write for instance gyr.fan.")
     if prefix not in SENSORS:
-        raise InputError(f"effect {effect_id}: sensor {prefix!r} is unknown", remedy=f"Use one of {', '.join(SENSORS)}.")
+        raise InputError(
+            f"effect {effect_id}: sensor {prefix!r} is unknown", remedy=f"Use one of {', '.join(SENSORS)}."
+        )
     if _imufit.find_effect(effect_id) is not None:
         raise InputError(f"effect {effect_id} is built in", remedy="Choose another name.")
     units = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters, "1")

@@ -91,7 +91,12 @@ class SensorModel:
         )
 
     def with_effect(self, effect_id: str) -> SensorModel:
-        """The same model with one more effect, its parameters zero.
+        """Return the same model with one more effect, its parameters zero.
+
+        Parameters
+        ----------
+        effect_id : str
+            Id such as ``gyr.g_sensitivity``.
 
         Raises
         ------
@@ -127,7 +132,13 @@ class SensorModel:
         return Fit.of(self, log, progress)
 
     def save(self, path: str | Path) -> None:
-        """Write the model as a TOML file."""
+        """Write the model as a TOML file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that exists is replaced.
+        """
         document: dict[str, Any] = {"kind": KIND, "format": FORMAT, "effects": list(self.effects)}
         if self.constants:
             document["constants"] = self.constants
@@ -143,6 +154,11 @@ class SensorModel:
     def load(cls, path: str | Path) -> SensorModel:
         """Read a model from its TOML file.
 
+        Parameters
+        ----------
+        path : str or Path
+            A file that :meth:`save` wrote, or one written by hand in its form.
+
         Raises
         ------
         InputError
@@ -152,7 +168,9 @@ class SensorModel:
         try:
             document = tomllib.loads(file.read_text(encoding="utf-8"))
         except OSError as error:
-            raise InputError(f"the model cannot be read ({error.strerror})", file=file, remedy="Check the name.") from None
+            raise InputError(
+                f"the model cannot be read ({error.strerror})", file=file, remedy="Check the name."
+            ) from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise InputError(f"this is no TOML: {error}", file=file) from None
         if document.get("kind") != KIND:
@@ -191,7 +209,7 @@ def _values(effect: _imufit.Effect, given: Mapping[str, float]) -> list[float]:
 
 
 def model_of(ids: Iterable[str], like: SensorModel) -> SensorModel:
-    """A model of the effects `ids` with the parameters and constants of another where it has them."""
+    """Return a model of the effects `ids` with the parameters and constants of another where it has them."""
     chosen = list(ids)
     kept = {key: values for key, values in like.parameters.items() if key in chosen}
     return SensorModel(chosen, kept, constants=like.constants)

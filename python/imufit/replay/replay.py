@@ -90,11 +90,23 @@ class Replay:
     mag_reference: Array | None = None
 
     def rotation(self, name: str) -> Rotation:
-        """Attitude of one filter as n scipy rotations, body to reference frame; rows before the start are NaN."""
+        """Attitude of one filter as n scipy rotations, body to reference frame; rows before the start are NaN.
+
+        Parameters
+        ----------
+        name : str
+            The filter.
+        """
         return Rotation.from_quat(self._of(name)[:, [1, 2, 3, 0]])
 
     def euler(self, name: str) -> Array:
-        """Roll, pitch, yaw of one filter, (n, 3), rad: ``R = Rz(yaw) Ry(pitch) Rx(roll)``, roll 0 at gimbal lock."""
+        """Roll, pitch, yaw of one filter, (n, 3), rad: ``R = Rz(yaw) Ry(pitch) Rx(roll)``, roll 0 at gimbal lock.
+
+        Parameters
+        ----------
+        name : str
+            The filter.
+        """
         return _imufit.euler_from_quaternion(self._of(name))
 
     def _of(self, name: str) -> Array:
@@ -115,6 +127,11 @@ class Replay:
         """Errors of one filter row by row, (n, 6), rad: total, heading, inclination, roll, pitch, yaw.
 
         NaN on rows without an attitude or a reference; for a log without a reference all rows.
+
+        Parameters
+        ----------
+        name : str
+            The filter.
         """
         q = self._of(name)
         ref = np.full_like(q, np.nan) if self.log.ref_q is None else self.log.ref_q
@@ -218,6 +235,11 @@ def estimate_mag_reference(log: Log) -> Array | None:
 
     None where the log has no reference or no magnetometer, or where the mean has no horizontal part. The mean includes
     the magnetometer's own bias and disturbances as far as the log's attitudes do not average them out.
+
+    Parameters
+    ----------
+    log : Log
+        With reference attitude and magnetometer.
     """
     if log.ref_q is None or log.mag is None:
         return None

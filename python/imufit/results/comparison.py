@@ -279,7 +279,13 @@ class Comparison:
         return Table("Residual by channel (measured - modelled)", header, rows)
 
     def where_table(self, limit: int = 10) -> Table:
-        """Covariates that explain the excess."""
+        """Covariates that explain the excess.
+
+        Parameters
+        ----------
+        limit : int
+            Rows at most.
+        """
         rows = tuple(
             (item.channel, item.covariate, quantity.share(item.share), quantity.span(item.t_start, item.t_end))
             for item in self.where[:limit]
@@ -287,7 +293,13 @@ class Comparison:
         return Table("What the excess depends on", ("channel", "covariate", ">share", ">mostly at"), rows)
 
     def segment_table(self, limit: int = 5) -> Table:
-        """Worst segments."""
+        """Worst segments.
+
+        Parameters
+        ----------
+        limit : int
+            Rows at most.
+        """
         rows = tuple(
             (quantity.span(t_start, t_end), channel, quantity.ratio(ratio))
             for t_start, t_end, channel, ratio in self.segments[:limit]

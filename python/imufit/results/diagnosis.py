@@ -257,7 +257,13 @@ class Diagnosis:
         )
 
     def candidate_table(self, limit: int = 10) -> Table:
-        """Ranked candidates in shown units."""
+        """Ranked candidates in shown units.
+
+        Parameters
+        ----------
+        limit : int
+            Rows at most.
+        """
         rows = tuple(
             (
                 item.effect,

@@ -13,7 +13,17 @@ Mark = Literal["right", "named among rivals", "wrong", "missed", "false alarm"]
 
 @dataclass(frozen=True)
 class ParameterGrade:
-    """One parameter: its true value, the estimate and its standard error, None where the answer has none."""
+    """One parameter of an effect, the truth beside the answer; SI units.
+
+    Attributes
+    ----------
+    effect, name : str
+        The effect and its parameter.
+    truth : float
+        The true value.
+    estimate, standard_error : float or None
+        As answered; None where the answer has none.
+    """
 
     effect: str
     name: str

@@ -63,13 +63,31 @@ class Injection:
     vibration: bool = False
 
     def direction(self, rng: np.random.Generator, run: Run) -> dict[str, float]:
-        """Draw parameters of about typical size and either sign, none of them negligible."""
+        """Draw parameters of about typical size and either sign, none of them negligible.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of randomness.
+        run : Run
+            The log for which the effect is set up.
+        """
         signs = np.ones(len(self.typical)) if self.positive else rng.choice([-1.0, 1.0], len(self.typical))
         drawn = rng.uniform(0.4, 1.0, len(self.typical)) * signs * list(self.typical.values())
         return dict(zip(self.typical, drawn.tolist(), strict=True)) | self.inner(rng, run)
 
     def scaled(self, direction: Parameters, factor: float, peak: float) -> dict[str, float]:
-        """Return parameters with an effect about `factor` times as strong; `peak` is the largest ideal reading."""
+        """Return parameters with an effect about `factor` times as strong; `peak` is the largest ideal reading.
+
+        Parameters
+        ----------
+        direction : mapping of str to float
+            Parameters as `direction` drew them, SI units.
+        factor : float
+            Times as strong.
+        peak : float
+            Largest ideal reading, in the sensor's unit.
+        """
         if self.stage == "range":
             return {"range": peak / (1.0 + 0.01 * factor)}
         return {name: value * factor if name in self.typical else value for name, value in direction.items()}
@@ -271,7 +289,13 @@ INJECTIONS: Mapping[str, Injection] = {
 
 
 def injection(effect: str) -> Injection:
-    """Return the injection for an effect's name, among them `acc.column:NAME`, `gyr.column:NAME`, `mag.column:NAME`."""
+    """Return the injection for an effect's name, among them `acc.column:NAME`, `gyr.column:NAME`, `mag.column:NAME`.
+
+    Parameters
+    ----------
+    effect : str
+        Its id.
+    """
     if effect in INJECTIONS:
         return INJECTIONS[effect]
     prefix, _, column = effect.partition(":")

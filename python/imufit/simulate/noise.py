@@ -32,7 +32,15 @@ class SensorNoise:
     resolution: float = 0.0
 
     def draw(self, rng: np.random.Generator, t: Array) -> Array:
-        """Return noise (n, 3) for samples at times `t` (s), without the rounding."""
+        """Return noise (n, 3) for samples at times `t` (s), without the rounding.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of randomness.
+        t : ndarray
+            (n,) times, s.
+        """
         noise = self.white * rng.standard_normal((t.size, 3))
         gaps = np.diff(t, prepend=t[0])
         if self.coloured > 0.0:
@@ -46,7 +54,13 @@ class SensorNoise:
         return noise
 
     def rounded(self, reading: Array) -> Array:
-        """Return the reading as the sensor's digits show it."""
+        """Return the reading as the sensor's digits show it.
+
+        Parameters
+        ----------
+        reading : ndarray
+            (n, 3) readings, in the sensor's unit.
+        """
         return reading if self.resolution == 0.0 else np.round(reading / self.resolution) * self.resolution
 
 
@@ -109,7 +123,13 @@ class Noise:
         )
 
     def sensor(self, name: str) -> SensorNoise:
-        """Return the noise of sensor `name`: "acc", "gyr" or "mag"."""
+        """Return the noise of sensor `name`: "acc", "gyr" or "mag".
+
+        Parameters
+        ----------
+        name : str
+            "acc", "gyr" or "mag".
+        """
         return {"acc": self.acc, "gyr": self.gyr, "mag": self.mag}[name]
 
     def white(self) -> dict[str, float]:

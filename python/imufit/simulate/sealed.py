@@ -38,7 +38,13 @@ class Truth:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Truth:
-        """Return the truth written by `to_json`."""
+        """Return the truth written by `to_json`.
+
+        Parameters
+        ----------
+        data : mapping
+            The JSON object.
+        """
         return cls(
             scenario=str(data["scenario"]),
             seed=int(data["seed"]),
@@ -49,13 +55,27 @@ class Truth:
 
 
 def sealed_path(log_path: str | Path) -> Path:
-    """Return where the truth of a log is kept: beside it, with `.sealed` added to its name."""
+    """Return where the truth of a log is kept: beside it, with `.sealed` added to its name.
+
+    Parameters
+    ----------
+    log_path : str or Path
+        Where the log is.
+    """
     path = Path(log_path)
     return path.with_name(path.name + ".sealed")
 
 
 def seal(truth: Truth, log_path: str | Path) -> Path:
-    """Write `truth` beside the log `log_path`, unreadable at a glance, and return the path of what was written."""
+    """Write `truth` beside the log `log_path`, unreadable at a glance, and return the path of what was written.
+
+    Parameters
+    ----------
+    truth : Truth
+        What was done to the log.
+    log_path : str or Path
+        Where the log is.
+    """
     packed = base64.b64encode(zlib.compress(json.dumps(truth.to_json()).encode(), 9)).decode()
     lines = [packed[i : i + 76] for i in range(0, len(packed), 76)]
     path = sealed_path(log_path)
@@ -65,6 +85,11 @@ def seal(truth: Truth, log_path: str | Path) -> Path:
 
 def unseal(log_path: str | Path) -> Truth:
     """Return the truth of the log `log_path`.
+
+    Parameters
+    ----------
+    log_path : str or Path
+        Where the log is.
 
     Raises
     ------

@@ -99,7 +99,8 @@ def simulate(
     frame : reference frame: "NED", "ENU" or "NWU".
     sensors : which of "acc", "gyr", "mag", "temp" the log has.
     covariates : further columns, such as "motor_current" and "vbat"; those that an effect needs are there anyhow.
-    noise : random errors; default white noise, or those of `Noise.realistic()` if `realistic`.
+    noise : random errors; default white noise.
+    realistic : whether the default is `Noise.realistic()` instead.
     rig_axis : axis of a one-axis rig: "x", "y" or "z".
     noise_in_metadata : whether the metadata tells the white noise.
 

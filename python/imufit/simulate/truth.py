@@ -68,7 +68,13 @@ class Kinematics:
     acceleration: Array
 
     def displaced(self, r: Array) -> Kinematics:
-        """Return the motion of the point of this rigid body at `r` (3,), body frame, m."""
+        """Return the motion of the point of this rigid body at `r` (3,), body frame, m.
+
+        Parameters
+        ----------
+        r : ndarray
+            (3,) the point, body frame, m.
+        """
         swing = np.cross(self.omega, r)
         return replace(
             self,
@@ -78,7 +84,13 @@ class Kinematics:
         )
 
     def mounted(self, mount: Array) -> Kinematics:
-        """Return the motion of a body frame fixed to this one and turned by `mount` (3, 3), its axes to this body's."""
+        """Return the motion of a body frame fixed to this one and turned by `mount` (3, 3), its axes to this body's.
+
+        Parameters
+        ----------
+        mount : ndarray
+            (3, 3) rotation from the new frame's axes to this body's.
+        """
         return replace(
             self,
             rotation=self.rotation @ mount,
@@ -87,7 +99,13 @@ class Kinematics:
         )
 
     def carried(self, base: Array) -> Kinematics:
-        """Return the same motion done on a base that is turned by `base` (3, 3) in the reference frame."""
+        """Return the same motion done on a base that is turned by `base` (3, 3) in the reference frame.
+
+        Parameters
+        ----------
+        base : ndarray
+            (3, 3) rotation of the base, reference frame.
+        """
         return replace(
             self,
             rotation=base @ self.rotation,
@@ -97,11 +115,23 @@ class Kinematics:
         )
 
     def specific_force(self, gravity: Array) -> Array:
-        """Return R^T (a - g), shape (n, 3), body frame, m/s^2, for the gravity vector (3,) in the reference frame."""
+        """Return R^T (a - g), shape (n, 3), body frame, m/s^2, for the gravity vector (3,) in the reference frame.
+
+        Parameters
+        ----------
+        gravity : ndarray
+            (3,) gravity, reference frame, m/s^2.
+        """
         return turn_back(self.rotation, self.acceleration - gravity)
 
     def flux_density(self, field: Array) -> Array:
-        """Return R^T m, shape (n, 3), body frame, for the field vector (3,) in the reference frame (uT)."""
+        """Return R^T m, shape (n, 3), body frame, for the field vector (3,) in the reference frame (uT).
+
+        Parameters
+        ----------
+        field : ndarray
+            (3,) magnetic field, reference frame, uT.
+        """
         return turn_back(self.rotation, field)
 
 
@@ -204,7 +234,13 @@ class Trajectory:
     rig_axis: int | None = field(default=None)
 
     def at(self, t: Array) -> Kinematics:
-        """Return the exact motion at times `t` (s), shape (n,); any time is allowed."""
+        """Return the exact motion at times `t` (s), shape (n,); any time is allowed.
+
+        Parameters
+        ----------
+        t : ndarray
+            (n,) times, s.
+        """
         still = np.zeros((t.size, 3))
         body = Turning(np.broadcast_to(np.eye(3), (t.size, 3, 3)), still, still)
         position, velocity, acceleration = (
@@ -224,7 +260,13 @@ class Trajectory:
         return last if self.rig_axis is not None and isinstance(last, Joint) else None
 
     def with_rig_angle(self, angle: Signal) -> Trajectory:
-        """Return the rig's motion when its axis really follows `angle` instead of the commanded one."""
+        """Return the rig's motion when its axis really follows `angle` instead of the commanded one.
+
+        Parameters
+        ----------
+        angle : callable
+            The angle, rad, as a signal of time.
+        """
         joint = self.rig_joint
         if joint is None:
             raise ValueError("this motion is not that of a one-axis rig: use the scenario 'tilt'")

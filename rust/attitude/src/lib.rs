@@ -3,7 +3,7 @@
 //! One convention everywhere: `q_nb` (Hamilton, scalar first) and `r_nb` take body vectors into the reference frame,
 //! `x_n = r_nb x_b`, and rotations compose like matrices: `q_nc = q_nb * q_bc`. Angles are in radians.
 //! The symbols follow the paper on TRIAD with the nonlinear complementary filter (paper C of the documentation).
-#![cfg_attr(test, allow(clippy::unwrap_used, clippy::float_cmp))]
+#![cfg_attr(test, allow(clippy::float_cmp))]
 
 pub mod attitude_error;
 pub mod euler;

@@ -11,7 +11,7 @@
 //!
 //! A filter sees one [`Sample`] at a time and never a time stamp or a value that is not finite: gaps, NaN, free fall and
 //! slow sensors are the business of [`replay`] alone.
-#![cfg_attr(test, allow(clippy::unwrap_used, clippy::float_cmp))]
+#![cfg_attr(test, allow(clippy::float_cmp))]
 
 pub mod accel;
 pub mod complementary;

@@ -11,7 +11,17 @@ const NEAR: f64 = 4.0;
 const CROWDED: f64 = 0.04;
 
 /// Covariates that every log has, before the log's own columns.
-const FIXED: [&str; 9] = ["t", "temp", "f_x", "f_y", "f_z", "omega_x", "omega_y", "omega_z", "omega_norm"];
+const FIXED: [&str; 9] = [
+    "t",
+    "temp",
+    "f_x",
+    "f_y",
+    "f_z",
+    "omega_x",
+    "omega_y",
+    "omega_z",
+    "omega_norm",
+];
 
 /// Edges of the bins of every covariate.
 #[derive(Clone, Debug)]
@@ -25,7 +35,11 @@ pub struct Bins {
 impl Bins {
     /// Names of the covariates of a log with these columns of its own.
     pub fn covariate_names(own: &[String]) -> Vec<String> {
-        FIXED.iter().map(|s| (*s).to_string()).chain(own.iter().cloned()).collect()
+        FIXED
+            .iter()
+            .map(|s| (*s).to_string())
+            .chain(own.iter().cloned())
+            .collect()
     }
 
     /// Unit of a covariate; empty for the log's own columns.
@@ -72,7 +86,10 @@ impl Bins {
                 edges
             })
             .collect();
-        Self { names: Self::covariate_names(own), edges }
+        Self {
+            names: Self::covariate_names(own),
+            edges,
+        }
     }
 
     /// Bin of each row for one covariate; `usize::MAX` where the covariate is not known.
@@ -81,7 +98,11 @@ impl Bins {
         let ideal = &evaluation.ideal;
         let edges = &self.edges[covariate];
         let mut put = |v: f64| {
-            out.push(if v.is_finite() { edges.partition_point(|e| *e <= v) } else { usize::MAX });
+            out.push(if v.is_finite() {
+                edges.partition_point(|e| *e <= v)
+            } else {
+                usize::MAX
+            });
         };
         match covariate {
             0 => t.iter().for_each(|v| put(*v)),
@@ -93,7 +114,9 @@ impl Bins {
             2..=4 => ideal.f.axis(covariate - 2).iter().for_each(|v| put(*v)),
             5..=7 => ideal.omega.axis(covariate - 5).iter().for_each(|v| put(*v)),
             8 => (0..t.len()).for_each(|i| put(ideal.omega.row(i).norm())),
-            _ => evaluation.covariates[covariate - FIXED.len()].iter().for_each(|v| put(*v)),
+            _ => evaluation.covariates[covariate - FIXED.len()]
+                .iter()
+                .for_each(|v| put(*v)),
         }
     }
 

@@ -70,8 +70,16 @@ impl ChannelBlock {
             n: 0,
             gram: DMatrix::zeros(width, width),
             sum: DVector::zeros(width),
-            bin_count: bins.edges.iter().map(|e| vec![0.0; if e.is_empty() { 0 } else { e.len() + 1 }]).collect(),
-            bin_sum: bins.edges.iter().map(|e| vec![0.0; if e.is_empty() { 0 } else { (e.len() + 1) * width }]).collect(),
+            bin_count: bins
+                .edges
+                .iter()
+                .map(|e| vec![0.0; if e.is_empty() { 0 } else { e.len() + 1 }])
+                .collect(),
+            bin_sum: bins
+                .edges
+                .iter()
+                .map(|e| vec![0.0; if e.is_empty() { 0 } else { (e.len() + 1) * width }])
+                .collect(),
         }
     }
 
@@ -79,7 +87,12 @@ impl ChannelBlock {
         self.n += other.n;
         self.gram += &other.gram;
         self.sum += &other.sum;
-        for (a, b) in self.bin_count.iter_mut().zip(&other.bin_count).chain(self.bin_sum.iter_mut().zip(&other.bin_sum)) {
+        for (a, b) in self
+            .bin_count
+            .iter_mut()
+            .zip(&other.bin_count)
+            .chain(self.bin_sum.iter_mut().zip(&other.bin_sum))
+        {
             for (x, y) in a.iter_mut().zip(b) {
                 *x += y;
             }
@@ -114,10 +127,14 @@ pub struct Samples {
 impl Samples {
     /// Usable samples of one sensor.
     pub fn new(sensor: Sensor, evaluation: &Evaluation, t: &[f64], dt: f64) -> Self {
-        let channels: Vec<_> =
-            (0..3).filter_map(|axis| evaluation.channels[3 * sensor.index() + axis].as_ref()).collect();
+        let channels: Vec<_> = (0..3)
+            .filter_map(|axis| evaluation.channels[3 * sensor.index() + axis].as_ref())
+            .collect();
         let mut usable = vec![channels.len() == 3; t.len()];
-        for column in channels.iter().flat_map(|c| c.columns.iter().chain(std::iter::once(&c.residual))) {
+        for column in channels
+            .iter()
+            .flat_map(|c| c.columns.iter().chain(std::iter::once(&c.residual)))
+        {
             for (u, v) in usable.iter_mut().zip(column) {
                 *u &= v.is_finite();
             }
@@ -125,7 +142,11 @@ impl Samples {
         let rows: Vec<usize> = (0..t.len()).filter(|i| usable[*i]).collect();
         let mut run = vec![0; rows.len()];
         for k in 1..rows.len() {
-            run[k] = if t[rows[k]] - t[rows[k - 1]] <= GAP * dt { run[k - 1] + 1 } else { 0 };
+            run[k] = if t[rows[k]] - t[rows[k - 1]] <= GAP * dt {
+                run[k - 1] + 1
+            } else {
+                0
+            };
         }
         Self { rows, run }
     }
@@ -141,7 +162,10 @@ impl Samples {
 impl Evidence {
     /// Empty evidence.
     pub fn new(layout: Arc<Layout>) -> Self {
-        Self { layout, blocks: Blocks::new() }
+        Self {
+            layout,
+            blocks: Blocks::new(),
+        }
     }
 
     /// Adds the core rows of a window. Rows before them are used as past of the whitening filter.
@@ -150,7 +174,12 @@ impl Evidence {
         let layout = &self.layout;
         let parts: Vec<Result<Blocks, EffectError>> = starts
             .into_par_iter()
-            .map(|begin| take(layout, &window.part(begin, (begin + PART).min(window.end), layout.facts.margin())))
+            .map(|begin| {
+                take(
+                    layout,
+                    &window.part(begin, (begin + PART).min(window.end), layout.facts.margin()),
+                )
+            })
             .collect();
         // Summed in the order of time, so that the result does not depend on the number of threads.
         for part in parts {
@@ -182,13 +211,20 @@ impl Evidence {
 
     /// Number of samples of a channel.
     pub fn count(&self, channel: usize) -> usize {
-        (0..self.layout.blocks).filter_map(|b| self.get(b, channel)).map(|b| b.n).sum()
+        (0..self.layout.blocks)
+            .filter_map(|b| self.get(b, channel))
+            .map(|b| b.n)
+            .sum()
     }
 }
 
 /// Evidence of one part of a window.
 fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
-    let back = if layout.filters.iter().any(|f| !f.is_empty()) { LOOKBACK } else { 0 };
+    let back = if layout.filters.iter().any(|f| !f.is_empty()) {
+        LOOKBACK
+    } else {
+        0
+    };
     let core = window.begin;
     let window = window.with_core(core.saturating_sub(back), window.end);
     let evaluation = layout.model.evaluate(&window, &layout.facts)?;
@@ -202,7 +238,10 @@ fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
     let mut out = Blocks::new();
     let (mut by_column, mut by_row) = (Vec::new(), Vec::new());
     for sensor in Sensor::ALL {
-        let order = (0..3).map(|a| layout.filters[3 * sensor.index() + a].len()).max().unwrap_or(0);
+        let order = (0..3)
+            .map(|a| layout.filters[3 * sensor.index() + a].len())
+            .max()
+            .unwrap_or(0);
         let samples = Samples::new(sensor, &evaluation, t, layout.facts.sensor_dt[sensor.index()]);
         let kept: Vec<usize> = samples.with_past(core - window.begin, order).collect();
         if kept.is_empty() {
@@ -210,14 +249,18 @@ fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
         }
         let row_of = |k: usize| window.offset + window.begin + samples.rows[k];
         for channel in 3 * sensor.index()..3 * sensor.index() + 3 {
-            let Some(columns) = &evaluation.channels[channel] else { continue };
+            let Some(columns) = &evaluation.channels[channel] else {
+                continue;
+            };
             let width = columns.columns.len() + 1;
             let n = kept.len();
             by_column.clear();
             let filter = &layout.filters[channel];
             for column in columns.columns.iter().chain(std::iter::once(&columns.residual)) {
                 by_column.extend(kept.iter().map(|&k| {
-                    filter.iter().enumerate().fold(column[samples.rows[k]], |v, (j, a)| v - a * column[samples.rows[k - 1 - j]])
+                    filter.iter().enumerate().fold(column[samples.rows[k]], |v, (j, a)| {
+                        v - a * column[samples.rows[k - 1 - j]]
+                    })
                 }));
             }
             by_row.clear();
@@ -232,7 +275,9 @@ fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
                 let block = layout.block(row_of(kept[first]));
                 let next = layout.block_start(block + 1);
                 let last = first + kept[first..].partition_point(|k| row_of(*k) < next || block + 1 == layout.blocks);
-                let target = out.entry((block, channel)).or_insert_with(|| ChannelBlock::new(width, &layout.bins));
+                let target = out
+                    .entry((block, channel))
+                    .or_insert_with(|| ChannelBlock::new(width, &layout.bins));
                 target.n += last - first;
                 let rows = DMatrixView::from_slice(&by_row[first * width..last * width], width, last - first);
                 let columns = DMatrixView::from_slice_with_strides(&by_column[first..], last - first, width, 1, n);

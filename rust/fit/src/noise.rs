@@ -19,7 +19,10 @@ pub struct Autocovariance {
 
 impl Default for Autocovariance {
     fn default() -> Self {
-        Self { sums: vec![[0.0; MAX_ORDER + 1]; CHANNELS], counts: vec![[0; MAX_ORDER + 1]; CHANNELS] }
+        Self {
+            sums: vec![[0.0; MAX_ORDER + 1]; CHANNELS],
+            counts: vec![[0; MAX_ORDER + 1]; CHANNELS],
+        }
     }
 }
 
@@ -33,7 +36,9 @@ impl Autocovariance {
         for sensor in Sensor::ALL {
             let samples = Samples::new(sensor, &evaluation, t, layout.facts.sensor_dt[sensor.index()]);
             for channel in 3 * sensor.index()..3 * sensor.index() + 3 {
-                let Some(columns) = &evaluation.channels[channel] else { continue };
+                let Some(columns) = &evaluation.channels[channel] else {
+                    continue;
+                };
                 let residual = columns.residual_after(&layout.model.active()[channel], step);
                 for k in samples.with_past(core - window.begin, 0) {
                     let now = residual[samples.rows[k]];
@@ -52,7 +57,11 @@ impl Autocovariance {
 
     /// Autocovariance of a channel, lag 0 first, and its number of samples.
     pub fn of_channel(&self, channel: usize) -> (Vec<f64>, usize) {
-        let values = self.sums[channel].iter().zip(&self.counts[channel]).map(|(s, n)| s / (*n).max(1) as f64).collect();
+        let values = self.sums[channel]
+            .iter()
+            .zip(&self.counts[channel])
+            .map(|(s, n)| s / (*n).max(1) as f64)
+            .collect();
         (values, self.counts[channel][0])
     }
 }

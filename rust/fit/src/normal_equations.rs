@@ -29,7 +29,12 @@ const RIDGE: f64 = 1e-10;
 impl NormalEquations {
     /// Zero equations of `p` parameters.
     pub fn zeros(p: usize) -> Self {
-        Self { gram: DMatrix::zeros(p, p), right: DVector::zeros(p), square: 0.0, n: 0.0 }
+        Self {
+            gram: DMatrix::zeros(p, p),
+            right: DVector::zeros(p),
+            square: 0.0,
+            n: 0.0,
+        }
     }
 
     /// Number of parameters.
@@ -90,7 +95,11 @@ impl NormalEquations {
         let mut solution = self.right.component_mul(&scale);
         factor.solve_mut(&mut solution);
         solution.component_mul_assign(&scale);
-        solution.iter().all(|v| v.is_finite()).then_some(Solved { factor, scale, solution })
+        solution.iter().all(|v| v.is_finite()).then_some(Solved {
+            factor,
+            scale,
+            solution,
+        })
     }
 
     /// Sum of squared residuals at given parameters.
@@ -119,10 +128,17 @@ mod tests {
 
     #[test]
     fn columns_of_very_different_size_are_solved_to_full_precision() {
-        let x = DMatrix::from_fn(50, 3, |i, j| [1.0, 1e-6 * (i as f64).sin(), 1e5 * (0.3 * i as f64).cos()][j]);
+        let x = DMatrix::from_fn(50, 3, |i, j| {
+            [1.0, 1e-6 * (i as f64).sin(), 1e5 * (0.3 * i as f64).cos()][j]
+        });
         let truth = DVector::from_vec(vec![2.0, -3e6, 4e-5]);
         let y = &x * &truth;
-        let equations = NormalEquations { gram: x.tr_mul(&x), right: x.tr_mul(&y), square: y.dot(&y), n: 50.0 };
+        let equations = NormalEquations {
+            gram: x.tr_mul(&x),
+            right: x.tr_mul(&y),
+            square: y.dot(&y),
+            n: 50.0,
+        };
         let solved = equations.solve(&DVector::zeros(3)).expect("determined");
         for j in 0..3 {
             assert!((solved.solution[j] / truth[j] - 1.0).abs() < 1e-8);

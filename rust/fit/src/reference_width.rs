@@ -23,11 +23,14 @@ pub struct SampledRow {
 /// Sampled rows by row number.
 pub type SampledRows = HashMap<usize, SampledRow>;
 
+/// Target, columns with a value per axis, and columns that all axes share.
+type Regressed = (Vector3<f64>, Vec<Vector3<f64>>, Vec<f64>);
+
 /// Fewer rows than this decide nothing.
 const MIN_ROWS: usize = 200;
 
 /// Mean square of targets that remains after a regression on columns, axis by axis.
-fn unexplained(rows: &[(Vector3<f64>, Vec<Vector3<f64>>, Vec<f64>)]) -> f64 {
+fn unexplained(rows: &[Regressed]) -> f64 {
     if rows.len() < MIN_ROWS {
         return f64::NAN;
     }
@@ -36,7 +39,10 @@ fn unexplained(rows: &[(Vector3<f64>, Vec<Vector3<f64>>, Vec<f64>)]) -> f64 {
         // Shared columns (readings) and columns of this axis (lever arm).
         let row = |k: usize| -> Vec<f64> {
             let (_, vectors, shared) = &rows[k];
-            std::iter::once(1.0).chain(shared.iter().copied()).chain(vectors.iter().map(|v| v[axis])).collect()
+            std::iter::once(1.0)
+                .chain(shared.iter().copied())
+                .chain(vectors.iter().map(|v| v[axis]))
+                .collect()
         };
         let width = row(0).len();
         let mut x = DMatrix::zeros(rows.len(), width);
@@ -68,7 +74,10 @@ pub fn of_attitude(widths: &Bandwidth, rows: &SampledRows) -> Smoothing {
                 .filter_map(|(row, rate, _)| {
                     let (y, slope) = rows.get(&row)?.rate;
                     let shared: Vec<f64> = y.iter().chain(slope.iter()).copied().collect();
-                    shared.iter().all(|v| v.is_finite()).then(|| (Vector3::from(rate), vec![], shared))
+                    shared
+                        .iter()
+                        .all(|v| v.is_finite())
+                        .then(|| (Vector3::from(rate), vec![], shared))
                 })
                 .collect();
             unexplained(&sample)
@@ -80,8 +89,10 @@ pub fn of_attitude(widths: &Bandwidth, rows: &SampledRows) -> Smoothing {
 /// Width for the position, with the rates of the attitude at the width chosen for it.
 pub fn of_position(widths: &Bandwidth, attitude: &Bandwidth, chosen: Smoothing, rows: &SampledRows) -> Smoothing {
     let k = WIDTHS.iter().position(|w| *w == chosen).unwrap_or(0);
-    let rates: HashMap<usize, (Vector3<f64>, Vector3<f64>)> =
-        attitude.sampled(k).map(|(row, rate, above)| (row, (Vector3::from(rate), Vector3::from(above)))).collect();
+    let rates: HashMap<usize, (Vector3<f64>, Vector3<f64>)> = attitude
+        .sampled(k)
+        .map(|(row, rate, above)| (row, (Vector3::from(rate), Vector3::from(above))))
+        .collect();
     let error: Vec<f64> = (0..WIDTHS.len())
         .map(|k| {
             let sample: Vec<_> = widths
@@ -96,8 +107,18 @@ pub fn of_position(widths: &Bandwidth, attitude: &Bandwidth, chosen: Smoothing, 
                         omega.cross(&omega.cross(&unit)) + alpha.cross(&unit)
                     });
                     let vectors: Vec<Vector3<f64>> = lever.collect();
-                    let shared: Vec<f64> = at.force.0.iter().chain(at.force.1.iter()).chain(up.iter()).copied().collect();
-                    shared.iter().all(|v| v.is_finite()).then_some((target, vectors, shared))
+                    let shared: Vec<f64> = at
+                        .force
+                        .0
+                        .iter()
+                        .chain(at.force.1.iter())
+                        .chain(up.iter())
+                        .copied()
+                        .collect();
+                    shared
+                        .iter()
+                        .all(|v| v.is_finite())
+                        .then_some((target, vectors, shared))
                 })
                 .collect();
             unexplained(&sample)

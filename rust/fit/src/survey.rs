@@ -106,7 +106,10 @@ impl Survey {
         for sensor in Sensor::ALL {
             let Some(y) = window.reading(sensor) else { continue };
             let mut last: Option<f64> = None;
-            for i in core.clone().filter(|i| y[3 * i..3 * i + 3].iter().all(|v| v.is_finite())) {
+            for i in core
+                .clone()
+                .filter(|i| y[3 * i..3 * i + 3].iter().all(|v| v.is_finite()))
+            {
                 self.counts[sensor.index()] += 1;
                 if let Some(before) = last
                     && self.sampled(window.offset + i, SAMPLES)
@@ -143,9 +146,15 @@ impl Survey {
                 let at = |s: Sensor, a: usize| window.reading(s).map_or(f64::NAN, |y| y[3 * i + a]);
                 let rate = Vector3::new(at(Sensor::Gyr, 0), at(Sensor::Gyr, 1), at(Sensor::Gyr, 2));
                 let fixed = [
-                    window.t[i], window.temperature.map_or(f64::NAN, |t| t[i]),
-                    at(Sensor::Acc, 0), at(Sensor::Acc, 1), at(Sensor::Acc, 2),
-                    rate.x, rate.y, rate.z, rate.norm(),
+                    window.t[i],
+                    window.temperature.map_or(f64::NAN, |t| t[i]),
+                    at(Sensor::Acc, 0),
+                    at(Sensor::Acc, 1),
+                    at(Sensor::Acc, 2),
+                    rate.x,
+                    rate.y,
+                    rate.z,
+                    rate.norm(),
                 ];
                 let values = fixed.into_iter().chain(window.covariates.iter().map(|c| c[i]));
                 for (sample, value) in self.samples.iter_mut().zip(values) {
@@ -155,12 +164,19 @@ impl Survey {
                 }
             }
         }
-        let rows: Vec<usize> = core.filter(|i| self.sampled(window.offset + i, BANDWIDTH_SAMPLES)).collect();
+        let rows: Vec<usize> = core
+            .filter(|i| self.sampled(window.offset + i, BANDWIDTH_SAMPLES))
+            .collect();
         for &i in &rows {
-            if let Some(q) = window.attitude.map(|q| &q[4 * i..4 * i + 4]).filter(|q| q.iter().all(|v| v.is_finite())) {
+            if let Some(q) = window
+                .attitude
+                .map(|q| &q[4 * i..4 * i + 4])
+                .filter(|q| q.iter().all(|v| v.is_finite()))
+            {
                 let attitude = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
                 let (rate, force) = (around(window, Sensor::Gyr, i), around(window, Sensor::Acc, i));
-                self.width_rows.insert(window.offset + i, SampledRow { rate, force, attitude });
+                self.width_rows
+                    .insert(window.offset + i, SampledRow { rate, force, attitude });
             }
         }
         self.attitude_width.add(window, rows.iter().copied());
@@ -175,12 +191,21 @@ impl Survey {
         let mean = |(sum, n): (f64, usize)| if n == 0 { f64::NAN } else { sum / n as f64 };
         let estimated = self.given.field.is_none() && self.field.1 > 0;
         let field = self.given.field.unwrap_or_else(|| {
-            if self.field.1 > 0 { self.field.0 / self.field.1 as f64 } else { Vector3::zeros() }
+            if self.field.1 > 0 {
+                self.field.0 / self.field.1 as f64
+            } else {
+                Vector3::zeros()
+            }
         });
         let dt = median(&mut self.steps);
         let attitude_smoothing = reference_width::of_attitude(&self.attitude_width, &self.width_rows);
         let position_smoothing = self.has_position.then(|| {
-            reference_width::of_position(&self.position_width, &self.attitude_width, attitude_smoothing, &self.width_rows)
+            reference_width::of_position(
+                &self.position_width,
+                &self.attitude_width,
+                attitude_smoothing,
+                &self.width_rows,
+            )
         });
         let facts = LogFacts {
             n: self.given.n,
@@ -209,7 +234,9 @@ impl Survey {
         };
         let rate = self.attitude_width.derivative_noise(facts.attitude_smoothing);
         let force = self.attitude_width.noise() * facts.gravity.norm()
-            + facts.position_smoothing.map_or(0.0, |s| self.position_width.derivative_noise(s));
+            + facts
+                .position_smoothing
+                .map_or(0.0, |s| self.position_width.derivative_noise(s));
         let bins = Bins::new(&self.given.covariates, &mut self.samples, rate, force);
         (facts, bins)
     }

@@ -32,7 +32,9 @@ fn contrasts(bins: usize) -> DMatrix<f64> {
     let m = (CONTRASTS + 1).min(bins);
     let mut q = DMatrix::zeros(bins, m);
     for k in 0..m {
-        let mut v = DVector::from_fn(bins, |i, _| (2.0 * i as f64 / (bins.max(2) - 1) as f64 - 1.0).powi(k as i32));
+        let mut v = DVector::from_fn(bins, |i, _| {
+            (2.0 * i as f64 / (bins.max(2) - 1) as f64 - 1.0).powf(k as f64)
+        });
         for j in 0..k {
             let c = q.column(j).dot(&v);
             v -= q.column(j) * c;
@@ -44,7 +46,13 @@ fn contrasts(bins: usize) -> DMatrix<f64> {
 }
 
 /// Equations of the model's parameters and the contrasts of one covariate in one channel.
-fn question(problem: &Problem, evidence: &Evidence, model: &[usize], channel: usize, covariate: usize) -> Option<Question> {
+fn question(
+    problem: &Problem,
+    evidence: &Evidence,
+    model: &[usize],
+    channel: usize,
+    covariate: usize,
+) -> Option<Question> {
     let bins = evidence.layout.bins.edges[covariate].len() + 1;
     if bins < 2 {
         return None;
@@ -83,7 +91,9 @@ fn question(problem: &Problem, evidence: &Evidence, model: &[usize], channel: us
         white.push(out);
     }
     let mut total = NormalEquations::zeros(p + m);
-    white.iter().for_each(|b| total.add(b, 1.0));
+    for b in &white {
+        total.add(b, 1.0);
+    }
     let mut precision = DVector::zeros(p + m);
     for (k, j) in model.iter().enumerate() {
         precision[k] = problem.precision(*j);
@@ -109,7 +119,13 @@ fn question(problem: &Problem, evidence: &Evidence, model: &[usize], channel: us
             s.with_sums(own)
         })
         .collect();
-    Some(Question { raw: white.clone(), white, precision, model: p, sums })
+    Some(Question {
+        raw: white.clone(),
+        white,
+        precision,
+        model: p,
+        sums,
+    })
 }
 
 /// Expected drop of the whitened sum of squares over all data: a quick look before the full test.
@@ -124,13 +140,21 @@ fn drop(question: &Question) -> f64 {
 }
 
 /// Tests every channel against every covariate on top of the model; best held-out gain first. Only what could be significant at `alpha` is worked out.
-pub fn test(problem: &Problem, evidence: &Evidence, model: &[usize], base: &HeldOut, channels: &[usize]) -> (Vec<Dependence>, usize) {
+pub fn test(
+    problem: &Problem,
+    evidence: &Evidence,
+    model: &[usize],
+    base: &HeldOut,
+    channels: &[usize],
+) -> (Vec<Dependence>, usize) {
     let covariates = evidence.layout.bins.names.len();
     let mut tried = 0;
     let mut found = Vec::new();
     for &channel in channels.iter().filter(|c| **c < CHANNELS && problem.weights[**c] > 0.0) {
         for covariate in 0..covariates {
-            let Some(q) = question(problem, evidence, model, channel, covariate) else { continue };
+            let Some(q) = question(problem, evidence, model, channel, covariate) else {
+                continue;
+            };
             tried += 1;
             if drop(&q) < 25.0 {
                 continue;
@@ -141,8 +165,19 @@ pub fn test(problem: &Problem, evidence: &Evidence, model: &[usize], base: &Held
                 continue;
             }
             let p_value = screening::p_value(&q);
-            let shape = q.solve(&q.total()).map_or_else(Vec::new, |b| b.rows(model.len() + 1, b.len() - model.len() - 1).iter().copied().collect());
-            found.push(Dependence { channel, covariate, p_value, gain, shape });
+            let shape = q.solve(&q.total()).map_or_else(Vec::new, |b| {
+                b.rows(model.len() + 1, b.len() - model.len() - 1)
+                    .iter()
+                    .copied()
+                    .collect()
+            });
+            found.push(Dependence {
+                channel,
+                covariate,
+                p_value,
+                gain,
+                shape,
+            });
         }
     }
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));

@@ -74,8 +74,17 @@ fn strengths(count: &DVector<f64>) -> Vec<Strength> {
                 1 => -1.0 / kappa,
                 _ => 0.0,
             });
-            let smoother = if kappa > 0.0 { Cholesky::new(inner)?.inverse() } else { DMatrix::zeros(blocks, blocks) };
-            Some(Strength { kappa, log_determinant: log_determinant(&covariance), covariance, smoother })
+            let smoother = if kappa > 0.0 {
+                Cholesky::new(inner)?.inverse()
+            } else {
+                DMatrix::zeros(blocks, blocks)
+            };
+            Some(Strength {
+                kappa,
+                log_determinant: log_determinant(&covariance),
+                covariance,
+                smoother,
+            })
         })
         .collect()
 }
@@ -98,7 +107,14 @@ pub fn channel_sums(white: &Evidence, weights: &[f64; CHANNELS]) -> Vec<ChannelS
         }
         let same = out.iter().find(|o| o.count == count).map(|o| o.strengths.clone());
         let strengths = same.unwrap_or_else(|| Arc::new(strengths(&count)));
-        out.push(ChannelSums { channel, weight: weights[channel], sums, right, count, strengths });
+        out.push(ChannelSums {
+            channel,
+            weight: weights[channel],
+            sums,
+            right,
+            count,
+            strengths,
+        });
     }
     out
 }
@@ -107,7 +123,10 @@ impl ChannelSums {
     /// The same in other parameters: `beta = basis * gamma` of the parameters chosen.
     #[must_use]
     pub fn reduced(&self, chosen: &[usize], basis: &DMatrix<f64>) -> Self {
-        Self { sums: self.sums.select_columns(chosen) * basis, ..self.clone() }
+        Self {
+            sums: self.sums.select_columns(chosen) * basis,
+            ..self.clone()
+        }
     }
 
     /// The same with other sums.
@@ -126,7 +145,9 @@ impl ChannelSums {
         let blocks = self.count.len();
         let mean = |sum: f64, b: usize| if self.count[b] > 0.0 { sum / self.count[b] } else { 0.0 };
         let residual = DVector::from_fn(blocks, |b, _| mean(self.right[b], b) * self.weight.sqrt());
-        let used: Vec<usize> = (0..self.sums.ncols()).filter(|k| self.sums.column(*k).iter().any(|v| *v != 0.0)).collect();
+        let used: Vec<usize> = (0..self.sums.ncols())
+            .filter(|k| self.sums.column(*k).iter().any(|v| *v != 0.0))
+            .collect();
         let mut columns = DMatrix::from_fn(blocks, used.len(), |b, k| mean(self.sums[(b, used[k])], b));
         for mut column in columns.column_iter_mut() {
             let norm = column.norm();
@@ -139,7 +160,8 @@ impl ChannelSums {
             let kept: Vec<usize> = (0..svd.singular_values.len())
                 .filter(|k| svd.singular_values[*k] > 1e-6 && *k < blocks / 2)
                 .collect();
-            svd.u.map_or_else(|| DMatrix::zeros(blocks, 0), |u| u.select_columns(&kept))
+            svd.u
+                .map_or_else(|| DMatrix::zeros(blocks, 0), |u| u.select_columns(&kept))
         };
         self.strengths
             .iter()
@@ -149,7 +171,9 @@ impl ChannelSums {
                     return -0.5 * plain;
                 }
                 let x = s.covariance.solve(&basis);
-                let Some(inner) = Cholesky::new(basis.tr_mul(&x)) else { return f64::NEG_INFINITY };
+                let Some(inner) = Cholesky::new(basis.tr_mul(&x)) else {
+                    return f64::NEG_INFINITY;
+                };
                 let right = x.tr_mul(&residual);
                 -0.5 * (plain + log_determinant(&inner) - right.dot(&inner.solve(&right)))
             })
@@ -171,7 +195,10 @@ impl ChannelSums {
 pub fn take_out(channels: &[ChannelSums], equations: &mut NormalEquations) -> bool {
     let mut wanders = false;
     for sensor in 0..3 {
-        let own: Vec<&ChannelSums> = channels.iter().filter(|c| c.channel / 3 == sensor && !c.strengths.is_empty()).collect();
+        let own: Vec<&ChannelSums> = channels
+            .iter()
+            .filter(|c| c.channel / 3 == sensor && !c.strengths.is_empty())
+            .collect();
         let Some(first) = own.first() else { continue };
         let strengths = first.strengths.len();
         let mut total = vec![0.0; strengths];
@@ -180,7 +207,9 @@ pub fn take_out(channels: &[ChannelSums], equations: &mut NormalEquations) -> bo
                 *t += l;
             }
         }
-        let best = (0..total.len()).max_by(|a, b| total[*a].total_cmp(&total[*b])).unwrap_or(0);
+        let best = (0..total.len())
+            .max_by(|a, b| total[*a].total_cmp(&total[*b]))
+            .unwrap_or(0);
         if first.strengths[best].kappa > 0.0 {
             wanders = true;
             for channel in own {
@@ -215,11 +244,20 @@ mod tests {
                 100.0 * level + 10.0 * normal()
             });
             let (sums, strengths) = (DMatrix::from_element(48, 1, 100.0), strengths.clone());
-            ChannelSums { channel: 3, weight: 1.0, sums, right, count: count.clone(), strengths }
+            ChannelSums {
+                channel: 3,
+                weight: 1.0,
+                sums,
+                right,
+                count: count.clone(),
+                strengths,
+            }
         };
         let best = |s: &ChannelSums| {
             let l = s.likelihoods();
-            (0..l.len()).max_by(|a, b| l[*a].total_cmp(&l[*b])).map(|k| s.strengths[k].kappa)
+            (0..l.len())
+                .max_by(|a, b| l[*a].total_cmp(&l[*b]))
+                .map(|k| s.strengths[k].kappa)
         };
         let (white, walking) = (sums(0.0), sums(0.1));
         assert!(best(&white) < Some(1e-4));

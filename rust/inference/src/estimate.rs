@@ -31,5 +31,8 @@ pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
             }
         }
     }
-    Some(Estimate { step: solved.solution, covariance })
+    Some(Estimate {
+        step: solved.solution,
+        covariance,
+    })
 }

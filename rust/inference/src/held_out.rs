@@ -38,12 +38,17 @@ pub fn held_out(question: &Question) -> HeldOut {
                 judged_raw.add(&question.raw[b], 1.0);
             }
         }
-        let beta = question.solve(&training).unwrap_or_else(|| DVector::zeros(question.precision.len()));
+        let beta = question
+            .solve(&training)
+            .unwrap_or_else(|| DVector::zeros(question.precision.len()));
         white.push(judged.residual_square(&beta).max(0.0));
         square += judged_raw.residual_square(&beta).max(0.0);
         n += judged_raw.n;
     }
-    HeldOut { white, ratio: if n > 0.0 { (square / n).sqrt() } else { f64::NAN } }
+    HeldOut {
+        white,
+        ratio: if n > 0.0 { (square / n).sqrt() } else { f64::NAN },
+    }
 }
 
 /// Gain of one question over another, summed over folds, and its standard error.
@@ -62,8 +67,14 @@ mod tests {
 
     #[test]
     fn gain_is_the_sum_over_folds() {
-        let a = HeldOut { white: vec![3.0, 4.0, 5.0], ratio: 1.0 };
-        let b = HeldOut { white: vec![1.0, 1.0, 1.0], ratio: 1.0 };
+        let a = HeldOut {
+            white: vec![3.0, 4.0, 5.0],
+            ratio: 1.0,
+        };
+        let b = HeldOut {
+            white: vec![1.0, 1.0, 1.0],
+            ratio: 1.0,
+        };
         let (sum, error) = gain(&a, &b);
         assert!((sum - 9.0).abs() < 1e-12 && (error - 3.0_f64.sqrt()).abs() < 1e-12);
     }

@@ -29,7 +29,9 @@ fn left_out(question: &Question, group: usize) -> Option<Vec<DVector<f64>>> {
         .chunks(group)
         .map(|chunk| {
             let mut sum = NormalEquations::zeros(question.precision.len());
-            chunk.iter().for_each(|b| sum.add(b, 1.0));
+            for b in chunk {
+                sum.add(b, 1.0);
+            }
             sum
         })
         .filter(|b| b.n > 0.0)
@@ -58,8 +60,10 @@ pub fn scatter(question: &Question) -> Option<DVector<f64>> {
 pub fn jackknife(question: &Question, group: usize) -> Option<Jackknife> {
     let estimate = question.solve(&question.total())?;
     let m = estimate.len() - question.model;
-    let left_out: Vec<DVector<f64>> =
-        left_out(question, group)?.iter().map(|v| v.rows(question.model, m).into_owned()).collect();
+    let left_out: Vec<DVector<f64>> = left_out(question, group)?
+        .iter()
+        .map(|v| v.rows(question.model, m).into_owned())
+        .collect();
     let count = left_out.len();
     if m == 0 || count < m + SPARE_BLOCKS {
         return None;
@@ -73,7 +77,11 @@ pub fn jackknife(question: &Question, group: usize) -> Option<Jackknife> {
     }
     let beta = estimate.rows(question.model, m).into_owned();
     let p_value = hotelling(&beta, &covariance, count);
-    Some(Jackknife { estimate, covariance, p_value })
+    Some(Jackknife {
+        estimate,
+        covariance,
+        p_value,
+    })
 }
 
 /// p-value of a mean of zero from an estimate and its covariance over `blocks` blocks.
@@ -84,7 +92,9 @@ pub fn hotelling(beta: &DVector<f64>, covariance: &DMatrix<f64>, blocks: usize) 
     for j in 0..m {
         correlation[(j, j)] += 1e-9;
     }
-    let Some(factor) = Cholesky::new(correlation) else { return 1.0 };
+    let Some(factor) = Cholesky::new(correlation) else {
+        return 1.0;
+    };
     let z = beta.component_div(&scale);
     let square = z.dot(&factor.solve(&z));
     let (mf, b) = (m as f64, blocks as f64);

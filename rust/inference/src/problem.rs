@@ -78,7 +78,11 @@ impl Problem {
     /// Prior precision of a parameter: weak, so that it only decides where the data do not.
     pub fn precision(&self, parameter: usize) -> f64 {
         let size = self.plausible[parameter];
-        if size > 0.0 { 0.01 / (size * size) } else { f64::MAX.sqrt() }
+        if size > 0.0 {
+            0.01 / (size * size)
+        } else {
+            f64::MAX.sqrt()
+        }
     }
 
     /// Whitened equations of the whole log for some parameters.
@@ -124,8 +128,9 @@ impl Problem {
         let scaled = DMatrix::from_fn(m, m, |i, j| 0.5 * (schur[(i, j)] + schur[(j, i)]) * scale[i] * scale[j]);
         let size: f64 = (0..m).map(|j| own[(j, j)] * scale[j] * scale[j]).sum();
         let eigen = scaled.symmetric_eigen();
-        let kept: Vec<usize> =
-            (0..m).filter(|k| eigen.eigenvalues[*k] > 1.0 && eigen.eigenvalues[*k] > 1e-8 * size).collect();
+        let kept: Vec<usize> = (0..m)
+            .filter(|k| eigen.eigenvalues[*k] > 1.0 && eigen.eigenvalues[*k] > 1e-8 * size)
+            .collect();
         DMatrix::from_fn(m, kept.len(), |i, k| scale[i] * eigen.eigenvectors[(i, kept[k])])
     }
 
@@ -144,7 +149,13 @@ impl Problem {
             precision[k] = self.precision(*j);
         }
         let sums = self.sums.iter().map(|s| s.reduced(&all, &basis)).collect();
-        Question { white: reduce(&self.white), raw: reduce(&self.raw), precision, model: p, sums }
+        Question {
+            white: reduce(&self.white),
+            raw: reduce(&self.raw),
+            precision,
+            model: p,
+            sums,
+        }
     }
 }
 

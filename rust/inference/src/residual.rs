@@ -59,7 +59,13 @@ pub fn channels(raw: &Evidence, step: &DVector<f64>) -> Vec<ChannelResidual> {
                     if n == 0 { f64::NAN } else { (s / n as f64).sqrt() }
                 })
                 .collect();
-            Some(ChannelResidual { channel, n, rms: (square / n as f64).sqrt(), mean: sum / n as f64, block_rms })
+            Some(ChannelResidual {
+                channel,
+                n,
+                rms: (square / n as f64).sqrt(),
+                mean: sum / n as f64,
+                block_rms,
+            })
         })
         .collect()
 }
@@ -84,7 +90,12 @@ pub fn panels(raw: &Evidence, step: &DVector<f64>, channel: usize, floor: f64) -
         for bin in 0..bins {
             let parts: Vec<(f64, f64)> = (0..raw.layout.blocks)
                 .filter_map(|b| raw.get(b, channel))
-                .map(|b| (dot(&b.bin_sum[covariate][bin * v.len()..(bin + 1) * v.len()], &v), b.bin_count[covariate][bin]))
+                .map(|b| {
+                    (
+                        dot(&b.bin_sum[covariate][bin * v.len()..(bin + 1) * v.len()], &v),
+                        b.bin_count[covariate][bin],
+                    )
+                })
                 .filter(|(_, count)| *count > 0.0)
                 .collect();
             let count: f64 = parts.iter().map(|p| p.1).sum();
@@ -101,7 +112,13 @@ pub fn panels(raw: &Evidence, step: &DVector<f64>, channel: usize, floor: f64) -
             between += count * m * m;
             expected += floor * floor;
         }
-        out.push(Panel { channel, covariate, mean, band, share: ((between - expected) / excess).clamp(0.0, 1.0) });
+        out.push(Panel {
+            channel,
+            covariate,
+            mean,
+            band,
+            share: ((between - expected) / excess).clamp(0.0, 1.0),
+        });
     }
     out.sort_by(|a, b| b.share.total_cmp(&a.share));
     out
@@ -109,7 +126,16 @@ pub fn panels(raw: &Evidence, step: &DVector<f64>, channel: usize, floor: f64) -
 
 /// Shortest stretch of blocks that holds 80 % of the excess over the floor; (first, one past last).
 pub fn stretch(block_rms: &[f64], floor: f64) -> (usize, usize) {
-    let excess: Vec<f64> = block_rms.iter().map(|r| if r.is_finite() { (r * r - floor * floor).max(0.0) } else { 0.0 }).collect();
+    let excess: Vec<f64> = block_rms
+        .iter()
+        .map(|r| {
+            if r.is_finite() {
+                (r * r - floor * floor).max(0.0)
+            } else {
+                0.0
+            }
+        })
+        .collect();
     let wanted = 0.8 * excess.iter().sum::<f64>();
     let mut best = (0, block_rms.len());
     for first in 0..excess.len() {

@@ -29,7 +29,9 @@ pub fn channel_square(evidence: &Evidence, channel: usize, step: &DVector<f64>) 
 
 /// The same for one block.
 pub fn block_square(evidence: &Evidence, block: usize, channel: usize, step: &DVector<f64>) -> (f64, usize) {
-    let Some(b) = evidence.get(block, channel) else { return (0.0, 0) };
+    let Some(b) = evidence.get(block, channel) else {
+        return (0.0, 0);
+    };
     let v = contrast(&evidence.layout, channel, step);
     ((&b.gram * &v).dot(&v).max(0.0), b.n)
 }
@@ -47,7 +49,9 @@ pub fn assemble(evidence: &Evidence, block: usize, weights: &[f64; CHANNELS]) ->
     let mut out = NormalEquations::zeros(evidence.layout.model.parameters());
     for channel in 0..CHANNELS {
         let weight = weights[channel];
-        let Some(b) = evidence.get(block, channel) else { continue };
+        let Some(b) = evidence.get(block, channel) else {
+            continue;
+        };
         if !(weight > 0.0 && weight.is_finite()) {
             continue;
         }
@@ -78,7 +82,13 @@ pub fn fit_all(evidence: &Evidence) -> Option<Saturated> {
         }
         let largest = variance.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
         // A noiseless channel must not outweigh the rest beyond what numbers can hold.
-        let weights = variance.map(|v| if v.is_finite() { 1.0 / v.max(1e-24 * largest).max(f64::MIN_POSITIVE) } else { 0.0 });
+        let weights = variance.map(|v| {
+            if v.is_finite() {
+                1.0 / v.max(1e-24 * largest).max(f64::MIN_POSITIVE)
+            } else {
+                0.0
+            }
+        });
         let mut total = NormalEquations::zeros(p);
         for block in 0..evidence.layout.blocks {
             total.add(&assemble(evidence, block, &weights), 1.0);

@@ -38,7 +38,10 @@ pub struct Screened {
 
 /// Parameter indices of slots.
 pub fn parameters_of<'a>(slots: impl IntoIterator<Item = &'a Slot>) -> Vec<usize> {
-    slots.into_iter().flat_map(|s| s.first..s.first + s.parameters.len()).collect()
+    slots
+        .into_iter()
+        .flat_map(|s| s.first..s.first + s.parameters.len())
+        .collect()
 }
 
 /// Above this p-value nothing more needs to be asked.
@@ -47,19 +50,35 @@ const CLEARLY_CHANCE: f64 = 0.01;
 /// The p-value of a question: the largest of two block lengths, in case correlation reaches beyond the shorter, and of
 /// a test that lets zeros wander.
 pub fn p_value(question: &Question) -> f64 {
-    let blocks = [1, 2].into_iter().filter_map(|group| jackknife::jackknife(question, group)).map(|j| j.p_value);
+    let blocks = [1, 2]
+        .into_iter()
+        .filter_map(|group| jackknife::jackknife(question, group))
+        .map(|j| j.p_value);
     let p = blocks.fold(0.0, f64::max);
-    if p > CLEARLY_CHANCE { p } else { p.max(p_value_with_drift(question)) }
+    if p > CLEARLY_CHANCE {
+        p
+    } else {
+        p.max(p_value_with_drift(question))
+    }
 }
 
 /// Wald test of the candidate's parameters with wandering zeros; 0 where no zero wanders, since the block tests then say it all.
 pub fn p_value_with_drift(question: &Question) -> f64 {
-    let Some(total) = question.total_without_drift() else { return 0.0 };
-    let Some(solved) = total.solve(&question.precision) else { return 1.0 };
+    let Some(total) = question.total_without_drift() else {
+        return 0.0;
+    };
+    let Some(solved) = total.solve(&question.precision) else {
+        return 1.0;
+    };
     let m = solved.solution.len() - question.model;
     let beta = solved.solution.rows(question.model, m).into_owned();
-    let covariance = solved.covariance().view((question.model, question.model), (m, m)).into_owned();
-    let Some(factor) = Cholesky::new(covariance) else { return 1.0 };
+    let covariance = solved
+        .covariance()
+        .view((question.model, question.model), (m, m))
+        .into_owned();
+    let Some(factor) = Cholesky::new(covariance) else {
+        return 1.0;
+    };
     let square = beta.dot(&factor.solve(&beta));
     ChiSquared::new(m as f64).map_or(1.0, |d| if square.is_finite() { d.sf(square.max(0.0)) } else { 1.0 })
 }
@@ -79,15 +98,20 @@ fn halves_agree(question: &Question, whole: &Jackknife) -> bool {
     let middle = question.white.len() / 2;
     let solve = |blocks: &[NormalEquations]| {
         let mut sum = NormalEquations::zeros(question.precision.len());
-        blocks.iter().for_each(|b| sum.add(b, 1.0));
+        for b in blocks {
+            sum.add(b, 1.0);
+        }
         let solved = sum.solve(&question.precision)?;
         let covariance = solved.covariance().view((p, p), (m, m)).into_owned();
         Some((solved.solution.rows(p, m).into_owned(), covariance))
     };
-    let (Some((first, c1)), Some((second, c2))) = (solve(&question.white[..middle]), solve(&question.white[middle..])) else {
+    let (Some((first, c1)), Some((second, c2))) = (solve(&question.white[..middle]), solve(&question.white[middle..]))
+    else {
         return true;
     };
-    let Some(information) = Cholesky::new(&c1 + &c2) else { return true };
+    let Some(information) = Cholesky::new(&c1 + &c2) else {
+        return true;
+    };
     let size = |v: &DVector<f64>| v.dot(&information.solve(v));
     // How much more the blocks scatter than whitened noise would.
     let scatter = question

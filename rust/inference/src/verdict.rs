@@ -81,7 +81,12 @@ fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[
         .collect();
     let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
     let passed = |s: &Screened| passes(s, s.p_value * tried);
-    screened.sort_by(|a, b| passed(b).cmp(&passed(a)).then(b.testable.cmp(&a.testable)).then(b.gain.total_cmp(&a.gain)));
+    screened.sort_by(|a, b| {
+        passed(b)
+            .cmp(&passed(a))
+            .then(b.testable.cmp(&a.testable))
+            .then(b.gain.total_cmp(&a.gain))
+    });
     let adjusted = screened.iter().map(|s| (s.p_value * tried).min(1.0)).collect();
     (screened, adjusted)
 }
@@ -100,7 +105,12 @@ pub fn passes(s: &Screened, adjusted: f64) -> bool {
 pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidates: &[usize]) -> Verdict {
     let slots = evidence.layout.model.slots();
     let (screened, adjusted) = screen_all(problem, slots, model, candidates);
-    let passing: Vec<&Screened> = screened.iter().zip(&adjusted).filter(|(s, a)| passes(s, **a)).map(|(s, _)| s).collect();
+    let passing: Vec<&Screened> = screened
+        .iter()
+        .zip(&adjusted)
+        .filter(|(s, a)| passes(s, **a))
+        .map(|(s, _)| s)
+        .collect();
     let best = passing.first().map(|s| s.slot);
 
     let mut path = Vec::new();
@@ -143,7 +153,9 @@ pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidate
     }
 
     let kind = match passing.first() {
-        None if unexplained.is_empty() && !screened.iter().zip(&adjusted).any(|(s, a)| significant(s, *a)) => Kind::Adequate,
+        None if unexplained.is_empty() && !screened.iter().zip(&adjusted).any(|(s, a)| significant(s, *a)) => {
+            Kind::Adequate
+        }
         None => Kind::Unknown,
         Some(first) => {
             let sensors = slots[first.slot].effect.sensors();
@@ -161,5 +173,14 @@ pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidate
             }
         }
     };
-    Verdict { kind, best, rivals, screened, adjusted, correlations, unexplained, path }
+    Verdict {
+        kind,
+        best,
+        rivals,
+        screened,
+        adjusted,
+        correlations,
+        unexplained,
+        path,
+    }
 }

@@ -12,24 +12,63 @@ use crate::window::Window;
 /// half their own sampling rate, and only the sensor can ask for them.
 pub const WIDTHS: [Smoothing; 13] = [
     NARROWEST,
-    Smoothing { degree: 8, half_width: 6 },
-    Smoothing { degree: 6, half_width: 6 },
-    Smoothing { degree: 6, half_width: 8 },
-    Smoothing { degree: 6, half_width: 11 },
-    Smoothing { degree: 6, half_width: 15 },
-    Smoothing { degree: 6, half_width: 20 },
-    Smoothing { degree: 6, half_width: 27 },
-    Smoothing { degree: 6, half_width: 36 },
-    Smoothing { degree: 6, half_width: 48 },
-    Smoothing { degree: 2, half_width: 1 },
-    Smoothing { degree: 2, half_width: 2 },
-    Smoothing { degree: 2, half_width: 4 },
+    Smoothing {
+        degree: 8,
+        half_width: 6,
+    },
+    Smoothing {
+        degree: 6,
+        half_width: 6,
+    },
+    Smoothing {
+        degree: 6,
+        half_width: 8,
+    },
+    Smoothing {
+        degree: 6,
+        half_width: 11,
+    },
+    Smoothing {
+        degree: 6,
+        half_width: 15,
+    },
+    Smoothing {
+        degree: 6,
+        half_width: 20,
+    },
+    Smoothing {
+        degree: 6,
+        half_width: 27,
+    },
+    Smoothing {
+        degree: 6,
+        half_width: 36,
+    },
+    Smoothing {
+        degree: 6,
+        half_width: 48,
+    },
+    Smoothing {
+        degree: 2,
+        half_width: 1,
+    },
+    Smoothing {
+        degree: 2,
+        half_width: 2,
+    },
+    Smoothing {
+        degree: 2,
+        half_width: 4,
+    },
 ];
 
 /// Number of widths that the reference alone may choose from.
 const ORDERED: usize = 10;
 
-const NOISE_FIT: Smoothing = Smoothing { degree: 8, half_width: 5 };
+const NOISE_FIT: Smoothing = Smoothing {
+    degree: 8,
+    half_width: 5,
+};
 
 /// Rows are judged in groups of like motion, so that short turns are not outvoted by long rests: upper ends of the groups, as shares of
 /// the rows ordered by how fast the first derivative changes.
@@ -82,13 +121,23 @@ impl Bandwidth {
     }
 
     fn new(of_attitude: bool, order: usize) -> Self {
-        Self { of_attitude, order, noise_sum: 0.0, noise_freedom: 0, samples: Vec::new(), spacing: None }
+        Self {
+            of_attitude,
+            order,
+            noise_sum: 0.0,
+            noise_freedom: 0,
+            samples: Vec::new(),
+            spacing: None,
+        }
     }
 
     /// Adds the rows given (indices into the window).
     pub fn add(&mut self, window: &Window, rows: impl Iterator<Item = usize>) {
-        let reference =
-            if self.of_attitude { LocalReference::attitude(window, None) } else { LocalReference::position(window, None) };
+        let reference = if self.of_attitude {
+            LocalReference::attitude(window, None)
+        } else {
+            LocalReference::position(window, None)
+        };
         let Some(mut reference) = reference else { return };
         if self.spacing.is_none() {
             self.spacing = Some(reference.spacing()).filter(|s| *s > 0.0);
@@ -102,10 +151,21 @@ impl Bandwidth {
             }
             let zero = [0.0; WIDTHS.len()];
             let none = [[f64::NAN; 3]; WIDTHS.len()];
-            let mut sample = Sample { lively: 0.0, difference: zero, gain: zero, own_gain: zero, values: none, above: none, row: window.offset + row, reached: [false; WIDTHS.len()] };
+            let mut sample = Sample {
+                lively: 0.0,
+                difference: zero,
+                gain: zero,
+                own_gain: zero,
+                values: none,
+                above: none,
+                row: window.offset + row,
+                reached: [false; WIDTHS.len()],
+            };
             let mut last: Option<(usize, Vec<f64>, [f64; 3])> = None;
             for (k, width) in WIDTHS.iter().enumerate() {
-                let Some((fit, values)) = reference.local_fit(at, *width, self.of_attitude) else { continue };
+                let Some((fit, values)) = reference.local_fit(at, *width, self.of_attitude) else {
+                    continue;
+                };
                 let all = fit.weights();
                 let combine = |weights: &[f64]| {
                     let mut value = [0.0; 3];
@@ -156,9 +216,20 @@ impl Bandwidth {
 
     /// Noise of the derivative at a width, per component: rad/s of the angular rate or m/s^2 of the acceleration.
     pub fn derivative_noise(&self, width: Smoothing) -> f64 {
-        let Some(k) = WIDTHS.iter().position(|w| *w == width) else { return 0.0 };
-        let gains: Vec<f64> = self.samples.iter().filter(|s| s.reached[k]).map(|s| s.own_gain[k]).collect();
-        if gains.is_empty() { 0.0 } else { self.noise() * (gains.iter().sum::<f64>() / gains.len() as f64).sqrt() }
+        let Some(k) = WIDTHS.iter().position(|w| *w == width) else {
+            return 0.0;
+        };
+        let gains: Vec<f64> = self
+            .samples
+            .iter()
+            .filter(|s| s.reached[k])
+            .map(|s| s.own_gain[k])
+            .collect();
+        if gains.is_empty() {
+            0.0
+        } else {
+            self.noise() * (gains.iter().sum::<f64>() / gains.len() as f64).sqrt()
+        }
     }
 
     /// Mean square difference of each width to the next narrower one, over what noise explains: the worst group of rows,
@@ -194,7 +265,11 @@ impl Bandwidth {
     /// Index of the width that the reference alone allows: one narrower than the widest that still agrees with its neighbour.
     fn allowed(&self) -> usize {
         let agreeing = self.excess().iter().take_while(|excess| **excess <= TOLERANCE).count();
-        if agreeing == ORDERED - 1 { agreeing } else { agreeing.saturating_sub(1) }
+        if agreeing == ORDERED - 1 {
+            agreeing
+        } else {
+            agreeing.saturating_sub(1)
+        }
     }
 
     /// The width to use. Where the noise of the reference is not white (interpolated, quantised, filtered), its neighbours
@@ -232,6 +307,9 @@ impl Bandwidth {
 
     /// For every width the rows sampled with the derivative and the one above it.
     pub fn sampled(&self, width: usize) -> impl Iterator<Item = (usize, [f64; 3], [f64; 3])> + '_ {
-        self.samples.iter().filter(move |s| s.reached[width]).map(move |s| (s.row, s.values[width], s.above[width]))
+        self.samples
+            .iter()
+            .filter(move |s| s.reached[width])
+            .map(move |s| (s.row, s.values[width], s.above[width]))
     }
 }

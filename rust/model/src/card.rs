@@ -58,6 +58,10 @@ pub const MATRIX: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "
 pub fn parameters(names: &[&str], unit: &str, typical: f64) -> Vec<Parameter> {
     names
         .iter()
-        .map(|name| Parameter { name: (*name).to_string(), unit: unit.to_string(), typical: Some(typical) })
+        .map(|name| Parameter {
+            name: (*name).to_string(),
+            unit: unit.to_string(),
+            typical: Some(typical),
+        })
         .collect()
 }

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use crate::effect::Effect;
-use crate::effects::{bias, covariate, field, g_sensitivity, iron, lever_arm, misalignment, reference, scale, temperature};
+use crate::effects::{
+    bias, covariate, field, g_sensitivity, iron, lever_arm, misalignment, reference, scale, temperature,
+};
 use crate::sensor::Sensor;
 
 /// Every built-in effect that does not depend on the log's own columns.
@@ -36,5 +38,8 @@ pub fn column_effect(id: &str) -> Option<Arc<dyn Effect>> {
 
 /// The built-in effect with this id.
 pub fn find(id: &str) -> Option<Arc<dyn Effect>> {
-    built_in().into_iter().find(|e| e.card().id == id).or_else(|| column_effect(id))
+    built_in()
+        .into_iter()
+        .find(|e| e.card().id == id)
+        .or_else(|| column_effect(id))
 }

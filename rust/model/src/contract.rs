@@ -8,10 +8,18 @@ use crate::sensor_model::{Evaluation, SensorModel};
 use crate::window::Window;
 
 fn violated(effect: &Arc<dyn Effect>, message: String) -> EffectError {
-    EffectError::Contract { effect: effect.card().id.clone(), message }
+    EffectError::Contract {
+        effect: effect.card().id.clone(),
+        message,
+    }
 }
 
-fn evaluate(effect: &Arc<dyn Effect>, at: &[f64], window: &Window, facts: &LogFacts) -> Result<Evaluation, EffectError> {
+fn evaluate(
+    effect: &Arc<dyn Effect>,
+    at: &[f64],
+    window: &Window,
+    facts: &LogFacts,
+) -> Result<Evaluation, EffectError> {
     SensorModel::new(vec![(effect.clone(), at.to_vec())], vec![], facts)?.evaluate(window, facts)
 }
 
@@ -26,7 +34,10 @@ pub fn check(effect: &Arc<dyn Effect>, at: &[f64], window: &Window, facts: &LogF
         for (column, parameter) in channel.columns.iter().zip(&model.active()[c]) {
             if let Some(row) = (0..column.len()).find(|i| known[*i] && !column[*i].is_finite()) {
                 let name = &effect.card().parameters[*parameter].name;
-                return Err(violated(effect, format!("column {name} is not finite in row {}", window.begin + row)));
+                return Err(violated(
+                    effect,
+                    format!("column {name} is not finite in row {}", window.begin + row),
+                ));
             }
         }
     }
@@ -35,13 +46,22 @@ pub fn check(effect: &Arc<dyn Effect>, at: &[f64], window: &Window, facts: &LogF
         let (mut above, mut below) = (at.to_vec(), at.to_vec());
         above[parameter] += h;
         below[parameter] -= h;
-        let (above, below) = (evaluate(effect, &above, window, facts)?, evaluate(effect, &below, window, facts)?);
+        let (above, below) = (
+            evaluate(effect, &above, window, facts)?,
+            evaluate(effect, &below, window, facts)?,
+        );
         for c in 0..here.channels.len() {
-            let (Some(channel), Some(above), Some(below)) = (&here.channels[c], &above.channels[c], &below.channels[c]) else {
+            let (Some(channel), Some(above), Some(below)) = (&here.channels[c], &above.channels[c], &below.channels[c])
+            else {
                 continue;
             };
-            let column = model.active()[c].iter().position(|p| *p == parameter).map(|k| &channel.columns[k]);
-            let size = column.map_or(0.0, |v| v.iter().filter(|x| x.is_finite()).fold(0.0_f64, |m, x| m.max(x.abs())));
+            let column = model.active()[c]
+                .iter()
+                .position(|p| *p == parameter)
+                .map(|k| &channel.columns[k]);
+            let size = column.map_or(0.0, |v| {
+                v.iter().filter(|x| x.is_finite()).fold(0.0_f64, |m, x| m.max(x.abs()))
+            });
             for row in 0..known.len() {
                 // The residual is measured less modelled.
                 let quotient = (below.residual[row] - above.residual[row]) / (2.0 * h);
@@ -66,12 +86,20 @@ pub fn check(effect: &Arc<dyn Effect>, at: &[f64], window: &Window, facts: &LogF
     for c in 0..here.channels.len() {
         let Some(channel) = &here.channels[c] else { continue };
         for (k, column) in channel.columns.iter().enumerate() {
-            let cut = parts.iter().flat_map(|p| p.channels[c].iter().flat_map(|ch| ch.columns[k].iter()));
-            let size = column.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+            let cut = parts
+                .iter()
+                .flat_map(|p| p.channels[c].iter().flat_map(|ch| ch.columns[k].iter()));
+            let size = column
+                .iter()
+                .filter(|v| v.is_finite())
+                .fold(0.0_f64, |m, v| m.max(v.abs()));
             for (row, (a, b)) in column.iter().zip(cut).enumerate() {
                 if (a - b).abs() > 1e-9 * size {
                     let name = &effect.card().parameters[model.active()[c][k]].name;
-                    let message = format!("column {name} depends on where the rows are cut (row {})", window.begin + row);
+                    let message = format!(
+                        "column {name} depends on where the rows are cut (row {})",
+                        window.begin + row
+                    );
                     return Err(violated(effect, message));
                 }
             }

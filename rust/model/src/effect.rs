@@ -86,7 +86,11 @@ impl Columns {
     /// A column that was asked for; `None` = zero.
     pub fn get(&self, parameter: usize, axis: usize) -> Option<&[f64]> {
         let k = 3 * parameter + axis;
-        self.active.get(k).copied().unwrap_or(false).then(|| self.data[k].as_slice())
+        self.active
+            .get(k)
+            .copied()
+            .unwrap_or(false)
+            .then(|| self.data[k].as_slice())
     }
 
     /// Number of parameters.

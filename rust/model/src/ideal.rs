@@ -22,7 +22,11 @@ pub struct ReferenceChange {
 
 impl Default for ReferenceChange {
     fn default() -> Self {
-        Self { delay: 0.0, alignment: UnitQuaternion::identity(), tilt: UnitQuaternion::identity() }
+        Self {
+            delay: 0.0,
+            alignment: UnitQuaternion::identity(),
+            tilt: UnitQuaternion::identity(),
+        }
     }
 }
 
@@ -80,9 +84,14 @@ impl Ideal {
     fn push(&mut self, k: Option<&Kinematics>, facts: &LogFacts, change: &ReferenceChange) {
         let Some(k) = k else {
             let nan = Vector3::repeat(f64::NAN);
-            for triple in
-                [&mut self.omega, &mut self.alpha, &mut self.f, &mut self.f_rate, &mut self.m, &mut self.m_rate]
-            {
+            for triple in [
+                &mut self.omega,
+                &mut self.alpha,
+                &mut self.f,
+                &mut self.f_rate,
+                &mut self.m,
+                &mut self.m_rate,
+            ] {
                 triple.push(&nan);
             }
             self.attitude.push(UnitQuaternion::identity());

@@ -79,7 +79,11 @@ impl Knots {
 fn median_step(t: &[f64]) -> f64 {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let middle = steps.len() / 2;
-    if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    if steps.is_empty() {
+        0.0
+    } else {
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
 }
 
 /// A gap in the reference is a step of more than this many median steps.
@@ -95,8 +99,8 @@ struct WeightCache {
 impl WeightCache {
     fn get(&mut self, t: &[f64], at: f64, degree: usize) -> Option<&[Vec<f64>; 4]> {
         let tolerance = 1e-9 * (t[t.len() - 1] - t[0]);
-        let same = self.offsets.len() == t.len()
-            && self.offsets.iter().zip(t).all(|(o, v)| (v - at - o).abs() <= tolerance);
+        let same =
+            self.offsets.len() == t.len() && self.offsets.iter().zip(t).all(|(o, v)| (v - at - o).abs() <= tolerance);
         if !same {
             self.offsets.clear();
             self.weights = LocalFit::new(t, at, degree)?.weights();
@@ -142,7 +146,13 @@ impl<'a> LocalReference<'a> {
     }
 
     fn new(window: &'a Window<'a>, knots: Knots) -> Self {
-        Self { window, knots, hint: 0, cache: WeightCache::default(), values: Vec::new() }
+        Self {
+            window,
+            knots,
+            hint: 0,
+            cache: WeightCache::default(),
+            values: Vec::new(),
+        }
     }
 
     /// Collects the attitudes around `at` as rotation vectors from the nearest knot; the nearest knot's attitude, the times.
@@ -202,7 +212,10 @@ impl<'a> LocalReference<'a> {
         } else {
             self.positions(at, s.half_width)?
         };
-        Some((LocalFit::new(&self.knots.t[first..last], at, s.degree)?, self.values.clone()))
+        Some((
+            LocalFit::new(&self.knots.t[first..last], at, s.degree)?,
+            self.values.clone(),
+        ))
     }
 }
 
@@ -269,7 +282,13 @@ pub fn kinematics(
                 }
             };
             let attitude = centre * UnitQuaternion::from_scaled_axis(phi);
-            Some(Kinematics { attitude, omega, alpha, acceleration, jerk })
+            Some(Kinematics {
+                attitude,
+                omega,
+                alpha,
+                acceleration,
+                jerk,
+            })
         })
         .collect()
 }
@@ -282,9 +301,18 @@ mod tests {
     /// Two sines about fixed axes one after the other: omega and alpha are known in closed form.
     fn truth(t: f64) -> (UnitQuaternion<f64>, Vector3<f64>, Vector3<f64>) {
         let (w1, w2) = (2.0 * std::f64::consts::PI * 2.0, 2.0 * std::f64::consts::PI * 1.3);
-        let (a, da, dda) = (0.3 * (w1 * t).sin(), 0.3 * w1 * (w1 * t).cos(), -0.3 * w1 * w1 * (w1 * t).sin());
-        let (b, db, ddb) = (0.5 * (w2 * t).cos(), -0.5 * w2 * (w2 * t).sin(), -0.5 * w2 * w2 * (w2 * t).cos());
-        let q = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), a) * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), b);
+        let (a, da, dda) = (
+            0.3 * (w1 * t).sin(),
+            0.3 * w1 * (w1 * t).cos(),
+            -0.3 * w1 * w1 * (w1 * t).sin(),
+        );
+        let (b, db, ddb) = (
+            0.5 * (w2 * t).cos(),
+            -0.5 * w2 * (w2 * t).sin(),
+            -0.5 * w2 * w2 * (w2 * t).cos(),
+        );
+        let q = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), a)
+            * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), b);
         // omega = x db + Rx(b)^T z da
         let z = Vector3::new(0.0, b.sin(), b.cos());
         let dz = Vector3::new(0.0, b.cos(), -b.sin()) * db;
@@ -295,10 +323,24 @@ mod tests {
     fn rate_and_angular_acceleration_of_a_two_hertz_motion_are_exact_to_a_millionth() {
         let n = 400;
         let t: Vec<f64> = (0..n).map(|i| f64::from(i) * 0.01).collect();
-        let q: Vec<f64> = t.iter().flat_map(|v| { let q = truth(*v).0; [q.w, q.i, q.j, q.k] }).collect();
+        let q: Vec<f64> = t
+            .iter()
+            .flat_map(|v| {
+                let q = truth(*v).0;
+                [q.w, q.i, q.j, q.k]
+            })
+            .collect();
         let window = Window {
-            t: &t, readings: [None; 3], temperature: None, attitude: Some(&q), position: None, reference_exact: None,
-            covariates: vec![], offset: 0, begin: 0, end: n as usize,
+            t: &t,
+            readings: [None; 3],
+            temperature: None,
+            attitude: Some(&q),
+            position: None,
+            reference_exact: None,
+            covariates: vec![],
+            offset: 0,
+            begin: 0,
+            end: n as usize,
         };
         for shift in [0.0, 0.0037] {
             let mut worst = (0.0_f64, 0.0_f64);
@@ -317,11 +359,25 @@ mod tests {
     #[test]
     fn nothing_is_invented_across_a_gap_in_the_reference() {
         let t: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.01).collect();
-        let mut q: Vec<f64> = t.iter().flat_map(|v| { let q = truth(*v).0; [q.w, q.i, q.j, q.k] }).collect();
+        let mut q: Vec<f64> = t
+            .iter()
+            .flat_map(|v| {
+                let q = truth(*v).0;
+                [q.w, q.i, q.j, q.k]
+            })
+            .collect();
         q[4 * 100..4 * 120].fill(f64::NAN);
         let window = Window {
-            t: &t, readings: [None; 3], temperature: None, attitude: Some(&q), position: None, reference_exact: None,
-            covariates: vec![], offset: 0, begin: 0, end: 200,
+            t: &t,
+            readings: [None; 3],
+            temperature: None,
+            attitude: Some(&q),
+            position: None,
+            reference_exact: None,
+            covariates: vec![],
+            offset: 0,
+            begin: 0,
+            end: 200,
         };
         let k = kinematics(&window, Widths { value: NARROWEST, columns: NARROWEST }, None, None, 0.0);
         assert!((97..123).all(|i| k[i].is_none()));

@@ -12,6 +12,9 @@ use crate::sensor::{CHANNELS, Sensor};
 use crate::triple::Triple;
 use crate::window::{Window, held};
 
+/// Columns of a sensor's three channels, in the order of their active parameters.
+type AxisColumns = [Vec<Vec<f64>>; 3];
+
 /// An effect with its parameters and its place among all parameters.
 #[derive(Clone)]
 pub struct Slot {
@@ -83,17 +86,34 @@ impl SensorModel {
             let count = effect.card().parameters.len();
             if parameters.len() != count {
                 let message = format!("takes {count} parameters, got {}", parameters.len());
-                return Err(EffectError::Contract { effect: effect.card().id.clone(), message });
+                return Err(EffectError::Contract {
+                    effect: effect.card().id.clone(),
+                    message,
+                });
             }
-            slots.push(Slot { effect, parameters, in_model: true, first });
+            slots.push(Slot {
+                effect,
+                parameters,
+                in_model: true,
+                first,
+            });
             first += count;
         }
         for effect in candidates {
             let count = effect.card().parameters.len();
-            slots.push(Slot { effect, parameters: vec![0.0; count], in_model: false, first });
+            slots.push(Slot {
+                effect,
+                parameters: vec![0.0; count],
+                in_model: false,
+                first,
+            });
             first += count;
         }
-        let mut model = Self { slots, parameters: first, active: vec![Vec::new(); CHANNELS] };
+        let mut model = Self {
+            slots,
+            parameters: first,
+            active: vec![Vec::new(); CHANNELS],
+        };
         model.find_active(facts)?;
         Ok(model)
     }
@@ -127,7 +147,12 @@ impl SensorModel {
         for i in 0..4 {
             let v = Vector3::new(0.3, -0.7, 1.1) * (1.0 + f64::from(i));
             for triple in [
-                &mut ideal.omega, &mut ideal.alpha, &mut ideal.f, &mut ideal.f_rate, &mut ideal.m, &mut ideal.m_rate,
+                &mut ideal.omega,
+                &mut ideal.alpha,
+                &mut ideal.f,
+                &mut ideal.f_rate,
+                &mut ideal.m,
+                &mut ideal.m_rate,
             ] {
                 triple.push(&v);
             }
@@ -139,14 +164,23 @@ impl SensorModel {
         let mut columns = Columns::default();
         for sensor in Sensor::ALL.into_iter().filter(|s| facts.sensors[s.index()]) {
             let rows = Rows {
-                facts, t: &t, ideal: &ideal, x: &ideal.f, temperature: Some(&ones), covariates: &covariates,
+                facts,
+                t: &t,
+                ideal: &ideal,
+                x: &ideal.f,
+                temperature: Some(&ones),
+                covariates: &covariates,
             };
             for slot in self.slots.iter().filter(|s| s.effect.sensors().contains(&sensor)) {
                 columns.reset(4, slot.parameters.len());
                 slot.effect.columns(&rows, sensor, &slot.parameters, &mut columns)?;
                 for axis in 0..3 {
                     let list = &mut self.active[3 * sensor.index() + axis];
-                    list.extend((0..slot.parameters.len()).filter(|p| columns.get(*p, axis).is_some()).map(|p| slot.first + p));
+                    list.extend(
+                        (0..slot.parameters.len())
+                            .filter(|p| columns.get(*p, axis).is_some())
+                            .map(|p| slot.first + p),
+                    );
                 }
             }
         }
@@ -158,7 +192,9 @@ impl SensorModel {
         self.slots
             .iter()
             .filter(|s| s.in_model && s.effect.card().stage == Stage::Reference)
-            .fold(ReferenceChange::default(), |change, s| change.and(s.effect.reference_change(&s.parameters)))
+            .fold(ReferenceChange::default(), |change, s| {
+                change.and(s.effect.reference_change(&s.parameters))
+            })
     }
 
     /// Residual and columns over the core rows of a window.
@@ -168,11 +204,16 @@ impl SensorModel {
         let temperature: Option<Vec<f64>> = window
             .temperature
             .map(|t| core.clone().map(|i| held(t, i) - facts.temperature_mean).collect());
-        let covariates: Vec<Vec<f64>> =
-            window.covariates.iter().map(|c| core.clone().map(|i| held(c, i)).collect()).collect();
+        let covariates: Vec<Vec<f64>> = window
+            .covariates
+            .iter()
+            .map(|c| core.clone().map(|i| held(c, i)).collect())
+            .collect();
         let mut channels: Vec<Option<ChannelColumns>> = vec![None; CHANNELS];
         for sensor in Sensor::ALL {
-            let Some(reading) = window.reading(sensor) else { continue };
+            let Some(reading) = window.reading(sensor) else {
+                continue;
+            };
             let rows = Rows {
                 facts,
                 t: &window.t[core.clone()],
@@ -191,11 +232,21 @@ impl SensorModel {
                 channels[3 * sensor.index() + axis] = Some(ChannelColumns { columns, residual });
             }
         }
-        Ok(Evaluation { ideal, channels, covariates, temperature })
+        Ok(Evaluation {
+            ideal,
+            channels,
+            covariates,
+            temperature,
+        })
     }
 
     /// Residual of each channel over the core rows of a window after a step of all parameters.
-    pub fn residuals(&self, window: &Window, facts: &LogFacts, step: &[f64]) -> Result<Vec<Option<Vec<f64>>>, EffectError> {
+    pub fn residuals(
+        &self,
+        window: &Window,
+        facts: &LogFacts,
+        step: &[f64],
+    ) -> Result<Vec<Option<Vec<f64>>>, EffectError> {
         let evaluation = self.evaluate(window, facts)?;
         Ok(evaluation
             .channels
@@ -206,14 +257,14 @@ impl SensorModel {
     }
 
     /// Modelled readings of one sensor and the columns of its three channels, stage after stage.
-    fn predict(&self, rows: Rows, sensor: Sensor) -> Result<(Triple, [Vec<Vec<f64>>; 3]), EffectError> {
+    fn predict(&self, rows: Rows, sensor: Sensor) -> Result<(Triple, AxisColumns), EffectError> {
         let n = rows.len();
         let mut x = match sensor {
             Sensor::Acc => rows.ideal.f.clone(),
             Sensor::Gyr => rows.ideal.omega.clone(),
             Sensor::Mag => rows.ideal.m.clone(),
         };
-        let mut out: [Vec<Vec<f64>>; 3] =
+        let mut out: AxisColumns =
             std::array::from_fn(|axis| vec![Vec::new(); self.active[3 * sensor.index() + axis].len()]);
         let mut columns = Columns::default();
         for stage in [Stage::Reference, Stage::Input, Stage::Gain, Stage::Offset] {
@@ -228,11 +279,18 @@ impl SensorModel {
                 for axis in 0..3 {
                     let list = &self.active[3 * sensor.index() + axis];
                     let from = list.partition_point(|p| *p < slot.first);
-                    for (k, p) in list.iter().enumerate().skip(from).take_while(|(_, p)| **p < slot.first + slot.parameters.len()) {
+                    for (k, p) in list
+                        .iter()
+                        .enumerate()
+                        .skip(from)
+                        .take_while(|(_, p)| **p < slot.first + slot.parameters.len())
+                    {
                         let value = slot.parameters[p - slot.first];
                         let column = columns.get(p - slot.first, axis);
                         // The value of a reference effect is in the ideal readings already.
-                        if slot.in_model && value != 0.0 && stage != Stage::Reference
+                        if slot.in_model
+                            && value != 0.0
+                            && stage != Stage::Reference
                             && let Some(column) = column
                         {
                             let target = &mut after.get_or_insert_with(|| x.clone()).0[axis];

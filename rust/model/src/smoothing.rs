@@ -19,7 +19,10 @@ pub const MAX_DEGREE: usize = 8;
 const TERMS: usize = MAX_DEGREE + 1;
 
 /// The narrowest choice: nine knots, degree eight, exact to 1e-8 for motions up to 4 Hz at 100 Hz.
-pub const NARROWEST: Smoothing = Smoothing { degree: 8, half_width: 4 };
+pub const NARROWEST: Smoothing = Smoothing {
+    degree: 8,
+    half_width: 4,
+};
 
 /// Normal equations of one local polynomial in Legendre polynomials of u = (t - t_at) / scale, which keeps them well conditioned.
 pub struct LocalFit {
@@ -90,7 +93,12 @@ impl LocalFit {
                 }
             }
         }
-        Some(Self { terms, scale, factor, basis })
+        Some(Self {
+            terms,
+            scale,
+            factor,
+            basis,
+        })
     }
 
     fn solve(&self, b: &mut [f64; TERMS]) {
@@ -115,7 +123,11 @@ impl LocalFit {
         for (order, w) in weights.iter_mut().enumerate() {
             let mut c = AT_ZERO[order];
             self.solve(&mut c);
-            *w = self.basis.iter().map(|b| (0..self.terms).map(|k| c[k] * b[k]).sum::<f64>() / unit).collect();
+            *w = self
+                .basis
+                .iter()
+                .map(|b| (0..self.terms).map(|k| c[k] * b[k]).sum::<f64>() / unit)
+                .collect();
             unit *= self.scale;
         }
         weights
@@ -160,13 +172,26 @@ mod tests {
 
     #[test]
     fn a_polynomial_comes_back_with_its_derivatives_at_uneven_times() {
-        let t: Vec<f64> = (0..15).map(|i| f64::from(i) * 0.01 + 0.002 * f64::from(i * 7 % 5)).collect();
+        let t: Vec<f64> = (0..15)
+            .map(|i| f64::from(i) * 0.01 + 0.002 * f64::from(i * 7 % 5))
+            .collect();
         let at = 0.07;
-        let values: Vec<[f64; 3]> =
-            t.iter().map(|v| { let u = v - at; [1.0 + 2.0 * u + 3.0 * u * u, u * u * u, 4.0 * u] }).collect();
+        let values: Vec<[f64; 3]> = t
+            .iter()
+            .map(|v| {
+                let u = v - at;
+                [1.0 + 2.0 * u + 3.0 * u * u, u * u * u, 4.0 * u]
+            })
+            .collect();
         let fit = LocalFit::new(&t, at, 6).expect("determined");
         let d = apply(&fit.weights(), &values);
-        for (got, want) in [(d[0][0], 1.0), (d[1][0], 2.0), (d[2][0], 6.0), (d[3][1], 6.0), (d[1][2], 4.0)] {
+        for (got, want) in [
+            (d[0][0], 1.0),
+            (d[1][0], 2.0),
+            (d[2][0], 6.0),
+            (d[3][1], 6.0),
+            (d[1][2], 4.0),
+        ] {
             assert!((got - want).abs() < 1e-7, "{got} {want}");
         }
         assert!(fit.residual(&values).0 < 1e-24);

@@ -65,7 +65,11 @@ impl<'a> Window<'a> {
     /// The same window with other rows to work on.
     #[must_use]
     pub fn with_core(&self, begin: usize, end: usize) -> Self {
-        Self { begin, end, ..self.clone() }
+        Self {
+            begin,
+            end,
+            ..self.clone()
+        }
     }
 }
 
@@ -82,5 +86,9 @@ pub fn held(column: &[f64], row: usize) -> f64 {
         return *v;
     }
     let last = (row + HOLD_ROWS).min(column.len());
-    column[row..last].iter().copied().find(|v| v.is_finite()).unwrap_or(f64::NAN)
+    column[row..last]
+        .iter()
+        .copied()
+        .find(|v| v.is_finite())
+        .unwrap_or(f64::NAN)
 }

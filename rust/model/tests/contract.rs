@@ -1,5 +1,5 @@
 //! Every built-in effect keeps the contract that fitting relies on.
-#![allow(clippy::expect_used, clippy::unwrap_used, missing_docs)]
+#![allow(missing_docs)]
 
 use imufit_model::catalogue;
 use imufit_model::contract::check;
@@ -19,7 +19,10 @@ fn every_built_in_effect_keeps_the_contract() {
             [q.w, q.i, q.j, q.k]
         })
         .collect();
-    let position: Vec<f64> = t.iter().flat_map(|t| [(2.0 * t).sin(), (3.0 * t).cos() * 0.3, 0.1 * t]).collect();
+    let position: Vec<f64> = t
+        .iter()
+        .flat_map(|t| [(2.0 * t).sin(), (3.0 * t).cos() * 0.3, 0.1 * t])
+        .collect();
     let reading = vec![0.1; 3 * n];
     let temperature: Vec<f64> = t.iter().map(|t| 30.0 + t.sin()).collect();
     let current: Vec<f64> = t.iter().map(|t| (5.0 * t).sin() + 2.0).collect();
@@ -61,8 +64,13 @@ fn every_built_in_effect_keeps_the_contract() {
     }
     for effect in &effects {
         let zero = vec![0.0; effect.card().parameters.len()];
-        let typical: Vec<f64> =
-            effect.card().parameters.iter().enumerate().map(|(k, p)| p.typical.unwrap_or(0.3) * (1.0 - 0.3 * k as f64)).collect();
+        let typical: Vec<f64> = effect
+            .card()
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(k, p)| p.typical.unwrap_or(0.3) * (1.0 - 0.3 * k as f64))
+            .collect();
         for at in [zero, typical] {
             if let Err(e) = check(effect, &at, &window, &facts) {
                 panic!("{e}");

@@ -5,7 +5,7 @@
 //! the array meanwhile is the caller's fault.
 
 use numpy::{
-    Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray,
+    Element, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray,
     PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -26,12 +26,6 @@ impl<'py, const C: usize> Rows<'py, C> {
     pub fn new(name: &'static str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
         let (array, n) = borrow::<f64, C>(name, value, "float64")?;
         Ok(Self { array, name, n })
-    }
-
-    /// The argument `name`, if it is not `None`.
-    #[allow(dead_code)] // for wrappers to come
-    pub fn optional(name: &'static str, value: Option<&Bound<'py, PyAny>>) -> PyResult<Option<Self>> {
-        value.map(|value| Self::new(name, value)).transpose()
     }
 
     /// The argument `name` with `n` rows, as many as `other` has.
@@ -102,30 +96,6 @@ where
     E: Send,
 {
     let array = PyArray2::zeros(py, [n, C], false);
-    let result = fill_array(
-        py,
-        array
-            .try_readwrite()
-            .map_err(|error| PyValueError::new_err(error.to_string()))?,
-        fill,
-    )?
-    .map_err(to_python)?;
-    Ok((array, result))
-}
-
-/// A new column of `n` numbers, filled by `fill`, which runs without the GIL.
-#[allow(dead_code)] // for wrappers to come
-pub fn filled_column<T, E>(
-    py: Python<'_>,
-    n: usize,
-    fill: impl Send + FnOnce(&mut [f64]) -> Result<T, E>,
-    to_python: impl FnOnce(E) -> PyErr,
-) -> PyResult<(Bound<'_, PyArray1<f64>>, T)>
-where
-    T: Send,
-    E: Send,
-{
-    let array = PyArray1::zeros(py, [n], false);
     let result = fill_array(
         py,
         array

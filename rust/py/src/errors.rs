@@ -12,19 +12,16 @@ pub fn value_error(message: impl std::fmt::Display) -> PyErr {
 }
 
 /// An error of the attitude crate.
-#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 pub fn from_attitude(error: InvalidAttitude) -> PyErr {
     value_error(error)
 }
 
 /// An error of the filters crate.
-#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 pub fn from_filters(error: FilterError) -> PyErr {
     value_error(error)
 }
 
 /// An error of an effect; a user's own exception comes out as it went in.
-#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 pub fn from_effect(error: EffectError) -> PyErr {
     match (&error, crate::python_effect::take_raised()) {
         (EffectError::User { .. }, Some(raised)) => raised,

@@ -71,6 +71,8 @@ impl PyFilter {
     }
 
     /// Attitudes (n, 4), scalar first, for the next rows, and the rows of which something was not used, by reason.
+    ///
+    /// `t` (n,) s; `acc` (n, 3) m/s^2; `gyr` (n, 3) rad/s; `mag` (n, 3) uT.
     #[pyo3(signature = (t, acc=None, gyr=None, mag=None))]
     fn run<'py>(
         &mut self,
@@ -112,7 +114,7 @@ impl PyFilter {
         Ok((attitude, reasons))
     }
 
-    /// All that the next row depends on: hand it to another filter with the same settings.
+    /// All that the next row depends on, (k,): hand it to another filter with the same settings.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.replay.state())

@@ -26,7 +26,13 @@ pub struct PySurvey(Survey);
 impl PySurvey {
     #[new]
     #[pyo3(signature = (n, frame, gravity, mag_reference, covariates))]
-    fn new(n: usize, frame: &str, gravity: f64, mag_reference: Option<[f64; 3]>, covariates: Vec<String>) -> PyResult<Self> {
+    fn new(
+        n: usize,
+        frame: &str,
+        gravity: f64,
+        mag_reference: Option<[f64; 3]>,
+        covariates: Vec<String>,
+    ) -> PyResult<Self> {
         let frame: Frame = frame.parse().map_err(value_error)?;
         Ok(Self(Survey::new(Given {
             n,
@@ -56,7 +62,12 @@ impl PySurvey {
         let (attitude_noise, position_noise) = (attitude.noise(), position.noise());
         let (facts, mut bins) = self.0.clone().finish();
         bins.centre_temperature(facts.temperature_mean);
-        PyFacts { facts, bins, attitude_noise, position_noise }
+        PyFacts {
+            facts,
+            bins,
+            attitude_noise,
+            position_noise,
+        }
     }
 }
 
@@ -66,7 +77,8 @@ pub struct PyEvidence(pub Evidence);
 
 #[pymethods]
 impl PyEvidence {
-    /// `effects` with their parameters are the model; `candidates` are asked for their columns only.
+    /// `effects` with their parameters are the model; `candidates` are asked for their columns only; `filters` has the
+    /// taps of a whitening filter for each of the nine channels.
     #[new]
     fn new(
         facts: &PyFacts,
@@ -81,7 +93,13 @@ impl PyEvidence {
         let effects = effects.into_iter().map(|(e, p)| (e.0.clone(), p)).collect();
         let candidates = candidates.into_iter().map(|e| e.0.clone()).collect();
         let model = SensorModel::new(effects, candidates, &facts.facts).map_err(from_effect)?;
-        let layout = Layout { model, facts: facts.facts.clone(), bins: facts.bins.clone(), blocks, filters };
+        let layout = Layout {
+            model,
+            facts: facts.facts.clone(),
+            bins: facts.bins.clone(),
+            blocks,
+            filters,
+        };
         Ok(Self(Evidence::new(Arc::new(layout))))
     }
 
@@ -112,6 +130,7 @@ impl PyEvidence {
         Ok(Self(Evidence::new(Arc::new(layout))))
     }
 
+    /// Blocks of time that the evidence is kept in.
     #[getter]
     fn blocks(&self) -> usize {
         self.0.layout.blocks
@@ -127,7 +146,8 @@ impl PyEvidence {
         self.0.layout.model.active()[channel].clone()
     }
 
-    /// Gram matrix of `[columns | residual]` of a channel, summed over all blocks or of one block; None without samples.
+    /// Gram matrix (a + 1, a + 1) of `[columns | residual]` of a channel with its a active parameters, summed over all
+    /// blocks or of one block; None without samples.
     #[pyo3(signature = (channel, block=None))]
     fn gram<'py>(&self, py: Python<'py>, channel: usize, block: Option<usize>) -> Option<Bound<'py, PyArray2<f64>>> {
         let blocks: Vec<usize> = block.map_or_else(|| (0..self.0.layout.blocks).collect(), |b| vec![b]);
@@ -135,11 +155,15 @@ impl PyEvidence {
         let first = parts.next()?.gram.clone();
         let sum = parts.fold(first, |s, b| s + &b.gram);
         let n = sum.nrows();
-        Some(PyArray2::from_owned_array(py, numpy::ndarray::Array2::from_shape_fn((n, n), |(i, j)| sum[(i, j)])))
+        Some(PyArray2::from_owned_array(
+            py,
+            numpy::ndarray::Array2::from_shape_fn((n, n), |(i, j)| sum[(i, j)]),
+        ))
     }
 }
 
-/// Residual of each channel over the core rows of a chunk, after a step of all parameters; None for a sensor that the log has not.
+/// Residual of each of the nine channels over the core rows of a chunk, (rows,), SI units (magnetometer uT), after a
+/// step of all parameters, (p,); None for a sensor that the log has not.
 #[pyfunction]
 fn evaluate<'py>(
     py: Python<'py>,
@@ -153,8 +177,13 @@ fn evaluate<'py>(
     }
     let arrays = ChunkArrays::new(chunk)?;
     let window = arrays.window()?;
-    let residuals = py.detach(|| layout.model.residuals(&window, &layout.facts, &step)).map_err(from_effect)?;
-    Ok(residuals.into_iter().map(|r| r.map(|r| PyArray1::from_vec(py, r))).collect())
+    let residuals = py
+        .detach(|| layout.model.residuals(&window, &layout.facts, &step))
+        .map_err(from_effect)?;
+    Ok(residuals
+        .into_iter()
+        .map(|r| r.map(|r| PyArray1::from_vec(py, r)))
+        .collect())
 }
 
 /// Autocovariances of the residual, from which whitening filters come.
@@ -169,16 +198,23 @@ impl PyAutocovariance {
     }
 
     /// Adds the core rows of a chunk: the residual of the evidence's layout less its columns times `step`.
-    fn add(&mut self, py: Python<'_>, chunk: &Bound<'_, PyDict>, evidence: &PyEvidence, step: Vec<f64>) -> PyResult<()> {
+    fn add(
+        &mut self,
+        py: Python<'_>,
+        chunk: &Bound<'_, PyDict>,
+        evidence: &PyEvidence,
+        step: Vec<f64>,
+    ) -> PyResult<()> {
         if step.len() != evidence.0.layout.model.parameters() {
             return Err(value_error("step must have one number per parameter"));
         }
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
-        py.detach(|| self.0.add(&window, &evidence.0.layout, &step)).map_err(from_effect)
+        py.detach(|| self.0.add(&window, &evidence.0.layout, &step))
+            .map_err(from_effect)
     }
 
-    /// Whitening filter of each channel; empty where the residual is white.
+    /// Whitening filter of each of the nine channels, its taps; empty where the residual is white.
     fn filters(&self) -> Vec<Vec<f64>> {
         (0..CHANNELS)
             .map(|channel| {
@@ -188,7 +224,7 @@ impl PyAutocovariance {
             .collect()
     }
 
-    /// Autocovariance of a channel, lag 0 first.
+    /// Autocovariance of a channel, lag 0 first, in the square of its unit.
     fn of_channel(&self, channel: usize) -> Vec<f64> {
         self.0.of_channel(channel).0
     }

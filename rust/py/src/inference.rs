@@ -13,17 +13,22 @@ use pyo3::types::{PyDict, PyList};
 use crate::errors::value_error;
 use crate::fit::PyEvidence;
 
-/// All effects fitted at once: (step of every parameter, residual variance per channel).
+/// All effects fitted at once: (step (p,) of every parameter, residual variance of each of the nine channels).
 #[pyfunction]
 fn saturate<'py>(py: Python<'py>, evidence: &PyEvidence) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<f64>)> {
     let fitted = py
         .detach(|| saturated::fit_all(&evidence.0))
         .ok_or_else(|| value_error("the normal equations cannot be solved: the log holds no usable samples"))?;
-    Ok((PyArray1::from_slice(py, fitted.step.as_slice()), fitted.variance.to_vec()))
+    Ok((
+        PyArray1::from_slice(py, fitted.step.as_slice()),
+        fitted.variance.to_vec(),
+    ))
 }
 
 fn nine(name: &str, values: &[f64]) -> PyResult<[f64; CHANNELS]> {
-    values.try_into().map_err(|_| value_error(format!("{name} must have {CHANNELS} numbers")))
+    values
+        .try_into()
+        .map_err(|_| value_error(format!("{name} must have {CHANNELS} numbers")))
 }
 
 /// Evidence of a log, whitened and not, ready to be asked.
@@ -37,23 +42,40 @@ pub struct PyProblem {
 
 #[pymethods]
 impl PyProblem {
-    /// `variance`: of the whitened residual per channel; `floors`: noise floor per channel.
+    /// `variance`: of the whitened residual of each of the nine channels; `floors`: their noise floors, in their units.
     #[new]
-    fn new(py: Python<'_>, white: &PyEvidence, raw: &PyEvidence, variance: Vec<f64>, floors: Vec<f64>) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        white: &PyEvidence,
+        raw: &PyEvidence,
+        variance: Vec<f64>,
+        floors: Vec<f64>,
+    ) -> PyResult<Self> {
         let (variance, floors) = (nine("variance", &variance)?, nine("floors", &floors)?);
         let (white, raw) = (white.0.clone(), raw.0.clone());
         let problem = py.detach(|| Problem::new(&white, &raw, &variance, &floors));
-        Ok(Self { problem, white, raw, floors })
+        Ok(Self {
+            problem,
+            white,
+            raw,
+            floors,
+        })
     }
 
-    /// Fits the slots given: step and standard error of each of their parameters, held-out and training ratio.
+    /// Fits the slots given: step and standard error (k,) of each of their k parameters, SI units; full step (p,) of
+    /// all; held-out and training residual RMS over noise floor.
     fn estimate<'py>(&self, py: Python<'py>, slots: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
         let all = self.white.layout.model.slots();
         if slots.iter().any(|s| *s >= all.len()) {
             return Err(value_error("there is no such slot"));
         }
         let parameters = parameters_of(slots.iter().map(|s| &all[*s]));
-        let (fitted, base) = py.detach(|| (estimate::estimate(&self.problem, &parameters), screening::base(&self.problem, &parameters)));
+        let (fitted, base) = py.detach(|| {
+            (
+                estimate::estimate(&self.problem, &parameters),
+                screening::base(&self.problem, &parameters),
+            )
+        });
         let fitted = fitted.ok_or_else(|| value_error("the normal equations cannot be solved"))?;
         let mut step = DVector::zeros(self.white.layout.model.parameters());
         for (k, p) in parameters.iter().enumerate() {
@@ -73,7 +95,12 @@ impl PyProblem {
     }
 
     /// Which effect is missing from the model of slots `model`, among the slots `candidates`.
-    fn diagnose<'py>(&self, py: Python<'py>, model: Vec<usize>, candidates: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
+    fn diagnose<'py>(
+        &self,
+        py: Python<'py>,
+        model: Vec<usize>,
+        candidates: Vec<usize>,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let v = py.detach(|| verdict::decide(&self.problem, &self.white, &model, &candidates));
         let out = PyDict::new(py);
         out.set_item("verdict", v.kind.word())?;
@@ -113,7 +140,8 @@ impl PyProblem {
         Ok(out)
     }
 
-    /// Residual at a step of all parameters: channels, blocks and binned panels.
+    /// Residual at a step (p,) of all parameters: RMS and mean by channel and block, and binned panels, in the
+    /// channels' units.
     fn residual<'py>(&self, py: Python<'py>, step: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
         if step.len() != self.raw.layout.model.parameters() {
             return Err(value_error("step must have one number per parameter"));
@@ -137,10 +165,15 @@ impl PyProblem {
                 let item = PyDict::new(py);
                 item.set_item("channel", channel_name(p.channel))?;
                 item.set_item("covariate", &self.raw.layout.bins.names[p.covariate])?;
-                item.set_item("unit", imufit_fit::bins::Bins::unit(&self.raw.layout.bins.names[p.covariate]))?;
+                item.set_item(
+                    "unit",
+                    imufit_fit::bins::Bins::unit(&self.raw.layout.bins.names[p.covariate]),
+                )?;
                 let mut edges = self.raw.layout.bins.edges[p.covariate].clone();
                 if p.covariate == 1 {
-                    edges.iter_mut().for_each(|e| *e += self.raw.layout.facts.temperature_mean);
+                    for edge in &mut edges {
+                        *edge += self.raw.layout.facts.temperature_mean;
+                    }
                 }
                 item.set_item("edges", PyArray1::from_vec(py, edges))?;
                 item.set_item("mean", PyArray1::from_slice(py, &p.mean))?;

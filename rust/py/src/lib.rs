@@ -1,5 +1,5 @@
 //! The module `imufit._imufit`: registration, nothing else.
-#![allow(missing_docs)]
+#![allow(clippy::needless_pass_by_value)] // arguments that pyo3 extracts are owned, and so are errors in `map_err`
 
 mod arrays;
 mod attitude;

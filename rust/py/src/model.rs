@@ -22,6 +22,7 @@ pub struct PyEffect(pub Arc<dyn Effect>);
 
 #[pymethods]
 impl PyEffect {
+    /// Its name in the catalogue, such as `gyr.bias`.
     #[getter]
     fn id(&self) -> String {
         self.0.card().id.clone()
@@ -36,10 +37,16 @@ impl PyEffect {
     /// Its parameters: (name, unit, typical size or None).
     #[getter]
     fn parameters(&self) -> Vec<(String, String, Option<f64>)> {
-        self.0.card().parameters.iter().map(|p| (p.name.clone(), p.unit.clone(), p.typical)).collect()
+        self.0
+            .card()
+            .parameters
+            .iter()
+            .map(|p| (p.name.clone(), p.unit.clone(), p.typical))
+            .collect()
     }
 
-    /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new values.
+    /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new
+    /// values.
     #[getter]
     fn nonlinear(&self) -> bool {
         self.0.card().stage == Stage::Reference
@@ -62,8 +69,12 @@ impl PyEffect {
         let card = self.0.card();
         let out = PyDict::new(py);
         for (key, value) in [
-            ("name", &card.name), ("physics", &card.physics), ("formula", &card.formula),
-            ("signature", &card.signature), ("mistaken_for", &card.mistaken_for), ("confirm", &card.confirm),
+            ("name", &card.name),
+            ("physics", &card.physics),
+            ("formula", &card.formula),
+            ("signature", &card.signature),
+            ("mistaken_for", &card.mistaken_for),
+            ("confirm", &card.confirm),
         ] {
             out.set_item(key, value)?;
         }
@@ -75,12 +86,14 @@ impl PyEffect {
         self.0.not_testable(&facts.facts)
     }
 
-    /// Checks the contract on the core rows of a chunk: finite, agrees with a difference quotient, independent of how rows are cut.
+    /// Checks the contract on the core rows of a chunk: finite, agrees with a difference quotient, independent of how
+    /// rows are cut. `at` holds a value for each parameter.
     fn check(&self, chunk: &Bound<'_, PyDict>, facts: &PyFacts, at: Vec<f64>) -> PyResult<()> {
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
         let py = chunk.py();
-        py.detach(|| contract::check(&self.0, &at, &window, &facts.facts)).map_err(from_effect)
+        py.detach(|| contract::check(&self.0, &at, &window, &facts.facts))
+            .map_err(from_effect)
     }
 }
 
@@ -96,6 +109,7 @@ pub struct PyFacts {
 
 #[pymethods]
 impl PyFacts {
+    /// Rows of the log.
     #[getter]
     fn n(&self) -> usize {
         self.facts.n
@@ -107,55 +121,76 @@ impl PyFacts {
         self.facts.margin()
     }
 
+    /// Time of the first row, s.
     #[getter]
     fn t_start(&self) -> f64 {
         self.facts.t_start
     }
 
+    /// Time of the last row, s.
     #[getter]
     fn t_end(&self) -> f64 {
         self.facts.t_end
     }
 
+    /// Median time between rows, s.
     #[getter]
     fn dt(&self) -> f64 {
         self.facts.dt
     }
 
+    /// Magnetic flux density in the reference frame, (3,), uT; zero without a magnetometer.
     #[getter]
     fn field(&self) -> [f64; 3] {
         self.facts.field.into()
     }
 
+    /// True if `field` was estimated from this log, so that it has to be fitted along.
     #[getter]
     fn field_estimated(&self) -> bool {
         self.facts.field_estimated
     }
 
+    /// Mean sensor temperature, degC.
     #[getter]
     fn temperature_mean(&self) -> f64 {
         self.facts.temperature_mean
     }
 
+    /// True if the log has a thermometer.
     #[getter]
     fn has_temperature(&self) -> bool {
         self.facts.has_temperature
     }
 
+    /// Prefixes of the sensors that the log has.
     #[getter]
     fn sensors(&self) -> Vec<&'static str> {
-        Sensor::ALL.iter().filter(|s| self.facts.sensors[s.index()]).map(|s| s.prefix()).collect()
+        Sensor::ALL
+            .iter()
+            .filter(|s| self.facts.sensors[s.index()])
+            .map(|s| s.prefix())
+            .collect()
     }
 
+    /// Mean of each covariate by name, in its own unit.
     #[getter]
     fn covariate_means(&self) -> std::collections::BTreeMap<String, f64> {
-        self.facts.covariates.iter().cloned().zip(self.facts.covariate_means.iter().copied()).collect()
+        self.facts
+            .covariates
+            .iter()
+            .cloned()
+            .zip(self.facts.covariate_means.iter().copied())
+            .collect()
     }
 
     /// Degree and half width of the polynomial through the reference attitude.
     #[getter]
     fn attitude_smoothing(&self) -> (usize, usize) {
-        (self.facts.attitude_smoothing.degree, self.facts.attitude_smoothing.half_width)
+        (
+            self.facts.attitude_smoothing.degree,
+            self.facts.attitude_smoothing.half_width,
+        )
     }
 
     /// Degree and half width of the polynomial through the reference position; None without position.
@@ -172,7 +207,11 @@ impl PyFacts {
 
     /// The same facts with the temperature and covariate means of the log that a model was fitted on.
     #[pyo3(signature = (temperature_mean=None, covariate_means=None))]
-    fn with_means(&self, temperature_mean: Option<f64>, covariate_means: Option<std::collections::BTreeMap<String, f64>>) -> Self {
+    fn with_means(
+        &self,
+        temperature_mean: Option<f64>,
+        covariate_means: Option<std::collections::BTreeMap<String, f64>>,
+    ) -> Self {
         let mut out = self.clone();
         if let Some(mean) = temperature_mean {
             out.bins.centre_temperature(mean - out.facts.temperature_mean);
@@ -187,17 +226,23 @@ impl PyFacts {
     }
 }
 
+/// The built-in effects that need no column of a log's own, in the order of the catalogue.
 #[pyfunction]
 fn built_in_effects() -> Vec<PyEffect> {
     catalogue::built_in().into_iter().map(PyEffect).collect()
 }
 
+/// The built-in effect with this id, `SENSOR.column:NAME` among them; None if there is none.
 #[pyfunction]
 fn find_effect(id: &str) -> Option<PyEffect> {
     catalogue::find(id).map(PyEffect)
 }
 
-/// An effect made of a Python function that returns d reading / d parameters, (n, 3, p).
+/// An effect made of a Python function that returns d reading / d parameters, (n, 3, p), float64, in SI units.
+///
+/// `parameters` are (name, unit, typical size or None); `words` the words of its card; `needs` the covariates that it
+/// reads. `function` gets a dict: t, t_start (s), omega, alpha, f, m, x (n, 3), temperature (n,) or None,
+/// columns by name.
 #[pyfunction]
 #[pyo3(signature = (id, sensor, parameters, words, stage, needs, function))]
 fn python_effect(
@@ -209,16 +254,16 @@ fn python_effect(
     needs: Vec<String>,
     function: Py<PyAny>,
 ) -> PyResult<PyEffect> {
-    let sensor = Sensor::from_prefix(sensor).ok_or_else(|| value_error(format!("sensor is {sensor:?}: pass acc, gyr or mag")))?;
+    let sensor = Sensor::from_prefix(sensor)
+        .ok_or_else(|| value_error(format!("sensor is {sensor:?}: pass acc, gyr or mag")))?;
     let stage = match stage {
         "input" => Stage::Input,
         "gain" => Stage::Gain,
         "offset" => Stage::Offset,
         other => return Err(value_error(format!("stage is {other:?}: pass input, gain or offset"))),
     };
-    let word = |key: &str| -> PyResult<String> {
-        words.get_item(key)?.map_or_else(|| Ok(String::new()), |v| v.extract())
-    };
+    let word =
+        |key: &str| -> PyResult<String> { words.get_item(key)?.map_or_else(|| Ok(String::new()), |v| v.extract()) };
     let card = Card {
         name: word("name")?,
         physics: word("physics")?,
@@ -228,9 +273,17 @@ fn python_effect(
         confirm: word("confirm")?,
         id,
         stage,
-        parameters: parameters.into_iter().map(|(name, unit, typical)| Parameter { name, unit, typical }).collect(),
+        parameters: parameters
+            .into_iter()
+            .map(|(name, unit, typical)| Parameter { name, unit, typical })
+            .collect(),
     };
-    Ok(PyEffect(Arc::new(PythonEffect { card, sensor: [sensor], needs, function })))
+    Ok(PyEffect(Arc::new(PythonEffect {
+        card,
+        sensor: [sensor],
+        needs,
+        function,
+    })))
 }
 
 /// Registers this file's part of the module.

@@ -33,7 +33,10 @@ pub struct PythonEffect {
 
 fn table<'py>(py: Python<'py>, triple: &Triple) -> Bound<'py, PyArray2<f64>> {
     let n = triple.len();
-    PyArray2::from_owned_array(py, numpy::ndarray::Array2::from_shape_fn((n, 3), |(i, axis)| triple.0[axis][i]))
+    PyArray2::from_owned_array(
+        py,
+        numpy::ndarray::Array2::from_shape_fn((n, 3), |(i, axis)| triple.0[axis][i]),
+    )
 }
 
 impl PythonEffect {
@@ -77,7 +80,10 @@ impl Effect for PythonEffect {
         if !facts.sensors[self.sensor[0].index()] {
             return Some(format!("the log has no {}", self.sensor[0].name()));
         }
-        self.needs.iter().find(|c| facts.covariate(c).is_none()).map(|c| format!("the log has no column {c}"))
+        self.needs
+            .iter()
+            .find(|c| facts.covariate(c).is_none())
+            .map(|c| format!("the log has no column {c}"))
     }
 
     fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
@@ -85,7 +91,10 @@ impl Effect for PythonEffect {
             self.call(py, rows, out).map_err(|error| {
                 let message = error.to_string();
                 *RAISED.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-                EffectError::User { effect: self.card.id.clone(), message }
+                EffectError::User {
+                    effect: self.card.id.clone(),
+                    message,
+                }
             })
         })
     }

@@ -26,13 +26,19 @@ fn item<'py>(chunk: &Bound<'py, PyDict>, key: &str) -> PyResult<Option<Bound<'py
 }
 
 fn number(chunk: &Bound<'_, PyDict>, key: &str) -> PyResult<usize> {
-    item(chunk, key)?.ok_or_else(|| value_error(format!("the chunk has no {key}")))?.extract()
+    item(chunk, key)?
+        .ok_or_else(|| value_error(format!("the chunk has no {key}")))?
+        .extract()
 }
 
 impl<'py> ChunkArrays<'py> {
-    /// Borrows the arrays of a chunk: t, acc, gyr, mag, temp, ref_q, ref_p, ref_exact, covariates (a list), offset, begin, end.
+    /// Borrows the arrays of a chunk: t, acc, gyr, mag, temp, ref_q, ref_p, ref_exact, covariates (a list), offset,
+    /// begin, end.
     pub fn new(chunk: &Bound<'py, PyDict>) -> PyResult<Self> {
-        let t = Column::new("t", &item(chunk, "t")?.ok_or_else(|| value_error("the chunk has no t"))?)?;
+        let t = Column::new(
+            "t",
+            &item(chunk, "t")?.ok_or_else(|| value_error("the chunk has no t"))?,
+        )?;
         let n = t.len();
         let mut covariates = Vec::new();
         if let Some(list) = item(chunk, "covariates")? {
@@ -42,7 +48,9 @@ impl<'py> ChunkArrays<'py> {
         }
         let (begin, end) = (number(chunk, "begin")?, number(chunk, "end")?);
         if begin > end || end > n {
-            return Err(value_error(format!("rows {begin} to {end} are not within the {n} rows of the chunk")));
+            return Err(value_error(format!(
+                "rows {begin} to {end} are not within the {n} rows of the chunk"
+            )));
         }
         let sensor = |key: &'static str| Rows::<3>::optional_with_rows(key, item(chunk, key)?.as_ref(), "t", n);
         Ok(Self {

@@ -40,7 +40,11 @@ pub fn bias(sensor: Sensor) -> Linear {
         ),
     };
     Linear {
-        card: words.card(format!("{}.bias", sensor.prefix()), Stage::Offset, parameters(&VECTOR, sensor.unit(), typical)),
+        card: words.card(
+            format!("{}.bias", sensor.prefix()),
+            Stage::Offset,
+            parameters(&VECTOR, sensor.unit(), typical),
+        ),
         sensor: [sensor],
         needs: Needs::Sensor,
         fill,

@@ -17,7 +17,10 @@ pub struct Covariate {
 pub fn column(sensor: Sensor, name: &str) -> Covariate {
     let words = Words {
         name: &format!("influence of {name} on the {}", sensor.name()),
-        physics: &format!("something that {name} measures (a supply, a current, a load) shifts the reading of the {}", sensor.name()),
+        physics: &format!(
+            "something that {name} measures (a supply, a current, a load) shifts the reading of the {}",
+            sensor.name()
+        ),
         formula: &format!("c ({name} - mean of {name})"),
         signature: &format!("the residual follows {name}"),
         mistaken_for: "whatever else changed together with that column",
@@ -25,7 +28,11 @@ pub fn column(sensor: Sensor, name: &str) -> Covariate {
     };
     let parameters = VECTOR
         .iter()
-        .map(|v| Parameter { name: (*v).to_string(), unit: format!("{}/{name}", sensor.unit()), typical: None })
+        .map(|v| Parameter {
+            name: (*v).to_string(),
+            unit: format!("{}/{name}", sensor.unit()),
+            typical: None,
+        })
         .collect();
     Covariate {
         card: words.card(format!("{}.column:{name}", sensor.prefix()), Stage::Offset, parameters),
@@ -47,14 +54,20 @@ impl Effect for Covariate {
         if !facts.sensors[self.sensor[0].index()] {
             return Some(format!("the log has no {}", self.sensor[0].name()));
         }
-        facts.covariate(&self.column).is_none().then(|| format!("the log has no column {}", self.column))
+        facts
+            .covariate(&self.column)
+            .is_none()
+            .then(|| format!("the log has no column {}", self.column))
     }
 
     fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
-        let k = rows.facts.covariate(&self.column).ok_or_else(|| EffectError::MissingColumn {
-            effect: self.card.id.clone(),
-            column: self.column.clone(),
-        })?;
+        let k = rows
+            .facts
+            .covariate(&self.column)
+            .ok_or_else(|| EffectError::MissingColumn {
+                effect: self.card.id.clone(),
+                column: self.column.clone(),
+            })?;
         let mean = rows.facts.covariate_means[k];
         for axis in 0..3 {
             out.set(axis, axis, rows.covariates[k].iter().map(|v| v - mean));

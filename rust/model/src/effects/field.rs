@@ -13,7 +13,9 @@ fn fill(rows: &Rows, out: &mut Columns) {
             out.column(parameter, axis);
         }
         for row in 0..rows.len() {
-            let v = rows.attitude(row).inverse_transform_vector(&Vector3::ith(parameter, 1.0));
+            let v = rows
+                .attitude(row)
+                .inverse_transform_vector(&Vector3::ith(parameter, 1.0));
             for axis in 0..3 {
                 out.column(parameter, axis)[row] = v[axis];
             }
@@ -35,7 +37,11 @@ pub fn field_reference() -> Linear {
         confirm: "measure the field with a second magnetometer at the same place",
     };
     Linear {
-        card: words.card(FIELD_REFERENCE.to_string(), Stage::Input, parameters(&VECTOR, "uT", 5.0)),
+        card: words.card(
+            FIELD_REFERENCE.to_string(),
+            Stage::Input,
+            parameters(&VECTOR, "uT", 5.0),
+        ),
         sensor: [Sensor::Mag],
         needs: Needs::Sensor,
         fill,

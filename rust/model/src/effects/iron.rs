@@ -26,7 +26,11 @@ pub fn hard_iron() -> Linear {
         confirm: "turn the sensor through all attitudes far from iron: the readings lie on a sphere whose centre is b",
     };
     Linear {
-        card: words.card("mag.hard_iron".to_string(), Stage::Offset, parameters(&VECTOR, "uT", 20.0)),
+        card: words.card(
+            "mag.hard_iron".to_string(),
+            Stage::Offset,
+            parameters(&VECTOR, "uT", 20.0),
+        ),
         sensor: [Sensor::Mag],
         needs: Needs::Sensor,
         fill: fill_hard,

@@ -34,7 +34,11 @@ pub fn lever_arm() -> Linear {
         confirm: "spin at a constant rate about each axis: the reading away from the axis is r omega^2",
     };
     Linear {
-        card: words.card("acc.lever_arm".to_string(), Stage::Input, parameters(&VECTOR, "m", 0.05)),
+        card: words.card(
+            "acc.lever_arm".to_string(),
+            Stage::Input,
+            parameters(&VECTOR, "m", 0.05),
+        ),
         sensor: [Sensor::Acc],
         needs: Needs::Sensor,
         fill,

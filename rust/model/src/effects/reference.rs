@@ -34,7 +34,11 @@ pub fn alignment() -> Reference {
         confirm: "compare the rotation found from gravity with the one found from turning: a mount gives the same for both",
     };
     Reference {
-        card: words.card("ref.alignment".to_string(), Stage::Reference, parameters(&VECTOR, "rad", 0.02)),
+        card: words.card(
+            "ref.alignment".to_string(),
+            Stage::Reference,
+            parameters(&VECTOR, "rad", 0.02),
+        ),
         kind: Kind::Alignment,
     }
 }
@@ -50,7 +54,11 @@ pub fn delay() -> Reference {
         confirm: "knock the body: the step in the sensor and in the reference must come at the same time",
     };
     Reference {
-        card: words.card("ref.delay".to_string(), Stage::Reference, parameters(&["tau"], "s", 0.01)),
+        card: words.card(
+            "ref.delay".to_string(),
+            Stage::Reference,
+            parameters(&["tau"], "s", 0.01),
+        ),
         kind: Kind::Delay,
     }
 }
@@ -62,7 +70,10 @@ fn right_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
     let (a, b) = if angle < 1e-4 {
         (0.5 - angle * angle / 24.0, 1.0 / 6.0 - angle * angle / 120.0)
     } else {
-        ((1.0 - angle.cos()) / angle.powi(2), (angle - angle.sin()) / angle.powi(3))
+        (
+            (1.0 - angle.cos()) / angle.powi(2),
+            (angle - angle.sin()) / angle.powi(3),
+        )
     };
     Matrix3::identity() - cross * a + cross * cross * b
 }
@@ -101,7 +112,11 @@ impl Effect for Reference {
                     for axis in 0..3 {
                         let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
                         let (xj, xk) = (x.axis(j), x.axis(k));
-                        out.set(parameter, axis, xj.iter().zip(xk).map(|(a, b)| a * turn[k] - b * turn[j]));
+                        out.set(
+                            parameter,
+                            axis,
+                            xj.iter().zip(xk).map(|(a, b)| a * turn[k] - b * turn[j]),
+                        );
                     }
                 }
             }
@@ -111,7 +126,10 @@ impl Effect for Reference {
 
     fn reference_change(&self, parameters: &[f64]) -> ReferenceChange {
         match self.kind {
-            Kind::Delay => ReferenceChange { delay: parameters[0], ..ReferenceChange::default() },
+            Kind::Delay => ReferenceChange {
+                delay: parameters[0],
+                ..ReferenceChange::default()
+            },
             Kind::Alignment => ReferenceChange {
                 alignment: UnitQuaternion::from_scaled_axis(Vector3::new(parameters[0], parameters[1], parameters[2])),
                 ..ReferenceChange::default()

@@ -32,7 +32,11 @@ pub fn scale(sensor: Sensor) -> Linear {
         },
     };
     Linear {
-        card: words.card(format!("{}.scale", sensor.prefix()), Stage::Gain, parameters(&VECTOR, "1", 0.03)),
+        card: words.card(
+            format!("{}.scale", sensor.prefix()),
+            Stage::Gain,
+            parameters(&VECTOR, "1", 0.03),
+        ),
         sensor: [sensor],
         needs: Needs::Sensor,
         fill,
