@@ -128,7 +128,7 @@ class BlindGrade:
         }
 
     def table(self) -> Table:
-        """The table as a person reads it."""
+        """Return the table as a person reads it."""
         rows = tuple(
             (
                 row["size"],

@@ -34,7 +34,9 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
     if candidate.status == "passed":
         text += f" Adding it should cut the held-out error from {before:.3f} to {after:.3f} of the noise floor."
     elif candidate.status == "differs between halves":
-        text += " But the two halves of the log disagree about it by more than chance, so it is no property of the sensor."
+        text += (
+            " But the two halves of the log disagree about it by more than chance, so it is no property of the sensor."
+        )
     elif candidate.status == "implausible size":
         text += " No sensor of this kind has so much of it: something else looks like it here."
     else:

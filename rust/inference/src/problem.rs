@@ -67,7 +67,14 @@ impl Problem {
             }
         }
         let sums = drift::channel_sums(white, &weights);
-        Self { white: white_blocks, raw: raw_blocks, plausible, typical, weights, sums }
+        Self {
+            white: white_blocks,
+            raw: raw_blocks,
+            plausible,
+            typical,
+            weights,
+            sums,
+        }
     }
 
     /// Number of blocks.

@@ -160,7 +160,9 @@ pub fn screen(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, c
     let beta = fine.estimate.rows(question.model, m).into_owned();
     let values: DVector<f64> = &out.directions * &beta;
     let covariance = &out.directions * &fine.covariance * out.directions.transpose();
-    out.parameters = (0..candidate.len()).map(|j| (values[j], covariance[(j, j)].max(0.0).sqrt())).collect();
+    out.parameters = (0..candidate.len())
+        .map(|j| (values[j], covariance[(j, j)].max(0.0).sqrt()))
+        .collect();
     out.plausible = candidate.iter().zip(&out.parameters).all(|(j, (value, error))| {
         let limit = BEYOND * problem.plausible[*j];
         !problem.typical[*j] || value.abs() - 3.0 * error <= limit

@@ -278,7 +278,9 @@ impl Bandwidth {
     /// Only where that falls by more than [`BURIED`] is a wider one taken, one narrower than the best.
     pub fn choose(&self, error: &[f64]) -> Smoothing {
         let allowed = self.allowed();
-        let best = (0..error.len()).filter(|k| error[*k].is_finite() && self.reaches(*k)).min_by(|a, b| error[*a].total_cmp(&error[*b]));
+        let best = (0..error.len())
+            .filter(|k| error[*k].is_finite() && self.reaches(*k))
+            .min_by(|a, b| error[*a].total_cmp(&error[*b]));
         match best {
             Some(best) if best > allowed && error.get(allowed).is_none_or(|e| *e > BURIED * error[best]) => {
                 WIDTHS[if best < ORDERED { (best - 1).max(allowed) } else { best }]

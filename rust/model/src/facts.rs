@@ -51,7 +51,12 @@ pub struct LogFacts {
 impl LogFacts {
     /// Rows around a window that its derivatives, held columns and whitening filters may need.
     pub fn margin(&self) -> usize {
-        let widths = [Some(self.attitude_smoothing), Some(self.attitude_columns), self.position_smoothing, self.position_columns];
+        let widths = [
+            Some(self.attitude_smoothing),
+            Some(self.attitude_columns),
+            self.position_smoothing,
+            self.position_columns,
+        ];
         let widest = widths.iter().flatten().map(|s| s.half_width).max().unwrap_or(0);
         let reach = 2.0 * (widest as f64 + 4.0) * (self.reference_dt / self.dt).max(1.0);
         let reach = if reach.is_finite() { reach as usize } else { 0 };

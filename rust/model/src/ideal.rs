@@ -67,10 +67,14 @@ impl Ideal {
         let spacing = Some(facts.reference_dt);
         let rows = reference::kinematics(
             window,
-            Widths { value: facts.attitude_smoothing, columns: facts.attitude_columns },
-            facts
-                .position_smoothing
-                .map(|value| Widths { value, columns: facts.position_columns.unwrap_or(value) }),
+            Widths {
+                value: facts.attitude_smoothing,
+                columns: facts.attitude_columns,
+            },
+            facts.position_smoothing.map(|value| Widths {
+                value,
+                columns: facts.position_columns.unwrap_or(value),
+            }),
             spacing,
             change.delay,
         );

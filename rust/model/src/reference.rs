@@ -256,10 +256,10 @@ pub fn kinematics(
     let mut translation = position.and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w.value)));
     // Derivatives that only enter columns come from a wider polynomial; it needs a cache of its own.
     let wider = |w: Widths| Some(w.columns).filter(|c| *c != w.value);
-    let mut smooth_rotation =
-        wider(attitude).and_then(|w| LocalReference::attitude(window, spacing).map(|r| (r, w)));
-    let mut smooth_translation =
-        position.and_then(wider).and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w)));
+    let mut smooth_rotation = wider(attitude).and_then(|w| LocalReference::attitude(window, spacing).map(|r| (r, w)));
+    let mut smooth_translation = position
+        .and_then(wider)
+        .and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w)));
     (window.begin..window.end)
         .map(|i| {
             let at = window.t[i] + shift;
@@ -344,7 +344,16 @@ mod tests {
         };
         for shift in [0.0, 0.0037] {
             let mut worst = (0.0_f64, 0.0_f64);
-            let k = kinematics(&window, Widths { value: NARROWEST, columns: NARROWEST }, None, None, shift);
+            let k = kinematics(
+                &window,
+                Widths {
+                    value: NARROWEST,
+                    columns: NARROWEST,
+                },
+                None,
+                None,
+                shift,
+            );
             for (i, k) in k.iter().enumerate().skip(5).take(n as usize - 10) {
                 let k = k.expect("inside");
                 let (_, omega, alpha) = truth(t[i] + shift);
@@ -353,7 +362,19 @@ mod tests {
             }
             assert!(worst.0 < 1e-6 * 5.0 && worst.1 < 1e-5 * 60.0, "{worst:?}");
         }
-        assert!(kinematics(&window, Widths { value: NARROWEST, columns: NARROWEST }, None, None, 0.0)[3].is_none());
+        assert!(
+            kinematics(
+                &window,
+                Widths {
+                    value: NARROWEST,
+                    columns: NARROWEST
+                },
+                None,
+                None,
+                0.0
+            )[3]
+            .is_none()
+        );
     }
 
     #[test]
@@ -379,7 +400,16 @@ mod tests {
             begin: 0,
             end: 200,
         };
-        let k = kinematics(&window, Widths { value: NARROWEST, columns: NARROWEST }, None, None, 0.0);
+        let k = kinematics(
+            &window,
+            Widths {
+                value: NARROWEST,
+                columns: NARROWEST,
+            },
+            None,
+            None,
+            0.0,
+        );
         assert!((97..123).all(|i| k[i].is_none()));
         assert!(k[90].is_some() && k[130].is_some());
     }
