@@ -27,7 +27,7 @@ test-rust: ## Rust tests
 	cargo test $(CARGO_FLAGS) --exclude imufit-py --quiet
 
 test-python: $(STAMP) ## Python tests
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: $(STAMP) ## Formatting, clippy, ruff, mypy, stubs, import layers
 	cargo fmt --all --check

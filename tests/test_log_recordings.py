@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 from imufit.errors import InputError
 from imufit.log import Log, open_log, parse_mapping, read
+from recording import DATA, recording
 
-DATA = Path(os.environ.get("IMUFIT_DATA", Path(__file__).resolve().parents[1] / ".." / "shared" / "data"))
 FILES = sorted(DATA.rglob("*.parquet")) if DATA.is_dir() else []
-
-
-def recording(name: str) -> Path:
-    path = DATA / name
-    if not path.exists():
-        if os.environ.get("CI") == "true":
-            pytest.fail(f"the recordings are missing: {path}; set IMUFIT_DATA")
-        pytest.skip("the recordings are missing")
-    return path
 
 
 def test_the_recordings_are_there() -> None:

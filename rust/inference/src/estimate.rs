@@ -14,6 +14,9 @@ pub struct Estimate {
     pub covariance: DMatrix<f64>,
 }
 
+/// Blocks of white noise give a jackknife variance this much above the expected one in one of a thousand cases.
+const SCATTER: f64 = 1.7;
+
 /// Fits the model's parameters. The covariance is that of whitened observations of unit variance whose zeros may wander.
 pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
     let total = problem.total_without_drift(model);
@@ -24,7 +27,8 @@ pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
     let question = problem.question(model, &[], &DMatrix::zeros(0, 0));
     if let Some(blocks) = jackknife::scatter(&question) {
         for j in 0..model.len() {
-            let factor = (blocks[j] / covariance[(j, j)]).max(1.0).sqrt();
+            let ratio = blocks[j] / covariance[(j, j)];
+            let factor = if ratio > SCATTER { ratio.sqrt() } else { 1.0 };
             for k in 0..model.len() {
                 covariance[(j, k)] *= factor;
                 covariance[(k, j)] *= factor;
