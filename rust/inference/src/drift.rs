@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use imufit_fit::evidence::Evidence;
 use imufit_fit::normal_equations::NormalEquations;
-use imufit_model::sensor::CHANNELS;
+use imufit_model::sensor::{CHANNELS, Sensor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Walk variances per block tried, in units of a block mean's variance.
@@ -89,11 +89,12 @@ fn strengths(count: &DVector<f64>) -> Vec<Strength> {
         .collect()
 }
 
-/// Block sums of every channel over all parameters.
+/// Block sums of every channel of accelerometer and gyroscope over all parameters.
 pub fn channel_sums(white: &Evidence, weights: &[f64; CHANNELS]) -> Vec<ChannelSums> {
     let blocks = white.layout.blocks;
     let mut out: Vec<ChannelSums> = Vec::new();
-    for channel in (0..CHANNELS).filter(|c| weights[*c] > 0.0) {
+    // The offset of a magnetometer is iron, which does not wander.
+    for channel in (0..CHANNELS).filter(|c| weights[*c] > 0.0 && c / 3 != Sensor::Mag.index()) {
         let mut sums = DMatrix::zeros(blocks, white.layout.model.parameters());
         let (mut right, mut count) = (DVector::zeros(blocks), DVector::zeros(blocks));
         let active = &white.layout.model.active()[channel];
