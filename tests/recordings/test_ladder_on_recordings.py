@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import imufit
 import numpy as np
 import pytest
@@ -36,12 +38,13 @@ def test_delay_and_lever_arm_of_broad_are_confirmed_by_the_other_half(name: str)
         assert values(result, "acc.lever_arm")[2] == pytest.approx(8.0e-3, rel=0.15)
 
 
-def test_iron_of_the_aircraft_is_found_in_flight() -> None:
+def test_iron_of_the_aircraft_is_the_same_in_both_parts_of_the_flight() -> None:
     log, whole = climbed("uav_motor_current/thor75_part1.parquet")
     assert whole.ratio_end < 0.5 * whole.ratio_start
-    half = imufit.ladder(log.rows(log.n // 2, log.n))
-    iron, again = values(whole, "mag.hard_iron"), values(half, "mag.hard_iron")
-    np.testing.assert_allclose(again, iron, rtol=0.25)
+    # On the ground the reference's heading drifts; the second half is flight.
+    cuts = [log.n // 2, 3 * log.n // 4, log.n]
+    first, second = (imufit.ladder(log.rows(a, b)) for a, b in itertools.pairwise(cuts))
+    np.testing.assert_allclose(values(first, "mag.hard_iron"), values(second, "mag.hard_iron"), rtol=0.2)
 
 
 @pytest.mark.parametrize(

@@ -95,13 +95,17 @@ class Analysis:
         nuisance = {}
         if facts.field_estimated and FIELD_REFERENCE not in model.effects:
             nuisance = {FIELD_REFERENCE: [0.0, 0.0, 0.0]}
-        white = [[] for _ in CHANNELS]  # type: list[list[float]]
-        raw = _empty(facts, model, nuisance, candidates, white)
+        raw = _empty(facts, model, nuisance, candidates, [[] for _ in CHANNELS])
         passes.evidence(raw, facts, "taking evidence")
         step, raw_variance = _imufit.saturate(raw)
         filters = passes.autocovariance(raw, facts, step).filters()
         floors = _floors(log, raw_variance)
-        analysis = cls(
+        white, variance = raw, raw_variance
+        if any(filters):
+            white = passes.evidence(raw.with_filters(filters), facts, "whitening the evidence")
+            _, variance = _imufit.saturate(white)
+        problem = _imufit.Problem(white, raw, variance, floors)
+        return cls(
             passes,
             facts,
             model,
@@ -109,25 +113,13 @@ class Analysis:
             candidates,
             refused,
             raw,
-            raw,
-            _imufit.Problem(raw, raw, raw_variance, floors),
+            white,
+            problem,
             raw_variance,
-            raw_variance,
+            variance,
             floors,
             filters,
         )
-        return analysis._whitened()
-
-    def _whitened(self) -> Analysis:
-        white, variance = self.raw, self.raw_variance
-        if any(self.filters):
-            white = self.passes.evidence(self.raw.with_filters(self.filters), self.facts, "whitening the evidence")
-            if self.problem is None:
-                _, variance = _imufit.saturate(white)
-            else:
-                variance = self.variance
-        problem = _imufit.Problem(white, self.raw, variance, self.floors)
-        return replace(self, white=white, variance=variance, problem=problem)
 
     def around(
         self, model: SensorModel, nuisance: Mapping[str, list[float]], *, with_candidates: bool = True
@@ -141,8 +133,14 @@ class Analysis:
         asked = candidates if with_candidates else {}
         raw = _empty(self.facts, model, nuisance, asked, [[] for _ in CHANNELS])
         self.passes.evidence(raw, self.facts, "taking evidence")
-        moved = replace(self, model=model, nuisance=dict(nuisance), candidates=candidates, raw=raw)
-        return moved._whitened()
+        white = raw
+        if any(self.filters):
+            white = self.passes.evidence(raw.with_filters(self.filters), self.facts, "whitening the evidence")
+        # The noise is that of the first evidence, which every effect of the catalogue was fitted to.
+        problem = _imufit.Problem(white, raw, self.variance, self.floors)
+        return replace(
+            self, model=model, nuisance=dict(nuisance), candidates=candidates, raw=raw, white=white, problem=problem
+        )
 
     @property
     def slots(self) -> list[str]:

@@ -89,12 +89,11 @@ fn strengths(count: &DVector<f64>) -> Vec<Strength> {
         .collect()
 }
 
-/// Block sums of every channel of accelerometer and gyroscope over all parameters.
+/// Block sums of every channel over all parameters.
 pub fn channel_sums(white: &Evidence, weights: &[f64; CHANNELS]) -> Vec<ChannelSums> {
     let blocks = white.layout.blocks;
     let mut out: Vec<ChannelSums> = Vec::new();
-    // The offset of a magnetometer is iron, which does not wander.
-    for channel in (0..CHANNELS).filter(|c| weights[*c] > 0.0 && c / 3 != Sensor::Mag.index()) {
+    for channel in (0..CHANNELS).filter(|c| weights[*c] > 0.0) {
         let mut sums = DMatrix::zeros(blocks, white.layout.model.parameters());
         let (mut right, mut count) = (DVector::zeros(blocks), DVector::zeros(blocks));
         let active = &white.layout.model.active()[channel];
@@ -192,7 +191,8 @@ impl ChannelSums {
     }
 }
 
-/// Takes wandering zeros out of the equations of a question, one strength per sensor; false if no zero wanders.
+/// Takes wandering zeros out of the equations of a question, one strength per sensor; true if a zero wanders that puts the answer in doubt.
+/// The offset of a magnetometer is iron, which does not wander; the field does, from place to place, and counts for less where it does.
 pub fn take_out(channels: &[ChannelSums], equations: &mut NormalEquations) -> bool {
     let mut wanders = false;
     for sensor in 0..3 {
@@ -212,7 +212,7 @@ pub fn take_out(channels: &[ChannelSums], equations: &mut NormalEquations) -> bo
             .max_by(|a, b| total[*a].total_cmp(&total[*b]))
             .unwrap_or(0);
         if first.strengths[best].kappa > 0.0 {
-            wanders = true;
+            wanders |= sensor != Sensor::Mag.index();
             for channel in own {
                 channel.take_out(best, equations);
             }
