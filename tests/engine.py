@@ -1,5 +1,6 @@
 """Helpers of the engine's tests: logs with exact motion, evidence in pieces, residuals of the ideal sensor."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -26,9 +27,9 @@ def swaying(
     noise: float = 0.0,
     seed: int = 0,
 ) -> Log:
-    """Log of a body that sways by about 30 deg and 0.5 m/s^2 in sums of sines up to `highest` Hz, readings worked out on paper.
+    """Log of a body that sways by about 30 deg and 0.5 m/s^2 in sums of sines up to `highest` Hz.
 
-    `noise` is in units of 0.02 m/s^2, 0.05 deg/s and 0.3 uT.
+    Readings are worked out on paper. `noise` is in units of 0.02 m/s^2, 0.05 deg/s and 0.3 uT.
     """
     rng = np.random.default_rng(seed)
     t = np.arange(int(duration * rate)) / rate
@@ -90,7 +91,7 @@ def pieces(log: Log, covariates: Sequence[str], cuts: Sequence[int], margin: int
     """Chunks of a log between the rows `cuts`, each with `margin` rows more on either side."""
     edges = [0, *sorted({c for c in cuts if 0 < c < log.n}), log.n]
     out = []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in itertools.pairwise(edges):
         first, last = max(0, start - margin), min(stop + margin, log.n)
         (chunk,) = log.rows(first, last).chunks(last - first)
         begin, end = start - first, stop - first

@@ -159,7 +159,9 @@ def test_a_diagnosis_on_another_log_is_of_that_log():
 
 @pytest.fixture(scope="module")
 def answered():
-    log = simulate.simulate("handheld", {"gyr.g_sensitivity": None}, 1, 40.0, size="large", covariates=("vbat",)).to_log()
+    log = simulate.simulate(
+        "handheld", {"gyr.g_sensitivity": None}, 1, 40.0, size="large", covariates=("vbat",)
+    ).to_log()
     fit = SensorModel(["gyr.bias"]).fit(log)
     return fit, fit.diagnose(), fit.compare(), fit.add("gyr.g_sensitivity")
 

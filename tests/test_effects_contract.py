@@ -159,7 +159,7 @@ def test_the_exception_of_one_fit_is_not_shown_for_another(log, user_effect):
         SensorModel(["gyr.fan"]).fit(log)
     forget("gyr.fan")
     fit = SensorModel(["gyr.bias"]).fit(log)
-    with pytest.raises(InputError, match="acc.nonsense"):
+    with pytest.raises(InputError, match=r"acc\.nonsense"):
         fit.add("acc.nonsense")
 
 
@@ -179,7 +179,7 @@ def test_an_effect_that_needs_a_column_is_not_offered_without_it(log, user_effec
 
     fit = SensorModel().fit(log)
     assert "gyr.fan" not in {c.effect for c in fit.diagnose().candidates}
-    with pytest.raises(InputError, match="gyr.fan cannot be added: the log has no column fan_speed"):
+    with pytest.raises(InputError, match=r"gyr\.fan cannot be added: the log has no column fan_speed"):
         fit.add("gyr.fan")
 
 

@@ -233,7 +233,15 @@ def test_comparing_with_another_log_keeps_the_parameters():
             "gyr.bias cannot be fitted: too few samples of gyr",
         ),
     ],
-    ids=["short", "no reference", "reference all missing", "no sensor", "sensor all missing", "5 references", "5 samples"],
+    ids=[
+        "short",
+        "no reference",
+        "reference all missing",
+        "no sensor",
+        "sensor all missing",
+        "5 references",
+        "5 samples",
+    ],
 )
 def test_a_log_that_cannot_be_fitted_is_refused_in_words(spoil, problem):
     log = spoil(swaying(duration=20.0, noise=1.0))
@@ -247,22 +255,22 @@ def test_a_log_that_cannot_be_fitted_is_refused_in_words(spoil, problem):
 def test_an_effect_on_a_sensor_without_samples_cannot_be_fitted():
     log = swaying(duration=20.0, noise=1.0)
     log = replace(log, acc=np.full_like(log.acc, np.nan))
-    with pytest.raises(InputError, match="acc.bias cannot be fitted: the log has no accelerometer"):
+    with pytest.raises(InputError, match=r"acc\.bias cannot be fitted: the log has no accelerometer"):
         SensorModel(["acc.bias"]).fit(log)
     assert SensorModel(["gyr.bias"]).fit(log).ratio == pytest.approx(1.0, abs=0.05)
 
 
 def test_an_effect_of_a_column_that_the_log_has_not_cannot_be_fitted():
-    with pytest.raises(InputError, match="gyr.column:fan cannot be fitted: the log has no column fan"):
+    with pytest.raises(InputError, match=r"gyr\.column:fan cannot be fitted: the log has no column fan"):
         SensorModel(["gyr.column:fan"]).fit(swaying(duration=20.0, noise=1.0))
-    with pytest.raises(InputError, match="gyr.bias_temperature cannot be fitted: the log has no column temp"):
+    with pytest.raises(InputError, match=r"gyr\.bias_temperature cannot be fitted: the log has no column temp"):
         SensorModel(["gyr.bias_temperature"]).fit(swaying(duration=20.0, noise=1.0))
 
 
 def test_a_column_that_is_known_only_now_and_then_is_not_used():
     log = simulate.simulate("handheld", {}, 1, 40.0, covariates=("vbat",)).to_log()
     log.covariates["vbat"][:2000] = np.nan
-    with pytest.raises(InputError, match="gyr.column:vbat cannot be fitted: column vbat is known in only .. %"):
+    with pytest.raises(InputError, match=r"gyr\.column:vbat cannot be fitted: column vbat is known in only .. %"):
         SensorModel(["gyr.column:vbat"]).fit(log)
 
 

@@ -42,7 +42,9 @@ def test_nothing_is_added_to_an_ideal_sensor(scenario):
 
 
 def test_each_step_starts_where_the_last_one_ended():
-    sim = simulate.simulate("handheld", dict.fromkeys(["gyr.bias", "acc.scale", "mag.hard_iron"]), 2, 60.0, size="large")
+    sim = simulate.simulate(
+        "handheld", dict.fromkeys(["gyr.bias", "acc.scale", "mag.hard_iron"]), 2, 60.0, size="large"
+    )
     answer = ladder(sim.to_log())
     assert [s.effect for s in answer.steps] == list(answer.model)
     assert answer.steps[0].before == answer.ratio_start
@@ -90,7 +92,9 @@ def test_of_two_things_that_cannot_be_told_apart_none_is_added():
 
 
 def test_a_second_pose_tells_them_apart():
-    parts = [static(0.1, v, seed=k) for k, v in enumerate([(0.6, 0.5, 0.2), (-0.5, 0.9, 0.0), (0.1, -0.8, 1.0), (2.5, 0, 0)])]
+    parts = [
+        static(0.1, v, seed=k) for k, v in enumerate([(0.6, 0.5, 0.2), (-0.5, 0.9, 0.0), (0.1, -0.8, 1.0), (2.5, 0, 0)])
+    ]
     n = sum(p.n for p in parts)
     quaternions = np.concatenate([p.ref_q for p in parts])
     log = replace(

@@ -11,7 +11,7 @@ import pytest
 from engine import NO_FILTERS, analysis_of, pieces, swaying
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from imufit import Log, SensorModel, _imufit, ladder, simulate
+from imufit import Log, _imufit, ladder, simulate
 from imufit.fit import passes
 from imufit.fit.passes import CHANNELS, chunk_arrays
 from imufit.log.log import concatenate
@@ -23,7 +23,7 @@ few = settings(max_examples=12, deadline=None, suppress_health_check=[HealthChec
 
 
 def rugged_log(seed: int = 3, duration: float = 40.0) -> Log:
-    """Everything that a log may have: jitter, lost rows, a slow magnetometer and thermometer, gaps in sensors and reference."""
+    """Jitter, lost rows, a slow magnetometer and thermometer, gaps in sensors and reference."""
     noise = Noise(jitter=1e-3, dropped=0.02, mag_rate=20.0, attitude_deg=0.01, position=1e-4)
     log = simulate.simulate(
         "handheld", {"gyr.bias": None}, seed, duration, noise=noise, covariates=("motor_current",), size="large"
@@ -58,7 +58,9 @@ def taken(analysis, filters, chunks: Iterable[dict]) -> _imufit.Evidence:
     return evidence
 
 
-def assert_same(one: _imufit.Evidence, other: _imufit.Evidence, blocks: Iterable[int | None] = (None, *range(BLOCKS))) -> None:
+def assert_same(
+    one: _imufit.Evidence, other: _imufit.Evidence, blocks: Iterable[int | None] = (None, *range(BLOCKS))
+) -> None:
     for channel in range(len(CHANNELS)):
         assert one.count(channel) == other.count(channel)
         for block in blocks:
@@ -168,7 +170,9 @@ def test_answers_do_not_depend_on_the_number_of_threads():
     answers = []
     for threads in ("1", "2", "5"):
         environment = {**os.environ, "RAYON_NUM_THREADS": threads}
-        run = subprocess.run([sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=True)
+        run = subprocess.run(
+            [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=True
+        )
         answers.append(json.loads(run.stdout))
     assert answers[0][0]["verdict"] == "adequate"
     assert answers[0] == answers[1] == answers[2]
