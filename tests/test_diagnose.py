@@ -137,11 +137,30 @@ def test_how_small_an_effect_would_have_been_seen_is_about_right():
     assert seen[0.4] <= 2
 
 
-def test_something_without_a_name_is_unknown():
-    sim = simulate.simulate("handheld", {}, 1, 120.0, covariates=("motor_current",))
-    current = sim.covariates["motor_current"]
-    sim.gyr[:, 0] += 3e-3 * np.abs(current - np.median(current))
-    answer = SensorModel(["gyr.bias"]).fit(sim.to_log()).diagnose()
+def bent_by_current(shape, seed: int = 1) -> Log:
+    """A log whose gyroscope reads on x too much by 3e-3 rad/s times a `shape` of the motor current that has no name."""
+    sim = simulate.simulate("handheld", {}, seed, 120.0, covariates=("motor_current",))
+    sim.gyr[:, 0] += 3e-3 * shape(sim.covariates["motor_current"])
+    return sim.to_log()
+
+
+SHAPES = {
+    "V": lambda c: np.abs(c - 1.6),
+    "parabola": lambda c: (c - 1.5) ** 2,
+    "two waves": lambda c: np.sin(4.0 * c),
+}
+UNSEEN = pytest.mark.xfail(
+    strict=True, reason="the whitening filter is fitted to a residual that holds the unnamed effect"
+)
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name == "V" else UNSEEN) for name in SHAPES])
+def test_something_without_a_name_is_unknown(name):
+    fit = SensorModel(["gyr.bias"]).fit(bent_by_current(SHAPES[name]))
+    where = fit.compare().where[0]
+    assert (where.channel, where.covariate) == ("gyr_x", "motor_current")
+    assert where.share > 0.8
+    answer = fit.diagnose()
     assert answer.verdict == "unknown"
     assert (answer.unexplained[0].channel, answer.unexplained[0].covariate) == ("gyr_x", "motor_current")
     assert "gyr_x" in answer.sentence
@@ -181,9 +200,7 @@ def test_json_of_a_diagnosis_has_the_promised_keys(answered):
             assert parameter.keys() >= {"value", "standard_error", "unit"}
         for rival in candidate["confounded_with"]:
             assert rival.keys() >= {"effect", "correlation"}
-    sim = simulate.simulate("handheld", {}, 1, 120.0, covariates=("motor_current",))
-    sim.gyr[:, 0] += 3e-3 * np.sin(4.0 * sim.covariates["motor_current"])
-    unknown = as_json(SensorModel().fit(sim.to_log()).diagnose())
+    unknown = as_json(SensorModel(["gyr.bias"]).fit(bent_by_current(lambda c: np.abs(c - 1.6))).diagnose())
     assert unknown["unexplained"]
     for item in unknown["unexplained"]:
         assert item.keys() >= {"channel", "covariate", "share"}

@@ -142,7 +142,7 @@ def test_answers_do_not_depend_on_the_size_of_chunks(effects, monkeypatch):
     noise = Noise.realistic()
     log = simulate.simulate("handheld", effects, 5, 40.0, noise=noise, size="large", noise_in_metadata=False).to_log()
     answers = []
-    for rows in (65536, 1500, 617):
+    for rows in (65536, 617):
         monkeypatch.setattr(passes, "CHUNK_ROWS", rows)
         answers.append(ladder(log))
     first = answers[0]
@@ -160,7 +160,7 @@ def test_answers_do_not_depend_on_the_size_of_chunks(effects, monkeypatch):
 SCRIPT = """
 import json
 from imufit import ladder, simulate
-log = simulate.simulate("arm", {"acc.bias": None, "gyr.scale": None}, 2, 60.0, size="large").to_log()
+log = simulate.simulate("arm", {"acc.bias": None, "gyr.scale": None}, 2, 40.0, size="large").to_log()
 answer = ladder(log)
 print(json.dumps([answer.to_dict(), answer.diagnosis.to_dict(), answer.comparison_end.to_dict()], sort_keys=True))
 """
@@ -168,14 +168,14 @@ print(json.dumps([answer.to_dict(), answer.diagnosis.to_dict(), answer.compariso
 
 def test_answers_do_not_depend_on_the_number_of_threads():
     answers = []
-    for threads in ("1", "2", "5"):
+    for threads in ("1", "3"):
         environment = {**os.environ, "RAYON_NUM_THREADS": threads}
         run = subprocess.run(
             [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=True
         )
         answers.append(json.loads(run.stdout))
     assert answers[0][0]["verdict"] == "adequate"
-    assert answers[0] == answers[1] == answers[2]
+    assert answers[0] == answers[1]
 
 
 @pytest.mark.parametrize(("mag_rate", "correlation_time"), [(5.0, 2.0), (2.0, 2.0), (1.0, 2.0)])
