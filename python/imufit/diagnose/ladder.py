@@ -45,7 +45,7 @@ def ladder(log: LogSource, model: SensorModel | None = None, progress: Progress 
     diagnosis = diagnose(fit)
     while len(steps) < MAX_STEPS:
         first = first or diagnosis
-        effect = next_effect(diagnosis)
+        effect = next_effect(fit, diagnosis)
         if effect is None:
             break
         expected = next(c.held_out_after for c in diagnosis.candidates if c.effect == effect)
@@ -71,15 +71,29 @@ def ladder(log: LogSource, model: SensorModel | None = None, progress: Progress 
     )
 
 
-def next_effect(diagnosis: Diagnosis) -> str | None:
+def next_effect(fit: Fit, diagnosis: Diagnosis) -> str | None:
     """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well."""
     if diagnosis.verdict == "adequate":
         return None
+    if diagnosis.verdict == "ambiguous":
+        return _beside_the_unsure(fit)
     if diagnosis.verdict == "unknown":
         # Beside what nothing explains, only effects that matter are taken up.
         return next((c.effect for c in diagnosis.candidates if c.status == "passed" and _matters(c)), None)
-    unsure = {diagnosis.best, *diagnosis.ambiguous_with} if diagnosis.verdict == "ambiguous" else set()
-    return next((c.effect for c in diagnosis.candidates if c.status == "passed" and c.effect not in unsure), None)
+    return next((c.effect for c in diagnosis.candidates if c.status == "passed"), None)
+
+
+def _beside_the_unsure(fit: Fit) -> str | None:
+    """Return what stands out once one of the effects that cannot be told apart is in the model, whichever it is."""
+    analysis = fit.analysis
+    model, candidates = list(analysis.fitted_slots), list(analysis.candidate_slots)
+    while True:
+        result = analysis.problem.diagnose(model, candidates)
+        best, rivals = result["best"], result["rivals"]
+        if best is None or not rivals:
+            return None if best is None else analysis.slots[best]
+        model.append(best)
+        candidates = [slot for slot in candidates if slot != best and slot not in rivals]
 
 
 def _matters(candidate: Candidate) -> bool:

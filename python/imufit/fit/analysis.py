@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.fit.passes import CHANNELS, MIN_COVERAGE, Passes
+from imufit.fit.users_effects import check_users_effects
 from imufit.log import LogSource
 from imufit.model.catalogue import COLUMN, column_effects, effects, find_effect
 from imufit.model.sensor_model import SensorModel
@@ -92,12 +93,14 @@ class Analysis:
             reason = effect.not_testable(facts) or _not_covered(effect.id, coverage)
             if reason is not None:
                 raise InputError(f"effect {effect.id} cannot be fitted: {reason}", file=log.path)
+        check_users_effects(passes, facts, [*model.effects, *candidates])
         nuisance = {}
         if facts.field_estimated and FIELD_REFERENCE not in model.effects:
             nuisance = {FIELD_REFERENCE: [0.0, 0.0, 0.0]}
         raw = _empty(facts, model, nuisance, candidates, [[] for _ in CHANNELS])
         passes.evidence(raw, facts, "taking evidence")
         step, raw_variance = _imufit.saturate(raw)
+        _check_samples(log, model, raw_variance)
         filters = passes.autocovariance(raw, facts, step).filters()
         floors = _floors(log, raw_variance)
         white, variance = raw, raw_variance
@@ -197,7 +200,7 @@ class Analysis:
                 if any(key.endswith(COLUMN + name) for key in self.model.effects)
             },
         }
-        kept = {key: value for key, value in constants.items() if value}
+        kept = {key: value for key, value in constants.items() if value is not None and value != {}}
         return SensorModel(self.model.effects, parameters, constants=kept, standard_errors=errors), nuisance
 
     def converged(self, estimate: Estimate) -> bool:
@@ -229,6 +232,22 @@ class Analysis:
             analysis = analysis.around(*analysis.moved_to(estimate))
             estimate = analysis.estimate()
         return analysis, estimate
+
+
+def _check_samples(log: LogSource, model: SensorModel, variance: list[float]) -> None:
+    """Refuse a log of which too few samples can be used for any sensor, or for one that an effect acts on."""
+    used = {channel[:3] for channel, v in zip(CHANNELS, variance, strict=True) if np.isfinite(v)}
+    remedy = "Check that sensors and reference cover the same time."
+    if not used:
+        raise InputError("too few samples have a reference around them", file=log.path, remedy=remedy)
+    for effect, _ in model.stack():
+        if not used.intersection(effect.sensors):
+            sensors = " and ".join(effect.sensors)
+            raise InputError(
+                f"effect {effect.id} cannot be fitted: too few samples of {sensors} have a reference around them",
+                file=log.path,
+                remedy=remedy,
+            )
 
 
 def _candidates(

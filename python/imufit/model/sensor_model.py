@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -203,8 +204,8 @@ def _values(effect: _imufit.Effect, given: Mapping[str, float]) -> list[float]:
     for name, value in given.items():
         if name not in names:
             raise InputError(f"{effect.id} has no parameter {name}", remedy=f"It has {', '.join(names)}.")
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InputError(f"{effect.id} {name} is {value!r}, not a number")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(f"{effect.id} {name} is {value!r}, not a finite number")
     return [float(given.get(name, 0.0)) for name in names]
 
 

@@ -38,6 +38,22 @@ pub struct Layout {
 }
 
 impl Layout {
+    /// True if evidence of the two adds up: same effects around the same parameters, blocks, bins and filters.
+    pub fn same(&self, other: &Self) -> bool {
+        let (a, b) = (self.model.slots(), other.model.slots());
+        let slots = a.len() == b.len()
+            && a.iter().zip(b).all(|(a, b)| {
+                a.effect.card().id == b.effect.card().id && a.in_model == b.in_model && a.parameters == b.parameters
+            });
+        slots
+            && self.model.active() == other.model.active()
+            && self.blocks == other.blocks
+            && self.facts.n == other.facts.n
+            && self.filters == other.filters
+            && self.bins.names == other.bins.names
+            && self.bins.edges == other.bins.edges
+    }
+
     /// Block that a row of the log belongs to.
     pub fn block(&self, row: usize) -> usize {
         (row * self.blocks / self.facts.n.max(1)).min(self.blocks.saturating_sub(1))

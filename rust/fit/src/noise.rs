@@ -55,13 +55,14 @@ impl Autocovariance {
         Ok(())
     }
 
-    /// Autocovariance of a channel, lag 0 first, and its number of samples.
+    /// Autocovariance of a channel, lag 0 first, and its number of samples. It ends with the last lag that most samples
+    /// look back on: a slow sensor has few samples within [`LOOKBACK`] rows.
     pub fn of_channel(&self, channel: usize) -> (Vec<f64>, usize) {
-        let values = self.sums[channel]
+        let counts = &self.counts[channel];
+        let seen = self.sums[channel]
             .iter()
-            .zip(&self.counts[channel])
-            .map(|(s, n)| s / (*n).max(1) as f64)
-            .collect();
-        (values, self.counts[channel][0])
+            .zip(counts)
+            .take_while(|(_, n)| 2 * **n >= counts[0].max(1));
+        (seen.map(|(s, n)| s / *n as f64).collect(), counts[0])
     }
 }

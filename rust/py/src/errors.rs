@@ -21,10 +21,19 @@ pub fn from_filters(error: FilterError) -> PyErr {
     value_error(error)
 }
 
+/// An `imufit.errors.InputError`: what a user can put right.
+pub fn input_error(py: Python<'_>, problem: impl std::fmt::Display) -> PyErr {
+    let made = py
+        .import("imufit.errors")
+        .and_then(|m| m.getattr("InputError")?.call1((problem.to_string(),)));
+    made.map_or_else(|error| error, PyErr::from_value)
+}
+
 /// An error of an effect; a user's own exception comes out as it went in.
 pub fn from_effect(error: EffectError) -> PyErr {
     match (&error, crate::python_effect::take_raised()) {
         (EffectError::User { .. }, Some(raised)) => raised,
+        (EffectError::Contract { .. }, _) => Python::attach(|py| input_error(py, &error)),
         _ => value_error(error),
     }
 }

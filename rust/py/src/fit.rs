@@ -112,8 +112,7 @@ impl PyEvidence {
 
     /// Adds evidence of other rows, taken for the same layout.
     fn merge(&mut self, other: &Self) -> PyResult<()> {
-        let (a, b) = (&self.0.layout, &other.0.layout);
-        if a.blocks != b.blocks || a.model.active() != b.model.active() || a.filters != b.filters {
+        if !self.0.layout.same(&other.0.layout) {
             return Err(value_error("evidence of different layouts cannot be added"));
         }
         self.0.merge(other.0.clone());

@@ -11,6 +11,8 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::errors::input_error;
+
 /// The exception a user's function raised last; taken by whoever turns the core error into a Python one.
 static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
 
@@ -58,6 +60,22 @@ impl PythonEffect {
         let result = self.function.bind(py).call1((window,))?;
         let array: PyReadonlyArray3<f64> = result.extract()?;
         let view = array.as_array();
+        let known = |i: usize| {
+            let ideal = [&rows.ideal.omega, &rows.ideal.f, &rows.ideal.m, rows.x];
+            ideal.iter().all(|triple| triple.row(i).iter().all(|v| v.is_finite()))
+                && rows.temperature.is_none_or(|t| t[i].is_finite())
+                && rows.covariates.iter().all(|c| c[i].is_finite())
+        };
+        for (i, row) in view.outer_iter().enumerate() {
+            if let Some(k) = row.iter().position(|v| !v.is_finite()).filter(|_| known(i)) {
+                let (id, name) = (
+                    &self.card.id,
+                    &self.card.parameters[k % self.card.parameters.len()].name,
+                );
+                let problem = format!("effect {id}: column {name} is not finite at t = {} s", rows.t[i]);
+                return Err(input_error(py, problem));
+            }
+        }
         for parameter in 0..self.card.parameters.len() {
             for axis in 0..3 {
                 out.set(parameter, axis, (0..rows.len()).map(|i| view[[i, axis, parameter]]));

@@ -6,6 +6,9 @@ use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
 
+/// Relative rounding error of a mean over a long log.
+const ROUNDING: f64 = 1e-10;
+
 /// `acc.column:NAME`, `gyr.column:NAME`, `mag.column:NAME`.
 pub struct Covariate {
     card: Card,
@@ -69,8 +72,13 @@ impl Effect for Covariate {
                 column: self.column.clone(),
             })?;
         let mean = rows.facts.covariate_means[k];
+        let deviation = |v: &f64| {
+            let d = v - mean;
+            // A constant column differs from its mean by rounding only.
+            if d.abs() <= ROUNDING * mean.abs() { 0.0 } else { d }
+        };
         for axis in 0..3 {
-            out.set(axis, axis, rows.covariates[k].iter().map(|v| v - mean));
+            out.set(axis, axis, rows.covariates[k].iter().map(deviation));
         }
         Ok(())
     }

@@ -1,0 +1,310 @@
+"""Fitting: parameters come back, their errors are honest, models keep what they know, unusable logs are refused."""
+
+import json
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from engine import swaying
+from imufit import InputError, Log, SensorModel, ladder, simulate
+from imufit.simulate import Noise, SensorNoise
+from scipy.spatial.transform import Rotation
+
+FIRST_EFFECTS = [
+    "acc.bias", "acc.scale", "acc.misalignment", "acc.lever_arm", "acc.bias_temperature", "gyr.bias", "gyr.scale",
+    "gyr.misalignment", "gyr.g_sensitivity", "gyr.bias_temperature", "mag.hard_iron", "mag.soft_iron",
+    "mag.field_reference", "ref.alignment", "ref.delay", "acc.column:vbat", "gyr.column:motor_current",
+    "mag.column:vbat",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("effect", FIRST_EFFECTS)
+def test_the_parameters_of_each_effect_come_back(effect):
+    sim = simulate.simulate("handheld", {effect: None}, 3, 60.0, size="large")
+    fit = SensorModel([effect]).fit(sim.to_log())
+    truth = sim.truth.effects[effect]
+    assert {p.name for p in fit.parameters} == set(truth)
+    for p in fit.parameters:
+        assert p.standard_error > 0.0
+        assert abs(p.value - truth[p.name]) < 4.0 * p.standard_error, str(p)
+    assert fit.ratio == pytest.approx(1.0, abs=0.05)
+    assert fit.training_ratio <= fit.ratio
+
+
+COLOURED = Noise(
+    acc=SensorNoise(0.02, coloured=0.01, correlation_time=0.3),
+    gyr=SensorNoise(8.7e-4, coloured=5e-4, correlation_time=0.3),
+)
+
+
+def test_standard_errors_cover_the_truth():
+    effects = {"gyr.bias": None, "acc.scale": None}
+    z = []
+    for seed in range(60):
+        noise = (Noise(), COLOURED)[seed % 2]
+        sim = simulate.simulate(
+            "handheld", effects, seed, 12.0, size=1.0, noise=noise, sensors=("acc", "gyr"), noise_in_metadata=False
+        )
+        for p in SensorModel(list(effects)).fit(sim.to_log()).parameters:
+            z.append((p.value - sim.truth.effects[p.effect][p.name]) / p.standard_error)
+    for half in (z, [v for k in range(0, 60, 2) for v in z[6 * k : 6 * k + 6]]):
+        assert 0.90 <= np.mean(np.abs(half) < 2.0) <= 0.99
+        assert abs(np.mean(half)) < 4.0 / np.sqrt(len(half))
+
+
+def test_a_nonlinear_effect_is_iterated_to_its_minimum():
+    truth = {"ref.alignment": {"x": 0.15, "y": -0.1, "z": 0.2}, "ref.delay": {"tau": 0.03}}
+    sim = simulate.simulate("handheld", truth, 1, 60.0)
+    fit = SensorModel(list(truth)).fit(sim.to_log())
+    for p in fit.parameters:
+        assert abs(p.value - truth[p.effect][p.name]) < 4.0 * p.standard_error, str(p)
+    assert fit.ratio == pytest.approx(1.0, abs=0.05)
+
+
+def test_starting_from_the_answer_changes_nothing():
+    log = simulate.simulate("arm", {"ref.alignment": None, "gyr.scale": None}, 1, 60.0, size="large").to_log()
+    fit = SensorModel(["ref.alignment", "gyr.scale"]).fit(log)
+    again = fit.model.fit(log)
+    for a, b in zip(fit.parameters, again.parameters, strict=True):
+        assert abs(a.value - b.value) < 0.1 * a.standard_error
+
+
+def test_the_order_of_the_effects_does_not_matter():
+    effects = ["acc.bias", "ref.alignment", "gyr.scale", "acc.scale"]
+    log = simulate.simulate("handheld", dict.fromkeys(effects), 1, 30.0, size="large").to_log()
+    one = {(p.effect, p.name): p for p in SensorModel(effects).fit(log).parameters}
+    other = {(p.effect, p.name): p for p in SensorModel(effects[::-1]).fit(log).parameters}
+    for key, p in one.items():
+        assert abs(p.value - other[key].value) < 0.01 * p.standard_error
+
+
+CHANGES = {"ENU": [[0, 1, 0], [1, 0, 0], [0, 0, -1]], "NWU": [[1, 0, 0], [0, -1, 0], [0, 0, -1]]}
+
+
+@pytest.mark.parametrize("frame", CHANGES)
+@pytest.mark.parametrize("effect", ["acc.bias", "ref.alignment", "acc.lever_arm", "mag.field_reference"])
+def test_the_same_motion_in_another_frame_gives_the_same_answer(frame, effect):
+    ned = simulate.simulate("handheld", {effect: None}, 2, 40.0, size="large").to_log()
+    change = np.array(CHANGES[frame], float)
+    reference = Rotation.from_matrix(change) * ned.reference
+    metadata = replace(ned.metadata, frame=frame, mag_reference=tuple(change @ ned.metadata.mag_reference))
+    other = replace(ned.with_reference(reference), ref_p=ned.ref_p @ change.T, metadata=metadata)
+    a, b = SensorModel([effect]).fit(ned), SensorModel([effect]).fit(other)
+    assert a.ratio == pytest.approx(b.ratio, rel=1e-9)
+    values, others = ([p.value for p in fit.parameters] for fit in (a, b))
+    if effect == "mag.field_reference":  # the only one whose parameters are a vector of the reference frame
+        values = change @ values
+    np.testing.assert_allclose(values, others, rtol=0.0, atol=1e-6 * max(p.standard_error for p in a.parameters))
+    assert [c.effect for c in a.diagnose().candidates[:4]] == [c.effect for c in b.diagnose().candidates[:4]]
+
+
+def test_a_model_comes_back_from_its_file(tmp_path):
+    sim = simulate.simulate(
+        "handheld",
+        {"gyr.bias_temperature": None, "acc.column:vbat": None, "ref.delay": None},
+        1,
+        40.0,
+        size="large",
+        covariates=("motor_current",),
+    )
+    fit = SensorModel(list(sim.truth.effects)).fit(sim.to_log())
+    fit.save(tmp_path / "model.toml")
+    model = SensorModel.load(tmp_path / "model.toml")
+    assert model.effects == fit.model.effects
+    assert model.parameters == fit.model.parameters
+    assert model.standard_errors == fit.model.standard_errors
+    assert model.constants == fit.model.constants
+    assert model.constants["temperature_mean"] == pytest.approx(np.mean(sim.temp), abs=1e-9)
+    assert model.constants["covariate_means"] == {"vbat": pytest.approx(np.mean(sim.covariates["vbat"]), abs=1e-9)}
+
+
+@pytest.fixture
+def model_file(tmp_path):
+    path = tmp_path / "model.toml"
+    SensorModel(["gyr.bias"], {"gyr.bias": {"x": 0.01}}).save(path)
+    assert tomllib.loads(path.read_text())["kind"]
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("rad/s", "deg/s", "gyr.bias x is in deg/s, not in rad/s"),
+        ("imufit sensor model", "recipe", "kind is 'recipe'"),
+        ("format = 1", "format = 99", "format 99 is not known"),
+        ("gyr.bias", "gyr.bios", "no effect gyr.bios.*Did you mean gyr.bias"),
+        ("x = 0.01", "w = 0.01", "gyr.bias has no parameter w.*x, y, z"),
+        ("x = 0.01", 'x = "much"', "gyr.bias x is 'much', not a finite number"),
+        ("x = 0.01", "x = ", "no TOML"),
+        ("x = 0.01", "x = nan", "gyr.bias x is nan"),
+    ],
+)
+def test_a_model_file_that_cannot_be_is_refused_with_its_name(model_file, old, new, problem):
+    text = model_file.read_text()
+    assert old in text
+    model_file.write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=rf"^model\.toml.*{problem}"):
+        SensorModel.load(model_file)
+
+
+def test_a_missing_model_file_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"^nothing\.toml: the model cannot be read"):
+        SensorModel.load(tmp_path / "nothing.toml")
+
+
+@pytest.mark.parametrize(
+    ("effects", "parameters", "problem"),
+    [
+        (["gyr.bias", "gyr.bias"], None, "twice"),
+        ("gyr.bias", None, "Pass a list"),
+        (["gyr.bais"], None, "Did you mean gyr.bias"),
+        (["gyr.bias"], {"gyr.scale": {"x": 1.0}}, "gyr.scale, which is not in the model"),
+    ],
+)
+def test_a_model_that_cannot_be_is_refused(effects, parameters, problem):
+    with pytest.raises(InputError, match=problem):
+        SensorModel(effects, parameters)
+
+
+def two_days(effect: str = "gyr.bias_temperature"):
+    """The same sensor on a cool and on a warm day."""
+    cool = simulate.simulate("handheld", {effect: None}, 1, 60.0, size="large")
+    c = np.array(list(cool.truth.effects[effect].values()))
+    warm = cool.to_log()
+    # The zero of the simulated effect is at the mean temperature of its own log.
+    warm = replace(warm, temp=warm.temp + 15.0, gyr=warm.gyr + 15.0 * c)
+    return cool.to_log(), warm
+
+
+def test_the_temperature_a_model_was_fitted_at_holds_for_other_logs(tmp_path):
+    cool, warm = two_days()
+    fit = SensorModel(["gyr.bias", "gyr.bias_temperature"]).fit(cool)
+    assert fit.compare(warm).sensors["gyr"] == pytest.approx(1.0, abs=0.05)
+    fit.save(tmp_path / "model.toml")
+    stored = SensorModel.load(tmp_path / "model.toml")
+    assert stored.constants["temperature_mean"] == pytest.approx(np.mean(cool.temp))
+    fit.model.constants.clear()
+    assert fit.compare(warm).sensors["gyr"] > 1.5
+
+
+def test_a_mean_temperature_of_zero_is_stored_as_well(tmp_path):
+    cool, _ = two_days()
+    cool = replace(cool, temp=np.round(cool.temp - np.mean(cool.temp)))
+    cool.temp[-1] -= cool.temp.sum()
+    fit = SensorModel(["gyr.bias_temperature"]).fit(cool)
+    fit.save(tmp_path / "model.toml")
+    assert SensorModel.load(tmp_path / "model.toml").constants["temperature_mean"] == 0.0
+
+
+def test_comparing_with_another_log_keeps_the_parameters():
+    made = simulate.simulate("handheld", {"gyr.bias": {"x": 0.02, "y": 0.0, "z": 0.0}}, 1, 40.0)
+    fit = SensorModel(["gyr.bias"]).fit(made.to_log())
+    other = simulate.simulate("handheld", {"gyr.bias": {"x": 0.05, "y": 0.0, "z": 0.0}}, 2, 40.0).to_log()
+    before = dict(fit.model.parameters)
+    found = fit.compare(other)
+    means = {c.channel: c.mean for c in found.channels}
+    assert means["gyr_x"] == pytest.approx(0.03, abs=2e-4)
+    assert means["gyr_y"] == pytest.approx(0.0, abs=2e-4)
+    assert fit.model.parameters == before
+    assert found.n == other.n
+
+
+@pytest.mark.parametrize(
+    ("spoil", "problem"),
+    [
+        (lambda log: log.rows(0, 150), "150 rows are too few for a fit.*at least 200"),
+        (lambda log: replace(log, ref_q=None, ref_p=None), "no reference attitude"),
+        (lambda log: replace(log, ref_q=np.full_like(log.ref_q, np.nan)), "no reference attitude"),
+        (lambda log: replace(log, acc=None, gyr=None, mag=None), "no sensor of the log has a sample"),
+        (
+            lambda log: replace(log, acc=np.full_like(log.acc, np.nan), gyr=None, mag=None),
+            "no sensor of the log has a sample",
+        ),
+        (
+            lambda log: replace(log, ref_q=np.where(np.arange(log.n)[:, None] < 5, log.ref_q, np.nan)),
+            "too few samples have a reference around them",
+        ),
+        (
+            lambda log: replace(log, gyr=np.where(np.arange(log.n)[:, None] < 5, log.gyr, np.nan)),
+            "gyr.bias cannot be fitted: too few samples of gyr",
+        ),
+    ],
+    ids=[
+        "short",
+        "no reference",
+        "reference all missing",
+        "no sensor",
+        "sensor all missing",
+        "5 references",
+        "5 samples",
+    ],
+)
+def test_a_log_that_cannot_be_fitted_is_refused_in_words(spoil, problem):
+    log = spoil(swaying(duration=20.0, noise=1.0))
+    with pytest.raises(InputError, match=problem):
+        SensorModel(["gyr.bias"]).fit(log)
+    if "gyr" not in problem:
+        with pytest.raises(InputError, match=problem):
+            ladder(log)
+
+
+def test_an_effect_on_a_sensor_without_samples_cannot_be_fitted():
+    log = swaying(duration=20.0, noise=1.0)
+    log = replace(log, acc=np.full_like(log.acc, np.nan))
+    with pytest.raises(InputError, match=r"acc\.bias cannot be fitted: the log has no accelerometer"):
+        SensorModel(["acc.bias"]).fit(log)
+    assert SensorModel(["gyr.bias"]).fit(log).ratio == pytest.approx(1.0, abs=0.05)
+
+
+def test_an_effect_of_a_column_that_the_log_has_not_cannot_be_fitted():
+    with pytest.raises(InputError, match=r"gyr\.column:fan cannot be fitted: the log has no column fan"):
+        SensorModel(["gyr.column:fan"]).fit(swaying(duration=20.0, noise=1.0))
+    with pytest.raises(InputError, match=r"gyr\.bias_temperature cannot be fitted: the log has no column temp"):
+        SensorModel(["gyr.bias_temperature"]).fit(swaying(duration=20.0, noise=1.0))
+
+
+def test_a_column_that_is_known_only_now_and_then_is_not_used():
+    log = simulate.simulate("handheld", {}, 1, 40.0, covariates=("vbat",)).to_log()
+    log.covariates["vbat"][:2000] = np.nan
+    with pytest.raises(InputError, match=r"gyr\.column:vbat cannot be fitted: column vbat is known in only .. %"):
+        SensorModel(["gyr.column:vbat"]).fit(log)
+
+
+def test_an_unknown_field_is_estimated_and_fitted_along():
+    known = simulate.simulate("handheld", {"mag.hard_iron": None}, 1, 60.0, size="large")
+    metadata = {k: v for k, v in known.metadata.items() if k != "mag_reference"}
+    log = replace(known.to_log(), metadata=type(known.to_log().metadata).from_mapping(metadata))
+    fit = SensorModel(["mag.hard_iron"]).fit(log)
+    for p in fit.parameters:
+        assert abs(p.value - known.truth.effects["mag.hard_iron"][p.name]) < 4.0 * p.standard_error
+    assert "mag.field_reference" not in fit.model.effects
+    assert "mag.field_reference" not in {c.effect for c in fit.diagnose().candidates}
+    assert any("field was estimated" in note for note in fit.compare().notes)
+
+
+def test_the_result_of_a_fit_is_json():
+    fit = SensorModel(["gyr.bias"]).fit(swaying(duration=20.0, noise=1.0))
+    found = json.loads(json.dumps(fit.to_dict(), allow_nan=False))
+    assert found.keys() >= {"model", "parameters", "ratio", "training_ratio", "n"}
+    assert found["parameters"]["gyr.bias"].keys() == {"x", "y", "z"}
+    assert found["parameters"]["gyr.bias"]["x"].keys() >= {"value", "standard_error", "unit"}
+
+
+def test_progress_is_told_of_every_row():
+    log = swaying(duration=20.0, noise=1.0)
+    told = []
+    SensorModel(["gyr.bias"]).fit(log, progress=lambda done, rows, label: told.append((done, rows, label)))
+    assert {rows for _, rows, _ in told} == {log.n}
+    assert max(done for done, _, _ in told) == log.n
+    assert all(label for _, _, label in told)
+
+
+def test_a_log_on_disk_gives_the_answer_of_the_log_in_memory(tmp_path):
+    from imufit import LogStream
+
+    log: Log = swaying(duration=20.0, noise=1.0)
+    log.write(tmp_path / "log.parquet")
+    a = SensorModel(["gyr.bias"]).fit(log)
+    b = SensorModel(["gyr.bias"]).fit(LogStream(tmp_path / "log.parquet"))
+    assert a.to_dict() == b.to_dict()

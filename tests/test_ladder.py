@@ -1,0 +1,126 @@
+"""The ladder: effect after effect until nothing is missing, and not one more."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from imufit import SensorModel, ladder, simulate
+from imufit.simulate import SCENARIOS, Noise
+from scipy.spatial.transform import Rotation
+from test_diagnose import static
+
+
+PAIRS = [
+    ("handheld", ("gyr.g_sensitivity", "acc.scale"), True),
+    ("handheld", ("gyr.bias", "gyr.scale"), False),
+    ("handheld", ("ref.delay", "acc.lever_arm"), False),
+    ("arm", ("ref.alignment", "acc.bias_temperature"), True),
+    ("arm", ("acc.bias", "acc.misalignment"), False),
+    ("turntable", ("gyr.scale", "gyr.misalignment"), False),
+    ("poses", ("mag.hard_iron", "mag.soft_iron"), True),
+    ("poses", ("acc.bias", "gyr.column:motor_current"), False),
+]
+
+
+@pytest.mark.parametrize(("scenario", "effects", "realistic"), PAIRS)
+def test_two_missing_effects_are_both_found(scenario, effects, realistic):
+    sim = simulate.simulate(scenario, dict.fromkeys(effects), 7, 120.0, size="large", realistic=realistic)
+    answer = ladder(sim.to_log())
+    assert set(answer.model) == set(effects)
+    assert answer.verdict == "adequate"
+    for p in answer.fit.parameters:
+        assert abs(p.value - sim.truth.effects[p.effect][p.name]) < 5.0 * p.standard_error, str(p)
+
+
+REFERENCE_NOISE = pytest.mark.xfail(
+    strict=True, reason="axes that never turn are told a scale of -1 by the noise of the reference"
+)
+
+
+@pytest.mark.parametrize(
+    "scenario", [pytest.param(name, marks=[REFERENCE_NOISE] if name == "tilt" else []) for name in SCENARIOS]
+)
+def test_nothing_is_added_to_an_ideal_sensor(scenario):
+    answer = ladder(simulate.simulate(scenario, {}, 5, 60.0, noise=Noise.realistic()).to_log())
+    assert (answer.steps, answer.model, answer.verdict) == ((), (), "adequate")
+    assert answer.ratio_start == answer.ratio_end
+
+
+def test_each_step_starts_where_the_last_one_ended():
+    sim = simulate.simulate(
+        "handheld", dict.fromkeys(["gyr.bias", "acc.scale", "mag.hard_iron"]), 2, 60.0, size="large"
+    )
+    answer = ladder(sim.to_log())
+    assert [s.effect for s in answer.steps] == list(answer.model)
+    assert answer.steps[0].before == answer.ratio_start
+    assert answer.steps[-1].after == answer.ratio_end == answer.fit.ratio
+    for a, b in zip(answer.steps[:-1], answer.steps[1:], strict=True):
+        assert a.after == b.before
+    for step in answer.steps:
+        assert step.after < step.before
+        assert step.after == pytest.approx(step.expected, rel=0.01)
+        assert step.training <= step.after
+    assert answer.ratio_end == pytest.approx(1.0, abs=0.05)
+    assert answer.first.model == ()
+    assert answer.comparison_start.model == ()
+    assert answer.comparison_end.model == answer.model
+
+
+def test_a_ladder_starts_from_the_model_given():
+    sim = simulate.simulate("handheld", {"gyr.bias": None, "acc.scale": None}, 2, 60.0, size="large")
+    answer = ladder(sim.to_log(), SensorModel(["gyr.bias"]))
+    assert answer.model == ("gyr.bias", "acc.scale")
+    assert [s.effect for s in answer.steps] == ["acc.scale"]
+
+
+def test_what_cannot_be_told_apart_is_not_added():
+    answer = ladder(static(0.1, (0.6, 0.5, 0.2)))
+    assert answer.verdict == "ambiguous"
+    assert answer.steps == ()
+    assert answer.diagnosis.experiment
+
+
+def test_beside_what_cannot_be_told_apart_the_rest_is_added():
+    log = static(0.1, (0.6, 0.5, 0.2))
+    current = np.repeat(np.random.default_rng(1).uniform(0.0, 3.0, 60), 100)
+    log = replace(log, gyr=log.gyr + 0.002 * (current - current.mean())[:, None], covariates={"current": current})
+    answer = ladder(log)
+    assert answer.model == ("gyr.column:current",)
+    assert answer.verdict == "ambiguous"
+
+
+def test_of_two_things_that_cannot_be_told_apart_none_is_added():
+    log = static(0.1, (0.6, 0.5, 0.2))
+    answer = ladder(replace(log, gyr=log.gyr + np.array([0.01, -0.02, 0.005])))
+    assert answer.model == ()
+    assert answer.verdict == "ambiguous"
+
+
+def test_a_second_pose_tells_them_apart():
+    parts = [
+        static(0.1, v, seed=k) for k, v in enumerate([(0.6, 0.5, 0.2), (-0.5, 0.9, 0.0), (0.1, -0.8, 1.0), (2.5, 0, 0)])
+    ]
+    n = sum(p.n for p in parts)
+    quaternions = np.concatenate([p.ref_q for p in parts])
+    log = replace(
+        parts[0],
+        t=np.concatenate([p.t + 70.0 * k for k, p in enumerate(parts)]),
+        **{s: np.concatenate([getattr(p, s) for p in parts]) for s in ("acc", "gyr", "mag")},
+        ref_q=quaternions,
+    )
+    assert log.n == n
+    assert isinstance(log.reference, Rotation)
+    answer = ladder(log)
+    assert (answer.model, answer.verdict) == (("acc.bias",), "adequate")
+
+
+def test_json_of_a_ladder_has_the_promised_keys():
+    sim = simulate.simulate("handheld", {"gyr.bias": None}, 2, 40.0, size="large")
+    found = json.loads(json.dumps(ladder(sim.to_log()).to_dict(), allow_nan=False))
+    assert found.keys() >= {"steps", "model", "verdict", "ratio_start", "ratio_end", "attitude"}
+    assert found["model"] == ["gyr.bias"]
+    for step in found["steps"]:
+        assert step.keys() >= {"effect", "before", "expected", "after"}
+    if found["attitude"] is not None:
+        assert found["attitude"].keys() >= {"before_deg", "after_deg"}
