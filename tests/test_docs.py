@@ -54,3 +54,33 @@ def anchors(file):
 def test_index_links_every_page():
     text = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     assert [page.name for page in DOCS if page.name != "index.md" and f"({page.name})" not in text] == []
+
+
+@pytest.mark.parametrize(
+    ("file", "constant", "words"),
+    [
+        ("rust/inference/src/verdict.rs", "ALPHA", "(Bonferroni) is at most {}, and"),
+        ("rust/inference/src/verdict.rs", "NAMED_SHARE", "takes at least {:.0%} of its gain and"),
+        ("rust/inference/src/verdict.rs", "LOOK_AHEAD", "up to {}, re-ranked"),
+        ("rust/inference/src/held_out.rs", "FOLDS", "{} folds, each of"),
+        ("rust/inference/src/dependence.rs", "CONTRASTS", "degree {} over the bins"),
+        ("rust/inference/src/screening.rs", "HALVES_CHANCE", "more than {} standard deviations of chance"),
+        ("rust/fit/src/bins.rs", "BINS", "up to {} bins"),
+        ("rust/fit/src/whitening.rs", "MAX_ORDER", "filter** of order 0 to {}"),
+        ("rust/model/src/bandwidth.rs", "TOLERANCE", "{}\\,\\sigma_{{\\text{{ref}}}}"),
+        ("python/imufit/fit/analysis.py", "BLOCKS", "B = {} blocks"),
+        ("python/imufit/diagnose/ladder.py", "MATTERS", "at least {:.1%} off the held-out error"),
+    ],
+)
+def test_method_states_the_constants_of_the_code(file, constant, words):
+    code = (ROOT / file).read_text(encoding="utf-8")
+    found = re.search(rf"^(?:pub )?(?:const )?{constant}(?:: \w+)? = ([\d.]+)", code, re.MULTILINE)
+    assert found, f"{file} has no {constant} any more"
+    value = float(found[1])
+    number = int(value) if value.is_integer() else value
+    spelt = {5: "five", 10: "ten", 12: "Twelve"}.get(number, number)
+    text = " ".join((ROOT / "docs" / "method.md").read_text(encoding="utf-8").split()).replace(" %", "%")
+    shapes = [number] if ":" in words else [number, spelt]
+    assert any(words.format(shape) in text for shape in shapes), (
+        f"docs/method.md does not say that {constant} is {value}"
+    )
