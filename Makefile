@@ -11,7 +11,7 @@ CARGO_FLAGS := --workspace --release
 SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-rust test-python lint wheel bench clean
+.PHONY: help build demo test test-rust test-python lint docs wheel bench clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -37,6 +37,11 @@ lint: $(STAMP) ## Formatting, clippy, ruff, mypy, stubs, import layers
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest imufit._imufit
 	$(BIN)/lint-imports
+
+docs: $(STAMP) ## Refresh what the documents take from the code: effects, pictures, pasted output
+	$(BIN)/python docs/make_effects.py
+	$(BIN)/python docs/pictures/make.py
+	$(BIN)/python docs/blocks.py --write README.md docs/logs.md docs/own_effect.md
 
 wheel: $(DEPENDENCIES) ## One abi3 wheel in dist/
 	$(BIN)/maturin build --release --out dist

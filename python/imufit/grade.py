@@ -1,4 +1,4 @@
-"""The blind protocol: how often is the answer right on logs whose truth is sealed?"""
+"""The blind protocol: how often the answer is right on logs whose truth is sealed."""
 
 from __future__ import annotations
 

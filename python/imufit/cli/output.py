@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -30,7 +31,7 @@ class Output:
 
         self._json_file = json_file
         quiet = json_file is not None and str(json_file) == "-"
-        width = None if sys.stdout.isatty() else _WIDTH_OF_FILES
+        width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else _WIDTH_OF_FILES
         self._console = Console(quiet=quiet, width=width, highlight=False, markup=False, emoji=False)
 
     def say(self, *sentences: str, bold: bool = False) -> None:
