@@ -10,7 +10,6 @@ from imufit.simulate import SCENARIOS, Noise
 from scipy.spatial.transform import Rotation
 from test_diagnose import static
 
-
 PAIRS = [
     ("handheld", ("gyr.g_sensitivity", "acc.scale"), True),
     ("handheld", ("gyr.bias", "gyr.scale"), False),

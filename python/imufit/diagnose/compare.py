@@ -59,8 +59,12 @@ def comparison(analysis: Analysis, step: Array) -> Comparison:
     for item in result["channels"]:
         name, floor = item["channel"], floors[item["index"]]
         channels.append(
-            ChannelResidual(name, item["rms"], item["mean"], floor, item["rms"] / floor, UNITS[name[:3]], item["n"])
+            ChannelResidual(name, item["rms"], _rounded(item["mean"], floor), floor, item["rms"] / floor, UNITS[name[:3]], item["n"])
         )
+        excess = item["rms"] ** 2 - floor**2
+        if excess > 0 and item["mean"] ** 2 >= MIN_SHARE * excess and item["rms"] > floor:
+            share = min(item["mean"] ** 2 / excess, 1.0)
+            where.append(Where(name, "constant", share, facts.t_start, facts.t_end))
         first, last = item["stretch"]
         spans[name] = (float(edges[first]), float(edges[last]))
         segments += [
@@ -93,6 +97,11 @@ def comparison(analysis: Analysis, step: Array) -> Comparison:
         segments=tuple(segments[:WORST_SEGMENTS]),
         notes=notes(analysis),
     )
+
+
+def _rounded(mean: float, floor: float) -> float:
+    """Zero where a mean is nothing but rounding."""
+    return mean if abs(mean) > 1e-9 * floor else 0.0
 
 
 def _panel(item: Mapping[str, Any], floors: list[float], facts: _imufit.Facts) -> Panel:

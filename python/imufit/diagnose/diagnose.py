@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from imufit.fit import Fit
 
 ALPHA = 0.003
+MIN_CORRELATION = 0.3
+"""Below this, two effects are not worth naming together."""
 POWER = 0.84
 """Standard errors beyond the threshold at which an effect is seen with 80 % power."""
 
@@ -41,6 +43,8 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     result = analysis.problem.diagnose(analysis.fitted_slots, slots)
     confounded: dict[str, list[Rival]] = {}
     for first, second, correlation in result["correlations"]:
+        if correlation < MIN_CORRELATION:
+            continue
         confounded.setdefault(ids[first], []).append(Rival(ids[second], correlation))
         confounded.setdefault(ids[second], []).append(Rival(ids[first], correlation))
     tested = max(sum(item["testable"] for item in result["screened"]), 1)

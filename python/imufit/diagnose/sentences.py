@@ -71,8 +71,8 @@ def verdict(
         raise ValueError(f"verdict {word} needs a candidate")
     if word == "ambiguous":
         return (
-            f"{best.effect} or {' or '.join(rivals)} is missing: each explains this log as well as the other, "
-            f"and neither adds anything to the other."
+            f"{best.effect} or {' or '.join(rivals)} is missing: each explains this log, "
+            f"and {best.effect} adds nothing to what {' or '.join(rivals)} explains."
         )
     text = f"{best.effect} is missing. {best.explanation}"
     return f"{text} Apart from it, {left}." if left else text

@@ -1,4 +1,4 @@
-"""A user's effect is tried on a few rows before anything is fitted: what breaks the contract would spoil every answer."""
+"""A user's effect is tried on a few rows before anything is fitted: a broken one would spoil every answer."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ def check_users_effects(passes: Passes, facts: _imufit.Facts, ids: Iterable[str]
     for chunk in passes.log.chunks(CHUNK_ROWS, facts.margin):
         arrays = chunk_arrays(chunk, passes.covariates)
         core = slice(arrays["begin"], arrays["end"])
-        known = np.flatnonzero(np.isfinite(arrays["ref_q"][core, 0])) if arrays["ref_q"] is not None else np.empty(0, int)
+        known = (
+            np.flatnonzero(np.isfinite(arrays["ref_q"][core, 0])) if arrays["ref_q"] is not None else np.empty(0, int)
+        )
         if known.size:
             begin = arrays["begin"] + int(known[0])
             rows = {"begin": begin, "end": min(begin + TRIED_ROWS, arrays["end"])}

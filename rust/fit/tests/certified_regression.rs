@@ -1,7 +1,13 @@
 //! Linear regressions with certified results: Statistical Reference Datasets of the National Institute of Standards and Technology.
 //!
 //! Each is solved to the digits that its condition number leaves, or is said to be ill-conditioned.
-#![allow(clippy::expect_used, missing_docs)]
+#![allow(
+    clippy::unreadable_literal,
+    clippy::inconsistent_digit_grouping,
+    clippy::excessive_precision,
+    clippy::expect_used,
+    missing_docs
+)]
 
 use imufit_fit::normal_equations::{NormalEquations, TRUSTED_CONDITION};
 use nalgebra::{DMatrix, DVector};

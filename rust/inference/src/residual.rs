@@ -86,7 +86,8 @@ pub fn panels(raw: &Evidence, step: &DVector<f64>, channel: usize, floor: f64) -
         }
         let bins = raw.layout.bins.edges[covariate].len() + 1;
         let (mut mean, mut band) = (vec![f64::NAN; bins], vec![f64::NAN; bins]);
-        let (mut between, mut expected) = (0.0, 0.0);
+        // Around the mean: a constant residual depends on nothing.
+        let (mut between, mut expected, mut sum, mut all) = (0.0, -floor * floor, 0.0, 0.0);
         for bin in 0..bins {
             let parts: Vec<(f64, f64)> = (0..raw.layout.blocks)
                 .filter_map(|b| raw.get(b, channel))
@@ -110,8 +111,11 @@ pub fn panels(raw: &Evidence, step: &DVector<f64>, channel: usize, floor: f64) -
                 band[bin] = 1.96 * (scatter * k / (k - 1.0)).sqrt() / count;
             }
             between += count * m * m;
+            sum += count * m;
+            all += count;
             expected += floor * floor;
         }
+        between -= if all > 0.0 { sum * sum / all } else { 0.0 };
         out.push(Panel {
             channel,
             covariate,
