@@ -177,11 +177,11 @@ def possible(effect, scenario):
     return SCENARIOS[scenario].rig or not effect.startswith("rig.")
 
 
-@pytest.mark.parametrize("effect", [*INJECTIONS, "gyr.column:vbat"])
-@pytest.mark.parametrize("scenario", ["handheld", "tilt"])
-def test_drawn_effect_has_the_wanted_size_in_the_sensor_it_affects_most(effect, scenario):
-    if not possible(effect, scenario):
-        pytest.skip("not a rig")
+POSSIBLE = [(s, e) for s in ("handheld", "tilt") for e in (*INJECTIONS, "gyr.column:vbat") if possible(e, s)]
+
+
+@pytest.mark.parametrize(("scenario", "effect"), POSSIBLE)
+def test_drawn_effect_has_the_wanted_size_in_the_sensor_it_affects_most(scenario, effect):
     log = simulate(scenario, {effect: None}, seed=5, duration=60.0, size="large")
     assert log.truth.sizes[effect] == pytest.approx(SIZES["large"], rel=0.02)
     assert tuple(log.truth.effects[effect]) == injection(effect).parameters
