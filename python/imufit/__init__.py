@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from imufit import errors as errors
     from imufit import figures as figures
     from imufit import fit as fit
+    from imufit import grade as grade
     from imufit import log as log
     from imufit import model as model
     from imufit import replay, simulate
@@ -29,7 +30,19 @@ if TYPE_CHECKING:
 else:
     from importlib import import_module
 
-    _MODULES = ("diagnose", "errors", "figures", "fit", "log", "model", "replay", "report", "results", "simulate")
+    _MODULES = (
+        "diagnose",
+        "errors",
+        "figures",
+        "fit",
+        "grade",
+        "log",
+        "model",
+        "replay",
+        "report",
+        "results",
+        "simulate",
+    )
     _HOMES = {
         "_imufit": ("__version__",),
         "diagnose": ("ladder",),
