@@ -59,7 +59,9 @@ def comparison(analysis: Analysis, step: Array) -> Comparison:
     for item in result["channels"]:
         name, floor = item["channel"], floors[item["index"]]
         channels.append(
-            ChannelResidual(name, item["rms"], _rounded(item["mean"], floor), floor, item["rms"] / floor, UNITS[name[:3]], item["n"])
+            ChannelResidual(
+                name, item["rms"], _rounded(item["mean"], floor), floor, item["rms"] / floor, UNITS[name[:3]], item["n"]
+            )
         )
         excess = item["rms"] ** 2 - floor**2
         if excess > 0 and item["mean"] ** 2 >= MIN_SHARE * excess and item["rms"] > floor:

@@ -59,7 +59,7 @@ impl Dataset {
 }
 
 fn polynomial(x: &[f64], degree: usize) -> DMatrix<f64> {
-    DMatrix::from_fn(x.len(), degree + 1, |i, j| x[i].powi(j as i32))
+    DMatrix::from_fn(x.len(), degree + 1, |i, j| x[i].powf(j as f64))
 }
 
 /// Lower difficulty: ozone monitors, a straight line.
