@@ -149,12 +149,9 @@ SHAPES = {
     "parabola": lambda c: (c - 1.5) ** 2,
     "two waves": lambda c: np.sin(4.0 * c),
 }
-UNSEEN = pytest.mark.xfail(
-    strict=True, reason="the whitening filter is fitted to a residual that holds the unnamed effect"
-)
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name == "V" else UNSEEN) for name in SHAPES])
+@pytest.mark.parametrize("name", SHAPES)
 def test_something_without_a_name_is_unknown(name):
     fit = SensorModel(["gyr.bias"]).fit(bent_by_current(SHAPES[name]))
     where = fit.compare().where[0]

@@ -223,7 +223,6 @@ def test_a_users_effect_is_found_when_it_is_the_hidden_one(user_effect):
     assert added.fit.diagnose().verdict == "adequate"
 
 
-@pytest.mark.xfail(strict=True, reason="the whitening filter is fitted to a residual that holds the unnamed effect")
 def test_without_the_users_effect_the_answer_is_unknown():
     log, _ = hidden_fan(lambda current: np.sin(4.0 * current))
     answer = SensorModel().fit(log).diagnose()

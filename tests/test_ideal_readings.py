@@ -57,20 +57,7 @@ def test_far_from_the_origin_and_late_in_the_day_as_well():
     assert max(relative(moved, worst=True).values()) < 3e-6
 
 
-@pytest.mark.parametrize(
-    "scenario",
-    [
-        pytest.param(
-            name,
-            marks=pytest.mark.xfail(
-                strict=True, reason="axes that never turn are told a scale of -1 by the noise of the reference"
-            ),
-        )
-        if name == "tilt"
-        else name
-        for name in SCENARIOS
-    ],
-)
+@pytest.mark.parametrize("scenario", SCENARIOS)
 def test_noise_of_the_reference_is_not_taken_for_an_effect(scenario):
     for seed in range(3):
         noise = Noise(attitude_deg=0.02)

@@ -32,14 +32,7 @@ def test_two_missing_effects_are_both_found(scenario, effects, realistic):
         assert abs(p.value - sim.truth.effects[p.effect][p.name]) < 5.0 * p.standard_error, str(p)
 
 
-REFERENCE_NOISE = pytest.mark.xfail(
-    strict=True, reason="axes that never turn are told a scale of -1 by the noise of the reference"
-)
-
-
-@pytest.mark.parametrize(
-    "scenario", [pytest.param(name, marks=[REFERENCE_NOISE] if name == "tilt" else []) for name in SCENARIOS]
-)
+@pytest.mark.parametrize("scenario", SCENARIOS)
 def test_nothing_is_added_to_an_ideal_sensor(scenario):
     answer = ladder(simulate.simulate(scenario, {}, 5, 60.0, noise=Noise.realistic()).to_log())
     assert (answer.steps, answer.model, answer.verdict) == ((), (), "adequate")

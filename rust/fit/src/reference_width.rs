@@ -65,6 +65,23 @@ fn unexplained(rows: &[Regressed]) -> f64 {
     sum
 }
 
+/// An axis turns if its rate stands out of the reference's noise by this factor.
+const TURNING: f64 = 2.5;
+
+/// Axes whose rates are nothing but noise of the reference at the width chosen.
+pub fn still_axes(widths: &Bandwidth, chosen: Smoothing) -> [bool; 3] {
+    let noise = widths.derivative_noise(chosen);
+    let k = WIDTHS.iter().position(|w| *w == chosen).unwrap_or(0);
+    let (mut sum, mut n) = ([0.0; 3], 0.0_f64);
+    for (_, rate, _) in widths.sampled(k) {
+        for axis in 0..3 {
+            sum[axis] += rate[axis] * rate[axis];
+        }
+        n += 1.0;
+    }
+    sum.map(|s| (s / n.max(1.0)).sqrt() < TURNING * noise)
+}
+
 /// Width for the attitude.
 pub fn of_attitude(widths: &Bandwidth, rows: &SampledRows) -> Smoothing {
     let error: Vec<f64> = (0..WIDTHS.len())

@@ -227,6 +227,7 @@ impl Survey {
             has_temperature: self.temperature.1 > 0,
             attitude_smoothing,
             position_smoothing,
+            still_axes: reference_width::still_axes(&self.attitude_width, attitude_smoothing),
             attitude_columns: self.attitude_width.for_columns(attitude_smoothing),
             position_columns: position_smoothing.map(|s| self.position_width.for_columns(s)),
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),

@@ -44,6 +44,9 @@ pub struct LogFacts {
     pub attitude_columns: Smoothing,
     /// The same for derivatives of the position above the second.
     pub position_columns: Option<Smoothing>,
+    /// Body axes about which the log never turns by more than the noise of the reference: their rates are noise, and a column made of noise
+    /// would give a scale of -1.
+    pub still_axes: [bool; 3],
     /// Median time between reference samples, s.
     pub reference_dt: f64,
 }

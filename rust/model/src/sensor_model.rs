@@ -209,6 +209,12 @@ impl SensorModel {
             .iter()
             .map(|c| core.clone().map(|i| held(c, i)).collect())
             .collect();
+        // Readings are modelled from the rates as they are; columns of axes that never turn would be noise.
+        let seen = facts.still_axes.contains(&true).then(|| Ideal {
+            omega: ideal.omega.without(facts.still_axes),
+            alpha: ideal.alpha.without(facts.still_axes),
+            ..ideal.clone()
+        });
         let mut channels: Vec<Option<ChannelColumns>> = vec![None; CHANNELS];
         for sensor in Sensor::ALL {
             let Some(reading) = window.reading(sensor) else {
@@ -217,12 +223,17 @@ impl SensorModel {
             let rows = Rows {
                 facts,
                 t: &window.t[core.clone()],
-                ideal: &ideal,
+                ideal: seen.as_ref().unwrap_or(&ideal),
                 x: &ideal.f,
                 temperature: temperature.as_deref(),
                 covariates: &covariates,
             };
-            let (modelled, columns) = self.predict(rows, sensor)?;
+            let reading_of = match sensor {
+                Sensor::Acc => &ideal.f,
+                Sensor::Gyr => &ideal.omega,
+                Sensor::Mag => &ideal.m,
+            };
+            let (modelled, columns) = self.predict(rows, reading_of.clone(), sensor)?;
             for (axis, columns) in columns.into_iter().enumerate() {
                 let residual = core
                     .clone()
@@ -257,24 +268,28 @@ impl SensorModel {
     }
 
     /// Modelled readings of one sensor and the columns of its three channels, stage after stage.
-    fn predict(&self, rows: Rows, sensor: Sensor) -> Result<(Triple, AxisColumns), EffectError> {
+    fn predict(&self, rows: Rows, mut x: Triple, sensor: Sensor) -> Result<(Triple, AxisColumns), EffectError> {
         let n = rows.len();
-        let mut x = match sensor {
-            Sensor::Acc => rows.ideal.f.clone(),
-            Sensor::Gyr => rows.ideal.omega.clone(),
-            Sensor::Mag => rows.ideal.m.clone(),
+        let still = if sensor == Sensor::Gyr {
+            rows.facts.still_axes
+        } else {
+            [false; 3]
         };
         let mut out: AxisColumns =
             std::array::from_fn(|axis| vec![Vec::new(); self.active[3 * sensor.index() + axis].len()]);
         let mut columns = Columns::default();
         for stage in [Stage::Reference, Stage::Input, Stage::Gain, Stage::Offset] {
             let mut after: Option<Triple> = None;
+            let seen = still.contains(&true).then(|| x.without(still));
             for slot in &self.slots {
                 if slot.effect.card().stage != stage || !slot.effect.sensors().contains(&sensor) {
                     continue;
                 }
                 columns.reset(n, slot.parameters.len());
-                let rows = Rows { x: &x, ..rows };
+                let rows = Rows {
+                    x: seen.as_ref().unwrap_or(&x),
+                    ..rows
+                };
                 slot.effect.columns(&rows, sensor, &slot.parameters, &mut columns)?;
                 for axis in 0..3 {
                     let list = &self.active[3 * sensor.index() + axis];

@@ -19,6 +19,18 @@ impl Triple {
         }
     }
 
+    /// The same with the flagged axes zero where they are known.
+    #[must_use]
+    pub fn without(&self, axes: [bool; 3]) -> Self {
+        let mut out = self.clone();
+        for axis in (0..3).filter(|a| axes[*a]) {
+            for v in out.0[axis].iter_mut().filter(|v| v.is_finite()) {
+                *v = 0.0;
+            }
+        }
+        out
+    }
+
     /// Vector of one row.
     pub fn row(&self, i: usize) -> Vector3<f64> {
         Vector3::new(self.0[0][i], self.0[1][i], self.0[2][i])

@@ -56,6 +56,7 @@ fn every_built_in_effect_keeps_the_contract() {
         position_smoothing: Some(NARROWEST),
         attitude_columns: NARROWEST,
         position_columns: Some(NARROWEST),
+        still_axes: [false; 3],
         reference_dt: 0.01,
     };
     let mut effects = catalogue::built_in();
