@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+# Fonts that figures do not use are no concern of the reader.
+logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
 
 BLUE = "#0072B2"
 SKY = "#56B4E9"
