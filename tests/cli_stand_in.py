@@ -83,7 +83,7 @@ def install(monkeypatch):
     found = ParameterGrade("gyr.g_sensitivity", "xx", 3.6e-5, 3.5e-5, 1e-6)
     mark = Grade("right", ("gyr.g_sensitivity",), ("gyr.g_sensitivity",), (found,))
     simulation = SimpleNamespace(t=np.arange(200) / 100.0, truth=Truth())
-    model = SimpleNamespace(fit=lambda log, progress: Fit())
+    model = SimpleNamespace(fit=lambda log, progress: Fit(), compare=Fit().compare)
     for name, result in (
         ("open_log", "opened"),
         ("sensor_model", model),

@@ -164,7 +164,6 @@ def test_something_without_a_name_is_unknown(name):
     assert "motor_current" in answer.sentence
 
 
-@pytest.mark.xfail(strict=True, reason="the share is that of the whitened gain in the excess that is not whitened")
 @pytest.mark.parametrize("name", SHAPES)
 def test_diagnosis_and_comparison_give_a_dependence_the_same_share(name):
     fit = SensorModel(["gyr.bias"]).fit(bent_by_current(SHAPES[name]))

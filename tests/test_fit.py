@@ -308,3 +308,16 @@ def test_a_log_on_disk_gives_the_answer_of_the_log_in_memory(tmp_path):
     a = SensorModel(["gyr.bias"]).fit(log)
     b = SensorModel(["gyr.bias"]).fit(LogStream(tmp_path / "log.parquet"))
     assert a.to_dict() == b.to_dict()
+
+
+def test_a_model_is_compared_as_it_is():
+    log = simulate.simulate("handheld", {"gyr.bias": {"x": 0.05, "y": 0.0, "z": 0.0}}, 1, 40.0).to_log()
+    model = SensorModel(["gyr.bias"], {"gyr.bias": {"x": 0.02}})
+    seen = {channel.channel: channel.mean for channel in model.compare(log).channels}
+    assert seen["gyr_x"] == pytest.approx(0.03, abs=1e-4)
+    assert seen["gyr_y"] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_chance_is_not_said_to_depend_on_anything():
+    logs = [simulate.simulate("handheld", {}, seed, 40.0).to_log() for seed in range(5)]
+    assert sum(len(SensorModel().compare(log).where) for log in logs) <= 2

@@ -32,7 +32,7 @@ def compare(
     output = Output(json_file)
     with ProgressBar() as progress:
         opened = engine.open_log(log, mapping)
-        comparison = engine.sensor_model(path=model).fit(opened, progress=progress).compare(opened, progress=progress)
+        comparison = engine.sensor_model(path=model).compare(opened, progress=progress)
     output.say(comparison.sentence, bold=True)
     output.say(*comparison.notes)
     output.tables(comparison.tables())

@@ -17,10 +17,12 @@ from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
 if TYPE_CHECKING:
     from imufit.fit import Fit
     from imufit.log import LogSource
+    from imufit.model import SensorModel
 
 Array = NDArray[np.float64]
 
 MIN_SHARE = 0.02
+SCATTER = 4.0
 WORST_SEGMENTS = 8
 SPECTRUM_ROWS = 512
 SPECTRUM_CHUNKS = 8
@@ -43,9 +45,24 @@ def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
     if log is None or log is fit.log:
         analysis, step = fit.analysis, fit.estimate.step
     else:
-        analysis = Analysis.of(fit.model, log, progress, keep_constants=True)
-        step = analysis.estimate_unnamed().step
+        return compare_model(fit.model, log, progress)
     return comparison(analysis, step)
+
+
+def compare_model(model: SensorModel, log: LogSource, progress: Progress) -> Comparison:
+    """Hold a model against a log, its parameters as they are.
+
+    Parameters
+    ----------
+    model : SensorModel
+        The model.
+    log : Log or LogStream
+        With reference attitude.
+    progress : callable
+        Called with (rows done, rows in all, what is being done).
+    """
+    analysis = Analysis.of(model, log, progress, keep_constants=True)
+    return comparison(analysis, analysis.estimate_unnamed().step)
 
 
 def comparison(analysis: Analysis, step: Array) -> Comparison:
@@ -56,6 +73,7 @@ def comparison(analysis: Analysis, step: Array) -> Comparison:
     edges = np.linspace(facts.t_start, facts.t_end, analysis.raw.blocks + 1)
     channels, where, segments = [], [], []
     spans = {}
+    stands_out: dict[str, bool] = {}
     for item in result["channels"]:
         name, floor = item["channel"], floors[item["index"]]
         channels.append(
@@ -64,7 +82,9 @@ def comparison(analysis: Analysis, step: Array) -> Comparison:
             )
         )
         excess = item["rms"] ** 2 - floor**2
-        if excess > 0 and item["mean"] ** 2 >= MIN_SHARE * excess and item["rms"] > floor:
+        # A mean square scatters by sqrt(2 / n): below that nothing is in excess.
+        stands_out[name] = excess > SCATTER * floor**2 * np.sqrt(2.0 / item["n"])
+        if stands_out[name] and item["mean"] ** 2 >= MIN_SHARE * excess:
             share = min(item["mean"] ** 2 / excess, 1.0)
             where.append(Where(name, "constant", share, facts.t_start, facts.t_end))
         first, last = item["stretch"]
@@ -77,7 +97,7 @@ def comparison(analysis: Analysis, step: Array) -> Comparison:
     panels = [_panel(item, floors, facts) for item in result["panels"]]
     ratios = {channel.channel: channel.ratio for channel in channels}
     for panel in panels:
-        if panel.share >= MIN_SHARE and ratios[panel.channel] > 1.0:
+        if panel.share >= MIN_SHARE and stands_out[panel.channel]:
             where.append(Where(panel.channel, panel.covariate, panel.share, *spans[panel.channel]))
     where.sort(key=lambda w: -w.share * (ratios[w.channel] ** 2 - 1.0))
     panels.sort(key=lambda p: -p.share * max(ratios[p.channel] ** 2 - 1.0, 1e-6))

@@ -13,7 +13,6 @@ from imufit import _imufit
 from imufit.diagnose import sentences
 from imufit.diagnose.compare import notes
 from imufit.fit.analysis import BLOCKS, Analysis
-from imufit.fit.passes import CHANNELS
 from imufit.model.catalogue import card_of
 from imufit.results import Candidate, Diagnosis, Parameter, Rival, Unexplained
 
@@ -120,19 +119,18 @@ def _unexplained(analysis: Analysis, step: Any, found: Sequence[Mapping[str, Any
     """Dependences that nothing in the catalogue explains, with their share of the excess and where in time it lies."""
     if not found:
         return ()
-    channels = {item["channel"]: item for item in analysis.problem.residual(step)["channels"]}
+    residual = analysis.problem.residual(step)
+    channels = {item["channel"]: item for item in residual["channels"]}
+    shares = {(item["channel"], item["covariate"]): item["share"] for item in residual["panels"]}
     edges = np.linspace(analysis.facts.t_start, analysis.facts.t_end, analysis.raw.blocks + 1)
     out = []
     for item in found:
-        channel = channels[item["channel"]]
-        floor = analysis.floors[CHANNELS.index(item["channel"])]
-        excess = max(channel["n"] * ((channel["rms"] / floor) ** 2 - 1.0), item["gain"])
-        first, last = channel["stretch"]
+        first, last = channels[item["channel"]]["stretch"]
         out.append(
             Unexplained(
                 item["channel"],
                 item["covariate"],
-                float(item["gain"] / excess),
+                float(shares.get((item["channel"], item["covariate"]), 0.0)),
                 item["shape"],
                 float(edges[first]),
                 float(edges[last]),

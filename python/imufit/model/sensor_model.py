@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from imufit.fit import Fit
     from imufit.log import LogSource
     from imufit.progress import Progress
+    from imufit.results import Comparison
 
 KIND = "imufit sensor model"
 FORMAT = 1
@@ -131,6 +132,31 @@ class SensorModel:
         from imufit.fit import Fit  # noqa: PLC0415  a fit needs the model, not the other way round
 
         return Fit.of(self, log, progress)
+
+    def compare(self, log: LogSource, progress: Progress | None = None) -> Comparison:
+        """Say where the model fails on a log, its parameters as they are; nothing is fitted.
+
+        Parameters
+        ----------
+        log : Log or LogStream
+            With reference attitude.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+
+        Returns
+        -------
+        Comparison
+            Residuals by channel, against every covariate, by segment and by frequency.
+
+        Raises
+        ------
+        InputError
+            The log has no usable reference, or an effect of the model cannot be tested on it.
+        """
+        from imufit.diagnose.compare import compare_model  # noqa: PLC0415  as for `fit`
+        from imufit.progress import silent  # noqa: PLC0415
+
+        return compare_model(self, log, progress or silent)
 
     def save(self, path: str | Path) -> None:
         """Write the model as a TOML file.
