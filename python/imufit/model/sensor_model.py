@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -233,10 +233,3 @@ def _values(effect: _imufit.Effect, given: Mapping[str, float]) -> list[float]:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(f"{effect.id} {name} is {value!r}, not a finite number")
     return [float(given.get(name, 0.0)) for name in names]
-
-
-def model_of(ids: Iterable[str], like: SensorModel) -> SensorModel:
-    """Return a model of the effects `ids` with the parameters and constants of another where it has them."""
-    chosen = list(ids)
-    kept = {key: values for key, values in like.parameters.items() if key in chosen}
-    return SensorModel(chosen, kept, constants=like.constants)

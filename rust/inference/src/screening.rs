@@ -50,11 +50,12 @@ const CLEARLY_CHANCE: f64 = 0.01;
 /// The p-value of a question: the largest of two block lengths, in case correlation reaches beyond the shorter, and of
 /// a test that lets zeros wander.
 pub fn p_value(question: &Question) -> f64 {
-    let blocks = [1, 2]
-        .into_iter()
-        .filter_map(|group| jackknife::jackknife(question, group))
-        .map(|j| j.p_value);
-    let p = blocks.fold(0.0, f64::max);
+    p_value_beside(question, jackknife::jackknife(question, 1).map_or(0.0, |j| j.p_value))
+}
+
+/// The same where the p-value of the shorter blocks is known already.
+fn p_value_beside(question: &Question, shorter: f64) -> f64 {
+    let p = jackknife::jackknife(question, 2).map_or(shorter, |j| j.p_value.max(shorter));
     if p > CLEARLY_CHANCE {
         p
     } else {
@@ -149,7 +150,7 @@ pub fn screen(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, c
         out.testable = false;
         return out;
     };
-    out.p_value = p_value(&question);
+    out.p_value = p_value_beside(&question, fine.p_value);
     let with = held_out::held_out(&question);
     (out.gain, out.gain_error) = held_out::gain(base, &with);
     out.held_out.1 = with.ratio;
