@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from imufit import diagnose as diagnose
+    from imufit import calibrate as calibrate
     from imufit import errors as errors
     from imufit import figures as figures
     from imufit import fit as fit
@@ -31,6 +32,7 @@ else:
     from importlib import import_module
 
     _MODULES = (
+        "calibrate",
         "diagnose",
         "errors",
         "figures",

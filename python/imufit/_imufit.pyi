@@ -16,6 +16,7 @@ __all__ = [
     "Evidence",
     "Facts",
     "Filter",
+    "PoseJudge",
     "Problem",
     "Survey",
     "__version__",
@@ -27,7 +28,9 @@ __all__ = [
     "evaluate",
     "filter_descriptions",
     "find_effect",
+    "find_rests",
     "frame_vectors",
+    "magnitude_calibration",
     "matrix_from_quaternion_rows",
     "python_effect",
     "quaternion_from_euler",
@@ -39,6 +42,10 @@ __all__ = [
     "rotate_back",
     "rotation_vector_from_quaternion",
     "saturate",
+    "sphere",
+    "table_attitudes",
+    "turn_calibration",
+    "vector_calibration",
 ]
 
 __version__: str
@@ -284,3 +291,107 @@ class Problem:
     def residual(self, step: _Numbers) -> _Residual: ...
 
 def saturate(evidence: Evidence) -> tuple[_Array, list[float]]: ...
+
+# --- calibration: sides are numbered +x -x +y -y +z -z; m/s^2, rad/s, rad
+
+class _Pose(TypedDict):
+    rows: tuple[int, int]
+    time: tuple[float, float]
+    knocks: list[tuple[int, int]]
+    n: int
+    mean: list[float]
+    deviation: list[float]
+    variance: list[float]
+    rate: list[float] | None
+    rate_variance: list[float] | None
+    side: int
+    label: int | None
+    flaw: tuple[str, float] | None
+
+class _Rests(TypedDict):
+    poses: list[_Pose]
+    acc_noise: float | None
+    gyr_noise: float | None
+    step: list[float | None]
+
+class _Judgement(TypedDict):
+    state: str
+    side: int | None
+    progress: float
+    unrest: float
+    closed: _Pose | None
+
+class _Solution(TypedDict):
+    matrix: list[list[float]]
+    bias: list[float]
+    scale: list[float]
+    misalignment: list[list[float]]
+    bias_error: list[float]
+    scale_error: list[float]
+    misalignment_error: list[list[float]]
+    model_gain: list[list[float]]
+    model_bias: list[float]
+    model_gain_error: list[list[float]]
+    model_bias_error: list[float]
+    model_scale_temperature: list[float]
+    model_bias_temperature: list[float]
+    model_scale_temperature_error: list[float]
+    model_bias_temperature_error: list[float]
+    extra: list[float]
+    extra_error: list[float]
+    condition: float
+    freedom: float
+    excess: float
+    residuals: _Array
+    held_out: _Array
+    held_out_length: _Array
+    correlation: _Array
+
+class _TurnSolution(_Solution):
+    before: _Array
+    way: _Array
+
+_Vector = Sequence[float]
+_Span = tuple[int, int, _Vector, _Vector, _Vector, _Vector, float]
+
+@final
+class PoseJudge:
+    def __new__(cls, settings: Mapping[str, float] | None = None) -> PoseJudge: ...
+    def step(self, t: float, acc: _Numbers, gyr: _Numbers | None = None) -> _Judgement: ...
+    def finish(self) -> _Pose | None: ...
+
+def find_rests(
+    t: _Array,
+    acc: _Array,
+    gyr: _Array | None = None,
+    labels: _Array | None = None,
+    settings: Mapping[str, float] | None = None,
+) -> _Rests: ...
+def vector_calibration(
+    readings: _Array,
+    variances: _Array,
+    targets: _Array,
+    gravity: float,
+    tilt: _Array | None = None,
+    temperature: _Array | None = None,
+    scale_temperature: bool = False,
+) -> _Solution: ...
+def magnitude_calibration(
+    readings: _Array,
+    groups: _Array,
+    length: float,
+    variances: _Array | None = None,
+    up: _Array | None = None,
+    temperature: _Array | None = None,
+    scale_temperature: bool = False,
+    misalignment: bool = True,
+) -> _Solution: ...
+def turn_calibration(t: _Array, gyr: _Array, spans: Sequence[_Span], bias: _Numbers) -> _TurnSolution: ...
+def table_attitudes(
+    t: _Array,
+    gyr: _Array,
+    spans: Sequence[_Span | None],
+    sides: _Array,
+    matrix: Sequence[Sequence[float]],
+) -> _Array | None: ...
+def sphere(readings: _Array) -> tuple[list[float], float] | None: ...

@@ -21,6 +21,20 @@ def open_log(path: Path, mapping: Sequence[str] = ()) -> Any:
     return open_log(path, mapping=parse_mapping(*mapping) or None)
 
 
+def read_log(path: Path, mapping: Sequence[str] = ()) -> Log:
+    """Read a log into memory; `mapping` as for :func:`open_log`."""
+    from imufit.log import parse_mapping, read  # noqa: PLC0415
+
+    return read(path, mapping=parse_mapping(*mapping) or None)
+
+
+def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], settings: Mapping[str, float]) -> Any:
+    """Calibrate a sensor from its logs; no sensors named means all."""
+    from imufit.calibrate import calibrate  # noqa: PLC0415
+
+    return calibrate(list(logs), cost, sensors=sensors or ("acc", "gyr", "mag"), settings=settings)
+
+
 def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
     """Return the model kept in the file `path`, or a stack of `effects`; no effects is the ideal sensor."""
     import imufit  # noqa: PLC0415

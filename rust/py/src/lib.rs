@@ -3,6 +3,7 @@
 
 mod arrays;
 mod attitude;
+mod calibration;
 mod errors;
 mod filters;
 mod fit;
@@ -17,6 +18,7 @@ use pyo3::prelude::*;
 fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     attitude::register(m)?;
+    calibration::register(m)?;
     filters::register(m)?;
     model::register(m)?;
     fit::register(m)?;

@@ -1,0 +1,231 @@
+"""Calibrate whatever sensors a log has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from imufit import _imufit
+from imufit.calibrate import accelerometer, gyroscope
+from imufit.calibrate.calibration import Calibration, SensorCalibration
+from imufit.calibrate.magnetometer import fit_magnetometer
+from imufit.calibrate.poses import SIDES, Found, Pose, distinct, find_poses
+from imufit.calibrate.temperature import Temperature
+from imufit.errors import InputError
+from imufit.model.sensor_model import SensorModel
+
+if TYPE_CHECKING:
+    from imufit.log import Log
+
+COSTS = ("vector", "magnitude")
+
+
+def calibrate(
+    logs: Log | Sequence[Log],
+    cost: str | None = None,
+    *,
+    sensors: Sequence[str] = ("acc", "gyr", "mag"),
+    settings: Mapping[str, float] | None = None,
+) -> Calibration:
+    """Calibrate a sensor from rests, turns between them, and free rotation (paper A).
+
+    The accelerometer needs rests: six sides up on a level table (vector cost), or at least nine attitudes of any kind
+    (magnitude cost). The gyro takes its bias from the rests, scale and misalignment from the turns between them. The
+    magnetometer needs free rotation.
+
+    Parameters
+    ----------
+    logs : Log or sequence of Log
+        Of one sensor; several add up.
+    cost : str, optional
+        ``vector``: the named side points up exactly (or the log's reference attitude says how), 12 unknowns.
+        ``magnitude``: only the length of gravity is known, 9 unknowns, at least nine different poses. Without it the
+        vector cost where poses are labelled, have a reference or lie along the axes, else the magnitude cost.
+    sensors : sequence of str
+        Those to be calibrated, if the logs have them.
+    settings : mapping, optional
+        Criteria of a rest, see :func:`imufit.calibrate.find_poses`.
+
+    Returns
+    -------
+    Calibration
+        Sensor model, standard errors, poses, verdict.
+
+    Raises
+    ------
+    InputError
+        The logs do not tell a calibration; the message says what is missing.
+    """
+    given = [logs] if not isinstance(logs, Sequence) else list(logs)
+    if cost is not None and cost not in COSTS:
+        raise InputError(f"the cost {cost!r} is unknown", remedy=f"Use {' or '.join(COSTS)}.")
+    if unknown := [name for name in sensors if name not in ("acc", "gyr", "mag")]:
+        raise InputError(f"the sensor {unknown[0]!r} is unknown", remedy="Use acc, gyr or mag.")
+    if not given:
+        raise InputError("there is no log to calibrate from")
+    wanted = [name for name in sensors if any(getattr(log, name) is not None for log in given)]
+    if not wanted:
+        raise InputError(
+            f"none of the sensors {', '.join(sensors)} is there",
+            file=str(given[0].path or "log"),
+            remedy="Check the log.",
+        )
+    gravity = float(given[0].metadata.gravity)
+    found, first = [], 1
+    for index, log in enumerate(given):
+        if log.acc is None:
+            found.append(Found((), False, np.nan, np.nan))
+            continue
+        found.append(find_poses(log, index, first, settings))
+        first += len(found[-1].poses)
+    return _Session(given, found, gravity).calibrated(cost, wanted)
+
+
+class _Session:
+    """One calibration in the making: what was found, and what is to be said of it."""
+
+    def __init__(self, logs: Sequence[Log], found: Sequence[Found], gravity: float) -> None:
+        self.logs = logs
+        self.found = found
+        self.gravity = gravity
+        self.poses: list[Pose] = [pose for one in found for pose in one.poses]
+        self.labelled = any(one.labelled for one in found)
+        self.file = str(logs[0].path or "log")
+        self.notes: list[str] = []
+
+    @property
+    def used(self) -> list[Pose]:
+        return [pose for pose in self.poses if pose.used]
+
+    def calibrated(self, cost: str | None, wanted: Sequence[str]) -> Calibration:
+        """Calibrate sensor after sensor; only what was asked for alone may fail."""
+        sensors: dict[str, SensorCalibration] = {}
+        failures: list[InputError] = []
+        temperature: Temperature | None = None
+        if self.poses and ("acc" in wanted or "gyr" in wanted):
+            accelerometer.check_unit(self.used or self.poses, self.gravity, self.file)
+        for name in wanted:
+            try:
+                if name == "acc":
+                    sensors["acc"], temperature = self._accelerometer(cost)
+                elif name == "gyr" and (gyr := self._gyroscope(sensors.get("acc"))) is not None:
+                    sensors["gyr"] = gyr
+                elif name == "mag":
+                    logs = [log for log in self.logs if log.mag is not None]
+                    sensors["mag"] = fit_magnetometer(logs, sensors.get("acc"), self.gravity)
+            except InputError as error:
+                failures.append(error)
+        if failures and ("acc" in wanted or not sensors) and "acc" not in sensors:
+            # Without the accelerometer the rest is worth something only where it was not meant to be there.
+            if "mag" not in sensors or cost is not None:
+                raise failures[0]
+        self.notes += [f"Not calibrated: {error.problem}." for error in failures]
+        self._name_left_out()
+        effects = {effect: values for sensor in sensors.values() for effect, values in sensor.effects.items()}
+        errors = {effect: values for sensor in sensors.values() for effect, values in sensor.standard_errors.items()}
+        constants: dict[str, Any] = {}
+        if temperature is not None and temperature.mean is not None:
+            constants["temperature_mean"] = temperature.mean
+        model = SensorModel(list(effects), effects, constants=constants, standard_errors=errors)
+        return Calibration(tuple(self.poses), sensors, model, tuple(self.notes), self.gravity)
+
+    def _name_left_out(self) -> None:
+        left_out = [pose for pose in self.poses if not pose.used]
+        if left_out:
+            texts = [f"pose {pose.number} ({pose.name}): {pose.reason}" for pose in left_out[:6]]
+            more = f"; and {len(left_out) - 6} more" if len(left_out) > 6 else ""
+            self.notes.append(f"Left out: {'; '.join(texts)}{more}.")
+
+    def _accelerometer(self, cost: str | None) -> tuple[SensorCalibration, Temperature | None]:
+        self.poses, flips = accelerometer.check_labels(self.poses, self.file)
+        if not self.used:
+            return self._from_motion(cost), None
+        usable = self.used
+        if self.labelled and all(pose.attitude is None for pose in usable):
+            self.poses = [
+                pose.without("it has no label") if pose.used and pose.label is None else pose for pose in self.poses
+            ]
+            usable = self.used
+        chosen = cost or self._cost(usable)
+        accelerometer.check_poses(usable, chosen, self.file)
+        temperature = Temperature.of(usable)
+        if chosen == "magnitude":
+            result = accelerometer.fit_magnitude(usable, self.gravity, temperature)
+            return self._said(result, flips), temperature
+        result = accelerometer.fit_vector(usable, self._targets(usable), self.gravity, temperature)
+        strewn = result.excess > accelerometer.ASTRAY * self.gravity
+        if cost is None and not self.labelled and strewn and len(usable) >= 7:
+            result = accelerometer.fit_magnitude(usable, self.gravity, temperature, misalignment=False)
+            self.notes.append(
+                "The poses lie along the axes, but were not laid on a table: lengths tell scale and bias; misalignment "
+                "needs nine attitudes, some of them oblique."
+            )
+        return self._said(result, flips), temperature
+
+    def _said(self, result: SensorCalibration, flips: Sequence[str]) -> SensorCalibration:
+        same = [f"{a.number} and {b.number}" for a, b in accelerometer.repeated(self.used)]
+        if same:
+            self.notes.append(
+                f"Poses {', '.join(same[:3])}{' and others' if len(same) > 3 else ''} are the same: they add no new "
+                "direction."
+            )
+        self.notes[:0] = flips
+        return result
+
+    def _cost(self, poses: Sequence[Pose]) -> str:
+        """Vector where directions are known; else by what the poses can tell."""
+        if self.labelled or all(pose.attitude is not None for pose in poses):
+            return "vector"
+        if distinct(np.array([pose.direction for pose in poses])) < accelerometer.UNKNOWNS["magnitude"]:
+            return "vector"
+        try:
+            accelerometer.fit_magnitude(poses, self.gravity, Temperature.of(()))
+        except InputError:
+            return "vector"
+        return "magnitude"
+
+    def _targets(self, poses: Sequence[Pose]) -> accelerometer.Targets:
+        attitudes = [pose.attitude for pose in poses if pose.attitude is not None]
+        if len(attitudes) == len(poses):
+            up = np.array(_imufit.frame_vectors(self.logs[0].metadata.frame)["up"])
+            return accelerometer.referenced(np.array(attitudes), up, self.gravity, "reference")
+        plain = accelerometer.nominal(poses, self.gravity)
+        if len(self.logs) > 1 or self.logs[0].gyr is None or len(poses) < 8:
+            return plain
+        # Headings from the gyro between the poses: then a tilt of the table does not pass for misalignment.
+        turns = gyroscope.find_turns(self.logs[0], poses, self.found[0].gyr_noise, None, self.gravity)
+        gyr = gyroscope.fit_gyroscope([turns], poses)
+        matrix = np.eye(3) if gyr is None else gyr.matrix
+        directions = {side: np.eye(3)[k // 2] * (-1.0 if k % 2 else 1.0) for k, side in enumerate(SIDES)}
+        found = gyroscope.table_attitudes(turns, poses, directions, matrix)
+        if found is None:
+            return plain
+        return accelerometer.referenced(found, np.array([0.0, 0.0, 1.0]), self.gravity, "sides")
+
+    def _from_motion(self, cost: str | None) -> SensorCalibration:
+        reasons = "; ".join(f"pose {pose.number} ({pose.name}): {pose.reason}" for pose in self.poses[:3])
+        never = f"no pose can be used ({reasons})" if reasons else "the sensor never lay still"
+        failed = InputError(
+            never,
+            file=self.file,
+            remedy="Lay each of the six sides up and keep the sensor still for 3 s each.",
+        )
+        acc = np.concatenate([log.acc[~np.isnan(log.acc).any(axis=1)] for log in self.logs if log.acc is not None])
+        if self.labelled or cost == "vector" or len(acc) < 1000:
+            raise failed
+        try:
+            return accelerometer.fit_motion(acc, self.gravity)
+        except InputError:
+            raise failed from None
+
+    def _gyroscope(self, acc: SensorCalibration | None) -> SensorCalibration | None:
+        turns, poses = [], []
+        for index, (log, found) in enumerate(zip(self.logs, self.found, strict=True)):
+            own = [pose for pose in self.poses if pose.log == index and (pose.used or pose.label is None)]
+            resting = [pose for pose in own if pose.used or pose.reason == "it has no label"]
+            if log.gyr is not None and resting:
+                turns.append(gyroscope.find_turns(log, resting, found.gyr_noise, acc, self.gravity))
+                poses += resting
+        return gyroscope.fit_gyroscope(turns, poses) if poses else None

@@ -1,0 +1,268 @@
+"""Gyroscope: bias at rest; scale and misalignment by turning it between rests, against gravity."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit import _imufit
+from imufit.calibrate.calibration import SensorCalibration
+from imufit.calibrate.poses import Pose
+from imufit.calibrate.temperature import ENOUGH
+
+if TYPE_CHECKING:
+    from imufit._imufit import _Span
+    from imufit.log import Log
+
+Array = NDArray[np.float64]
+
+LEAST_WAY = np.radians(20.0)
+"""Turns shorter than this (rad) tell less than the rests' own noise."""
+LONGEST = 60.0
+"""Longest time (s) between two rests over which the rate is integrated."""
+TOLD = 0.03
+"""Standard error of A's elements beyond which the turns did not tell them."""
+_AXES = ("x", "y", "z")
+_OFF = ("xy", "xz", "yx", "yz", "zx", "zy")
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Turns between the rests of one log.
+
+    Attributes
+    ----------
+    log : Log
+        With `gyr`.
+    spans : tuple
+        One for each pair of neighbouring rests, None where the rate cannot be integrated: rows, bias before and after,
+        up before and after, variance.
+    left_out : tuple of str
+        Why.
+    """
+
+    log: Log
+    spans: tuple[_Span | None, ...]
+    left_out: tuple[str, ...]
+
+
+def find_turns(log: Log, poses: Sequence[Pose], noise: float, acc: SensorCalibration | None, gravity: float) -> Turns:
+    """Find the turns between neighbouring rests of a log.
+
+    Parameters
+    ----------
+    log : Log
+        With `gyr`.
+    poses : sequence of Pose
+        Its usable poses in the order of time.
+    noise : float
+        Gyro noise at rest, one axis, rad/s.
+    acc : SensorCalibration, optional
+        Corrects the directions of gravity.
+    gravity : float
+        m/s^2.
+    """
+    gyr = log.gyr
+    assert gyr is not None  # noqa: S101 - the caller asks only where there is a gyro
+    step = float(np.median(np.diff(log.t))) if log.n > 1 else np.nan
+    clipped = _clipped(gyr)
+    spans: list[_Span | None] = []
+    left_out: list[str] = []
+    for before, after in itertools.pairwise(poses):
+        first, last = before.rows[1], after.rows[0]
+        rows = slice(first, last + 1)
+        name = f"The turn from pose {before.number} to {after.number} is left out"
+        seen = ~np.isnan(gyr[rows, 0])
+        times = log.t[rows][seen]
+        spans.append(None)
+        if before.rate is None or after.rate is None:
+            continue
+        if log.t[last] - log.t[first] > LONGEST:
+            left_out.append(f"{name}: {log.t[last] - log.t[first]:.0f} s are too long.")
+        elif times.size < 3 or float(np.max(np.diff(times))) > max(5.0 * step, 0.05):
+            left_out.append(f"{name}: there is a gap in the readings.")
+        elif np.any(clipped[rows]):
+            left_out.append(f"{name}: the gyro reached the end of its range (turn more slowly).")
+        else:
+            up = [_up(pose, acc) for pose in (before, after)]
+            time = float(log.t[last] - log.t[first])
+            direction = sum(float(np.mean(pose.variance)) for pose in (before, after)) / gravity**2
+            wander = float(np.mean(np.concatenate([before.rate_variance, after.rate_variance]))) * time**2 / 2
+            variance = direction + noise**2 * step * time + wander
+            spans[-1] = (first, last, before.rate.tolist(), after.rate.tolist(), up[0], up[1], variance)
+    return Turns(log, tuple(spans), tuple(left_out))
+
+
+def _up(pose: Pose, acc: SensorCalibration | None) -> list[float]:
+    reading = pose.mean if acc is None else acc.correct(pose.mean)
+    return list((reading / np.linalg.norm(reading)).tolist())
+
+
+def _clipped(gyr: Array) -> NDArray[np.bool_]:
+    """Rows at which a rate stands at the end of its range: the extreme, twice or more in a row."""
+    clipped = np.zeros(len(gyr), dtype=np.bool_)
+    for axis in range(3):
+        rate = gyr[:, axis]
+        for end in (np.nanmax(rate), np.nanmin(rate)):
+            at_end = rate == end
+            again = at_end[1:] & at_end[:-1]
+            if np.count_nonzero(again) >= 2 and abs(end) > 1.0:
+                clipped |= at_end
+    return clipped
+
+
+def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibration | None:
+    """Calibrate the gyro: bias from the rests, scale and misalignment from the turns where they tell them.
+
+    Parameters
+    ----------
+    turns : sequence of Turns
+        One for each log.
+    poses : sequence of Pose
+        Usable poses of all logs.
+
+    Returns
+    -------
+    SensorCalibration or None
+        None without a gyro reading at rest.
+    """
+    rests = [pose for pose in poses if pose.rate is not None]
+    if not rests:
+        return None
+    bias, bias_error, slope = _bias(rests)
+    remarks = [text for turn in turns for text in turn.left_out]
+    t, gyr, spans = _joined(turns)
+    told = None
+    if spans:
+        trial = _imufit.turn_calibration(t, gyr, spans, bias)
+        far = [span for span, way in zip(spans, trial["way"], strict=True) if way > LEAST_WAY]
+        if len(far) >= 3:
+            told = _imufit.turn_calibration(t, gyr, far, bias)
+    effects: dict[str, dict[str, float]] = {"gyr.bias": dict(zip(_AXES, bias.tolist(), strict=True))}
+    errors: dict[str, dict[str, float]] = {"gyr.bias": dict(zip(_AXES, bias_error.tolist(), strict=True))}
+    if slope is not None:
+        effects["gyr.bias_temperature"] = dict(zip(_AXES, slope[0].tolist(), strict=True))
+        errors["gyr.bias_temperature"] = dict(zip(_AXES, slope[1].tolist(), strict=True))
+    nothing = np.zeros((3, 3))
+    if told is None:
+        remarks.append("Fewer than three turns between rests: the gyro's scale and misalignment stay as they are.")
+        return SensorCalibration(
+            "gyr", "rest", np.eye(3), np.ones(3), -bias, nothing, np.zeros(3), bias_error, "rad/s",
+            np.nan, np.nan, np.nan, "rad", np.zeros(0), 1.0, np.eye(3), 0.0, len(rests), effects, errors,
+            tuple(remarks),
+        )  # fmt: skip
+    gain, gain_error = np.array(told["model_gain"]), np.array(told["model_gain_error"])
+    scale = np.array(told["scale"])
+    unsure = [_AXES[i] for i in range(3) if gain_error[i, i] > TOLD]
+    loose = [name for name, k in zip(_OFF, itertools.permutations(range(3), 2), strict=True) if gain_error[k] > TOLD]
+    if unsure:
+        remarks.append(
+            f"The turns do not tell the gyro's scale of {' and '.join(unsure)}: turn it about that axis while the axis "
+            "is level."
+        )
+    if loose:
+        remarks.append(f"The turns do not tell the gyro's misalignment {' '.join(loose)}.")
+    remarks += [f"Negative scale: gyro axis {_AXES[i]} is flipped." for i in range(3) if scale[i] < 0.0]
+    held_out = told["held_out"][:, 0]
+    left_out = held_out[np.isfinite(held_out)]
+    before, after = _rms(told["before"]), _rms(told["residuals"][:, 0])
+    worse = left_out.size and _rms(left_out) > before
+    if worse:
+        remarks.append("The turns do not support a scale or misalignment of the gyro: only its bias is kept.")
+    else:
+        effects["gyr.scale"] = dict(zip(_AXES, np.diag(gain).tolist(), strict=True))
+        errors["gyr.scale"] = dict(zip(_AXES, np.diag(gain_error).tolist(), strict=True))
+        off = list(itertools.permutations(range(3), 2))
+        effects["gyr.misalignment"] = {name: float(gain[k]) for name, k in zip(_OFF, off, strict=True)}
+        errors["gyr.misalignment"] = {name: float(gain_error[k]) for name, k in zip(_OFF, off, strict=True)}
+    return SensorCalibration(
+        sensor="gyr",
+        cost="rest" if worse else "turns",
+        misalignment=np.eye(3) if worse else np.array(told["misalignment"]),
+        scale=np.ones(3) if worse else scale,
+        bias=-bias if worse else np.array(told["bias"]),
+        misalignment_error=nothing if worse else np.array(told["misalignment_error"]),
+        scale_error=np.zeros(3) if worse else np.array(told["scale_error"]),
+        bias_error=bias_error,
+        unit="rad/s",
+        before=before,
+        after=before if worse else after,
+        held_out=before if worse else (_rms(left_out) if left_out.size else np.nan),
+        error_unit="rad",
+        residuals=told["before"] if worse else told["residuals"][:, 0],
+        condition=told["condition"],
+        correlation=told["correlation"],
+        excess=told["excess"],
+        items=len(told["before"]),
+        effects=effects,
+        standard_errors=errors,
+        remarks=tuple(remarks),
+        extras={"rests": len(rests)},
+    )
+
+
+def _joined(turns: Sequence[Turns]) -> tuple[Array, Array, list[_Span]]:
+    """Rows of all logs one after the other, and their turns with rows counted on."""
+    spans: list[_Span] = []
+    rows = 0
+    for turn in turns:
+        spans += [(s[0] + rows, s[1] + rows, *s[2:]) for s in turn.spans if s is not None]
+        rows += turn.log.n
+    t = np.concatenate([turn.log.t for turn in turns]) if turns else np.zeros(0)
+    gyr = np.concatenate([turn.log.gyr for turn in turns if turn.log.gyr is not None]) if turns else np.zeros((0, 3))
+    return np.ascontiguousarray(t), np.ascontiguousarray(gyr), spans
+
+
+def _bias(rests: Sequence[Pose]) -> tuple[Array, Array, tuple[Array, Array] | None]:
+    """Mean rate at rest and its error; slope against temperature and its error where that stands out."""
+    rates = np.array([pose.rate for pose in rests])
+    variances = np.array([pose.rate_variance for pose in rests])
+    temperature = np.array([pose.temperature for pose in rests])
+    count = len(rests)
+    # Rests weigh by their noise and by how the bias wanders from rest to rest.
+    wander = np.zeros(3)
+    if count > 2:
+        wander = np.maximum(np.var(rates, axis=0, ddof=1) - variances.mean(axis=0), 0.0)
+    weights = 1.0 / np.maximum(variances + wander, 1e-30)
+    bias = np.sum(weights * rates, axis=0) / np.sum(weights, axis=0)
+    error = 1.0 / np.sqrt(np.sum(weights, axis=0))
+    if count < 5 or np.any(np.isnan(temperature)) or float(np.ptp(temperature)) < ENOUGH:
+        return bias, error, None
+    warmth = temperature - temperature.mean()
+    slope, slope_error = np.zeros(3), np.zeros(3)
+    for axis in range(3):
+        fit, covariance = np.polyfit(warmth, rates[:, axis], 1, cov=True)
+        slope[axis], slope_error[axis] = fit[0], np.sqrt(covariance[0, 0])
+    if not np.any(np.abs(slope) > 4.0 * slope_error):
+        return bias, error, None
+    return rates.mean(axis=0), error, (slope, slope_error)
+
+
+def table_attitudes(turns: Turns, poses: Sequence[Pose], sides: Mapping[str, Array], matrix: Array) -> Array | None:
+    """Attitudes (n, 3, 3), body to table, of poses whose headings follow from the turns between them; None else.
+
+    Parameters
+    ----------
+    turns : Turns
+        Of the one log that the poses are from.
+    poses : sequence of Pose
+        In the order of time.
+    sides : mapping
+        Direction of each side in the body frame.
+    matrix : (3, 3) array
+        The gyro's correction A.
+    """
+    if turns.log.gyr is None or any(span is None for span in turns.spans):
+        return None
+    ups = np.array([sides[pose.name] for pose in poses])
+    found = _imufit.table_attitudes(turns.log.t, turns.log.gyr, list(turns.spans), ups, matrix.tolist())
+    return None if found is None else found.reshape(-1, 3, 3)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")

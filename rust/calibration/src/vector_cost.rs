@@ -1,0 +1,259 @@
+//! Vector cost: the direction of gravity in the body frame is known for every pose (paper A, eqs. 2, 6 and 7).
+
+use imufit_fit::normal_equations::NormalEquations;
+use nalgebra::{DMatrix, DVector, Matrix3xX, SymmetricEigen, Vector3};
+
+use crate::CalibrationError;
+use crate::solution::{Form, Solution, excess_variance};
+
+/// One pose with what it should read.
+#[derive(Clone, Debug)]
+pub struct Item {
+    /// Mean reading, m/s^2.
+    pub reading: Vector3<f64>,
+    /// Variance of the mean, each axis.
+    pub variance: Vector3<f64>,
+    /// What the ideal sensor reads: gravity's reaction in the body frame, m/s^2.
+    pub target: Vector3<f64>,
+    /// Change of the target by a tilt (rad) of the table about its x and y axis.
+    pub tilt: [Vector3<f64>; 2],
+    /// Temperature less the poses' mean, K.
+    pub temperature: f64,
+}
+
+/// Least share of gravity that has to have turned from one pose to another for an axis to count as turned.
+const TURNED: f64 = 0.05;
+
+/// Number of independent equations per axis that the poses give for A and b, of four.
+pub fn independent(items: &[Item], gravity: f64) -> usize {
+    let mut gram = DMatrix::zeros(4, 4);
+    for item in items {
+        let row = DVector::from_vec(vec![
+            item.target.x / gravity,
+            item.target.y / gravity,
+            item.target.z / gravity,
+            1.0,
+        ]);
+        gram += &row * row.transpose();
+    }
+    let values = SymmetricEigen::new(gram).eigenvalues;
+    values.iter().filter(|v| **v > TURNED).count()
+}
+
+struct Problem<'a> {
+    items: &'a [Item],
+    form: Form,
+    tilted: bool,
+}
+
+impl Problem<'_> {
+    fn parameters(&self) -> usize {
+        self.form.parameters() + if self.tilted { 2 } else { 0 }
+    }
+
+    fn columns(&self, item: &Item) -> Matrix3xX<f64> {
+        let columns = self.form.columns(&item.reading, item.temperature);
+        if !self.tilted {
+            return columns;
+        }
+        let first = columns.ncols();
+        let mut columns = columns.resize_horizontally(first + 2, 0.0);
+        for (k, tilt) in item.tilt.iter().enumerate() {
+            columns.set_column(first + k, &-tilt);
+        }
+        columns
+    }
+
+    fn equations(&self, excess: f64, left_out: Option<usize>) -> NormalEquations {
+        let mut equations = NormalEquations::zeros(self.parameters());
+        for (_, item) in self.items.iter().enumerate().filter(|(k, _)| Some(*k) != left_out) {
+            let columns = self.columns(item);
+            for axis in 0..3 {
+                let weight = 1.0 / (item.variance[axis] + excess).max(f64::MIN_POSITIVE);
+                let row = columns.row(axis).transpose();
+                equations.gram.ger(weight, &row, &row, 1.0);
+                equations.right.axpy(weight * item.target[axis], &row, 1.0);
+                equations.square += weight * item.target[axis] * item.target[axis];
+                equations.n += 1.0;
+            }
+        }
+        equations
+    }
+
+    fn solve(&self, excess: f64, left_out: Option<usize>) -> Option<(DVector<f64>, DMatrix<f64>, f64)> {
+        let equations = self.equations(excess, left_out);
+        let solved = equations.solve(&DVector::zeros(self.parameters()))?;
+        let covariance = solved.covariance();
+        Some((solved.solution, covariance, equations.condition()))
+    }
+
+    fn residual(&self, item: &Item, theta: &DVector<f64>) -> Vector3<f64> {
+        self.columns(item) * theta - item.target
+    }
+
+    fn squares(&self, theta: &DVector<f64>, excess: f64) -> f64 {
+        let weighted = |item: &Item| {
+            let r = self.residual(item, theta);
+            (0..3)
+                .map(|axis| r[axis] * r[axis] / (item.variance[axis] + excess).max(f64::MIN_POSITIVE))
+                .sum::<f64>()
+        };
+        self.items.iter().map(weighted).sum()
+    }
+}
+
+/// Fits the correction by weighted linear least squares; `tilted` fits the table's tilt along with it.
+pub fn fit(items: &[Item], form: Form, tilted: bool, gravity: f64) -> Result<Solution, CalibrationError> {
+    let problem = Problem { items, form, tilted };
+    let p = problem.parameters();
+    let independent = independent(items, gravity);
+    let finite = |item: &Item| {
+        item.reading
+            .iter()
+            .chain(&item.target)
+            .chain(&item.variance)
+            .all(|x| x.is_finite())
+            && item.temperature.is_finite()
+    };
+    if !items.iter().all(finite) {
+        return Err(CalibrationError::NotFinite("a pose"));
+    }
+    if independent < 4 || 3 * items.len() < p {
+        return Err(CalibrationError::Underdetermined {
+            unknowns: p,
+            equations: (3 * independent).min(3 * items.len()),
+        });
+    }
+    let freedom = (3 * items.len() - p) as f64;
+    let excess = excess_variance(freedom, 1e-6 * gravity * gravity, |excess| {
+        let (theta, ..) = problem.solve(excess, None)?;
+        Some(problem.squares(&theta, excess))
+    })
+    .ok_or(CalibrationError::Diverged)?;
+    let (theta, covariance, condition) = problem.solve(excess, None).ok_or(CalibrationError::Diverged)?;
+    let residuals = items.iter().map(|item| problem.residual(item, &theta)).collect();
+    let nan = Vector3::repeat(f64::NAN);
+    let (mut held_out, mut held_out_length) = (Vec::new(), Vec::new());
+    for (k, item) in items.iter().enumerate() {
+        let others: Vec<Item> = items
+            .iter()
+            .enumerate()
+            .filter(|(j, _)| *j != k)
+            .map(|(_, item)| item.clone())
+            .collect();
+        let enough = self::independent(&others, gravity) == 4 && 3 * others.len() >= p;
+        let left_out = if enough { problem.solve(excess, Some(k)) } else { None };
+        // Past a tenfold condition the pose carried a parameter alone.
+        if let Some((theta, ..)) = left_out.filter(|(.., c)| *c < 10.0 * condition) {
+            held_out.push(problem.residual(item, &theta));
+            let corrected = form.columns(&item.reading, item.temperature) * theta.rows(0, form.parameters());
+            held_out_length.push(corrected.norm());
+        } else {
+            held_out.push(nan);
+            held_out_length.push(f64::NAN);
+        }
+    }
+    Ok(Solution {
+        form,
+        parameters: theta,
+        covariance,
+        condition,
+        freedom,
+        excess,
+        residuals,
+        held_out,
+        held_out_length,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::affine::Affine;
+    use crate::side::Side;
+    use nalgebra::Matrix3;
+
+    const G: f64 = 9.80665;
+
+    fn truth() -> Affine {
+        // Paper A's published parameters, one choice of the signs.
+        let c = Matrix3::new(1.0, 0.0003, 0.0025, -0.0070, 1.0, 0.0081, 0.0258, -0.0069, 1.0);
+        Affine {
+            matrix: c * Matrix3::from_diagonal(&Vector3::new(0.9662, 0.9784, 0.9832)),
+            offset: Vector3::new(0.0146, 0.0402, 0.0193) * G,
+        }
+    }
+
+    fn item(target: Vector3<f64>) -> Item {
+        let truth = truth();
+        Item {
+            reading: truth.matrix.try_inverse().expect("invertible") * (target - truth.offset),
+            variance: Vector3::repeat(1e-8),
+            target,
+            tilt: [Vector3::zeros(); 2],
+            temperature: 0.0,
+        }
+    }
+
+    fn six() -> Vec<Item> {
+        (0..6)
+            .map(|k| item(Side::new(k).expect("a side").direction() * G))
+            .collect()
+    }
+
+    #[test]
+    fn six_exact_poses_give_the_twelve_parameters() {
+        let solution = fit(&six(), Form::FULL, false, G).expect("determined");
+        assert!((solution.affine().matrix - truth().matrix).norm() < 1e-10);
+        assert!((solution.affine().offset - truth().offset).norm() < 1e-10);
+        assert!(solution.excess.abs() < 1e-12);
+        assert!(solution.held_out_length.iter().all(|n| (n - G).abs() < 1e-9));
+    }
+
+    #[test]
+    fn poses_that_repeat_each_other_are_refused() {
+        let mut items = six();
+        items.truncate(2);
+        items.push(items[0].clone());
+        items.push(items[1].clone());
+        let error = fit(&items, Form::FULL, false, G).expect_err("underdetermined");
+        assert!(matches!(
+            error,
+            CalibrationError::Underdetermined {
+                equations: 6,
+                unknowns: 12
+            }
+        ));
+    }
+
+    #[test]
+    fn the_tilt_of_the_table_is_told_from_misalignment_when_the_sensor_is_turned_on_it() {
+        // Up in the table's frame, tilted by (x, y): u = R^T (z + theta x z).
+        let tilt = [0.01, -0.004];
+        let mut items = Vec::new();
+        for k in 0..6 {
+            let up = Side::new(k).expect("a side").direction();
+            for turn in 0..3 {
+                // Rotation that takes body `up` to table z, turned by `turn` thirds about it.
+                let level = nalgebra::Rotation3::rotation_between(&up, &Vector3::z())
+                    .unwrap_or_else(|| nalgebra::Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+                let yaw = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 2.0 * f64::from(turn));
+                let to_body = (yaw * level).inverse();
+                let change = [
+                    to_body * (Vector3::x().cross(&Vector3::z()) * G),
+                    to_body * (Vector3::y().cross(&Vector3::z()) * G),
+                ];
+                let true_target = to_body * (Vector3::z() * G) + change[0] * tilt[0] + change[1] * tilt[1];
+                items.push(Item {
+                    target: to_body * (Vector3::z() * G),
+                    tilt: change,
+                    ..item(true_target)
+                });
+            }
+        }
+        let solution = fit(&items, Form::FULL, true, G).expect("determined");
+        assert!((solution.parameters[12] - tilt[0]).abs() < 1e-9);
+        assert!((solution.parameters[13] - tilt[1]).abs() < 1e-9);
+        assert!((solution.affine().matrix - truth().matrix).norm() < 1e-9);
+    }
+}
