@@ -64,15 +64,20 @@ class OutputDirectory(click.ParamType):  # type: ignore[type-arg]
 EXISTING = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 
 
-def log_argument(command: Command) -> Command:
-    """Add LOG and --map."""
-    command = click.option(
+def map_option(command: Command) -> Command:
+    """Add --map."""
+    return click.option(
         "--map",
         "mapping",
         multiple=True,
         metavar="COL=NAME[unit]",
         help="Column COL of the log is the file's column NAME in that unit, e.g. acc_x=AccX[g]. Repeatable.",
     )(command)
+
+
+def log_argument(command: Command) -> Command:
+    """Add LOG and --map."""
+    command = map_option(command)
     return click.argument("log", metavar="LOG", type=EXISTING)(command)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from imufit.log import Log
+    from imufit.log import Contents, Log
     from imufit.results import EffectCard, Ladder
     from imufit.simulate import Grade, Simulation, Truth
 
@@ -19,6 +19,20 @@ def open_log(path: Path, mapping: Sequence[str] = ()) -> Any:
     from imufit.log import open_log, parse_mapping  # noqa: PLC0415
 
     return open_log(path, mapping=parse_mapping(*mapping) or None)
+
+
+def read_log(path: Path, mapping: Sequence[str] = ()) -> Log:
+    """Read a whole log into memory; `mapping` as for `open_log`."""
+    from imufit.log import parse_mapping, read  # noqa: PLC0415
+
+    return read(path, mapping=parse_mapping(*mapping) or None)
+
+
+def contents(log: Log) -> Contents:
+    """Return what a log holds and what it lacks."""
+    from imufit.log import contents  # noqa: PLC0415
+
+    return contents(log)
 
 
 def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
