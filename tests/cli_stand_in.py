@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 from imufit.cli import engine
 from imufit.cli.app import main
+from imufit.log import Log
 from imufit.simulate import Grade, ParameterGrade
 from loop_results import BIAS, addition, card, comparison, diagnosis, ladder
 
@@ -86,6 +87,7 @@ def install(monkeypatch):
     model = SimpleNamespace(fit=lambda log, progress: Fit(), compare=Fit().compare)
     for name, result in (
         ("open_log", "opened"),
+        ("read_log", Log.from_arrays([0.0, 0.5], acc=[[0.0, 0.0, 9.8], [0.0, 0.0, 9.9]])),
         ("sensor_model", model),
         ("ladder", ladder_result),
         ("explain", card()),

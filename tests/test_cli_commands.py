@@ -28,6 +28,7 @@ def log(tmp_path):
         (["fit", "LOG", "--effects", "gyr.bias,gyr.scale"], "model"),
         (["explain", "gyr.g_sensitivity"], "physics"),
         (["replay", "LOG", "--filter", "mahony"], "filters"),
+        (["convert", "LOG", "-o", "new.parquet"], "missing"),
         (["reveal", "LOG"], "truth"),
         (["grade", "--logs", "2", "--nothing", "1"], "correct"),
         (["simulate", "handheld", "--hidden", "1", "-o", "new.parquet"], "sealed"),

@@ -70,9 +70,9 @@ def test_header_in_a_comment(tmp_path: Path) -> None:
 
 def test_no_header_gives_numbered_columns(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(text(",").split("\n", 1)[1])
-    log = read(tmp_path / "a.csv", {"t": "1", "mag_x": "2", "mag_y": "3", "mag_z": "4"})
+    log = read(tmp_path / "a.csv", {"t": "c1", "mag_x": "c2", "mag_y": "c3", "mag_z": "c4"})
     check(log)
-    assert log.notes == ("a.csv: no header: the columns are called 1 to 4",)
+    assert log.notes == ("a.csv: no header: the columns are called c1 to c4",)
 
 
 def test_header_of_another_length(tmp_path: Path) -> None:

@@ -58,6 +58,15 @@ def test_original_of_a_nine_axis_log() -> None:
 COUNTS = [f"acc_{a}=a{a}[16384 LSB/g],gyr_{a}=g{a}[131 LSB/(deg/s)]" for a in "xyz"]
 
 
+def test_original_without_header() -> None:
+    path = recording("many_positions/mpu9150_unit0.log")
+    with pytest.raises(InputError, match=r"column t is missing\. .* The columns are c1, c2, c3, c4, c5, c6\."):
+        read(path)
+    log = read(path, parse_mapping("t=row[100Hz],acc_x=c1,acc_y=c2,acc_z=c3,gyr_x=c4,gyr_y=c5,gyr_z=c6"))
+    close(log, "many_positions/mpu9150_unit0.parquet")
+    assert log.notes == ("mpu9150_unit0.log: no header: the columns are called c1 to c6",)
+
+
 def test_original_in_raw_counts() -> None:
     path = recording("many_positions/mpu6050_poses_raw_counts.csv")
     close(read(path, parse_mapping("t=row[100 Hz]", *COUNTS)), "many_positions/mpu6050_poses.parquet")

@@ -71,6 +71,14 @@ def written(tmp_path: Path, reference: bool = True, **factors: float) -> Path:
         ("t", "100 Hz", 0.01, 0.0),
         ("temp", "degC", 1.0, 0.0),
         ("temp", "K", 1.0, -273.15),
+        ("temp", "333.87LSB/degC+21", 1 / 333.87, 21.0),
+        ("temp", "340 LSB/degC + 36.53", 1 / 340, 36.53),
+        ("temp", "100 LSB/K - 3", 0.01, -276.15),
+        ("temp", "*0.005+25", 0.005, 25.0),
+        ("temp", "*5e-3-1e1", 0.005, -10.0),
+        ("acc_x", "g-0.5", G, -0.5 * G),
+        ("acc_x", "16384LSB/g", G / 16384, 0.0),
+        ("gyr_x", "131LSB/dps", DEG / 131, 0.0),
         ("ref_angle", "deg", DEG, 0.0),
         ("ref_angle", "rad", 1.0, 0.0),
         ("ref_px", "mm", 1e-3, 0.0),
@@ -86,6 +94,13 @@ def test_unit_becomes_si(target: str, unit: str, factor: float, offset: float) -
 
 def test_fahrenheit() -> None:
     np.testing.assert_allclose(conversion("temp", "degF").apply(np.array([32.0, 212.0])), [0.0, 100.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("unit", ["degX+3", "m/s^-2", "+2", "degC+", "degC+x", "340 LSB/degC+36.53+1"])
+def test_offset_that_cannot_be_read(unit: str) -> None:
+    with pytest.raises(InputError) as caught:
+        conversion("temp", unit)
+    assert str(caught.value).startswith(f"column temp: the unit [{unit}] is not known.")
 
 
 def test_unit_of_another_quantity_is_refused() -> None:

@@ -8,8 +8,8 @@ Names are loaded when they are first used, so that ``import imufit`` costs next 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from imufit import diagnose as diagnose
     from imufit import calibrate as calibrate
+    from imufit import diagnose as diagnose
     from imufit import errors as errors
     from imufit import figures as figures
     from imufit import fit as fit

@@ -200,8 +200,8 @@ def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
         raise InputError(problem, file=str(file), remedy="Record at least six: each of the six sides up for 3 s.")
     if cost == "magnitude" and count < UNKNOWNS["magnitude"]:
         raise InputError(
-            f"the magnitude cost has 9 unknowns (scale 3, non-orthogonality 3, bias 3) and each pose gives one equation: "
-            f"{count} different poses are too few{doubled}",
+            "the magnitude cost has 9 unknowns (scale 3, non-orthogonality 3, bias 3) and each pose gives one "
+            f"equation: {count} different poses are too few{doubled}",
             file=str(file),
             remedy="Record at least nine attitudes, some of them oblique, or use --cost vector with the six sides up.",
         )

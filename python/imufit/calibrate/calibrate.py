@@ -11,7 +11,7 @@ from imufit import _imufit
 from imufit.calibrate import accelerometer, gyroscope
 from imufit.calibrate.calibration import Calibration, SensorCalibration
 from imufit.calibrate.magnetometer import fit_magnetometer
-from imufit.calibrate.poses import SIDES, Found, Pose, distinct, find_poses
+from imufit.calibrate.poses import SIDES, Found, Pose, distinct, find_poses, repeated
 from imufit.calibrate.temperature import Temperature
 from imufit.errors import InputError
 from imufit.model.sensor_model import SensorModel
@@ -80,13 +80,16 @@ def calibrate(
             continue
         found.append(find_poses(log, index, first, settings))
         first += len(found[-1].poses)
-    return _Session(given, found, gravity).calibrated(cost, wanted)
+    return _Session(given, found, gravity, settings or {}).calibrated(cost, wanted)
 
 
 class _Session:
     """One calibration in the making: what was found, and what is to be said of it."""
 
-    def __init__(self, logs: Sequence[Log], found: Sequence[Found], gravity: float) -> None:
+    def __init__(
+        self, logs: Sequence[Log], found: Sequence[Found], gravity: float, settings: Mapping[str, float]
+    ) -> None:
+        self.settings = settings
         self.logs = logs
         self.found = found
         self.gravity = gravity
@@ -117,10 +120,11 @@ class _Session:
                     sensors["mag"] = fit_magnetometer(logs, sensors.get("acc"), self.gravity)
             except InputError as error:
                 failures.append(error)
-        if failures and ("acc" in wanted or not sensors) and "acc" not in sensors:
-            # Without the accelerometer the rest is worth something only where it was not meant to be there.
-            if "mag" not in sensors or cost is not None:
-                raise failures[0]
+        # A log for the magnetometer need not rest; one that was to calibrate an accelerometer must.
+        if failures and (not sensors or ("acc" in wanted and "acc" not in sensors and "mag" not in sensors)):
+            raise failures[0]
+        if failures and cost is not None and "acc" not in sensors:
+            raise failures[0]
         self.notes += [f"Not calibrated: {error.problem}." for error in failures]
         self._name_left_out()
         effects = {effect: values for sensor in sensors.values() for effect, values in sensor.effects.items()}
@@ -165,7 +169,7 @@ class _Session:
         return self._said(result, flips), temperature
 
     def _said(self, result: SensorCalibration, flips: Sequence[str]) -> SensorCalibration:
-        same = [f"{a.number} and {b.number}" for a, b in accelerometer.repeated(self.used)]
+        same = [f"{a.number} and {b.number}" for a, b in repeated(self.used)]
         if same:
             self.notes.append(
                 f"Poses {', '.join(same[:3])}{' and others' if len(same) > 3 else ''} are the same: they add no new "
@@ -221,11 +225,14 @@ class _Session:
             raise failed from None
 
     def _gyroscope(self, acc: SensorCalibration | None) -> SensorCalibration | None:
-        turns, poses = [], []
+        turns, rests = [], []
         for index, (log, found) in enumerate(zip(self.logs, self.found, strict=True)):
-            own = [pose for pose in self.poses if pose.log == index and (pose.used or pose.label is None)]
-            resting = [pose for pose in own if pose.used or pose.reason == "it has no label"]
-            if log.gyr is not None and resting:
-                turns.append(gyroscope.find_turns(log, resting, found.gyr_noise, acc, self.gravity))
-                poses += resting
-        return gyroscope.fit_gyroscope(turns, poses) if poses else None
+            if log.gyr is None or log.acc is None:
+                continue
+            # A rest without a label says nothing of the accelerometer, but a turn may begin or end there.
+            every = find_poses(log, index, settings=self.settings, labelled_only=False) if found.labelled else found
+            resting = [pose for pose in every.poses if pose.used]
+            if resting:
+                turns.append(gyroscope.find_turns(log, resting, every.gyr_noise, acc, self.gravity))
+                rests += resting
+        return gyroscope.fit_gyroscope(turns, rests) if rests else None

@@ -59,7 +59,7 @@ class SensorCalibration:
     correlation : (p, p) array
         Correlation of the parameters: A row by row (or its free elements), b, and further ones.
     excess : float
-        Standard deviation beyond the noise that the residual shows: how well poses were placed, or the field's variation.
+        Standard deviation beyond the noise that the residual shows: placement of the poses, variation of the field.
     items : int
         Poses, turns or readings that took part.
     effects : mapping
@@ -245,7 +245,7 @@ class Calibration:
         }
 
     def pose_table(self) -> Table:
-        """The poses with their readings and residuals."""
+        """List the poses with their readings and residuals."""
         acc = self.sensors.get("acc")
         residuals = dict(
             zip(
@@ -270,7 +270,7 @@ class Calibration:
         return Table("Poses", header, rows)
 
     def correction_table(self) -> Table:
-        """Scale, misalignment and bias in paper A's form."""
+        """List scale, misalignment and bias in paper A's form."""
         rows = []
         for name, sensor in self.sensors.items():
             for i, axis in enumerate("xyz"):

@@ -43,7 +43,7 @@ class Advice:
 
 
 class PoseGuide:
-    """Takes sample after sample and says which side comes next, whether the sensor is still enough, and when it is done.
+    """Says, sample after sample, which side comes next, whether the sensor is still enough, and when it is done.
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ def find_turns(log: Log, poses: Sequence[Pose], noise: float, acc: SensorCalibra
         m/s^2.
     """
     gyr = log.gyr
-    assert gyr is not None  # noqa: S101 - the caller asks only where there is a gyro
+    assert gyr is not None
     step = float(np.median(np.diff(log.t))) if log.n > 1 else np.nan
     clipped = _clipped(gyr)
     spans: list[_Span | None] = []
@@ -76,11 +76,11 @@ def find_turns(log: Log, poses: Sequence[Pose], noise: float, acc: SensorCalibra
     for before, after in itertools.pairwise(poses):
         first, last = before.rows[1], after.rows[0]
         rows = slice(first, last + 1)
-        name = f"The turn from pose {before.number} to {after.number} is left out"
+        name = f"The turn from {before.t_end:.1f} to {after.t_start:.1f} s is left out"
         seen = ~np.isnan(gyr[rows, 0])
         times = log.t[rows][seen]
         spans.append(None)
-        if before.rate is None or after.rate is None:
+        if before.rate is None or after.rate is None or last - first < 3:
             continue
         if log.t[last] - log.t[first] > LONGEST:
             left_out.append(f"{name}: {log.t[last] - log.t[first]:.0f} s are too long.")

@@ -13,6 +13,7 @@ from imufit.calibrate.calibration import SensorCalibration
 from imufit.errors import InputError
 
 if TYPE_CHECKING:
+    from imufit._imufit import _Solution
     from imufit.log import Log
 
 Array = NDArray[np.float64]
@@ -135,11 +136,11 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
 
 
 def _chosen(logs: Sequence[Log], acc: SensorCalibration | None, gravity: float) -> tuple[Array, Array]:
-    """Readings (n, 3) that differ from the one before, and up (n, 3) beside them, NaN where the sensor accelerates."""
+    """Return readings (n, 3) that differ from the one before, and up (n, 3) beside them, NaN where it accelerates."""
     readings: list[Array] = []
     ups: list[Array] = []
     for log in logs:
-        assert log.mag is not None  # noqa: S101 - the caller hands over such logs only
+        assert log.mag is not None
         rows = np.flatnonzero(~np.isnan(log.mag).any(axis=1))
         field = log.mag[rows]
         if not len(rows):
@@ -174,9 +175,9 @@ def _new(field: Array, least: float) -> NDArray[np.intp]:
     return np.array(kept)
 
 
-def _dip_errors(readings: Array, ups: Array, solution: object) -> dict[str, float]:
-    """Standard deviation of the dip angle before and after, degrees."""
-    matrix, bias = np.array(solution["matrix"]), np.array(solution["bias"])  # type: ignore[index]
+def _dip_errors(readings: Array, ups: Array, solution: _Solution) -> dict[str, float]:
+    """Return the standard deviation of the dip angle before and after, degrees."""
+    matrix, bias = np.array(solution["matrix"]), np.array(solution["bias"])
 
     def spread(field: Array) -> float:
         sine = np.sum(field * ups, axis=1) / np.linalg.norm(field, axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -120,7 +121,14 @@ class Found:
     gyr_noise: float
 
 
-def find_poses(log: Log, index: int = 0, first: int = 1, settings: Mapping[str, float] | None = None) -> Found:
+def find_poses(
+    log: Log,
+    index: int = 0,
+    first: int = 1,
+    settings: Mapping[str, float] | None = None,
+    *,
+    labelled_only: bool = True,
+) -> Found:
     """Find where the sensor lies still.
 
     Poses with a label are looked for in the labelled rows only; otherwise every rest counts. A rest is judged by the
@@ -138,6 +146,8 @@ def find_poses(log: Log, index: int = 0, first: int = 1, settings: Mapping[str, 
     settings : mapping, optional
         Criteria: ``window``, ``hold``, ``bridge`` (s), ``fewest`` (readings), ``creep`` (rad), ``acc_noise`` (m/s^2),
         ``gyr_noise`` (rad/s).
+    labelled_only : bool
+        Whether labels, where the log has them, limit the search.
 
     Raises
     ------
@@ -150,7 +160,7 @@ def find_poses(log: Log, index: int = 0, first: int = 1, settings: Mapping[str, 
         )
     labels = side_numbers(log)
     # With a reference attitude every rest is known, labelled or not.
-    named = labels if log.ref_q is None else None
+    named = labels if labelled_only and log.ref_q is None else None
     rests = _imufit.find_rests(log.t, log.acc, log.gyr, named, dict(settings or {}))
     poses = [_pose(found, log, labels, index, first + k) for k, found in enumerate(rests["poses"])]
     noise = [rests["acc_noise"], rests["gyr_noise"]]
@@ -282,8 +292,4 @@ def repeated(poses: Sequence[Pose]) -> list[tuple[Pose, Pose]]:
     poses : sequence of Pose
         In the order of time.
     """
-    return [
-        (a, b)
-        for a, b in zip(poses, poses[1:], strict=False)
-        if float(a.direction @ b.direction) > np.cos(SAME_DIRECTION)
-    ]
+    return [(a, b) for a, b in itertools.pairwise(poses) if float(a.direction @ b.direction) > np.cos(SAME_DIRECTION)]

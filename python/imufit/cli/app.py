@@ -13,6 +13,7 @@ import click
 from imufit.cli.add import add
 from imufit.cli.calibrate import calibrate
 from imufit.cli.compare import compare
+from imufit.cli.convert import convert
 from imufit.cli.demo import demo
 from imufit.cli.diagnose import diagnose
 from imufit.cli.explain import explain
@@ -59,13 +60,28 @@ def _version(ctx: click.Context, _param: click.Parameter, wanted: bool) -> None:
 def imufit(ctx: click.Context) -> None:
     """Find out which physical effect your inertial sensor model is missing, add it, and watch the error fall.
 
-    LOG is a Parquet, CSV or NPZ table with one row per sample. `imufit demo` shows the whole loop on a made-up log.
+    LOG is a Parquet, CSV or NPZ table with one row per sample, or a serial transcript. `imufit demo` shows the whole
+    loop on a made-up log.
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
 
 
-for _command in (calibrate, compare, diagnose, add, ladder, fit, explain, simulate, reveal, grade, replay, demo):
+for _command in (
+    calibrate,
+    compare,
+    diagnose,
+    add,
+    ladder,
+    fit,
+    explain,
+    simulate,
+    reveal,
+    grade,
+    replay,
+    convert,
+    demo,
+):
     imufit.add_command(_command)
 
 

@@ -64,7 +64,7 @@ class OutputDirectory(click.ParamType):  # type: ignore[type-arg]
 EXISTING = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 
 
-def mapping_option(command: Command) -> Command:
+def map_option(command: Command) -> Command:
     """Add --map."""
     return click.option(
         "--map",
@@ -77,7 +77,8 @@ def mapping_option(command: Command) -> Command:
 
 def log_argument(command: Command) -> Command:
     """Add LOG and --map."""
-    return click.argument("log", metavar="LOG", type=EXISTING)(mapping_option(command))
+    command = map_option(command)
+    return click.argument("log", metavar="LOG", type=EXISTING)(command)
 
 
 def model_option(command: Command) -> Command:

@@ -7,17 +7,17 @@ from pathlib import Path
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import EXISTING, json_option, keep_inputs, mapping_option, model_output, plot_option
+from imufit.cli.arguments import EXISTING, json_option, keep_inputs, map_option, model_output, plot_option
 from imufit.cli.output import Output
 
 
 @click.command(short_help="Calibrate accelerometer, gyro and magnetometer.")
 @click.argument("logs", metavar="LOG...", type=EXISTING, nargs=-1, required=True)
-@mapping_option
+@map_option
 @click.option(
     "--cost",
     type=click.Choice(["vector", "magnitude"]),
-    help="vector: six sides up on a level table, 12 unknowns. magnitude: nine or more attitudes of any kind, 9 unknowns.",
+    help="vector: six sides up on a level table, 12 unknowns. magnitude: nine or more attitudes, 9 unknowns.",
 )
 @click.option(
     "--sensor",
@@ -43,8 +43,8 @@ def calibrate(
 ) -> None:
     """Calibrate a sensor from one or several LOGs of it.
 
-    The accelerometer from poses at rest (labelled in the column `pose`, or found), the gyro from the rests and the turns
-    between them, the magnetometer from free rotation.
+    The accelerometer from poses at rest (labelled in the column `pose`, or found), the gyro from the rests and the
+    turns between them, the magnetometer from free rotation.
     """
     keep_inputs(logs, [output, json_file, plot_file])
     out = Output(json_file)
@@ -54,7 +54,7 @@ def calibrate(
         out.say(sensor.sentence(), bold=True)
     remarks = [remark for sensor in result.sensors.values() for remark in sensor.remarks]
     out.say(*remarks, *result.notes)
-    out.tables(result.tables())
+    out.tables([result.pose_table(), result.correction_table()])
     if output is not None:
         result.save(output)
         out.wrote(output)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from imufit.log import Log
+    from imufit.log import Contents, Log
     from imufit.results import EffectCard, Ladder
     from imufit.simulate import Grade, Simulation, Truth
 
@@ -22,7 +22,7 @@ def open_log(path: Path, mapping: Sequence[str] = ()) -> Any:
 
 
 def read_log(path: Path, mapping: Sequence[str] = ()) -> Log:
-    """Read a log into memory; `mapping` as for :func:`open_log`."""
+    """Read a whole log into memory; `mapping` as for `open_log`."""
     from imufit.log import parse_mapping, read  # noqa: PLC0415
 
     return read(path, mapping=parse_mapping(*mapping) or None)
@@ -33,6 +33,13 @@ def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], set
     from imufit.calibrate import calibrate  # noqa: PLC0415
 
     return calibrate(list(logs), cost, sensors=sensors or ("acc", "gyr", "mag"), settings=settings)
+
+
+def contents(log: Log) -> Contents:
+    """Return what a log holds and what it lacks."""
+    from imufit.log import contents  # noqa: PLC0415
+
+    return contents(log)
 
 
 def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:

@@ -74,15 +74,24 @@ def calibration_figure(
 
 def _intervals(axes: Axes, readings: Readings, poses: Sequence[PoseMark], prefix: str) -> None:
     t, acc, _ = readings
-    assert acc is not None  # noqa: S101 - chosen for it
+    assert acc is not None
     step = -(-len(t) // _MOST_POINTS)
-    for _, start, end, name, used, reason, _ in poses:
+    named, apart = -np.inf, 0.03 * float(t[-1] - t[0]) if len(t) else 0.0
+    for _, start, end, name, used, _, _ in poses:
+        middle = 0.5 * (start + end)
         axes.axvspan(start, end, color=SKY if used else VERMILION, alpha=0.30 if used else 0.18, linewidth=0)
-        axes.text(
-            0.5 * (start + end), 1.01, name if used else "×", transform=axes.get_xaxis_transform(), ha="center",
-            va="bottom", fontsize=8, color=INK if used else VERMILION,
-        )  # fmt: skip
-        del reason
+        if middle - named > apart:
+            named = middle
+            axes.text(
+                middle,
+                1.01,
+                name if used else "×",
+                transform=axes.get_xaxis_transform(),
+                ha="center",
+                va="bottom",
+                fontsize=8,
+                color=INK if used else VERMILION,
+            )
     for axis, name in enumerate("xyz"):
         axes.plot(t[::step], acc[::step, axis], color=AXES[name], linewidth=0.8)
         seen = acc[:, axis][~np.isnan(acc[:, axis])]
@@ -91,11 +100,11 @@ def _intervals(axes: Axes, readings: Readings, poses: Sequence[PoseMark], prefix
             xytext=(3, 0), textcoords="offset points", color=AXES[name], fontsize=9, va="center",
         )  # fmt: skip
     tidy(axes)
-    used = sum(pose[4] for pose in poses)
+    count = sum(pose[4] for pose in poses)
     axes.set_xlabel("t (s)")
     axes.set_ylabel("specific force (m/s²)")
-    left_out = len(poses) - used
-    text = f"{prefix}{used} poses found" + (f", {left_out} left out (×)" if left_out else "")
+    left_out = len(poses) - count
+    text = f"{prefix}{count} poses found" + (f", {left_out} left out (×)" if left_out else "")
     axes.set_title(text, loc="left", fontsize=11, color=INK, pad=14)
 
 

@@ -1,6 +1,7 @@
 """Log files: read, check, convert, write."""
 
 from imufit.errors import InputError
+from imufit.log.contents import Contents, contents
 from imufit.log.log import Chunk, Log, LogSource, concatenate
 from imufit.log.metadata import Metadata
 from imufit.log.segments import gaps
@@ -9,12 +10,14 @@ from imufit.log.units import parse_mapping
 
 __all__ = [
     "Chunk",
+    "Contents",
     "InputError",
     "Log",
     "LogSource",
     "LogStream",
     "Metadata",
     "concatenate",
+    "contents",
     "gaps",
     "open_log",
     "parse_mapping",

@@ -28,7 +28,7 @@ class Layout:
     separator : str
         Comma, semicolon, tab; a blank stands for any run of blanks.
     names : tuple of str
-        Header; ``1``, ``2``, ... when there is none.
+        Header; ``c1``, ``c2``, ... when there is none.
     header_line : int or None
         Line of the header, from 0.
     data_offset : int
@@ -148,8 +148,8 @@ def _header(
             line=table[0] + 1,
             remedy="Give every column one name.",
         )
-    names = tuple(str(k + 1) for k in range(width))
-    return None, names, (f"{path.name}: no header: the columns are called 1 to {width}",)
+    names = tuple(f"c{k + 1}" for k in range(width))
+    return None, names, (f"{path.name}: no header: the columns are called c1 to c{width}",)
 
 
 def _trailing(lines: list[str], rows: list[int], separator: str) -> bool:

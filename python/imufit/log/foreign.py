@@ -172,15 +172,18 @@ def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place)
 def _missing(missing: dict[str, str], targets: Sequence[str], place: Place) -> InputError:
     """Error for the first missing column, with the mapping for all of them."""
     first = min(missing, key=CONTRACT.index)
+    known = {column: name for column, name in missing.items() if name}
+    pairs = ",".join(f"{column}={known[column]}" for column in sorted(known, key=CONTRACT.index))
     if not missing[first]:
         group = next((group for group in GROUPS.values() if first in group), ())
         there = [column for column in group if column in targets]
         problem = f"column {first} is missing" + (f" although {' and '.join(there)} are there" if there else "")
-        remedy = "Give time in s, for a fixed rate with --map t=row[100Hz]." if first == "t" else ""
-        remedy = remedy or f"Add it, or leave out the others of {', '.join(group)}."
+        remedy = f"Add it, or leave out the others of {', '.join(group)}."
+        if first == "t":
+            rate = f"t=row[100Hz],{pairs}" if pairs else "t=row[100Hz]"
+            remedy = f"Give time in s, for a fixed rate with --map {shlex.quote(rate) if pairs else rate}."
+            remedy += "" if pairs or set(targets) & set(CONTRACT) else _listing(targets)
         return place.error(problem, column=first, remedy=remedy)
-    known = {column: name for column, name in missing.items() if name}
-    pairs = ",".join(f"{column}={known[column]}" for column in sorted(known, key=CONTRACT.index))
     return place.error(
         f"column {first} is missing; did you mean {missing[first]}?",
         column=first,

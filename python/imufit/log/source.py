@@ -9,9 +9,9 @@ from typing import Any, Final, Protocol
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
-from imufit.log.csv import CsvSource
 from imufit.log.npz import NpzSource
 from imufit.log.parquet import ParquetSource
+from imufit.log.text import looks_like_text, open_text
 
 TEXT_SUFFIXES: Final = (".csv", ".txt", ".tsv", ".dat", ".log")
 SUFFIXES: Final = (".parquet", ".npz", *TEXT_SUFFIXES)
@@ -57,7 +57,7 @@ class Source(Protocol):
 
 
 def open_source(path: Path) -> Source:
-    """Open a log file by its suffix.
+    """Open a log file: Parquet and NPZ by their suffix, text by its content.
 
     Raises
     ------
@@ -69,17 +69,17 @@ def open_source(path: Path) -> Source:
     if not path.exists():
         raise InputError(f"there is no file {path}", file=path, remedy="Check the name.")
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(
-            f"the suffix {suffix or '(none)'} is not a log's",
-            file=path,
-            remedy=f"Logs are {', '.join(SUFFIXES)}; imufit convert makes one of other formats.",
-        )
     try:
         if path.stat().st_size == 0:
             raise InputError("the file is empty (0 bytes)", file=path, remedy="Record or copy it again.")
+        if suffix not in SUFFIXES and not looks_like_text(path):
+            raise InputError(
+                f"the suffix {suffix or '(none)'} is not a log's, and the file is no text",
+                file=path,
+                remedy=f"Logs are {', '.join(SUFFIXES)}: export it as text, of which imufit convert makes a log.",
+            )
         if suffix == ".parquet":
             return ParquetSource(path)
-        return NpzSource(path) if suffix == ".npz" else CsvSource(path)
+        return NpzSource(path) if suffix == ".npz" else open_text(path)
     except OSError as error:
         raise InputError(f"the file cannot be read ({error.strerror or error})", file=path) from None

@@ -104,6 +104,8 @@ _QUANTITIES: Final = {
     "ref_angle": "angle",
 }
 _NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+# the sign of an exponent, as in *1e-3, begins no offset
+_WITH_OFFSET: Final = re.compile(rf"(.*?[^\s^*/(+\-]\s*)(?<![\d.][eE])(?=[+-])({_NUMBER}|[+-]\s+{_NUMBER})")
 
 
 def lookup(text: str) -> tuple[str, float, float] | None:
@@ -128,7 +130,8 @@ def conversion(target: str, unit: str) -> Conversion:
         Column of the log; a name without fixed meaning takes any unit.
     unit : str
         ``g``, ``deg/s``, ..., ``16384 LSB/g``, ``0.061 mg/LSB``, ``*0.0005`` (a bare factor), ``100 Hz`` (row numbers
-        or ticks to seconds), or empty for SI.
+        or ticks to seconds), or empty for SI. What is added after that may follow, in the unit named:
+        ``340 LSB/degC + 36.53``.
 
     Raises
     ------
@@ -138,10 +141,18 @@ def conversion(target: str, unit: str) -> Conversion:
     text = unit.strip()
     if not text:
         return Conversion()
+    if found := _WITH_OFFSET.fullmatch(text):
+        plain, si_per_unit = _without_offset(target, found[1].strip(), unit)
+        return Conversion(plain.factor, plain.offset + float("".join(found[2].split())) * si_per_unit)
+    return _without_offset(target, text, unit)[0]
+
+
+def _without_offset(target: str, text: str, unit: str) -> tuple[Conversion, float]:
+    """Conversion, and the SI value of one of the unit named: what an offset counts in."""
     if found := re.fullmatch(rf"\*\s*({_NUMBER})", text):
-        return Conversion(float(found[1]))
+        return Conversion(float(found[1])), 1.0
     if found := re.fullmatch(rf"({_NUMBER})\s*Hz", text, re.IGNORECASE):
-        return Conversion(1.0 / _positive(float(found[1]), target, unit))
+        return Conversion(1.0 / _positive(float(found[1]), target, unit)), 1.0
     scale, inner = 1.0, text
     if found := re.fullmatch(rf"({_NUMBER})\s*(?:LSB|counts?|digits?)\s*(?:/|per)\s*(.+)", text, re.IGNORECASE):
         scale, inner = 1.0 / _positive(float(found[1]), target, unit), found[2]
@@ -152,13 +163,14 @@ def conversion(target: str, unit: str) -> Conversion:
         raise InputError(
             f"the unit [{unit}] is not known",
             column=target,
-            remedy=f"Known are {', '.join(_UNITS)}, [16384 LSB/g] and a bare factor such as [*0.0005].",
+            remedy=f"Known are {', '.join(_UNITS)}, [16384 LSB/g], [340 LSB/degC + 36.53] and a bare factor such as "
+            "[*0.0005].",
         )
     quantity, factor, offset = known
     wanted = _QUANTITIES.get(target)
     if wanted is not None and quantity != wanted:
         raise InputError(f"[{unit}] is a unit of {quantity}, but {target} is {wanted}", column=target)
-    return Conversion(factor * scale, offset)
+    return Conversion(factor * scale, offset), factor
 
 
 def _positive(number: float, target: str, unit: str) -> float:

@@ -1,0 +1,60 @@
+"""``imufit convert``: whatever can be read becomes a log, and is summed up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import EXISTING, LOG_ENDINGS, OutputFile, json_option, keep_inputs, map_option
+from imufit.cli.output import Output
+
+if TYPE_CHECKING:
+    from imufit.log import Contents
+    from imufit.log.contents import ColumnContents
+    from imufit.results import Table
+
+_LABELS = 8
+
+
+@click.command(short_help="Another maker's file, a text table or a serial transcript becomes a log.")
+@click.argument("file", metavar="FILE", type=EXISTING)
+@map_option
+@click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
+@json_option
+def convert(file: Path, *, mapping: tuple[str, ...], output: Path, json_file: Path | None) -> None:
+    """Make a log of FILE: a table of numbers, a serial transcript with named values, or another log.
+
+    Tables are separated by commas, semicolons, tabs or blanks; without a header their columns are c1, c2, ... In a
+    transcript the most frequent line of the kind accel=(1, 2, 3) temp=21 is the record, the other lines are ignored.
+    """
+    keep_inputs([file], [output, json_file])
+    out = Output(json_file)
+    log = engine.read_log(file, mapping)
+    found = engine.contents(log)
+    engine.write_log(log, output)
+    rate = "" if found.rate is None else f" over {found.duration:.4g} s, {found.rate:.4g} Hz"
+    out.say(f"{found.n} row{'' if found.n == 1 else 's'}{rate}.", bold=True)
+    out.say(*(f"{note}." for note in found.notes))
+    out.table(_table(found))
+    out.say(f"Not in it: {found.missing_words}." if found.missing else "")
+    out.wrote(output)
+    out.json({"log": str(output), **found.to_dict()})
+
+
+def _table(found: Contents) -> Table:
+    """One row for each column, so that a wrong column or unit is seen at once."""
+    from imufit.results import Table  # noqa: PLC0415
+
+    header = ("column", "unit", ">samples", ">smallest", ">median", ">largest")
+    return Table("", header, tuple(_row(column) for column in found.columns))
+
+
+def _row(column: ColumnContents) -> tuple[str, ...]:
+    if column.labels:
+        shown = " ".join(column.labels[:_LABELS]) + (" ..." if len(column.labels) > _LABELS else "")
+        return column.name, shown, str(column.samples), "", "", ""
+    numbers = ("-" if value is None else f"{value:.4g}" for value in (column.low, column.median, column.high))
+    return column.name, column.unit, str(column.samples), *numbers
