@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 UNKNOWNS = {"vector": 12, "magnitude": 9}
+MOTION_ERROR = 0.04
+"""Standard error of the bias (m/s^2) beyond which a motion told nothing."""
 MOTION_GROUPS = 20
 """Stretches of time that are left out in turn where there are no poses."""
 ASTRAY = 0.02
@@ -347,6 +349,8 @@ def fit_motion(acc: Array, gravity: float) -> SensorCalibration:
     """
     groups = np.floor(np.arange(len(acc)) * MOTION_GROUPS / len(acc))
     solution = _imufit.magnitude_calibration(np.ascontiguousarray(acc), groups, gravity, misalignment=False)
+    if max(solution["bias_error"]) > MOTION_ERROR:
+        raise InputError("the motion's accelerations hide gravity")
     lengths = gravity + solution["residuals"][:, 0]
     return _result(
         "magnitude",

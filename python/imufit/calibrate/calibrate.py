@@ -110,10 +110,11 @@ class _Session:
         if self.poses and ("acc" in wanted or "gyr" in wanted):
             accelerometer.check_unit(self.used or self.poses, self.gravity, self.file)
         for name in wanted:
+            mean = np.nan if temperature is None or temperature.mean is None else temperature.mean
             try:
                 if name == "acc":
                     sensors["acc"], temperature = self._accelerometer(cost)
-                elif name == "gyr" and (gyr := self._gyroscope(sensors.get("acc"))) is not None:
+                elif name == "gyr" and (gyr := self._gyroscope(sensors.get("acc"), mean)) is not None:
                     sensors["gyr"] = gyr
                 elif name == "mag":
                     logs = [log for log in self.logs if log.mag is not None]
@@ -199,7 +200,7 @@ class _Session:
         if len(self.logs) > 1 or self.logs[0].gyr is None or len(poses) < 8:
             return plain
         # Headings from the gyro between the poses: then a tilt of the table does not pass for misalignment.
-        turns = gyroscope.find_turns(self.logs[0], poses, self.found[0].gyr_noise, None, self.gravity)
+        turns = gyroscope.find_turns(self.logs[0], poses, self.found[0].gyr_noise, self.gravity)
         gyr = gyroscope.fit_gyroscope([turns], poses)
         matrix = np.eye(3) if gyr is None else gyr.matrix
         directions = {side: np.eye(3)[k // 2] * (-1.0 if k % 2 else 1.0) for k, side in enumerate(SIDES)}
@@ -224,7 +225,7 @@ class _Session:
         except InputError:
             raise failed from None
 
-    def _gyroscope(self, acc: SensorCalibration | None) -> SensorCalibration | None:
+    def _gyroscope(self, acc: SensorCalibration | None, mean: float) -> SensorCalibration | None:
         turns, rests = [], []
         for index, (log, found) in enumerate(zip(self.logs, self.found, strict=True)):
             if log.gyr is None or log.acc is None:
@@ -233,6 +234,6 @@ class _Session:
             every = find_poses(log, index, settings=self.settings, labelled_only=False) if found.labelled else found
             resting = [pose for pose in every.poses if pose.used]
             if resting:
-                turns.append(gyroscope.find_turns(log, resting, every.gyr_noise, acc, self.gravity))
+                turns.append(gyroscope.find_turns(log, resting, every.gyr_noise, self.gravity, acc, mean))
                 rests += resting
         return gyroscope.fit_gyroscope(turns, rests) if rests else None

@@ -100,15 +100,27 @@ class SensorCalibration:
         """A = C K, (3, 3)."""
         return self.misalignment * self.scale
 
-    def correct(self, reading: Array) -> Array:
+    def correct(self, reading: Array, warmth: float = 0.0) -> Array:
         """Correct readings (n, 3) or (3,).
 
         Parameters
         ----------
         reading : ndarray
             In `unit`, body frame.
+        warmth : float
+            Temperature less the calibration's mean, K.
         """
-        return np.asarray(reading @ self.matrix.T + self.bias, dtype=np.float64)
+        if warmth == 0.0:
+            return np.asarray(reading @ self.matrix.T + self.bias, dtype=np.float64)
+        gain = np.linalg.inv(self.matrix)
+        bias = -gain @ self.bias
+        gain = gain + warmth * np.diag(self._slopes("scale_temperature"))
+        bias = bias + warmth * self._slopes("bias_temperature")
+        return np.asarray((reading - bias) @ np.linalg.inv(gain).T, dtype=np.float64)
+
+    def _slopes(self, name: str) -> Array:
+        values = self.effects.get(f"{self.sensor}.{name}", {})
+        return np.array([values.get(axis, 0.0) for axis in "xyz"])
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one sensor: paper A's form, errors, before and after."""
@@ -148,6 +160,8 @@ class SensorCalibration:
             "gyr": "angle missed after a turn",
             "mag": "|m| less the field",
         }[self.sensor]
+        if self.extras.get("from_motion"):
+            what = "|f| less g in motion"
         name = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}[self.sensor]
         if not np.isfinite(self.before):
             return f"{name}: bias from {self.items} rest{'s' if self.items != 1 else ''}."
@@ -277,12 +291,15 @@ class Calibration:
                 rows.append(
                     (
                         f"{name}_{axis}",
-                        f"{sensor.scale[i]:.5f} ± {sensor.scale_error[i]:.5f}",
+                        f"{sensor.scale[i]:.5f} ± {sensor.scale_error[i]:.5f}"
+                        if sensor.scale_error[i] > 0.0
+                        else "not told",
                         "  ".join(
                             f"{'xyz'[j]} {sensor.misalignment[i, j]:+.5f} ± {sensor.misalignment_error[i, j]:.5f}"
                             for j in range(3)
-                            if j != i
-                        ),
+                            if j != i and sensor.misalignment_error[i, j] > 0.0
+                        )
+                        or "not told",
                         quantity.with_error(float(sensor.bias[i]), float(sensor.bias_error[i]), sensor.unit),
                     )
                 )

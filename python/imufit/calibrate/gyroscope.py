@@ -51,7 +51,14 @@ class Turns:
     left_out: tuple[str, ...]
 
 
-def find_turns(log: Log, poses: Sequence[Pose], noise: float, acc: SensorCalibration | None, gravity: float) -> Turns:
+def find_turns(
+    log: Log,
+    poses: Sequence[Pose],
+    noise: float,
+    gravity: float,
+    acc: SensorCalibration | None = None,
+    temperature_mean: float = np.nan,
+) -> Turns:
     """Find the turns between neighbouring rests of a log.
 
     Parameters
@@ -62,10 +69,12 @@ def find_turns(log: Log, poses: Sequence[Pose], noise: float, acc: SensorCalibra
         Its usable poses in the order of time.
     noise : float
         Gyro noise at rest, one axis, rad/s.
-    acc : SensorCalibration, optional
-        Corrects the directions of gravity.
     gravity : float
         m/s^2.
+    acc : SensorCalibration, optional
+        Corrects the directions of gravity.
+    temperature_mean : float
+        Of the accelerometer's calibration, degC; NaN where it does not know the temperature.
     """
     gyr = log.gyr
     assert gyr is not None
@@ -89,7 +98,7 @@ def find_turns(log: Log, poses: Sequence[Pose], noise: float, acc: SensorCalibra
         elif np.any(clipped[rows]):
             left_out.append(f"{name}: the gyro reached the end of its range (turn more slowly).")
         else:
-            up = [_up(pose, acc) for pose in (before, after)]
+            up = [_up(pose, acc, temperature_mean) for pose in (before, after)]
             time = float(log.t[last] - log.t[first])
             direction = sum(float(np.mean(pose.variance)) for pose in (before, after)) / gravity**2
             wander = float(np.mean(np.concatenate([before.rate_variance, after.rate_variance]))) * time**2 / 2
@@ -98,8 +107,10 @@ def find_turns(log: Log, poses: Sequence[Pose], noise: float, acc: SensorCalibra
     return Turns(log, tuple(spans), tuple(left_out))
 
 
-def _up(pose: Pose, acc: SensorCalibration | None) -> list[float]:
-    reading = pose.mean if acc is None else acc.correct(pose.mean)
+def _up(pose: Pose, acc: SensorCalibration | None, mean: float) -> list[float]:
+    reading = (
+        pose.mean if acc is None else acc.correct(pose.mean, pose.temperature - mean if np.isfinite(mean) else 0.0)
+    )
     return list((reading / np.linalg.norm(reading)).tolist())
 
 

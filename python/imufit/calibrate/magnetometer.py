@@ -139,13 +139,13 @@ def _chosen(logs: Sequence[Log], acc: SensorCalibration | None, gravity: float) 
     """Return readings (n, 3) that differ from the one before, and up (n, 3) beside them, NaN where it accelerates."""
     readings: list[Array] = []
     ups: list[Array] = []
-    for log in logs:
-        assert log.mag is not None
-        rows = np.flatnonzero(~np.isnan(log.mag).any(axis=1))
-        field = log.mag[rows]
-        if not len(rows):
+    sampled = [(log, np.flatnonzero(~np.isnan(log.mag).any(axis=1))) for log in logs if log.mag is not None]
+    # A log at rest has no size of its own: what counts as new is told by the one that was turned furthest.
+    size = max((_reach(log.mag[rows]) for log, rows in sampled if log.mag is not None and len(rows)), default=0.0)
+    for log, rows in sampled:
+        if log.mag is None or not len(rows):
             continue
-        size = float(np.median(np.linalg.norm(field - np.median(field, axis=0), axis=1)))
+        field = log.mag[rows]
         kept = _new(field, NEW * size)
         readings.append(field[kept])
         up = np.full((len(kept), 3), np.nan)
@@ -161,6 +161,11 @@ def _chosen(logs: Sequence[Log], acc: SensorCalibration | None, gravity: float) 
     stacked, up = np.concatenate(readings), np.concatenate(ups)
     stride = -(-len(stacked) // MOST)
     return np.ascontiguousarray(stacked[::stride]), np.ascontiguousarray(up[::stride])
+
+
+def _reach(field: Array) -> float:
+    """Return how far readings (n, 3) lie from their middle, as a rule."""
+    return float(np.median(np.linalg.norm(field - np.median(field, axis=0), axis=1)))
 
 
 def _new(field: Array, least: float) -> NDArray[np.intp]:

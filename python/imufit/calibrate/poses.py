@@ -261,7 +261,8 @@ def _saturated(poses: Sequence[Pose], acc: Array) -> list[Pose]:
         readings = acc[pose.rows[0] : pose.rows[1] + 1]
         for axis in range(3):
             at_end = max(float(np.mean(readings[:, axis] == end[axis])) for end in ends)
-            if at_end > 0.2 and pose.deviation[axis] < 0.3 * usual[axis] and pose.used:
+            noisy = usual[axis] > 1e-6 * float(np.linalg.norm(pose.mean))
+            if pose.used and noisy and at_end > 0.2 and pose.deviation[axis] < 0.3 * usual[axis]:
                 pose = pose.without(  # noqa: PLW2901 - the pose as judged so far
                     f"acc_{'xyz'[axis]} stands at the end of its range ({abs(pose.mean[axis]):.3g} m/s²): saturated"
                 )
