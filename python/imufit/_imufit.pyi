@@ -375,6 +375,7 @@ def vector_calibration(
     tilt: _Array | None = None,
     temperature: _Array | None = None,
     scale_temperature: bool = False,
+    leave_out: bool = True,
 ) -> _Solution: ...
 def magnitude_calibration(
     readings: _Array,
@@ -385,6 +386,7 @@ def magnitude_calibration(
     temperature: _Array | None = None,
     scale_temperature: bool = False,
     misalignment: bool = True,
+    leave_out: bool = True,
 ) -> _Solution: ...
 def turn_calibration(t: _Array, gyr: _Array, spans: Sequence[_Span], bias: _Numbers) -> _TurnSolution: ...
 def table_attitudes(
