@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import click
 
 from imufit.cli.add import add
+from imufit.cli.apply import apply
 from imufit.cli.compare import compare
 from imufit.cli.demo import demo
 from imufit.cli.diagnose import diagnose
@@ -64,7 +65,7 @@ def imufit(ctx: click.Context) -> None:
         click.echo(ctx.get_help())
 
 
-for _command in (compare, diagnose, add, ladder, fit, explain, simulate, reveal, grade, replay, demo):
+for _command in (compare, diagnose, add, ladder, fit, apply, explain, simulate, reveal, grade, replay, demo):
     imufit.add_command(_command)
 
 

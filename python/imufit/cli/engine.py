@@ -21,6 +21,13 @@ def open_log(path: Path, mapping: Sequence[str] = ()) -> Any:
     return open_log(path, mapping=parse_mapping(*mapping) or None)
 
 
+def read_log(path: Path, mapping: Sequence[str] = ()) -> Log:
+    """Read a whole log; `mapping` holds texts such as ``acc_x=AccX[g]``."""
+    from imufit.log import parse_mapping, read  # noqa: PLC0415
+
+    return read(path, mapping=parse_mapping(*mapping) or None)
+
+
 def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
     """Return the model kept in the file `path`, or a stack of `effects`; no effects is the ideal sensor."""
     import imufit  # noqa: PLC0415
@@ -78,6 +85,22 @@ def replay(log: Any, filters: Sequence[str], progress: Progress) -> Any:
 def write_log(log: Any, path: Path) -> None:
     """Write a log as Parquet, CSV or NPZ, by the path's ending."""
     log.write(path)
+
+
+def changes(recorded: Log, corrected: Log) -> dict[str, dict[str, Any]]:
+    """Return by how much the readings of each sensor differ: samples, RMS per axis and largest, with their unit."""
+    import numpy as np  # noqa: PLC0415
+
+    units = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
+    found = {}
+    for name, unit in units.items():
+        before, after = getattr(recorded, name), getattr(corrected, name)
+        if before is None:
+            continue
+        change = (after - before)[np.isfinite(after - before)]
+        size = {"rms": float(np.sqrt(np.mean(change**2))), "max": float(np.abs(change).max())} if change.size else {}
+        found[name] = {"n": int(np.isfinite(after).all(axis=1).sum()), "rms": 0.0, "max": 0.0, **size, "unit": unit}
+    return found
 
 
 def scenarios() -> dict[str, str]:

@@ -3,6 +3,7 @@
 
 mod arrays;
 mod attitude;
+mod correction;
 mod errors;
 mod filters;
 mod fit;
@@ -19,6 +20,7 @@ fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     attitude::register(m)?;
     filters::register(m)?;
     model::register(m)?;
+    correction::register(m)?;
     fit::register(m)?;
     inference::register(m)?;
     Ok(())
