@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from imufit import diagnose as diagnose
     from imufit import errors as errors
+    from imufit import export as export
     from imufit import figures as figures
     from imufit import fit as fit
     from imufit import grade as grade
@@ -33,6 +34,7 @@ else:
     _MODULES = (
         "diagnose",
         "errors",
+        "export",
         "figures",
         "fit",
         "grade",

@@ -16,6 +16,7 @@ from imufit.cli.compare import compare
 from imufit.cli.demo import demo
 from imufit.cli.diagnose import diagnose
 from imufit.cli.explain import explain
+from imufit.cli.export import export
 from imufit.cli.fit import fit
 from imufit.cli.grade import grade
 from imufit.cli.ladder import ladder
@@ -65,7 +66,7 @@ def imufit(ctx: click.Context) -> None:
         click.echo(ctx.get_help())
 
 
-for _command in (compare, diagnose, add, ladder, fit, apply, explain, simulate, reveal, grade, replay, demo):
+for _command in (compare, diagnose, add, ladder, fit, apply, export, explain, simulate, reveal, grade, replay, demo):
     imufit.add_command(_command)
 
 

@@ -87,6 +87,24 @@ def write_log(log: Any, path: Path) -> None:
     log.write(path)
 
 
+def export(path: Path, form: str) -> str:
+    """Return the constant part of the model in a file, in the words of others.
+
+    Raises
+    ------
+    InputError
+        The model has nothing to export, or a gain without inverse; the file is named.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.export import export  # noqa: PLC0415
+
+    model = sensor_model(path=path)
+    try:
+        return export(model, form)
+    except InputError as error:
+        raise InputError(error.problem, file=path, remedy=error.remedy) from None
+
+
 def changes(recorded: Log, corrected: Log) -> dict[str, dict[str, Any]]:
     """Return by how much the readings of each sensor differ: samples, RMS per axis and largest, with their unit."""
     import numpy as np  # noqa: PLC0415
