@@ -57,12 +57,8 @@ def with_scipy(readings: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, n
 
 
 def many_poses(folder: Path) -> None:
-    print(
-        "magnitude cost, 9 unknowns   RMS of |f| - g left out, m/s^2         bare fit, ms             left out too, ms"
-    )
-    print(
-        "recording           poses   before    scipy     ours  ours/scipy    scipy   ours ratio       scipy   ours ratio"
-    )
+    print("magnitude cost, 9 unknowns   RMS of |f| - g left out, m/s^2       bare fit, ms          left out too, ms")
+    print("recording           poses   before    scipy     ours  ours/scipy  scipy   ours ratio     scipy   ours ratio")
     for name in MANY:
         log = read(folder / "many_positions" / f"{name}.parquet")
         poses = [pose for pose in find_poses(log).poses if pose.used]
@@ -96,8 +92,8 @@ def many_poses(folder: Path) -> None:
         bare = best(theirs), best(ours_bare)
         whole = best(theirs_left_out, 3), best(ours)
         print(
-            f"{name:20}{len(poses):4d}  {before:8.4f}  {peer:.5f}  {own:.5f}   {own / peer:8.2f}    "
-            f"{1e3 * bare[0]:8.2f} {1e3 * bare[1]:6.3f} {bare[0] / bare[1]:5.0f}    "
+            f"{name:20}{len(poses):4d}  {before:8.4f}  {peer:.5f}  {own:.5f}   {own / peer:8.2f}  "
+            f"{1e3 * bare[0]:8.2f} {1e3 * bare[1]:6.3f} {bare[0] / bare[1]:5.0f}  "
             f"{1e3 * whole[0]:8.1f} {1e3 * whole[1]:6.2f} {whole[0] / whole[1]:5.0f}"
         )
 
@@ -119,7 +115,7 @@ def six_positions(folder: Path) -> None:
         spans[f"{axis}_rot"] = (r[0], r[-1] + 1)
     sections = pd.DataFrame(spans, index=["start", "end"]).T
     regions = imucal.ferraris_regions_from_section_list(frame, sections)
-    peer = imucal.FerrarisCalibration(expected_angle=-360)
+    peer = imucal.FerrarisCalibration(grav=G, expected_angle=-360)
     found = peer.compute(regions, 102.4, from_acc_unit="m/s^2", from_gyr_unit="deg/s")
     labelled = calibrate(log, "vector", sensors=["acc"])
     every = find_poses(log, labelled_only=False).poses
