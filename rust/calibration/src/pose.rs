@@ -46,75 +46,137 @@ pub struct Pose {
     pub flaw: Option<Flaw>,
 }
 
-/// Running sums of one sensor.
-#[derive(Clone, Debug, Default)]
-struct Sums {
-    n: usize,
+/// Sums of a part of a pose.
+#[derive(Clone, Debug)]
+struct Block {
+    rows: (usize, usize),
+    time: (f64, f64),
+    n: f64,
     mean: Vector3<f64>,
     /// Sum of squared deviations from the mean (Welford).
     square: Vector3<f64>,
-    blocks: Vec<(f64, Vector3<f64>)>,
-    block_start: f64,
 }
 
-impl Sums {
-    fn add(&mut self, t: f64, reading: Vector3<f64>) {
-        self.n += 1;
-        let before = reading - self.mean;
-        self.mean += before / self.n as f64;
-        self.square += before.component_mul(&(reading - self.mean));
-        match self.blocks.last_mut() {
-            Some((count, sum)) if t - self.block_start < BLOCK => {
-                *count += 1.0;
-                *sum += reading;
-            }
-            _ => {
-                self.block_start = t;
-                self.blocks.push((1.0, reading));
-            }
+impl Block {
+    fn new(row: usize, t: f64, reading: Vector3<f64>) -> Self {
+        Self {
+            rows: (row, row),
+            time: (t, t),
+            n: 1.0,
+            mean: reading,
+            square: Vector3::zeros(),
         }
     }
 
-    fn deviation(&self) -> Vector3<f64> {
-        (self.square / (self.n.max(2) - 1) as f64).map(f64::sqrt)
+    fn add(&mut self, row: usize, t: f64, reading: Vector3<f64>) {
+        self.n += 1.0;
+        let before = reading - self.mean;
+        self.mean += before / self.n;
+        self.square += before.component_mul(&(reading - self.mean));
+        self.rows.1 = row;
+        self.time.1 = t;
+    }
+
+    /// Both parts as one.
+    fn joined(&self, other: &Self) -> Self {
+        let n = self.n + other.n;
+        let step = other.mean - self.mean;
+        Self {
+            rows: (self.rows.0, other.rows.1),
+            time: (self.time.0, other.time.1),
+            n,
+            mean: self.mean + step * (other.n / n),
+            square: self.square + other.square + step.component_mul(&step) * (self.n * other.n / n),
+        }
+    }
+}
+
+/// One sensor's readings in blocks.
+#[derive(Clone, Debug, Default)]
+struct Sums {
+    blocks: Vec<Block>,
+}
+
+/// Blocks at either end of a pose that may be the tail of a movement.
+const EDGE: usize = 2;
+/// They are if they differ from the pose's middle by this many times its own scatter.
+const STRANGE: f64 = 4.0;
+
+impl Sums {
+    fn add(&mut self, row: usize, t: f64, reading: Vector3<f64>) {
+        match self.blocks.last_mut() {
+            Some(block) if t - block.time.0 < BLOCK => block.add(row, t, reading),
+            _ => self.blocks.push(Block::new(row, t, reading)),
+        }
+    }
+
+    /// Time (s) of the first and last block that belong to the pose: a movement dies away slowly, and its tail would turn
+    /// the mean and pass for a bias of the gyro.
+    fn calm(&self) -> Option<(f64, f64)> {
+        let count = self.blocks.len();
+        if count < 3 * EDGE {
+            return None;
+        }
+        let middle = &self.blocks[EDGE..count - EDGE];
+        let median = |values: &mut Vec<f64>| {
+            let half = values.len() / 2;
+            *values.select_nth_unstable_by(half, f64::total_cmp).1
+        };
+        let centre =
+            Vector3::from_fn(|axis, _| median(&mut middle.iter().map(|block| block.mean[axis]).collect::<Vec<f64>>()));
+        let away = |block: &Block| (block.mean - centre).norm();
+        let scatter = median(&mut middle.iter().map(away).collect::<Vec<f64>>());
+        let strange = |block: &&Block| away(block) > STRANGE * scatter;
+        let first = self.blocks[..EDGE]
+            .iter()
+            .rposition(|block| strange(&block))
+            .map_or(0, |k| k + 1);
+        let last = self.blocks[count - EDGE..].iter().position(|block| strange(&block));
+        let last = last.map_or(count, |k| count - EDGE + k);
+        Some((self.blocks[first].time.0, self.blocks[last - 1].time.1))
+    }
+
+    /// Only the blocks within a span of time.
+    fn within(&mut self, (start, end): (f64, f64)) {
+        self.blocks.retain(|block| block.time.1 > start && block.time.0 < end);
+    }
+
+    fn whole(&self) -> Option<Block> {
+        let (first, rest) = self.blocks.split_first()?;
+        Some(rest.iter().fold(first.clone(), |sum, block| sum.joined(block)))
     }
 
     /// Variance of the mean: what white noise gives, or what the means of blocks say if that is more.
-    fn variance_of_mean(&self) -> Vector3<f64> {
-        let n = self.n.max(1) as f64;
-        let white = self.deviation().map(|d| d * d) / n;
+    fn variance_of_mean(&self, whole: &Block) -> Vector3<f64> {
+        let white = whole.square / (whole.n.max(2.0) - 1.0) / whole.n;
         let count = self.blocks.len() as f64;
         if count < 4.0 {
             return white;
         }
-        let scatter = self.blocks.iter().fold(Vector3::zeros(), |sum, (k, block)| {
-            let d = block / *k - self.mean;
-            sum + d.component_mul(&d) * *k
+        let scatter = self.blocks.iter().fold(Vector3::zeros(), |sum: Vector3<f64>, block| {
+            let d = block.mean - whole.mean;
+            sum + d.component_mul(&d) * block.n
         });
-        let blocks = scatter / (n * (count - 1.0));
-        white.sup(&blocks)
+        white.sup(&(scatter / (whole.n * (count - 1.0))))
     }
 
     /// Angle (rad) between the means of the first and of the second half, and its standard error.
-    fn creep(&self) -> Option<(f64, f64)> {
+    fn creep(&self, whole: &Block) -> Option<(f64, f64)> {
         let half = self.blocks.len() / 2;
         if half == 0 {
             return None;
         }
-        let mean = |blocks: &[(f64, Vector3<f64>)]| {
+        let mean = |blocks: &[Block]| {
             let (n, sum) = blocks
                 .iter()
-                .fold((0.0, Vector3::zeros()), |(n, sum), (k, s)| (n + k, sum + s));
+                .fold((0.0, Vector3::zeros()), |(n, sum), b| (n + b.n, sum + b.mean * b.n));
             sum / n
         };
         let (first, second) = (mean(&self.blocks[..half]), mean(&self.blocks[half..]));
         // From block to block a creep hardly shows, so that it does not hide behind its own scatter (von Neumann 1941).
-        let steps = self
-            .blocks
-            .windows(2)
-            .map(|w| (w[1].1 / w[1].0 - w[0].1 / w[0].0).norm_squared());
+        let steps = self.blocks.windows(2).map(|w| (w[1].mean - w[0].mean).norm_squared());
         let scatter = steps.sum::<f64>() / (2 * (self.blocks.len() - 1)) as f64;
-        let error = 2.0 * (scatter / self.blocks.len() as f64).sqrt() / self.mean.norm().max(f64::MIN_POSITIVE);
+        let error = 2.0 * (scatter / self.blocks.len() as f64).sqrt() / whole.mean.norm().max(f64::MIN_POSITIVE);
         Some((first.angle(&second), error))
     }
 }
@@ -122,10 +184,11 @@ impl Sums {
 /// A pose in the making.
 #[derive(Clone, Debug)]
 pub struct OpenPose {
-    first: usize,
     start: f64,
     last: usize,
     end: f64,
+    n: usize,
+    mean: Vector3<f64>,
     force: Sums,
     rate: Sums,
     knocks: Vec<(usize, usize)>,
@@ -137,10 +200,11 @@ impl OpenPose {
     /// A pose that begins at row `first`, time `start` (s).
     pub fn new(first: usize, start: f64) -> Self {
         Self {
-            first,
             start,
             last: first,
             end: start,
+            n: 0,
+            mean: Vector3::zeros(),
             force: Sums::default(),
             rate: Sums::default(),
             knocks: Vec::new(),
@@ -150,14 +214,17 @@ impl OpenPose {
 
     /// Adds a reading of the accelerometer.
     pub fn add(&mut self, row: usize, t: f64, force: Vector3<f64>) {
-        self.force.add(t, force);
+        self.force.add(row, t, force);
+        let step = (force - self.mean) / (self.n + 1) as f64;
+        self.n += 1;
+        self.mean += step;
         self.last = row;
         self.end = t;
     }
 
     /// Adds a reading of the gyro.
     pub fn add_rate(&mut self, t: f64, rate: Vector3<f64>) {
-        self.rate.add(t, rate);
+        self.rate.add(0, t, rate);
     }
 
     /// Leaves out what came since the last reading, a knock, and goes on at row `first`, time `start` (s).
@@ -176,12 +243,12 @@ impl OpenPose {
 
     /// Mean specific force so far.
     pub fn mean(&self) -> Vector3<f64> {
-        self.force.mean
+        self.mean
     }
 
     /// Readings so far.
     pub fn n(&self) -> usize {
-        self.force.n
+        self.n
     }
 
     /// Time from the first reading to the last one, knocks left out, s.
@@ -189,35 +256,48 @@ impl OpenPose {
         self.end - self.start - self.pause
     }
 
-    /// The pose, judged.
-    pub fn close(self, criteria: &Criteria, label: Option<Side>) -> Pose {
-        let scatter = (self.force.deviation().norm_squared() / 3.0).sqrt();
+    /// The pose, judged, without the tails of movements at its ends; `None` if nothing was read.
+    pub fn close(mut self, criteria: &Criteria, label: Option<Side>) -> Option<Pose> {
+        for span in [self.rate.calm(), self.force.calm()].into_iter().flatten() {
+            self.force.within(span);
+            self.rate.within(span);
+        }
+        let whole = self.force.whole()?;
+        let deviation = (whole.square / (whole.n.max(2.0) - 1.0)).map(f64::sqrt);
+        let scatter = (deviation.norm_squared() / 3.0).sqrt();
         let allowed = criteria.acc_noise.map_or(criteria.ceiling.0, |noise| {
             (3.0 * noise).max(2.0 * criteria.floor.0).min(criteria.ceiling.0)
         });
-        let flaw = if self.duration() < criteria.hold || self.n() < criteria.fewest {
-            Some(Flaw::Short(self.duration()))
+        let still = whole.time.1 - whole.time.0 - self.pause;
+        let flaw = if still < criteria.hold || (whole.n as usize) < criteria.fewest {
+            Some(Flaw::Short(still.max(0.0)))
         } else if scatter > allowed {
             Some(Flaw::Unsteady(scatter))
         } else {
             self.force
-                .creep()
+                .creep(&whole)
                 .filter(|(angle, error)| *angle > criteria.creep.max(5.0 * error))
                 .map(|(angle, _)| Flaw::Crept(angle))
         };
-        Pose {
-            rows: (self.first, self.last),
-            time: (self.start, self.end),
+        self.knocks
+            .retain(|(first, last)| *first > whole.rows.0 && *last < whole.rows.1);
+        Some(Pose {
+            rows: whole.rows,
+            time: whole.time,
             knocks: self.knocks,
-            n: self.force.n,
-            mean: self.force.mean,
-            deviation: self.force.deviation(),
-            variance: self.force.variance_of_mean(),
-            rate: (self.rate.n > 1).then(|| (self.rate.mean, self.rate.variance_of_mean())),
-            side: Side::nearest(&self.force.mean),
+            n: whole.n as usize,
+            mean: whole.mean,
+            deviation,
+            variance: self.force.variance_of_mean(&whole),
+            rate: self
+                .rate
+                .whole()
+                .filter(|rate| rate.n > 1.0)
+                .map(|rate| (rate.mean, self.rate.variance_of_mean(&rate))),
+            side: Side::nearest(&whole.mean),
             label,
             flaw,
-        }
+        })
     }
 }
 
@@ -238,13 +318,15 @@ mod tests {
             x = 0.95 * x + noise;
             pose.add(i, i as f64 * 0.01, Vector3::new(x, noise, 9.8));
         }
-        let closed = pose.close(
-            &Criteria {
-                ceiling: (9.0, 9.0),
-                ..Criteria::default()
-            },
-            None,
-        );
+        let closed = pose
+            .close(
+                &Criteria {
+                    ceiling: (9.0, 9.0),
+                    ..Criteria::default()
+                },
+                None,
+            )
+            .expect("readings");
         let white = closed.deviation.map(|d| d * d) / closed.n as f64;
         assert!(closed.variance.x > 8.0 * white.x);
         assert!(closed.variance.y < 2.0 * white.y);
@@ -267,6 +349,8 @@ mod tests {
             creep: 0.005,
             ..Criteria::default()
         };
-        assert!(matches!(pose.close(&criteria, None).flaw, Some(Flaw::Crept(a)) if (a - 0.015).abs() < 1e-3));
+        assert!(
+            matches!(pose.close(&criteria, None).expect("readings").flaw, Some(Flaw::Crept(a)) if (a - 0.015).abs() < 1e-3)
+        );
     }
 }

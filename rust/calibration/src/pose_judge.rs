@@ -199,10 +199,10 @@ impl PoseJudge {
                 pose.add_rate(t, rate);
             }
         }
-        Some(self.close(pose))
+        self.close(pose)
     }
 
-    fn close(&self, pose: OpenPose) -> Pose {
+    fn close(&self, pose: OpenPose) -> Option<Pose> {
         pose.close(&self.criteria, self.label)
     }
 
@@ -294,7 +294,10 @@ impl PoseJudge {
         self.disturbed = None;
         let pose = self.pose.take()?;
         // A pose shorter than the window is the end of a movement that passed for stillness.
-        (pose.duration() >= self.criteria.window).then(|| self.close(pose))
+        if pose.duration() < self.criteria.window {
+            return None;
+        }
+        self.close(pose)
     }
 }
 

@@ -152,10 +152,7 @@ fn unsteady(readings: &Readings<'_>, first: usize, end: usize, label: Side, crit
     for row in (first..end).filter(finite) {
         pose.add(row, readings.t[row], readings.force(row));
     }
-    if pose.n() == 0 {
-        return None;
-    }
-    let mut pose = pose.close(criteria, Some(label));
+    let mut pose = pose.close(criteria, Some(label))?;
     if !matches!(pose.flaw, Some(Flaw::Short(_))) {
         let scatter = (pose.deviation.norm_squared() / 3.0).sqrt();
         pose.flaw = Some(Flaw::Unsteady(scatter));
