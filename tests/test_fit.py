@@ -12,8 +12,9 @@ from imufit.simulate import Noise, SensorNoise
 from scipy.spatial.transform import Rotation
 
 FIRST_EFFECTS = [
-    "acc.bias", "acc.scale", "acc.misalignment", "acc.lever_arm", "acc.bias_temperature", "gyr.bias", "gyr.scale",
-    "gyr.misalignment", "gyr.g_sensitivity", "gyr.bias_temperature", "mag.hard_iron", "mag.soft_iron",
+    "acc.bias", "acc.scale", "acc.misalignment", "acc.lever_arm", "acc.bias_temperature",
+    "acc.scale_temperature", "gyr.bias", "gyr.scale", "gyr.misalignment", "gyr.g_sensitivity", "gyr.bias_temperature",
+    "gyr.scale_temperature", "mag.hard_iron", "mag.soft_iron", "mag.bias_temperature", "mag.scale_temperature",
     "mag.field_reference", "ref.alignment", "ref.delay", "acc.column:vbat", "gyr.column:motor_current",
     "mag.column:vbat",
 ]  # fmt: skip

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from imufit import calibrate as calibrate
     from imufit import diagnose as diagnose
     from imufit import errors as errors
+    from imufit import export as export
     from imufit import figures as figures
     from imufit import fit as fit
     from imufit import grade as grade
@@ -35,6 +36,7 @@ else:
         "calibrate",
         "diagnose",
         "errors",
+        "export",
         "figures",
         "fit",
         "grade",

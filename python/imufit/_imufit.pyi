@@ -23,7 +23,9 @@ __all__ = [
     "attitude_errors",
     "attitude_rmse",
     "built_in_effects",
+    "concerns_reference",
     "convert_frame",
+    "correct_readings",
     "euler_from_quaternion",
     "evaluate",
     "filter_descriptions",
@@ -182,6 +184,17 @@ def python_effect(
     needs: Sequence[str],
     function: Callable[..., object],
 ) -> Effect: ...
+
+# --- correction: readings (n, 3) or None, and samples lost, for each of acc, gyr, mag
+
+def correct_readings(
+    chunk: _Chunk,
+    effects: Sequence[tuple[Effect, Sequence[float]]],
+    covariates: Sequence[str],
+    covariate_means: Sequence[float | None],
+    temperature_mean: float | None = None,
+) -> tuple[list[_Array | None], list[int]]: ...
+def concerns_reference(effect: Effect) -> bool: ...
 
 # --- fit: nine channels, acc gyr mag by x y z
 
@@ -375,6 +388,7 @@ def vector_calibration(
     tilt: _Array | None = None,
     temperature: _Array | None = None,
     scale_temperature: bool = False,
+    leave_out: bool = True,
 ) -> _Solution: ...
 def magnitude_calibration(
     readings: _Array,
@@ -385,6 +399,7 @@ def magnitude_calibration(
     temperature: _Array | None = None,
     scale_temperature: bool = False,
     misalignment: bool = True,
+    leave_out: bool = True,
 ) -> _Solution: ...
 def turn_calibration(t: _Array, gyr: _Array, spans: Sequence[_Span], bias: _Numbers) -> _TurnSolution: ...
 def table_attitudes(

@@ -11,12 +11,14 @@ from collections.abc import Sequence
 import click
 
 from imufit.cli.add import add
+from imufit.cli.apply import apply
 from imufit.cli.calibrate import calibrate
 from imufit.cli.compare import compare
 from imufit.cli.convert import convert
 from imufit.cli.demo import demo
 from imufit.cli.diagnose import diagnose
 from imufit.cli.explain import explain
+from imufit.cli.export import export
 from imufit.cli.fit import fit
 from imufit.cli.grade import grade
 from imufit.cli.ladder import ladder
@@ -74,6 +76,8 @@ for _command in (
     add,
     ladder,
     fit,
+    apply,
+    export,
     explain,
     simulate,
     reveal,

@@ -101,6 +101,40 @@ def write_log(log: Any, path: Path) -> None:
     log.write(path)
 
 
+def export(path: Path, form: str) -> str:
+    """Return the constant part of the model in a file, in the words of others.
+
+    Raises
+    ------
+    InputError
+        The model has nothing to export, or a gain without inverse; the file is named.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.export import export  # noqa: PLC0415
+
+    model = sensor_model(path=path)
+    try:
+        return export(model, form)
+    except InputError as error:
+        raise InputError(error.problem, file=path, remedy=error.remedy) from None
+
+
+def changes(recorded: Log, corrected: Log) -> dict[str, dict[str, Any]]:
+    """Return by how much the readings of each sensor differ: samples, RMS per axis and largest, with their unit."""
+    import numpy as np  # noqa: PLC0415
+
+    units = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
+    found = {}
+    for name, unit in units.items():
+        before, after = getattr(recorded, name), getattr(corrected, name)
+        if before is None:
+            continue
+        change = (after - before)[np.isfinite(after - before)]
+        size = {"rms": float(np.sqrt(np.mean(change**2))), "max": float(np.abs(change).max())} if change.size else {}
+        found[name] = {"n": int(np.isfinite(after).all(axis=1).sum()), "rms": 0.0, "max": 0.0, **size, "unit": unit}
+    return found
+
+
 def scenarios() -> dict[str, str]:
     """Return the scenarios that can be simulated, with what happens in each."""
     from imufit.simulate.scenarios import SCENARIOS  # noqa: PLC0415

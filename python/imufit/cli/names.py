@@ -9,6 +9,13 @@ from typing import Any
 import click
 
 FILTERS = ("accel", "gyro", "complementary", "kalman", "triad", "quest", "mahony", "hybrid", "mekf")
+FORMS = {
+    "c-header": "C99 header, SI units",
+    "arduino": "sketch with a function to call after reading the sensor, SI units",
+    "imufusion": "Python for imufusion (xio Fusion), g and deg/s",
+    "ahrs": "Python that makes the arrays for the filters of ahrs",
+    "json": "matrices, offsets and standard errors",
+}
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:

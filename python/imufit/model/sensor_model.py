@@ -17,7 +17,7 @@ from imufit.results import Parameter
 
 if TYPE_CHECKING:
     from imufit.fit import Fit
-    from imufit.log import LogSource
+    from imufit.log import Log, LogSource
     from imufit.progress import Progress
     from imufit.results import Comparison
 
@@ -157,6 +157,34 @@ class SensorModel:
         from imufit.progress import silent  # noqa: PLC0415
 
         return compare_model(self, log, progress or silent)
+
+    def apply(self, log: LogSource) -> Log:
+        """Correct a log's readings: take out what the model's effects added to them.
+
+        No reference is needed. What effects read of the motion is taken from the corrected readings themselves: an
+        effect of one sensor on another uses the other one corrected, held or interpolated where that one is slower, and
+        derivatives come from local polynomials. Effects of the reference (``ref.delay``, ``ref.alignment``,
+        ``mag.field_reference``) change no reading; a note of the result names them.
+
+        Parameters
+        ----------
+        log : Log or LogStream
+            Readings as they were recorded. A stream is read into memory.
+
+        Returns
+        -------
+        Log
+            The same rows with corrected ``acc``, ``gyr`` and ``mag``; everything else as it was. NaN stays NaN.
+
+        Raises
+        ------
+        InputError
+            An effect needs a column that the log does not have, or cannot be undone: different inputs give the same
+            reading, or none gives it. The effect and, where there is one, the row are named.
+        """
+        from imufit.fit.apply import apply  # noqa: PLC0415  as for `fit`
+
+        return apply(self, log)
 
     def save(self, path: str | Path) -> None:
         """Write the model as a TOML file.

@@ -4,7 +4,7 @@
 //! Lengths leave three rotations open: the symmetric form keeps the sensor's own axes. With the dip A is full.
 
 use imufit_fit::normal_equations::NormalEquations;
-use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
 
 use crate::CalibrationError;
 use crate::affine::Affine;
@@ -46,6 +46,8 @@ struct Problem<'a> {
     form: Form,
     dip: bool,
     length: f64,
+    /// What the corrected reading of each item depends on, three rows each.
+    columns: Vec<Matrix3xX<f64>>,
 }
 
 /// Weights of the lengths and of the dips.
@@ -61,12 +63,10 @@ impl Problem<'_> {
     }
 
     /// Corrected reading, its length error and dip error.
-    fn errors(&self, item: &Item, theta: &DVector<f64>) -> (Vector3<f64>, f64, Option<f64>) {
-        let corrected = self.form.columns(&item.reading, item.temperature) * theta.rows(0, self.form.parameters());
-        let dip = item
-            .up
-            .filter(|_| self.dip)
-            .map(|up| corrected.dot(&up) - theta[self.form.parameters()]);
+    fn errors(&self, k: usize, theta: &DVector<f64>) -> (Vector3<f64>, f64, Option<f64>) {
+        let corrected = &self.columns[k] * theta.rows(0, self.form.parameters());
+        let up = self.items[k].up.filter(|_| self.dip);
+        let dip = up.map(|up| corrected.dot(&up) - theta[self.form.parameters()]);
         (corrected, corrected.norm() - self.length, dip)
     }
 
@@ -84,14 +84,13 @@ impl Problem<'_> {
             if Some(item.group) == left_out {
                 continue;
             }
-            let columns = self.form.columns(&item.reading, item.temperature);
-            let (corrected, error, dip) = self.errors(item, theta);
+            let (corrected, error, dip) = self.errors(k, theta);
             let direction = corrected / corrected.norm().max(f64::MIN_POSITIVE);
             row.fill(0.0);
-            row.rows_mut(0, p).gemv_tr(1.0, &columns, &direction, 0.0);
+            row.rows_mut(0, p).gemv_tr(1.0, &self.columns[k], &direction, 0.0);
             add(&row, error, weights.length[k]);
             if let (Some(error), Some(up)) = (dip, item.up) {
-                row.rows_mut(0, p).gemv_tr(1.0, &columns, &up, 0.0);
+                row.rows_mut(0, p).gemv_tr(1.0, &self.columns[k], &up, 0.0);
                 row[p] = -1.0;
                 add(&row, error, weights.dip[k]);
             }
@@ -100,14 +99,12 @@ impl Problem<'_> {
     }
 
     fn square(&self, theta: &DVector<f64>, weights: &Weights, left_out: Option<usize>) -> f64 {
-        let of_item = |(k, item): (usize, &Item)| {
-            let (_, error, dip) = self.errors(item, theta);
+        let of_item = |k: usize| {
+            let (_, error, dip) = self.errors(k, theta);
             weights.length[k] * error * error + dip.map_or(0.0, |d| weights.dip[k] * d * d)
         };
-        self.items
-            .iter()
-            .enumerate()
-            .filter(|(_, item)| Some(item.group) != left_out)
+        (0..self.items.len())
+            .filter(|k| Some(self.items[*k].group) != left_out)
             .map(of_item)
             .sum()
     }
@@ -116,28 +113,49 @@ impl Problem<'_> {
     fn minimise(&self, start: &DVector<f64>, weights: &Weights, left_out: Option<usize>) -> Option<DVector<f64>> {
         let mut theta = start.clone();
         let mut square = self.square(&theta, weights, left_out);
-        let mut damping = 1e-3;
+        let mut damping = 1e-6;
         for _ in 0..ITERATIONS {
             let equations = self.equations(&theta, weights, left_out);
-            let mut improved = false;
+            let mut small = true;
             for _ in 0..12 {
                 let precision = equations.gram.diagonal() * damping;
                 let step = equations.solve(&precision)?.solution;
                 let trial = &theta + &step;
                 let then = self.square(&trial, weights, left_out);
-                if then.is_finite() && then <= square {
-                    let small = square - then <= 1e-14 * square && step.norm() <= 1e-12 * theta.norm();
-                    (theta, square, improved) = (trial, then, !small);
+                if then <= square {
+                    // Converges quadratically: the next step would be the square of this one.
+                    small = step.norm() <= 1e-7 * theta.norm();
+                    (theta, square) = (trial, then);
                     damping = (0.1 * damping).max(1e-15);
                     break;
                 }
-                damping *= 10.0;
+                damping = (10.0 * damping).max(1e-6);
             }
-            if !improved {
-                return Some(theta);
+            if small {
+                break;
             }
         }
-        Some(theta)
+        square.is_finite().then_some(theta)
+    }
+
+    /// The solution without a group, by two Gauss-Newton steps from the whole one; `None` if the group carried a
+    /// parameter alone: its variance (`spread` in the whole fit) would become a hundredfold.
+    fn without(
+        &self,
+        theta: &DVector<f64>,
+        weights: &Weights,
+        group: usize,
+        spread: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let none = DVector::zeros(self.parameters());
+        let first = self.equations(theta, weights, Some(group)).solve(&none)?;
+        let variances = first.covariance().diagonal();
+        if variances.iter().zip(spread).any(|(now, before)| *now > 100.0 * before) {
+            return None;
+        }
+        let near = theta + first.solution;
+        let second = self.equations(&near, weights, Some(group)).solve(&none)?;
+        Some(near + second.solution)
     }
 
     fn weights_of_poses(&self, excess: f64) -> Weights {
@@ -151,7 +169,7 @@ impl Problem<'_> {
 
     /// Huber's weights over the present scatter (median absolute deviation).
     fn weights_of_readings(&self, theta: &DVector<f64>) -> Weights {
-        let errors: Vec<_> = self.items.iter().map(|item| self.errors(item, theta)).collect();
+        let errors: Vec<_> = (0..self.items.len()).map(|k| self.errors(k, theta)).collect();
         let scale = |values: &mut Vec<f64>| {
             if values.is_empty() {
                 return f64::INFINITY;
@@ -214,13 +232,14 @@ pub fn sphere(readings: impl Iterator<Item = Vector3<f64>>) -> Option<(Vector3<f
 }
 
 /// Fits the correction that gives every reading the length `length`; the form's A is symmetric or diagonal, with the dip
-/// full.
+/// full. `leave_out` asks for the held-out errors; single readings need it for their standard errors too.
 pub fn fit(
     items: &[Item],
     form: Form,
     dip: bool,
     length: f64,
     weighing: Weighing,
+    leave_out: bool,
 ) -> Result<Solution, CalibrationError> {
     let form = Form {
         matrix: if dip { Elements::Full } else { form.matrix },
@@ -231,6 +250,10 @@ pub fn fit(
         form,
         dip,
         length,
+        columns: items
+            .iter()
+            .map(|item| form.columns(&item.reading, item.temperature))
+            .collect(),
     };
     let p = problem.parameters();
     let finite = |item: &Item| item.reading.iter().all(|x| x.is_finite()) && item.variance.is_finite();
@@ -263,20 +286,20 @@ pub fn fit(
     let mut excess = 0.0;
     match weighing {
         Weighing::Poses => {
-            theta = problem
-                .minimise(&theta, &weights, None)
-                .ok_or(CalibrationError::Diverged)?;
-            let started = theta.clone();
-            excess = excess_variance(freedom, 1e-6 * length * length, |excess| {
-                let weights = problem.weights_of_poses(excess);
-                let theta = problem.minimise(&started, &weights, None)?;
-                Some(problem.square(&theta, &weights, None))
-            })
-            .ok_or(CalibrationError::Diverged)?;
-            weights = problem.weights_of_poses(excess);
-            theta = problem
-                .minimise(&started, &weights, None)
-                .ok_or(CalibrationError::Diverged)?;
+            for _ in 0..20 {
+                theta = problem
+                    .minimise(&theta, &weights, None)
+                    .ok_or(CalibrationError::Diverged)?;
+                let squares = |excess| Some(problem.square(&theta, &problem.weights_of_poses(excess), None));
+                let next =
+                    excess_variance(freedom, 1e-6 * length * length, squares).ok_or(CalibrationError::Diverged)?;
+                let settled = (next - excess).abs() <= 1e-2 * next;
+                excess = next;
+                weights = problem.weights_of_poses(excess);
+                if settled {
+                    break;
+                }
+            }
         }
         Weighing::Readings => {
             for _ in 0..8 {
@@ -301,27 +324,26 @@ pub fn fit(
     let equations = problem.equations(&theta, &weights, None);
     let condition = equations.condition();
     let solved = equations.solve(&DVector::zeros(p)).ok_or(CalibrationError::Diverged)?;
-    let residual = |item: &Item, theta: &DVector<f64>| {
-        let (corrected, error, dip) = problem.errors(item, theta);
+    let spread = solved.covariance().diagonal();
+    let residual = |k: usize, theta: &DVector<f64>| {
+        let (corrected, error, dip) = problem.errors(k, theta);
         (Vector3::new(error, dip.unwrap_or(0.0), 0.0), corrected.norm())
     };
-    let residuals = items.iter().map(|item| residual(item, &theta).0).collect();
+    let residuals = (0..items.len()).map(|k| residual(k, &theta).0).collect();
     let groups = items.iter().map(|item| item.group).max().map_or(0, |g| g + 1);
     let mut held_out = vec![Vector3::repeat(f64::NAN); items.len()];
     let mut held_out_length = vec![f64::NAN; items.len()];
     let mut without = Vec::new();
-    for group in 0..groups {
+    for group in (0..groups).filter(|_| leave_out) {
         let left = items.iter().filter(|item| item.group != group).count();
         if left < p || left == items.len() {
             continue;
         }
-        let fitted = problem.minimise(&theta, &weights, Some(group));
-        let carried = problem.equations(&theta, &weights, Some(group)).condition();
-        let Some(fitted) = fitted.filter(|_| carried < 10.0 * condition) else {
+        let Some(fitted) = problem.without(&theta, &weights, group, &spread) else {
             continue;
         };
-        for (k, item) in items.iter().enumerate().filter(|(_, item)| item.group == group) {
-            (held_out[k], held_out_length[k]) = residual(item, &fitted);
+        for k in (0..items.len()).filter(|k| items[*k].group == group) {
+            (held_out[k], held_out_length[k]) = residual(k, &fitted);
         }
         without.push(fitted);
     }
@@ -399,7 +421,7 @@ mod tests {
 
     #[test]
     fn twelve_exact_poses_give_the_nine_parameters() {
-        let solution = fit(&items(12), Form::SYMMETRIC, false, G, Weighing::Poses).expect("determined");
+        let solution = fit(&items(12), Form::SYMMETRIC, false, G, Weighing::Poses, true).expect("determined");
         assert!((solution.affine().matrix - truth().matrix).norm() < 1e-9);
         assert!((solution.affine().offset - truth().offset).norm() < 1e-8);
         assert!(solution.held_out_length.iter().all(|n| (n - G).abs() < 1e-6));
@@ -408,7 +430,7 @@ mod tests {
     #[test]
     fn eight_poses_and_poses_of_one_circle_are_refused() {
         assert!(matches!(
-            fit(&items(8), Form::SYMMETRIC, false, G, Weighing::Poses),
+            fit(&items(8), Form::SYMMETRIC, false, G, Weighing::Poses, true),
             Err(CalibrationError::Underdetermined {
                 unknowns: 9,
                 equations: 8
@@ -424,7 +446,7 @@ mod tests {
             })
             .collect();
         assert!(matches!(
-            fit(&flat, Form::SYMMETRIC, false, G, Weighing::Poses),
+            fit(&flat, Form::SYMMETRIC, false, G, Weighing::Poses, true),
             Err(CalibrationError::Underdetermined { .. })
         ));
     }
@@ -450,7 +472,7 @@ mod tests {
                 }
             })
             .collect();
-        let solution = fit(&items, Form::FULL, true, field, Weighing::Readings).expect("determined");
+        let solution = fit(&items, Form::FULL, true, field, Weighing::Readings, true).expect("determined");
         assert!((solution.affine().matrix - matrix).norm() < 1e-7);
         assert!((solution.affine().offset - offset).norm() < 1e-5);
     }

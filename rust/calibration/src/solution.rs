@@ -219,19 +219,22 @@ pub fn excess_variance(freedom: f64, largest: f64, mut squares: impl FnMut(f64) 
         return Some(0.0);
     }
     let (mut low, mut high) = (0.0, largest.max(f64::MIN_POSITIVE));
+    let mut doublings = 0;
     while squares(high)? > freedom {
         low = high;
         high *= 4.0;
+        doublings += 1;
+        if doublings > 60 {
+            return None;
+        }
     }
-    for _ in 0..50 {
+    // A part in a thousand is far more than a variance from a few poses is worth.
+    while high - low > 1e-3 * high {
         let middle = 0.5 * (low + high);
         if squares(middle)? > freedom {
             low = middle;
         } else {
             high = middle;
-        }
-        if high - low < 1e-6 * high {
-            break;
         }
     }
     Some(0.5 * (low + high))

@@ -77,8 +77,13 @@ impl Turn {
     }
 }
 
+/// A turn's error and its derivative at some A.
+type Linearised = (Vector3<f64>, Sensitivity);
+
 struct Problem<'a> {
     turns: &'a [Turn],
+    /// Where the prior holds A: the identity, with the signs of flipped axes.
+    start: DVector<f64>,
 }
 
 fn matrix_of(theta: &DVector<f64>) -> Matrix3<f64> {
@@ -86,12 +91,22 @@ fn matrix_of(theta: &DVector<f64>) -> Matrix3<f64> {
 }
 
 impl Problem<'_> {
-    fn equations(&self, theta: &DVector<f64>, excess: f64, left_out: Option<usize>) -> NormalEquations {
+    fn linearised(&self, theta: &DVector<f64>) -> Vec<Linearised> {
         let matrix = matrix_of(theta);
+        self.turns.iter().map(|turn| turn.error(&matrix)).collect()
+    }
+
+    fn weight(&self, turn: usize, excess: f64) -> f64 {
+        1.0 / (self.turns[turn].variance + excess)
+    }
+
+    fn equations(&self, linearised: &[Linearised], excess: f64, left_out: Option<usize>) -> NormalEquations {
         let mut equations = NormalEquations::zeros(9);
-        for (_, turn) in self.turns.iter().enumerate().filter(|(k, _)| Some(*k) != left_out) {
-            let (error, derivative) = turn.error(&matrix);
-            let weight = 1.0 / (turn.variance + excess);
+        for (k, (error, derivative)) in linearised.iter().enumerate() {
+            if Some(k) == left_out {
+                continue;
+            }
+            let weight = self.weight(k, excess);
             let gram = derivative.transpose() * derivative * weight;
             let right = derivative.transpose() * error * -weight;
             for j in 0..9 {
@@ -106,54 +121,87 @@ impl Problem<'_> {
         equations
     }
 
-    fn square(&self, theta: &DVector<f64>, start: &DVector<f64>, excess: f64, left_out: Option<usize>) -> f64 {
-        let matrix = matrix_of(theta);
-        let prior = (theta - start).norm_squared() / (SPREAD * SPREAD);
-        prior
-            + self
-                .turns
-                .iter()
-                .enumerate()
-                .filter(|(k, _)| Some(*k) != left_out)
-                .map(|(_, turn)| turn.error(&matrix).0.norm_squared() / (turn.variance + excess))
-                .sum::<f64>()
+    /// Weighted squares of the turns.
+    fn misses(&self, linearised: &[Linearised], excess: f64) -> f64 {
+        let turns = linearised.iter().enumerate();
+        turns
+            .map(|(k, (error, _))| error.norm_squared() * self.weight(k, excess))
+            .sum()
     }
 
-    fn minimise(
-        &self,
-        start: &DVector<f64>,
-        excess: f64,
-        left_out: Option<usize>,
-    ) -> Option<(DVector<f64>, NormalEquations)> {
+    /// Weighted squares of the turns, and of the prior.
+    fn square(&self, linearised: &[Linearised], theta: &DVector<f64>, excess: f64) -> f64 {
+        self.misses(linearised, excess) + (theta - &self.start).norm_squared() / (SPREAD * SPREAD)
+    }
+
+    /// The step from `theta`, damped by `damping` times the diagonal.
+    fn step(&self, equations: &NormalEquations, theta: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
         let precision = 1.0 / (SPREAD * SPREAD);
-        let mut theta = start.clone();
-        let mut square = self.square(&theta, start, excess, left_out);
-        let mut damping = 1e-3;
-        let mut equations = self.equations(&theta, excess, left_out);
+        let mut pulled = equations.clone();
+        pulled.right.axpy(-precision, &(theta - &self.start), 1.0);
+        let damped = equations.gram.diagonal() * damping;
+        Some(pulled.solve(&damped.add_scalar(precision))?.solution)
+    }
+
+    /// Levenberg-Marquardt; each trial integrates every turn once.
+    fn minimise(&self, from: &DVector<f64>, excess: f64) -> Option<(DVector<f64>, Vec<Linearised>)> {
+        let mut theta = from.clone();
+        let mut linearised = self.linearised(&theta);
+        let mut square = self.square(&linearised, &theta, excess);
+        let mut damping = 1e-4;
         for _ in 0..ITERATIONS {
-            let mut improved = false;
-            for _ in 0..10 {
-                let mut pulled = equations.clone();
-                pulled.right.axpy(-precision, &(&theta - start), 1.0);
-                let damp = equations.gram.diagonal() * damping;
-                let step = pulled.solve(&damp.add_scalar(precision))?.solution;
+            let equations = self.equations(&linearised, excess, None);
+            let mut step_length = 0.0;
+            for _ in 0..8 {
+                let step = self.step(&equations, &theta, damping)?;
                 let trial = &theta + &step;
-                let then = self.square(&trial, start, excess, left_out);
+                let there = self.linearised(&trial);
+                let then = self.square(&there, &trial, excess);
                 if then <= square {
-                    improved = square - then > 1e-12 * square || step.norm() > 1e-10;
-                    (theta, square) = (trial, then);
+                    step_length = step.norm();
+                    (theta, linearised, square) = (trial, there, then);
                     damping = (0.1 * damping).max(1e-15);
                     break;
                 }
                 damping *= 10.0;
             }
-            equations = self.equations(&theta, excess, left_out);
-            if !improved {
+            if step_length < 1e-8 {
                 break;
             }
         }
-        Some((theta, equations))
+        Some((theta, linearised))
     }
+}
+
+/// Beyond this (rad) turns miss so far that an axis may be flipped.
+const ASTRAY: f64 = 0.35;
+
+/// The identity, or the signs of its axes that explain the turns far better.
+fn signs(turns: &[Turn]) -> DVector<f64> {
+    let mut problem = Problem {
+        turns,
+        start: DVector::zeros(9),
+    };
+    let (mut best, mut least) = (DVector::zeros(9), f64::INFINITY);
+    for flips in 0..8_u32 {
+        for axis in 0..3 {
+            problem.start[4 * axis] = if flips >> axis & 1 == 1 { -1.0 } else { 1.0 };
+        }
+        let from = problem.start.clone();
+        let Some((theta, linearised)) = problem.minimise(&from, 0.0) else {
+            continue;
+        };
+        let square = problem.square(&linearised, &theta, 0.0);
+        // The right way round unless another is far better.
+        if square < 0.2 * least {
+            (best, least) = (from, square);
+        }
+        let missed = linearised.iter().map(|(error, _)| error.norm_squared()).sum::<f64>() / turns.len() as f64;
+        if flips == 0 && missed.sqrt() < ASTRAY && (&theta - &best).norm() < 0.5 {
+            break;
+        }
+    }
+    best
 }
 
 /// Fits A of `corrected = A (reading - bias at rest)` to turns between rests; the offset is zero.
@@ -175,33 +223,26 @@ pub fn fit(turns: &[Turn]) -> Result<Solution, CalibrationError> {
     if !turns.iter().all(finite) {
         return Err(CalibrationError::NotFinite("a turn"));
     }
-    let problem = Problem { turns };
+    let problem = Problem {
+        turns,
+        start: signs(turns),
+    };
     let freedom = (2.0 * turns.len() as f64 - 9.0).max(0.0);
-    let (mut start, mut best) = (DVector::zeros(9), f64::INFINITY);
-    for flips in 0..8_u32 {
-        let mut signs = DVector::zeros(9);
-        for axis in 0..3 {
-            signs[4 * axis] = if flips >> axis & 1 == 1 { -1.0 } else { 1.0 };
-        }
-        let Some((theta, _)) = problem.minimise(&signs, 0.0, None) else {
-            continue;
-        };
-        let square = problem.square(&theta, &signs, 0.0, None);
-        // The right way round unless another is far better.
-        if square < 0.2 * best {
-            (start, best) = (signs, square);
-        }
-    }
-    // Before the excess is known a guess of half a degree keeps one bad turn from ruling.
-    let limit = 0.5_f64.to_radians().powi(2);
-    let excess = excess_variance(freedom, limit, |excess| {
-        let (theta, _) = problem.minimise(&start, excess, None)?;
-        Some(problem.square(&theta, &start, excess, None))
-    })
-    .ok_or(CalibrationError::Diverged)?;
-    let (theta, equations) = problem
-        .minimise(&start, excess, None)
+    let mut excess = 0.0;
+    let (mut theta, mut linearised) = problem
+        .minimise(&problem.start, excess)
         .ok_or(CalibrationError::Diverged)?;
+    for _ in 0..5 {
+        let squares = |excess| Some(problem.misses(&linearised, excess));
+        let next = excess_variance(freedom, 1e-4, squares).ok_or(CalibrationError::Diverged)?;
+        let settled = (next - excess).abs() <= 1e-2 * next;
+        excess = next;
+        if settled {
+            break;
+        }
+        (theta, linearised) = problem.minimise(&theta, excess).ok_or(CalibrationError::Diverged)?;
+    }
+    let equations = problem.equations(&linearised, excess, None);
     let solved = equations
         .solve(&DVector::from_element(9, 1.0 / (SPREAD * SPREAD)))
         .ok_or(CalibrationError::Diverged)?;
@@ -209,18 +250,17 @@ pub fn fit(turns: &[Turn]) -> Result<Solution, CalibrationError> {
     covariance.view_mut((0, 0), (9, 9)).copy_from(&solved.covariance());
     let matrix = matrix_of(&theta);
     let angle = |turn: &Turn, matrix: &Matrix3<f64>| Vector3::new(turn.angle(matrix), 0.0, 0.0);
-    let held_out = turns
-        .iter()
-        .enumerate()
-        .map(|(k, turn)| {
-            let fitted = if turns.len() > 5 {
-                problem.minimise(&start, excess, Some(k))
-            } else {
-                None
-            };
-            fitted.map_or(Vector3::repeat(f64::NAN), |(theta, _)| angle(turn, &matrix_of(&theta)))
-        })
-        .collect();
+    let nan = Vector3::repeat(f64::NAN);
+    let held_out = turns.iter().enumerate().map(|(k, turn)| {
+        if turns.len() < 6 {
+            return nan;
+        }
+        // Without one turn A moves so little that the derivatives stay what they are.
+        let without = problem.equations(&linearised, excess, Some(k));
+        let step = problem.step(&without, &theta, 0.0);
+        step.map_or(nan, |step| angle(turn, &matrix_of(&(&theta + step))))
+    });
+    let held_out = held_out.collect();
     let mut parameters = DVector::zeros(12);
     parameters.rows_mut(0, 9).copy_from(&theta);
     Ok(Solution {

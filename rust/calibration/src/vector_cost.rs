@@ -1,7 +1,7 @@
 //! Vector cost: the direction of gravity in the body frame is known for every pose (paper A, eqs. 2, 6 and 7).
 
 use imufit_fit::normal_equations::NormalEquations;
-use nalgebra::{DMatrix, DVector, Matrix3xX, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
 
 use crate::CalibrationError;
 use crate::solution::{Form, Solution, excess_variance};
@@ -40,71 +40,102 @@ pub fn independent(items: &[Item], gravity: f64) -> usize {
     values.iter().filter(|v| **v > TURNED).count()
 }
 
+/// Share of the placement's variance that is allowed along gravity: a pose askew by an angle reads less by its square,
+/// and whatever else the model does not know must have some room.
+const ALONG: f64 = 1e-3;
+
 struct Problem<'a> {
     items: &'a [Item],
     form: Form,
     tilted: bool,
+    /// What the corrected reading of each item depends on, three rows each.
+    columns: Vec<Matrix3xX<f64>>,
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
     fn parameters(&self) -> usize {
         self.form.parameters() + if self.tilted { 2 } else { 0 }
     }
 
-    fn columns(&self, item: &Item) -> Matrix3xX<f64> {
-        let columns = self.form.columns(&item.reading, item.temperature);
-        if !self.tilted {
-            return columns;
+    fn new(items: &'a [Item], form: Form, tilted: bool) -> Self {
+        let columns = |item: &Item| {
+            let columns = form.columns(&item.reading, item.temperature);
+            if !tilted {
+                return columns;
+            }
+            let first = columns.ncols();
+            let mut columns = columns.resize_horizontally(first + 2, 0.0);
+            for (k, tilt) in item.tilt.iter().enumerate() {
+                columns.set_column(first + k, &-tilt);
+            }
+            columns
+        };
+        Self {
+            items,
+            form,
+            tilted,
+            columns: items.iter().map(columns).collect(),
         }
-        let first = columns.ncols();
-        let mut columns = columns.resize_horizontally(first + 2, 0.0);
-        for (k, tilt) in item.tilt.iter().enumerate() {
-            columns.set_column(first + k, &-tilt);
-        }
-        columns
     }
 
-    fn equations(&self, excess: f64, left_out: Option<usize>) -> NormalEquations {
+    /// Square root of an item's weight matrix: L^T with L L^T the inverse of its covariance.
+    ///
+    /// A pose that is placed askew by a small angle moves the target across gravity, not along it: what placement adds
+    /// to the noise has next to no part along gravity, so that scale and bias rest on what each axis reads when it is vertical.
+    fn root(item: &Item, excess: f64) -> Option<Matrix3<f64>> {
+        let up = item.target.normalize();
+        let across = Matrix3::identity() - up * up.transpose() * (1.0 - ALONG);
+        let noise = item.variance.map(|v| v.max(f64::MIN_POSITIVE));
+        let covariance = Matrix3::from_diagonal(&noise) + across * excess;
+        Some(covariance.try_inverse()?.cholesky()?.l().transpose())
+    }
+
+    fn roots(&self, excess: f64) -> Option<Vec<Matrix3<f64>>> {
+        self.items.iter().map(|item| Self::root(item, excess)).collect()
+    }
+
+    fn equations(&self, roots: &[Matrix3<f64>], left_out: Option<usize>) -> NormalEquations {
         let mut equations = NormalEquations::zeros(self.parameters());
-        for (_, item) in self.items.iter().enumerate().filter(|(k, _)| Some(*k) != left_out) {
-            let columns = self.columns(item);
-            for axis in 0..3 {
-                let weight = 1.0 / (item.variance[axis] + excess).max(f64::MIN_POSITIVE);
-                let row = columns.row(axis).transpose();
-                equations.gram.ger(weight, &row, &row, 1.0);
-                equations.right.axpy(weight * item.target[axis], &row, 1.0);
-                equations.square += weight * item.target[axis] * item.target[axis];
-                equations.n += 1.0;
-            }
+        for (k, item) in self.items.iter().enumerate().filter(|(k, _)| Some(*k) != left_out) {
+            let columns = roots[k] * &self.columns[k];
+            let target = roots[k] * item.target;
+            equations.gram.gemm_tr(1.0, &columns, &columns, 1.0);
+            equations.right.gemv_tr(1.0, &columns, &target, 1.0);
+            equations.square += target.norm_squared();
+            equations.n += 3.0;
         }
         equations
     }
 
-    fn solve(&self, excess: f64, left_out: Option<usize>) -> Option<(DVector<f64>, DMatrix<f64>, f64)> {
-        let equations = self.equations(excess, left_out);
+    /// Solution, covariance and condition number.
+    fn solve(&self, roots: &[Matrix3<f64>], left_out: Option<usize>) -> Option<(DVector<f64>, DMatrix<f64>, f64)> {
+        let equations = self.equations(roots, left_out);
         let solved = equations.solve(&DVector::zeros(self.parameters()))?;
         let covariance = solved.covariance();
         Some((solved.solution, covariance, equations.condition()))
     }
 
-    fn residual(&self, item: &Item, theta: &DVector<f64>) -> Vector3<f64> {
-        self.columns(item) * theta - item.target
+    fn residual(&self, k: usize, theta: &DVector<f64>) -> Vector3<f64> {
+        &self.columns[k] * theta - self.items[k].target
     }
 
-    fn squares(&self, theta: &DVector<f64>, excess: f64) -> f64 {
-        let weighted = |item: &Item| {
-            let r = self.residual(item, theta);
-            (0..3)
-                .map(|axis| r[axis] * r[axis] / (item.variance[axis] + excess).max(f64::MIN_POSITIVE))
-                .sum::<f64>()
-        };
-        self.items.iter().map(weighted).sum()
+    fn squares(&self, roots: &[Matrix3<f64>], theta: &DVector<f64>) -> f64 {
+        (0..self.items.len())
+            .map(|k| (roots[k] * self.residual(k, theta)).norm_squared())
+            .sum()
     }
 }
 
-/// Fits the correction by weighted linear least squares; `tilted` fits the table's tilt along with it.
-pub fn fit(items: &[Item], form: Form, tilted: bool, gravity: f64) -> Result<Solution, CalibrationError> {
-    let problem = Problem { items, form, tilted };
+/// Fits the correction by weighted linear least squares; `tilted` fits the table's tilt along with it,
+/// `leave_out` asks for the held-out errors.
+pub fn fit(
+    items: &[Item],
+    form: Form,
+    tilted: bool,
+    gravity: f64,
+    leave_out: bool,
+) -> Result<Solution, CalibrationError> {
+    let problem = Problem::new(items, form, tilted);
     let p = problem.parameters();
     let independent = independent(items, gravity);
     let finite = |item: &Item| {
@@ -125,16 +156,29 @@ pub fn fit(items: &[Item], form: Form, tilted: bool, gravity: f64) -> Result<Sol
         });
     }
     let freedom = (3 * items.len() - p) as f64;
-    let excess = excess_variance(freedom, 1e-6 * gravity * gravity, |excess| {
-        let (theta, ..) = problem.solve(excess, None)?;
-        Some(problem.squares(&theta, excess))
-    })
-    .ok_or(CalibrationError::Diverged)?;
-    let (theta, covariance, condition) = problem.solve(excess, None).ok_or(CalibrationError::Diverged)?;
-    let residuals = items.iter().map(|item| problem.residual(item, &theta)).collect();
+    let mut excess = 0.0;
+    let mut roots = problem.roots(excess).ok_or(CalibrationError::Diverged)?;
+    for _ in 0..20 {
+        let (theta, ..) = problem.solve(&roots, None).ok_or(CalibrationError::Diverged)?;
+        let squares = |excess| Some(problem.squares(&problem.roots(excess)?, &theta));
+        let next = excess_variance(freedom, 1e-6 * gravity * gravity, squares).ok_or(CalibrationError::Diverged)?;
+        let settled = (next - excess).abs() <= 1e-2 * next;
+        excess = next;
+        roots = problem.roots(excess).ok_or(CalibrationError::Diverged)?;
+        if settled {
+            break;
+        }
+    }
+    let (theta, covariance, condition) = problem.solve(&roots, None).ok_or(CalibrationError::Diverged)?;
+    let residuals = (0..items.len()).map(|k| problem.residual(k, &theta)).collect();
     let nan = Vector3::repeat(f64::NAN);
     let (mut held_out, mut held_out_length) = (Vec::new(), Vec::new());
     for (k, item) in items.iter().enumerate() {
+        if !leave_out {
+            held_out.push(nan);
+            held_out_length.push(f64::NAN);
+            continue;
+        }
         let others: Vec<Item> = items
             .iter()
             .enumerate()
@@ -142,10 +186,10 @@ pub fn fit(items: &[Item], form: Form, tilted: bool, gravity: f64) -> Result<Sol
             .map(|(_, item)| item.clone())
             .collect();
         let enough = self::independent(&others, gravity) == 4 && 3 * others.len() >= p;
-        let left_out = if enough { problem.solve(excess, Some(k)) } else { None };
+        let left_out = if enough { problem.solve(&roots, Some(k)) } else { None };
         // Past a tenfold condition the pose carried a parameter alone.
         if let Some((theta, ..)) = left_out.filter(|(.., c)| *c < 10.0 * condition) {
-            held_out.push(problem.residual(item, &theta));
+            held_out.push(problem.residual(k, &theta));
             let corrected = form.columns(&item.reading, item.temperature) * theta.rows(0, form.parameters());
             held_out_length.push(corrected.norm());
         } else {
@@ -171,7 +215,6 @@ mod tests {
     use super::*;
     use crate::affine::Affine;
     use crate::side::Side;
-    use nalgebra::Matrix3;
 
     const G: f64 = 9.80665;
 
@@ -203,7 +246,7 @@ mod tests {
 
     #[test]
     fn six_exact_poses_give_the_twelve_parameters() {
-        let solution = fit(&six(), Form::FULL, false, G).expect("determined");
+        let solution = fit(&six(), Form::FULL, false, G, true).expect("determined");
         assert!((solution.affine().matrix - truth().matrix).norm() < 1e-10);
         assert!((solution.affine().offset - truth().offset).norm() < 1e-10);
         assert!(solution.excess.abs() < 1e-12);
@@ -216,7 +259,7 @@ mod tests {
         items.truncate(2);
         items.push(items[0].clone());
         items.push(items[1].clone());
-        let error = fit(&items, Form::FULL, false, G).expect_err("underdetermined");
+        let error = fit(&items, Form::FULL, false, G, true).expect_err("underdetermined");
         assert!(matches!(
             error,
             CalibrationError::Underdetermined {
@@ -251,7 +294,7 @@ mod tests {
                 });
             }
         }
-        let solution = fit(&items, Form::FULL, true, G).expect("determined");
+        let solution = fit(&items, Form::FULL, true, G, true).expect("determined");
         assert!((solution.parameters[12] - tilt[0]).abs() < 1e-9);
         assert!((solution.parameters[13] - tilt[1]).abs() < 1e-9);
         assert!((solution.affine().matrix - truth().matrix).norm() < 1e-9);

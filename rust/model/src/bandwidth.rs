@@ -120,6 +120,11 @@ impl Bandwidth {
         Self::new(false, 2)
     }
 
+    /// For the first derivative of a vector that stands in the window as its position.
+    pub fn of_reading() -> Self {
+        Self::new(false, 1)
+    }
+
     fn new(of_attitude: bool, order: usize) -> Self {
         Self {
             of_attitude,

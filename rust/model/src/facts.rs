@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::smoothing::Smoothing;
+use crate::smoothing::{NARROWEST, Smoothing};
+use crate::window::Window;
 
 /// Rows before a window that a whitening filter may look back on.
 pub const LOOKBACK: usize = 128;
@@ -51,7 +52,57 @@ pub struct LogFacts {
     pub reference_dt: f64,
 }
 
+/// Mean of the finite values; NaN without any.
+fn mean(values: &[f64]) -> f64 {
+    let known = || values.iter().filter(|v| v.is_finite());
+    known().sum::<f64>() / known().count() as f64
+}
+
 impl LogFacts {
+    /// Facts of a log of which only the readings count: nothing is known of its reference. `window` is the whole log; means that are not
+    /// given are taken from it.
+    pub fn without_reference(
+        window: &Window,
+        covariates: Vec<String>,
+        covariate_means: &[Option<f64>],
+        temperature_mean: Option<f64>,
+    ) -> Self {
+        let (t_start, t_end) = (
+            window.t.first().copied().unwrap_or_default(),
+            window.t.last().copied().unwrap_or_default(),
+        );
+        let has_temperature = window.temperature.is_some_and(|t| t.iter().any(|v| v.is_finite()));
+        let steps = window.len().saturating_sub(1).max(1) as f64;
+        let dt = (t_end - t_start) / steps;
+        let given = |k: usize| covariate_means.get(k).copied().flatten();
+        Self {
+            n: window.len(),
+            t_start,
+            t_end,
+            dt,
+            gravity: Vector3::zeros(),
+            field: Vector3::zeros(),
+            field_estimated: false,
+            temperature_mean: temperature_mean.unwrap_or_else(|| window.temperature.map_or(f64::NAN, mean)),
+            covariate_means: window
+                .covariates
+                .iter()
+                .enumerate()
+                .map(|(k, c)| given(k).unwrap_or_else(|| mean(c)))
+                .collect(),
+            covariates,
+            sensors: window.readings.map(|r| r.is_some()),
+            sensor_dt: [dt; 3],
+            has_temperature,
+            attitude_smoothing: NARROWEST,
+            position_smoothing: None,
+            attitude_columns: NARROWEST,
+            position_columns: None,
+            still_axes: [false; 3],
+            reference_dt: dt,
+        }
+    }
+
     /// Rows around a window that its derivatives, held columns and whitening filters may need.
     pub fn margin(&self) -> usize {
         let widths = [

@@ -7,6 +7,7 @@ pub mod bandwidth;
 pub mod card;
 pub mod catalogue;
 pub mod contract;
+pub mod correction;
 pub mod effect;
 pub mod effects;
 pub mod facts;

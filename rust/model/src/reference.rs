@@ -204,6 +204,19 @@ impl<'a> LocalReference<'a> {
         Some(smoothing::apply(weights, &self.values))
     }
 
+    /// First derivative of the position around `at`, the others not being worked out.
+    pub fn position_rate(&mut self, at: f64, s: Smoothing) -> Option<[f64; 3]> {
+        let (first, last) = self.positions(at, s.half_width)?;
+        let weights = self.cache.get(&self.knots.t[first..last], at, s.degree)?;
+        let mut rate = [0.0; 3];
+        for (w, v) in weights[1].iter().zip(&self.values) {
+            for axis in 0..3 {
+                rate[axis] += w * v[axis];
+            }
+        }
+        Some(rate)
+    }
+
     /// A fit around `at` with its values, for judging how wide the polynomial may be.
     pub fn local_fit(&mut self, at: f64, s: Smoothing, of_attitude: bool) -> Option<(LocalFit, Vec<[f64; 3]>)> {
         let (first, last) = if of_attitude {

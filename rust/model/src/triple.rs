@@ -36,6 +36,12 @@ impl Triple {
         Vector3::new(self.0[0][i], self.0[1][i], self.0[2][i])
     }
 
+    /// Some of the rows.
+    #[must_use]
+    pub fn part(&self, rows: &std::ops::Range<usize>) -> Self {
+        Self(std::array::from_fn(|axis| self.0[axis][rows.clone()].to_vec()))
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.0[0].len()

@@ -228,7 +228,9 @@ fn vectors(rows: &Rows<'_, 3>) -> PyResult<Vec<Vector3<f64>>> {
 ///
 /// `tilt` (n, 6) has the targets' change by a tilt of the table about its x and its y axis; with it the tilt is fitted.
 #[pyfunction]
-#[pyo3(signature = (readings, variances, targets, gravity, tilt=None, temperature=None, scale_temperature=false))]
+#[pyo3(signature = (
+    readings, variances, targets, gravity, tilt=None, temperature=None, scale_temperature=false, leave_out=true
+))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of one Python call
 fn vector_calibration<'py>(
     py: Python<'py>,
@@ -239,6 +241,7 @@ fn vector_calibration<'py>(
     tilt: Option<&Bound<'py, PyAny>>,
     temperature: Option<&Bound<'py, PyAny>>,
     scale_temperature: bool,
+    leave_out: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let readings = Rows::<3>::new("readings", readings)?;
     let n = readings.len();
@@ -268,7 +271,7 @@ fn vector_calibration<'py>(
         ..Form::FULL
     };
     let solution = py
-        .detach(|| vector_cost::fit(&items, form, tilts.is_some(), gravity))
+        .detach(|| vector_cost::fit(&items, form, tilts.is_some(), gravity, leave_out))
         .map_err(|error| from_calibration(py, error))?;
     solution_dict(py, &solution, &solution.affine())
 }
@@ -280,7 +283,8 @@ fn vector_calibration<'py>(
 /// and bias alone are fitted.
 #[pyfunction]
 #[pyo3(signature = (
-    readings, groups, length, variances=None, up=None, temperature=None, scale_temperature=false, misalignment=true
+    readings, groups, length, variances=None, up=None, temperature=None, scale_temperature=false, misalignment=true,
+    leave_out=true
 ))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of one Python call
 fn magnitude_calibration<'py>(
@@ -293,6 +297,7 @@ fn magnitude_calibration<'py>(
     temperature: Option<&Bound<'py, PyAny>>,
     scale_temperature: bool,
     misalignment: bool,
+    leave_out: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let readings = Rows::<3>::new("readings", readings)?;
     let n = readings.len();
@@ -330,7 +335,7 @@ fn magnitude_calibration<'py>(
         Weighing::Readings
     };
     let solution = py
-        .detach(|| norm_cost::fit(&items, form, ups.is_some(), length, weighing))
+        .detach(|| norm_cost::fit(&items, form, ups.is_some(), length, weighing, leave_out))
         .map_err(|error| from_calibration(py, error))?;
     solution_dict(py, &solution, &solution.affine())
 }

@@ -5,6 +5,7 @@ use imufit_filters::FilterError;
 use imufit_model::effect::EffectError;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// The text of a core error as a `ValueError`.
 pub fn value_error(message: impl std::fmt::Display) -> PyErr {
@@ -27,6 +28,17 @@ pub fn input_error(py: Python<'_>, problem: impl std::fmt::Display) -> PyErr {
         .import("imufit.errors")
         .and_then(|m| m.getattr("InputError")?.call1((problem.to_string(),)));
     made.map_or_else(|error| error, PyErr::from_value)
+}
+
+/// An `imufit.errors.InputError` that names a row.
+pub fn input_error_in_row(py: Python<'_>, problem: impl std::fmt::Display, row: usize) -> PyErr {
+    let made = || {
+        let place = PyDict::new(py);
+        place.set_item("row", row)?;
+        let class = py.import("imufit.errors")?.getattr("InputError")?;
+        class.call((problem.to_string(),), Some(&place))
+    };
+    made().map_or_else(|error: PyErr| error, PyErr::from_value)
 }
 
 /// An error of an effect; a user's own exception comes out as it went in.

@@ -4,6 +4,7 @@
 mod arrays;
 mod attitude;
 mod calibration;
+mod correction;
 mod errors;
 mod filters;
 mod fit;
@@ -21,6 +22,7 @@ fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     calibration::register(m)?;
     filters::register(m)?;
     model::register(m)?;
+    correction::register(m)?;
     fit::register(m)?;
     inference::register(m)?;
     Ok(())

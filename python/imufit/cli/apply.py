@@ -1,0 +1,55 @@
+"""``imufit apply``: readings corrected with a model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import (
+    EXISTING,
+    LOG_ENDINGS,
+    OutputFile,
+    effects_from_option,
+    json_option,
+    keep_inputs,
+    log_argument,
+)
+from imufit.cli.output import Output
+
+
+@click.command(short_help="A log with the model's effects taken out of its readings.")
+@click.argument("model", metavar="MODEL", type=EXISTING)
+@log_argument
+@effects_from_option
+@click.option(
+    "-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="OUT", help="Write the corrected log."
+)
+@json_option
+def apply(model: Path, log: Path, *, mapping: tuple[str, ...], output: Path, json_file: Path | None) -> None:
+    """Take the effects of MODEL out of the readings of LOG; rows and all other columns stay as they are."""
+    from imufit.figures import quantity  # noqa: PLC0415
+    from imufit.results import Table  # noqa: PLC0415
+
+    keep_inputs([model, log], [output, json_file])
+    out = Output(json_file)
+    stack = engine.sensor_model(path=model)
+    recorded = engine.read_log(log, mapping)
+    corrected = stack.apply(recorded)
+    changes = engine.changes(recorded, corrected)
+    out.say(f"{corrected.n} rows: {' + '.join(stack.effects) or 'no effect'} taken out.", bold=True)
+    rows = tuple(
+        (
+            name,
+            str(change["n"]),
+            quantity.quantity(change["rms"], change["unit"]),
+            quantity.quantity(change["max"], change["unit"]),
+        )
+        for name, change in changes.items()
+    )
+    out.table(Table("Change of the readings", ("sensor", ">samples", ">RMS", ">largest"), rows))
+    out.say(*(f"Note: {note}." for note in corrected.notes))
+    engine.write_log(corrected, output)
+    out.wrote(output)
+    out.json({"n": corrected.n, "model": list(stack.effects), "change": changes, "notes": list(corrected.notes)})

@@ -1,0 +1,79 @@
+"""A sensor model the other way round: readings of a log with the model's effects taken out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from imufit import _imufit
+from imufit.errors import InputError
+from imufit.fit.passes import chunk_arrays, covariate_names
+from imufit.log import Log, LogSource
+from imufit.log.log import concatenate
+
+if TYPE_CHECKING:
+    from imufit.model.sensor_model import SensorModel
+
+READ_ROWS = 65536
+SENSORS = ("acc", "gyr", "mag")
+
+
+def apply(model: SensorModel, log: LogSource) -> Log:
+    """Return the log with corrected readings; see :meth:`imufit.SensorModel.apply`.
+
+    Parameters
+    ----------
+    model : SensorModel
+        Effects and parameters.
+    log : Log or LogStream
+        Readings; a reference is not needed.
+    """
+    whole = log if isinstance(log, Log) else concatenate([chunk.core for chunk in log.chunks(READ_ROWS)])
+    if not whole.n:
+        return whole
+    (chunk,) = whole.chunks(whole.n)
+    covariates = covariate_names(whole)
+    means = model.constants.get("covariate_means", {})
+    kept = [(effect, values) for effect, values in model.stack() if not _imufit.concerns_reference(effect)]
+    try:
+        readings, lost = _imufit.correct_readings(
+            chunk_arrays(chunk, covariates),
+            kept,
+            covariates,
+            [means.get(name) for name in covariates],
+            model.constants.get("temperature_mean"),
+        )
+    except InputError as error:
+        wrong = "Add it to the log, or take the effect out of the model." if error.row is None else "Check the model."
+        remedy = error.remedy or wrong
+        raise InputError(error.problem, file=log.path, row=error.row, remedy=remedy) from None
+    notes = [*_left_alone(model, whole), *_lost(dict(zip(SENSORS, lost, strict=True)))]
+    acc, gyr, mag = (
+        getattr(whole, name) if values is None else values for name, values in zip(SENSORS, readings, strict=True)
+    )
+    return replace(whole, acc=acc, gyr=gyr, mag=mag, notes=(*whole.notes, *notes))
+
+
+def _left_alone(model: SensorModel, log: Log) -> list[str]:
+    """Say which effects of the model did nothing to the readings, and which means had to be taken from the log."""
+    notes = []
+    of_reference = [effect.id for effect, _ in model.stack() if _imufit.concerns_reference(effect)]
+    if of_reference:
+        notes.append(f"{' and '.join(of_reference)} left alone: of the reference, not of the readings")
+    for sensor in SENSORS:
+        of_sensor = [key for key in model.effects if key.startswith(f"{sensor}.") and key not in of_reference]
+        if of_sensor and getattr(log, sensor) is None:
+            notes.append(f"{' and '.join(of_sensor)} left alone: the log has no {sensor}")
+    on_temperature = [key for key in model.effects if key.endswith("_temperature")]
+    if on_temperature and "temperature_mean" not in model.constants and log.temp is not None:
+        notes.append(f"{' and '.join(on_temperature)}: the model has no temperature_mean, the log's own was taken")
+    return notes
+
+
+def _lost(lost: dict[str, int]) -> list[str]:
+    """Say how many samples could not be corrected."""
+    return [
+        f"{count} samples of {sensor} are NaN now: what an effect reads besides is not known there"
+        for sensor, count in lost.items()
+        if count
+    ]

@@ -1,0 +1,84 @@
+//! Corrected readings of a log.
+
+use std::sync::Arc;
+
+use imufit_model::correction::{CorrectionError, correct, of_reference};
+use imufit_model::effect::{Effect, EffectError};
+use imufit_model::facts::LogFacts;
+use imufit_model::triple::Triple;
+use numpy::{PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::errors::{from_effect, input_error, input_error_in_row};
+use crate::model::PyEffect;
+use crate::window::ChunkArrays;
+
+/// Corrected readings (n, 3) or None for each of acc, gyr and mag, and how many samples of each were lost.
+type Corrections<'py> = (Vec<Option<Bound<'py, PyArray2<f64>>>>, [usize; 3]);
+
+fn table<'py>(py: Python<'py>, x: &Triple) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let array = PyArray2::zeros(py, [x.len(), 3], false);
+    let mut rows = array.try_readwrite()?;
+    for (i, row) in rows.as_slice_mut()?.chunks_exact_mut(3).enumerate() {
+        for (axis, value) in row.iter_mut().enumerate() {
+            *value = x.axis(axis)[i];
+        }
+    }
+    drop(rows);
+    Ok(array)
+}
+
+fn from_correction(py: Python<'_>, error: CorrectionError) -> PyErr {
+    match error {
+        CorrectionError::Effect(error @ EffectError::MissingColumn { .. }) => input_error(py, error),
+        CorrectionError::Effect(error) => from_effect(error),
+        CorrectionError::Singular { row, .. } | CorrectionError::Unreached { row, .. } => {
+            input_error_in_row(py, &error, row)
+        }
+        CorrectionError::Lacking { .. } | CorrectionError::Restless { .. } => input_error(py, error),
+    }
+}
+
+/// Undoes effects, each with its parameters, on all rows of a chunk, which is a whole log.
+///
+/// `covariates` names the chunk's covariates; means that are None are those of the log.
+#[pyfunction]
+#[pyo3(signature = (chunk, effects, covariates, covariate_means, temperature_mean=None))]
+fn correct_readings<'py>(
+    py: Python<'py>,
+    chunk: &Bound<'py, PyDict>,
+    effects: Vec<(PyRef<'_, PyEffect>, Vec<f64>)>,
+    covariates: Vec<String>,
+    covariate_means: Vec<Option<f64>>,
+    temperature_mean: Option<f64>,
+) -> PyResult<Corrections<'py>> {
+    let effects: Vec<(Arc<dyn Effect>, Vec<f64>)> = effects.iter().map(|(e, p)| (e.0.clone(), p.clone())).collect();
+    let arrays = ChunkArrays::new(chunk)?;
+    let window = arrays.window()?;
+    let corrected = py
+        .detach(|| {
+            let facts = LogFacts::without_reference(&window, covariates, &covariate_means, temperature_mean);
+            correct(&window, &facts, &effects)
+        })
+        .map_err(|error| from_correction(py, error))?;
+    let readings = corrected
+        .readings
+        .iter()
+        .map(|r| r.as_ref().map(|x| table(py, x)).transpose())
+        .collect::<PyResult<_>>()?;
+    Ok((readings, corrected.lost))
+}
+
+/// True if an effect says what is wrong with the reference, so that correcting a reading does not concern it.
+#[pyfunction]
+fn concerns_reference(effect: &PyEffect) -> bool {
+    of_reference(effect.0.as_ref())
+}
+
+/// Registers this file's part of the module.
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(correct_readings, m)?)?;
+    m.add_function(wrap_pyfunction!(concerns_reference, m)?)?;
+    Ok(())
+}
