@@ -11,7 +11,7 @@ sys.path.insert(0, str(ROOT / "docs"))
 
 import blocks  # noqa: E402  lies beside the documents
 
-PAGES = ("README.md", "docs/logs.md", "docs/own_effect.md")
+PAGES = ("README.md", "docs/logs.md", "docs/own_effect.md", "docs/calibration.md")
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -40,3 +40,15 @@ def test_the_picture_shows_what_its_script_draws(tmp_path):
     told = f"from {result.ratio_start:.2f} to {result.ratio_end:.2f} times the noise floor as five effects"
     assert len(result.steps) == 5
     assert told in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_pictures_of_a_calibration_are_drawn_from_what_the_page_says():
+    make = runpy.run_path(str(ROOT / "docs" / "pictures" / "make.py"))
+    page = " ".join((ROOT / "docs" / "calibration.md").read_text(encoding="utf-8").split())
+    for effect, values in make["SENSOR"].items():
+        assert f"--effect {effect}:{','.join(f'{name}={value:g}' for name, value in values.items())} " in page
+    for name in ("sides", "calibration"):
+        assert (ROOT / "docs" / "pictures" / f"{name}.png").stat().st_size < 150_000
+    turned = make["LYING"]
+    for up, axes in turned.items():
+        assert axes["xyz".index(up[1])] == up[0] + "z", "the named axis points up in the room"

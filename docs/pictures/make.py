@@ -1,14 +1,43 @@
-"""Draw the pictures of the documents: simulate a log with five effects and let the error fall.
+"""Draw the pictures of the documents: the error falling in a simulated log, the six sides, a calibration.
 
 python docs/pictures/make.py [FOLDER]
 """
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import imufit
+import numpy as np
+from imufit.figures.style import AXES, GREY, INK, PALE, new_figure
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 HIDDEN = ("acc.lever_arm", "acc.scale", "gyr.g_sensitivity", "gyr.bias_temperature", "mag.hard_iron")
+
+EDGES = np.array([1.5, 1.1, 0.5])
+"""Lengths of the drawn box along its x, y and z."""
+LYING = {
+    "+z": ("+x", "+y", "+z"),
+    "+x": ("+z", "+y", "-x"),
+    "-z": ("-x", "+y", "-z"),
+    "-x": ("-z", "+y", "+x"),
+    "+y": ("+x", "+z", "-y"),
+    "-y": ("+x", "-z", "+y"),
+}
+"""For each side that is up: where the box's x, y and z point in the room (x right, y away, z up)."""
+SENSOR = {
+    "acc.bias": {"x": 0.15, "y": -0.1, "z": 0.2},
+    "acc.scale": {"x": 0.02, "y": -0.015, "z": 0.01},
+    "acc.misalignment": {"xy": 0.01, "xz": -0.005},
+    "gyr.bias": {"x": 0.01, "y": -0.02, "z": 0.005},
+    "gyr.scale": {"x": 0.01, "y": -0.01, "z": 0.02},
+    "mag.hard_iron": {"x": 20.0, "y": -10.0, "z": 5.0},
+}
+"""What docs/calibration.md puts into its sensor."""
 
 
 def ladder() -> imufit.Ladder:
@@ -17,6 +46,67 @@ def ladder() -> imufit.Ladder:
     return imufit.ladder(log)
 
 
+def sides() -> "Figure":
+    """Draw a box on a table with each of its six sides up."""
+    figure = new_figure(9.0, 5.4)
+    grid = figure.add_gridspec(2, 3)
+    for place, up in enumerate(LYING):
+        _box(figure.add_subplot(grid[place // 3, place % 3]), up)
+    return figure
+
+
+def calibration() -> "Figure":
+    """Calibrate the sensor of docs/calibration.md."""
+    log = imufit.simulate.simulate("poses", SENSOR, duration=60.0, seed=1).to_log()
+    return imufit.calibrate.calibrate(log).plot(log)
+
+
+def _seen(point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Project a point of the room on the paper: what is further away lies further up and to the right."""
+    return np.array([point[0] + 0.40 * point[1], point[2] + 0.30 * point[1]])
+
+
+def _box(axes: "Axes", up: str) -> None:
+    room = {
+        sign + name: s * row
+        for sign, s in (("+", 1.0), ("-", -1.0))
+        for name, row in zip("xyz", np.eye(3), strict=True)
+    }
+    turned = np.stack([room[name] for name in LYING[up]], axis=1)
+    half = 0.5 * np.abs(turned @ EDGES)
+    floor = -half[2]
+    corners = [_seen(np.array([x, y, floor])) for x, y in ((-1.6, -1.1), (1.6, -1.1), (1.6, 1.1), (-1.6, 1.1))]
+    axes.fill(*np.transpose(corners), color=PALE, linewidth=0)
+    axes.plot(*np.transpose([corners[0], corners[1]]), color=GREY, linewidth=2.5, solid_capstyle="butt")
+    for k, sign, shade in ((1, -1.0, "#C9D3DA"), (2, 1.0, "#F7F9FA"), (0, 1.0, "#AEBBC4")):
+        i, j = [n for n in range(3) if n != k]
+        face = []
+        for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+            point = np.zeros(3)
+            point[k], point[i], point[j] = sign * half[k], a * half[i], b * half[j]
+            face.append(_seen(point))
+        axes.fill(*np.transpose(face), facecolor=shade, edgecolor=INK, linewidth=0.9)
+    for name, direction, edge in zip("xyz", turned.T, EDGES, strict=True):
+        tip, label = _seen((0.5 * edge + 0.60) * direction), _seen((0.5 * edge + 0.82) * direction)
+        axes.annotate(
+            "", tip, (0.0, 0.0),
+            arrowprops={"arrowstyle": "-|>", "color": AXES[name], "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
+        axes.text(*label, name, color=AXES[name], fontsize=13, weight="bold", ha="center", va="center")
+    axes.plot(0.0, 0.0, "o", color=INK, markersize=5)
+    axes.annotate("", (-2.35, -0.55), (-2.35, 0.55), arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.6})
+    axes.text(-2.2, 0.0, "g", color=INK, fontsize=12, style="italic", va="center")
+    reading = ", ".join(f"{9.8 * value:+.1f}" if value else "0" for value in turned[2])
+    axes.set_title(f"{up} up", fontsize=13, color=INK, weight="bold", pad=2)
+    axes.text(0.0, -2.05, f"reads {reading} m/s²", fontsize=10, color=INK, ha="center")
+    axes.set_xlim(-2.6, 2.4)
+    axes.set_ylim(-2.1, 1.75)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
 if __name__ == "__main__":
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     ladder().plot().savefig(folder / "ladder.png", dpi=110)
+    sides().savefig(folder / "sides.png", dpi=90)
+    calibration().savefig(folder / "calibration.png", dpi=90)
