@@ -109,8 +109,9 @@ def check_unit(poses: Sequence[Pose], gravity: float, file: object) -> None:
     counts = next((c for c in (16384, 8192, 4096, 2048, 1024) if abs(length / c - 1.0) < 0.2), None)
     if counts is not None:
         unit = f"{counts}LSB/g"
+    axes = ",".join(f"acc_{axis}=acc_{axis}[{unit}]" for axis in _AXES)
     remedy = (
-        f"It looks like {'raw counts: ' if counts else ''}{unit}: map it, e.g. --map acc_x=acc_x[{unit}]."
+        f"It looks like {'raw counts: ' if counts else ''}{unit}: map it, e.g. --map {axes}."
         if unit
         else "Give the unit in the mapping, e.g. --map acc_x=NAME[g]."
     )
@@ -194,11 +195,9 @@ def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
     same = [f"{a.number} and {b.number} ({a.name})" for a, b in repeated(poses)]
     doubled = f"; poses {', '.join(same[:3])} are the same" if same else ""
     if count == 1:
-        only = f"pose {poses[0].number} ({poses[0].name} up) is the only one"
-        problem = (
-            f"{only}: bias and tilt can't be separated" if len(poses) == 1 else f"all {len(poses)} poses are the same"
-        )
-        problem += "" if len(poses) == 1 else f" ({poses[0].name} up): bias and tilt can't be separated"
+        every = {1: f"pose {poses[0].number} ({poses[0].name} up) is the only one", 2: "both poses are the same"}
+        which = every.get(len(poses), f"all {len(poses)} poses are the same ({poses[0].name} up)")
+        problem = f"{which}: bias and tilt can't be separated"
         raise InputError(problem, file=str(file), remedy="Record at least six: each of the six sides up for 3 s.")
     if cost == "magnitude" and count < UNKNOWNS["magnitude"]:
         raise InputError(
@@ -261,10 +260,11 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
         if determined:
             extras["table_tilt"] = {"x": tilt[0], "y": tilt[1], "standard_errors": {"x": error[0], "y": error[1]}}
             shown = ", ".join(
-                f"{axis} {np.degrees(v):.2f} ± {np.degrees(e):.2f} deg"
+                f"{axis} {np.degrees(v):+.3f} ± {np.degrees(e):.3f} deg"
                 for axis, v, e in zip("xy", tilt, error, strict=True)
             )
-            remarks.append(f"The table is {'tilted' if tilted else 'level within the error'} (ref.tilt): {shown}.")
+            frame = "table" if targets.source == "sides" else "reference frame"
+            remarks.append(f"The {frame} is {'tilted' if tilted else 'level within the error'}: {shown}.")
     chosen, more = temperature.choose(lambda bias, scale: solve(tilted, bias, scale), 3 * len(poses) - 12 - 2 * tilted)
     remarks += more
     solution = solve(tilted, *chosen)
@@ -278,6 +278,11 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     residuals = np.linalg.norm(solution["residuals"], axis=1)
     lengths = np.linalg.norm(targets.readings + solution["residuals"], axis=1)
     remarks += _weak_axes(poses)
+    if _rms(lengths - gravity) > 1.5 * _rms(np.linalg.norm(readings, axis=1) - gravity) + 0.01:
+        remarks.append(
+            "The lengths got worse: a tilted table or a crooked side passes for misalignment. Record one log with the "
+            "gyro, so that headings are known, or nine attitudes for --cost magnitude."
+        )
     return _result("vector", readings, solution, gravity, lengths, residuals, remarks, extras, chosen)
 
 

@@ -67,10 +67,11 @@ def calibrate(
         raise InputError("there is no log to calibrate from")
     wanted = [name for name in sensors if any(getattr(log, name) is not None for log in given)]
     if not wanted:
+        columns = " nor ".join(f"{name}_x {name}_y {name}_z" for name in sensors)
         raise InputError(
-            f"none of the sensors {', '.join(sensors)} is there",
+            f"there is nothing to calibrate: the log has {'neither' if len(sensors) > 1 else 'no'} {columns}",
             file=str(given[0].path or "log"),
-            remedy="Check the log.",
+            remedy="Name the columns with --map.",
         )
     gravity = float(given[0].metadata.gravity)
     found, first = [], 1
@@ -126,7 +127,8 @@ class _Session:
             raise failures[0]
         if failures and cost is not None and "acc" not in sensors:
             raise failures[0]
-        self.notes += [f"Not calibrated: {error.problem}." for error in failures]
+        # What was left out is told once, below.
+        self.notes += [f"Not calibrated: {error.problem.split(' (pose ')[0]}." for error in failures]
         self._name_left_out()
         effects = {effect: values for sensor in sensors.values() for effect, values in sensor.effects.items()}
         errors = {effect: values for sensor in sensors.values() for effect, values in sensor.standard_errors.items()}
@@ -211,11 +213,14 @@ class _Session:
 
     def _from_motion(self, cost: str | None) -> SensorCalibration:
         reasons = "; ".join(f"pose {pose.number} ({pose.name}): {pose.reason}" for pose in self.poses[:3])
+        reasons += f"; and {len(self.poses) - 3} more" if len(self.poses) > 3 else ""
         never = f"no pose can be used ({reasons})" if reasons else "the sensor never lay still"
         failed = InputError(
             never,
             file=self.file,
-            remedy="Lay each of the six sides up and keep the sensor still for 3 s each.",
+            remedy="Choose a wider range of the sensor."
+            if all("saturated" in pose.reason for pose in self.poses) and self.poses
+            else "Lay each of the six sides up and keep the sensor still for 3 s each.",
         )
         acc = np.concatenate([log.acc[~np.isnan(log.acc).any(axis=1)] for log in self.logs if log.acc is not None])
         if self.labelled or cost == "vector" or len(acc) < 1000:

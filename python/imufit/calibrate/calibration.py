@@ -14,7 +14,7 @@ from imufit.errors import InputError
 from imufit.figures import quantity
 from imufit.model.sensor_model import SensorModel
 from imufit.results.json_value import json_value
-from imufit.results.parameter import parameter_frame, parameter_table
+from imufit.results.parameter import by_effect, parameter_frame, parameter_table
 from imufit.results.table import Table, html, page
 
 if TYPE_CHECKING:
@@ -166,8 +166,10 @@ class SensorCalibration:
         if not np.isfinite(self.before):
             return f"{name}: bias from {self.items} rest{'s' if self.items != 1 else ''}."
         shown = [quantity.quantity(value, self.error_unit) for value in (self.before, self.after, self.held_out)]
-        left_out = shown[2] if np.isfinite(self.held_out) else "not to be had"
-        return f"{name}: {what} {shown[0]} before, {shown[1]} after, on what the fit did not see {left_out} (RMS)."
+        left_out = (
+            f"{shown[2]} on what the fit did not see" if np.isfinite(self.held_out) else "nothing could be left out"
+        )
+        return f"{name}: {what} {shown[0]} before, {shown[1]} after, {left_out} (RMS)."
 
 
 @dataclass(frozen=True)
@@ -255,6 +257,7 @@ class Calibration:
             else json_value({"before": acc.before, "after": acc.after, "held_out": acc.held_out}),
             "sensors": {name: sensor.to_dict() for name, sensor in self.sensors.items()},
             "model": list(self.model.effects),
+            "parameters": by_effect(self.model.listed()),
             "verdict": self.verdict,
         }
 
@@ -271,7 +274,7 @@ class Calibration:
         rows = tuple(
             (
                 str(pose.number),
-                pose.name,
+                pose.shown,
                 f"{pose.t_start:.1f} to {pose.t_end:.1f} s",
                 str(pose.n),
                 f"{np.linalg.norm(pose.mean):.4f}",
@@ -339,7 +342,7 @@ class Calibration:
                     pose.log,
                     pose.t_start,
                     pose.t_end,
-                    pose.name,
+                    pose.shown,
                     pose.used,
                     pose.reason,
                     float(np.linalg.norm(pose.mean)),

@@ -13,6 +13,9 @@ from imufit.calibrate.poses import SAME_DIRECTION, SIDES
 
 Array = NDArray[np.float64]
 
+NEARLY = 5.0
+"""Scatter over what is allowed below which a hand is trying to hold still."""
+
 
 @dataclass(frozen=True)
 class Advice:
@@ -95,7 +98,7 @@ class PoseGuide:
             judged["progress"],
             self._ordered(side),
             accepted,
-            self._message(judged["state"], side, judged["progress"], refused),
+            self._message(judged["state"], side, judged["progress"], judged["unrest"], refused),
         )
 
     def finish(self) -> str | None:
@@ -127,17 +130,17 @@ class PoseGuide:
             return self.missing
         return tuple(sorted(self.missing, key=lambda s: (s != side, s[1] == side[1])))
 
-    def _message(self, state: str, side: str | None, progress: float, refused: str) -> str:
+    def _message(self, state: str, side: str | None, progress: float, unrest: float, refused: str) -> str:
         if refused:
             return refused
         if self.complete:
             return "All six sides are known."
         wanted = self._ordered(side)[0]
+        if state == "moving":
+            return f"{side} up: hold still." if side in self.missing and unrest < NEARLY else f"Turn {wanted} up."
         if side in self.missing:
             if state == "held":
                 rest = [s for s in self._ordered(side) if s != side]
                 return f"{side} up: done. " + (f"Turn {rest[0]} up." if rest else "Pick it up.")
-            if state == "settling":
-                return f"{side} up: hold still, {100 * progress:.0f} %."
-            return f"{side} up: hold still."
+            return f"{side} up: hold still, {100 * progress:.0f} %."
         return f"Turn {wanted} up."

@@ -81,22 +81,22 @@ def find_turns(
     step = float(np.median(np.diff(log.t))) if log.n > 1 else np.nan
     clipped = _clipped(gyr)
     spans: list[_Span | None] = []
-    left_out: list[str] = []
+    left_out: list[tuple[str, str]] = []
     for before, after in itertools.pairwise(poses):
         first, last = before.rows[1], after.rows[0]
         rows = slice(first, last + 1)
-        name = f"The turn from {before.t_end:.1f} to {after.t_start:.1f} s is left out"
+        span = f"{before.t_end:.1f} to {after.t_start:.1f} s"
         seen = ~np.isnan(gyr[rows, 0])
         times = log.t[rows][seen]
         spans.append(None)
         if before.rate is None or after.rate is None or last - first < 3:
             continue
         if log.t[last] - log.t[first] > LONGEST:
-            left_out.append(f"{name}: {log.t[last] - log.t[first]:.0f} s are too long.")
+            left_out.append(("too long", span))
         elif times.size < 3 or float(np.max(np.diff(times))) > max(5.0 * step, 0.05):
-            left_out.append(f"{name}: there is a gap in the readings.")
+            left_out.append(("with a gap in the readings", span))
         elif np.any(clipped[rows]):
-            left_out.append(f"{name}: the gyro reached the end of its range (turn more slowly).")
+            left_out.append(("at the end of the gyro's range (turn more slowly)", span))
         else:
             up = [_up(pose, acc, temperature_mean) for pose in (before, after)]
             time = float(log.t[last] - log.t[first])
@@ -104,7 +104,16 @@ def find_turns(
             wander = float(np.mean(np.concatenate([before.rate_variance, after.rate_variance]))) * time**2 / 2
             variance = direction + noise**2 * step * time + wander
             spans[-1] = (first, last, before.rate.tolist(), after.rate.tolist(), up[0], up[1], variance)
-    return Turns(log, tuple(spans), tuple(left_out))
+    return Turns(log, tuple(spans), _told_once(left_out))
+
+
+def _told_once(left_out: Sequence[tuple[str, str]]) -> tuple[str, ...]:
+    """One sentence for each reason, with the times of its turns."""
+    reasons = dict.fromkeys(reason for reason, _ in left_out)
+    return tuple(
+        f"Turns left out, {reason}: {', '.join(span for other, span in left_out if other == reason)}."
+        for reason in reasons
+    )
 
 
 def _up(pose: Pose, acc: SensorCalibration | None, mean: float) -> list[float]:
@@ -168,13 +177,20 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
             tuple(remarks),
         )  # fmt: skip
     gain, gain_error = np.array(told["model_gain"]), np.array(told["model_gain_error"])
-    scale = np.array(told["scale"])
     unsure = [_AXES[i] for i in range(3) if gain_error[i, i] > TOLD]
-    loose = [name for name, k in zip(_OFF, itertools.permutations(range(3), 2), strict=True) if gain_error[k] > TOLD]
+    open_elements = gain_error > TOLD
+    # What the turns leave open stays as the maker meant it: a guess must not get into the model.
+    gain[open_elements], gain_error[open_elements] = 0.0, 0.0
+    matrix = np.linalg.inv(np.eye(3) + gain)
+    scale = np.diag(matrix)
+    misalignment_error = np.array(told["misalignment_error"])
+    misalignment_error[open_elements] = 0.0
+    scale_error = np.where(np.diag(open_elements), 0.0, told["scale_error"])
+    loose = [name for name, k in zip(_OFF, itertools.permutations(range(3), 2), strict=True) if open_elements[k]]
     if unsure:
         remarks.append(
-            f"The turns do not tell the gyro's scale of {' and '.join(unsure)}: turn it about that axis while the axis "
-            "is level."
+            f"The turns do not tell the gyro's scale of {', '.join(unsure)}: turn it about that axis while the axis is "
+            "level."
         )
     if loose:
         remarks.append(f"The turns do not tell the gyro's misalignment {' '.join(loose)}.")
@@ -183,6 +199,8 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
     left_out = held_out[np.isfinite(held_out)]
     before, after = _rms(told["before"]), _rms(told["residuals"][:, 0])
     worse = left_out.size and _rms(left_out) > before
+    if told["freedom"] < 1.0:
+        remarks.append(f"{len(told['before'])} turns have no equation to spare: nothing checks the gyro's calibration.")
     if worse:
         remarks.append("The turns do not support a scale or misalignment of the gyro: only its bias is kept.")
     else:
@@ -194,11 +212,11 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
     return SensorCalibration(
         sensor="gyr",
         cost="rest" if worse else "turns",
-        misalignment=np.eye(3) if worse else np.array(told["misalignment"]),
+        misalignment=np.eye(3) if worse else matrix / scale,
         scale=np.ones(3) if worse else scale,
-        bias=-bias if worse else np.array(told["bias"]),
-        misalignment_error=nothing if worse else np.array(told["misalignment_error"]),
-        scale_error=np.zeros(3) if worse else np.array(told["scale_error"]),
+        bias=-bias if worse else -matrix @ bias,
+        misalignment_error=nothing if worse else misalignment_error,
+        scale_error=np.zeros(3) if worse else scale_error,
         bias_error=bias_error,
         unit="rad/s",
         before=before,

@@ -53,7 +53,7 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
     found = _imufit.sphere(readings) if len(readings) >= 30 else None
     if found is None:
         raise InputError(
-            f"the magnetometer was hardly turned: {len(readings)} different readings",
+            f"the magnetometer was hardly turned: {len(readings)} of its readings differ",
             file=name,
             column="mag_x",
             remedy=remedy,

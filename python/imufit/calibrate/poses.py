@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
+HOLD = 0.6
+"""Shortest pose, s."""
 SAME_DIRECTION = np.radians(8.0)
 """Poses nearer to each other than this (rad) show gravity from the same side."""
 
@@ -84,6 +86,16 @@ class Pose:
     def name(self) -> str:
         """Its label, or the side that is up by the readings."""
         return self.label or self.side
+
+    @property
+    def shown(self) -> str:
+        """Its name, for an oblique pose with the angle (degrees) between that axis and the vertical."""
+        return self.name if self.off_deg < 12.0 else f"{self.name} {self.off_deg:.0f}°"
+
+    @property
+    def off_deg(self) -> float:
+        """Angle between the nearest axis and the vertical by the readings, degrees."""
+        return float(np.degrees(np.arccos(min(1.0, float(np.max(np.abs(self.direction)))))))
 
     @property
     def direction(self) -> Array:
@@ -161,8 +173,11 @@ def find_poses(
     labels = side_numbers(log)
     # With a reference attitude every rest is known, labelled or not.
     named = labels if labelled_only and log.ref_q is None else None
-    rests = _imufit.find_rests(log.t, log.acc, log.gyr, named, dict(settings or {}))
-    poses = [_pose(found, log, labels, index, first + k) for k, found in enumerate(rests["poses"])]
+    rests = _imufit.find_rests(log.t, log.acc, log.gyr, named, {"hold": HOLD, **(settings or {})})
+    hold = float((settings or {}).get("hold", HOLD))
+    poses = [
+        _pose(found, log, labels, index=index, number=first + k, hold=hold) for k, found in enumerate(rests["poses"])
+    ]
     noise = [rests["acc_noise"], rests["gyr_noise"]]
     acc_noise, gyr_noise = (np.nan if value is None else value for value in noise)
     return Found(tuple(_saturated(poses, log.acc)), labels is not None, acc_noise, gyr_noise)
@@ -199,7 +214,7 @@ def side_numbers(log: Log) -> Array | None:
     return numbers if np.any(numbers >= 0.0) else None
 
 
-def _pose(found: Any, log: Log, labels: Array | None, index: int, number: int) -> Pose:
+def _pose(found: Any, log: Log, labels: Array | None, *, index: int, number: int, hold: float) -> Pose:
     first, last = found["rows"]
     label = None if found["label"] is None else SIDES[found["label"]]
     if label is None and labels is not None and labels[first] >= 0 and labels[first] == labels[last]:
@@ -226,12 +241,12 @@ def _pose(found: Any, log: Log, labels: Array | None, index: int, number: int) -
         label=label,
         attitude=_attitude(log, rows),
     )
-    return pose if found["flaw"] is None else pose.without(_flaw(*found["flaw"]))
+    return pose if found["flaw"] is None else pose.without(_flaw(*found["flaw"], hold))
 
 
-def _flaw(kind: str, value: float) -> str:
+def _flaw(kind: str, value: float, hold: float) -> str:
     if kind == "short":
-        return f"still for {value:.1f} s only: too short"
+        return f"still for {value:.1f} s, {hold:.1f} s are asked for: too short"
     if kind == "crept":
         return f"moved by {np.degrees(value):.1f} deg while it should have been still"
     return f"not still: the readings scatter by {value:.2g} m/s²"

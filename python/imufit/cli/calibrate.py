@@ -26,7 +26,9 @@ from imufit.cli.output import Output
     multiple=True,
     help="Calibrate this sensor only. Repeatable.",
 )
-@click.option("--hold", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="Shortest pose, s.")
+@click.option(
+    "--hold", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="Shortest pose, s (default 0.6)."
+)
 @model_output
 @json_option
 @plot_option

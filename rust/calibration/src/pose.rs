@@ -181,6 +181,9 @@ impl Sums {
     }
 }
 
+/// Share of the creep that is forgiven to a pose that ended by drifting away: a slow turn is no row of short poses.
+const DRIFT: f64 = 0.2;
+
 /// A pose in the making.
 #[derive(Clone, Debug)]
 pub struct OpenPose {
@@ -257,7 +260,8 @@ impl OpenPose {
     }
 
     /// The pose, judged, without the tails of movements at its ends; `None` if nothing was read.
-    pub fn close(mut self, criteria: &Criteria, label: Option<Side>) -> Option<Pose> {
+    /// `drifted`: it ended because the direction had left the mean, so that less is forgiven.
+    pub fn close(mut self, criteria: &Criteria, label: Option<Side>, drifted: bool) -> Option<Pose> {
         for span in [self.rate.calm(), self.force.calm()].into_iter().flatten() {
             self.force.within(span);
             self.rate.within(span);
@@ -276,7 +280,14 @@ impl OpenPose {
         } else {
             self.force
                 .creep(&whole)
-                .filter(|(angle, error)| *angle > criteria.creep.max(5.0 * error))
+                .filter(|(angle, error)| {
+                    let forgiven = if drifted {
+                        DRIFT * criteria.creep
+                    } else {
+                        criteria.creep
+                    };
+                    *angle > forgiven.max(5.0 * error)
+                })
                 .map(|(angle, _)| Flaw::Crept(angle))
         };
         self.knocks
@@ -325,6 +336,7 @@ mod tests {
                     ..Criteria::default()
                 },
                 None,
+                false,
             )
             .expect("readings");
         let white = closed.deviation.map(|d| d * d) / closed.n as f64;
@@ -350,7 +362,7 @@ mod tests {
             ..Criteria::default()
         };
         assert!(
-            matches!(pose.close(&criteria, None).expect("readings").flaw, Some(Flaw::Crept(a)) if (a - 0.015).abs() < 1e-3)
+            matches!(pose.close(&criteria, None, false).expect("readings").flaw, Some(Flaw::Crept(a)) if (a - 0.015).abs() < 1e-3)
         );
     }
 }

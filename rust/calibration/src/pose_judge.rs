@@ -199,11 +199,11 @@ impl PoseJudge {
                 pose.add_rate(t, rate);
             }
         }
-        self.close(pose)
+        self.close(pose, false)
     }
 
-    fn close(&self, pose: OpenPose) -> Option<Pose> {
-        pose.close(&self.criteria, self.label)
+    fn close(&self, pose: OpenPose, drifted: bool) -> Option<Pose> {
+        pose.close(&self.criteria, self.label, drifted)
     }
 
     /// A pause in the samples that ends a pose.
@@ -250,7 +250,7 @@ impl PoseJudge {
                 self.disturbed = Some(t);
             }
             let over = self.disturbed.is_some_and(|since| t - since > self.criteria.bridge);
-            return if over { self.close_disturbed() } else { None };
+            return if over { self.close_disturbed(false) } else { None };
         }
         let mean = self.force.mean();
         let disturbed = self.disturbed.is_some();
@@ -275,8 +275,8 @@ impl PoseJudge {
                 }
                 None
             }
-            (Some(false), _) => {
-                let closed = self.close_disturbed();
+            (Some(false), disturbed) => {
+                let closed = self.close_disturbed(disturbed.is_none());
                 self.open();
                 closed
             }
@@ -290,14 +290,14 @@ impl PoseJudge {
         }
     }
 
-    fn close_disturbed(&mut self) -> Option<Pose> {
+    fn close_disturbed(&mut self, drifted: bool) -> Option<Pose> {
         self.disturbed = None;
         let pose = self.pose.take()?;
         // A pose shorter than the window is the end of a movement that passed for stillness.
         if pose.duration() < self.criteria.window {
             return None;
         }
-        self.close(pose)
+        self.close(pose, drifted)
     }
 }
 

@@ -152,7 +152,7 @@ fn unsteady(readings: &Readings<'_>, first: usize, end: usize, label: Side, crit
     for row in (first..end).filter(finite) {
         pose.add(row, readings.t[row], readings.force(row));
     }
-    let mut pose = pose.close(criteria, Some(label))?;
+    let mut pose = pose.close(criteria, Some(label), false)?;
     if !matches!(pose.flaw, Some(Flaw::Short(_))) {
         let scatter = (pose.deviation.norm_squared() / 3.0).sqrt();
         pose.flaw = Some(Flaw::Unsteady(scatter));
