@@ -27,6 +27,8 @@ pub struct Turn {
 /// log does not have (about the vertical, say) and is far looser than what one turn tells.
 const SPREAD: f64 = 0.1;
 const ITERATIONS: usize = 30;
+/// Squared misfit per degree of freedom, in units of half a degree, below which no other sign of an axis is looked for.
+const RIGHT: f64 = 9.0;
 
 impl Turn {
     /// Rotation of the body from before to after, `x_before = R x_after`, and the derivative of its rotation vector
@@ -177,23 +179,26 @@ pub fn fit(turns: &[Turn]) -> Result<Solution, CalibrationError> {
     }
     let problem = Problem { turns };
     let freedom = (2.0 * turns.len() as f64 - 9.0).max(0.0);
+    // Before the excess is known a guess of half a degree keeps one bad turn from ruling.
+    let limit = 0.5_f64.to_radians().powi(2);
     let (mut start, mut best) = (DVector::zeros(9), f64::INFINITY);
     for flips in 0..8_u32 {
         let mut signs = DVector::zeros(9);
         for axis in 0..3 {
             signs[4 * axis] = if flips >> axis & 1 == 1 { -1.0 } else { 1.0 };
         }
-        let Some((theta, _)) = problem.minimise(&signs, 0.0, None) else {
+        let Some((theta, _)) = problem.minimise(&signs, limit, None) else {
             continue;
         };
-        let square = problem.square(&theta, &signs, 0.0, None);
-        // The right way round unless another is far better.
+        let square = problem.square(&theta, &signs, limit, None);
         if square < 0.2 * best {
             (start, best) = (signs, square);
         }
+        // A flipped axis misses by tens of degrees: what fits the right way round is not flipped, whatever fits better.
+        if best < RIGHT * freedom.max(1.0) {
+            break;
+        }
     }
-    // Before the excess is known a guess of half a degree keeps one bad turn from ruling.
-    let limit = 0.5_f64.to_radians().powi(2);
     let excess = excess_variance(freedom, limit, |excess| {
         let (theta, _) = problem.minimise(&start, excess, None)?;
         Some(problem.square(&theta, &start, excess, None))
