@@ -126,6 +126,8 @@ pub struct OpenPose {
     start: f64,
     last: usize,
     end: f64,
+    /// What was read before this time (s) is motion.
+    from: f64,
     force: Sums,
     rate: Sums,
     knocks: Vec<(usize, usize)>,
@@ -141,6 +143,7 @@ impl OpenPose {
             start,
             last: first,
             end: start,
+            from: start,
             force: Sums::default(),
             rate: Sums::default(),
             knocks: Vec::new(),
@@ -150,6 +153,9 @@ impl OpenPose {
 
     /// Adds a reading of the accelerometer.
     pub fn add(&mut self, row: usize, t: f64, force: Vector3<f64>) {
+        if t < self.from {
+            return;
+        }
         self.force.add(t, force);
         self.last = row;
         self.end = t;
@@ -157,7 +163,14 @@ impl OpenPose {
 
     /// Adds a reading of the gyro.
     pub fn add_rate(&mut self, t: f64, rate: Vector3<f64>) {
-        self.rate.add(t, rate);
+        if t >= self.from {
+            self.rate.add(t, rate);
+        }
+    }
+
+    /// Time of the last reading, s.
+    pub fn end(&self) -> f64 {
+        self.end
     }
 
     /// Leaves out what came since the last reading, a knock, and goes on at row `first`, time `start` (s).
@@ -172,6 +185,7 @@ impl OpenPose {
         }
         self.pause += (start - self.end).max(0.0);
         self.end = start;
+        self.from = start;
     }
 
     /// Mean specific force so far.

@@ -165,7 +165,7 @@ impl PoseJudge {
         closed = closed.or(now);
         let open = self.pose.as_ref().filter(|_| self.disturbed.is_none());
         let held = open.map_or(0.0, |p| {
-            let waiting = self.force.start().map_or(0.0, |s| t - s);
+            let waiting = self.force.start().map_or(0.0, |s| t - s.max(p.end()));
             let n = (p.n() + self.force.len()) as f64 / self.criteria.fewest as f64;
             ((p.duration() + waiting) / self.criteria.hold).min(n)
         });
@@ -269,9 +269,9 @@ impl PoseJudge {
             (Some(true), None) => None,
             (Some(true), Some(_)) => {
                 self.disturbed = None;
-                let start = self.rows.front().zip(self.force.start());
-                if let (Some(pose), Some((first, start))) = (self.pose.as_mut(), start) {
-                    pose.leave_out_until(*first, start);
+                let settled = self.settled();
+                if let (Some(pose), Some((first, start))) = (self.pose.as_mut(), settled) {
+                    pose.leave_out_until(first, start);
                 }
                 None
             }
@@ -284,10 +284,19 @@ impl PoseJudge {
     }
 
     fn open(&mut self) {
-        if let (Some(start), Some(first)) = (self.force.start(), self.rows.front()) {
-            self.pose = Some(OpenPose::new(*first, start));
+        if let Some((first, start)) = self.settled() {
+            self.pose = Some(OpenPose::new(first, start));
             self.disturbed = None;
         }
+    }
+
+    /// Row and time at which the stillness of the present window began: the last of a turn hardly adds to the window's
+    /// scatter, but to its mean.
+    fn settled(&self) -> Option<(usize, f64)> {
+        let by_force = self.force.time(self.force.tail())?;
+        let by_rate = self.rate.time(self.rate.tail()).unwrap_or(by_force);
+        let place = (0..self.force.len()).find(|k| self.force.time(*k) >= Some(by_force.max(by_rate)))?;
+        Some((*self.rows.get(place)?, self.force.time(place)?))
     }
 
     fn close_disturbed(&mut self) -> Option<Pose> {
