@@ -92,11 +92,16 @@ pub fn find(readings: &Readings<'_>, labels: Option<&[Option<Side>]>, criteria: 
         poses.extend(judge.step(readings.t[row], force, rate).closed);
     }
     end_segment(&mut judge, &mut poses, found, segment, n);
-    for pose in &mut poses {
-        for axis in 0..3 {
-            if let Some(step) = step[axis] {
-                pose.variance[axis] += quantisation::variance_of_mean(step, pose.deviation[axis]);
-            }
+    for axis in 0..3 {
+        let Some(step) = step[axis] else { continue };
+        // One pose's scatter depends on where its mean lies between two steps: all poses together tell the noise.
+        let still = poses.iter().filter(|pose| pose.flaw.is_none());
+        let (count, square) = still.fold((0.0, 0.0), |(n, sum), pose| {
+            (n + 1.0, sum + pose.deviation[axis].powi(2))
+        });
+        let noise = (square / f64::max(count, 1.0)).sqrt();
+        for pose in &mut poses {
+            pose.variance[axis] += quantisation::variance_of_mean(step, noise);
         }
     }
     if labels.is_none() {
