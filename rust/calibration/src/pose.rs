@@ -203,8 +203,13 @@ impl OpenPose {
         self.end - self.start - self.pause
     }
 
-    /// The pose, judged.
-    pub fn close(self, criteria: &Criteria, label: Option<Side>) -> Pose {
+    /// The pose, judged. One that `crept` away, or from another, without a disturbance may have crept by less itself.
+    pub fn close(self, criteria: &Criteria, label: Option<Side>, crept: bool) -> Pose {
+        let (creep, certain) = if crept {
+            (0.25 * criteria.creep, 3.0)
+        } else {
+            (criteria.creep, 5.0)
+        };
         let scatter = (self.force.deviation().norm_squared() / 3.0).sqrt();
         let allowed = criteria.acc_noise.map_or(criteria.ceiling.0, |noise| {
             (3.0 * noise).max(2.0 * criteria.floor.0).min(criteria.ceiling.0)
@@ -216,7 +221,7 @@ impl OpenPose {
         } else {
             self.force
                 .creep()
-                .filter(|(angle, error)| *angle > criteria.creep.max(5.0 * error))
+                .filter(|(angle, error)| *angle > creep.max(certain * error))
                 .map(|(angle, _)| Flaw::Crept(angle))
         };
         Pose {
@@ -258,6 +263,7 @@ mod tests {
                 ..Criteria::default()
             },
             None,
+            false,
         );
         let white = closed.deviation.map(|d| d * d) / closed.n as f64;
         assert!(closed.variance.x > 8.0 * white.x);
@@ -281,6 +287,6 @@ mod tests {
             creep: 0.005,
             ..Criteria::default()
         };
-        assert!(matches!(pose.close(&criteria, None).flaw, Some(Flaw::Crept(a)) if (a - 0.015).abs() < 1e-3));
+        assert!(matches!(pose.close(&criteria, None, false).flaw, Some(Flaw::Crept(a)) if (a - 0.015).abs() < 1e-3));
     }
 }

@@ -97,6 +97,8 @@ pub struct PoseJudge {
     /// Rows of the readings in the window, oldest first.
     rows: std::collections::VecDeque<usize>,
     label: Option<Side>,
+    /// Whether the open pose took over from one that ended without a disturbance, or ends so itself.
+    crept: bool,
 }
 
 impl PoseJudge {
@@ -112,6 +114,7 @@ impl PoseJudge {
             last: None,
             rows: std::collections::VecDeque::new(),
             label: None,
+            crept: false,
             criteria,
         }
     }
@@ -202,8 +205,9 @@ impl PoseJudge {
         Some(self.close(pose))
     }
 
-    fn close(&self, pose: OpenPose) -> Pose {
-        pose.close(&self.criteria, self.label)
+    fn close(&mut self, pose: OpenPose) -> Pose {
+        let crept = std::mem::take(&mut self.crept);
+        pose.close(&self.criteria, self.label, crept)
     }
 
     /// A pause in the samples that ends a pose.
@@ -263,6 +267,7 @@ impl PoseJudge {
         };
         match (self.pose.as_ref().map(same), self.disturbed) {
             (None, _) => {
+                self.crept = false;
                 self.open();
                 None
             }
@@ -276,8 +281,10 @@ impl PoseJudge {
                 None
             }
             (Some(false), _) => {
+                self.crept |= !disturbed;
                 let closed = self.close_disturbed();
                 self.open();
+                self.crept = !disturbed;
                 closed
             }
         }
@@ -310,6 +317,7 @@ impl PoseJudge {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pose::Flaw;
 
     struct Noise(u64);
 
@@ -391,6 +399,40 @@ mod tests {
     }
 
     #[test]
+    fn a_sensor_that_creeps_all_the_time_has_no_pose() {
+        let poses = run(
+            |t| {
+                let s = (0.2 * t).to_radians();
+                UP * s.cos() + SIDE * s.sin()
+            },
+            16.0,
+        );
+        assert!(poses.len() > 1, "{poses:#?}");
+        assert!(
+            poses
+                .iter()
+                .rev()
+                .skip(1)
+                .all(|p| matches!(p.flaw, Some(Flaw::Crept(_)))),
+            "{poses:#?}"
+        );
+    }
+
+    #[test]
+    fn a_rest_that_is_left_slowly_stays_a_pose() {
+        let poses = run(
+            |t| {
+                let s = 2.0 * (t - 6.0).clamp(0.0, 2.0).to_radians();
+                UP * s.cos() + SIDE * s.sin()
+            },
+            14.0,
+        );
+        assert_eq!(poses.first().map(|p| p.flaw.clone()), Some(None), "{poses:#?}");
+        assert!((poses[0].mean - UP).norm() < 0.01);
+        assert_eq!(poses.last().map(|p| p.flaw.clone()), Some(None), "{poses:#?}");
+    }
+
+    #[test]
     fn a_shaking_hand_is_no_pose() {
         let poses = run(|t| UP + SIDE * 0.05 * (20.0 * t).sin(), 10.0);
         assert!(poses.iter().all(|p| p.flaw.is_some()));
@@ -402,7 +444,7 @@ mod tests {
         let mut noise = Noise(3);
         let mut poses = Vec::new();
         for i in 0..1000 {
-            let t = i as f64 * 0.01 + if i >= 500 { 30.0 } else { 0.0 };
+            let t = f64::from(i) * 0.01 + if i >= 500 { 30.0 } else { 0.0 };
             let force = if i % 10 == 3 {
                 Vector3::repeat(f64::NAN)
             } else {

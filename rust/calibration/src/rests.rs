@@ -68,11 +68,11 @@ pub fn find(readings: &Readings<'_>, labels: Option<&[Option<Side>]>, criteria: 
     let end_segment =
         |judge: &mut PoseJudge, poses: &mut Vec<Pose>, found: usize, segment: Option<(usize, Side)>, end: usize| {
             poses.extend(judge.finish());
-            if let Some((first, label)) = segment
-                && poses.len() == found
-            {
+            let Some((first, label)) = segment else { return };
+            if poses.len() == found {
                 poses.extend(unsteady(readings, first, end, label, &criteria));
             }
+            moved(&mut poses[found..], criteria.creep);
         };
     for row in 0..n {
         let label = labels.and_then(|labels| labels[row]);
@@ -150,6 +150,24 @@ fn noise(
     Some(deviations[place] / low)
 }
 
+/// Poses of one labelled segment are one pose: where they point elsewhere the sensor moved, and none can be used.
+fn moved(poses: &mut [Pose], creep: f64) {
+    let still = poses.iter().any(|pose| pose.flaw.is_none());
+    let counts = |pose: &Pose| match pose.flaw {
+        None | Some(Flaw::Crept(_)) => true,
+        Some(Flaw::Short(_)) => !still,
+        Some(Flaw::Unsteady(_)) => false,
+    };
+    let means: Vec<_> = poses.iter().filter(|pose| counts(pose)).map(|pose| pose.mean).collect();
+    let angles = means.iter().flat_map(|a| means.iter().map(|b| a.angle(b)));
+    let angle = angles.fold(0.0, f64::max);
+    if angle > creep {
+        for pose in poses.iter_mut().filter(|pose| counts(pose)) {
+            pose.flaw = Some(Flaw::Crept(angle));
+        }
+    }
+}
+
 /// A labelled segment in which no rest was found: what it looks like.
 fn unsteady(readings: &Readings<'_>, first: usize, end: usize, label: Side, criteria: &Criteria) -> Option<Pose> {
     let mut pose = crate::pose::OpenPose::new(first, readings.t[first]);
@@ -160,7 +178,7 @@ fn unsteady(readings: &Readings<'_>, first: usize, end: usize, label: Side, crit
     if pose.n() == 0 {
         return None;
     }
-    let mut pose = pose.close(criteria, Some(label));
+    let mut pose = pose.close(criteria, Some(label), false);
     if !matches!(pose.flaw, Some(Flaw::Short(_))) {
         let scatter = (pose.deviation.norm_squared() / 3.0).sqrt();
         pose.flaw = Some(Flaw::Unsteady(scatter));
