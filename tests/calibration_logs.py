@@ -79,7 +79,7 @@ class Course:
     up: np.ndarray
 
 
-def course(  # noqa: PLR0914
+def course(
     poses: Sequence[str | Sequence[float]],
     *,
     hold: float = 2.0,

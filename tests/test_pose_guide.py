@@ -93,7 +93,7 @@ def test_pose_that_was_left_too_early_is_refused_with_its_time():
 
 
 def test_side_that_is_known_is_not_taken_twice():
-    guide, advice = guided(course(["+x", "+y", "+x", "+z"], hold=3.0))
+    _, advice = guided(course(["+x", "+y", "+x", "+z"], hold=3.0))
     assert [one.accepted for one in advice if one.accepted] == ["+x", "+y"]
     assert [one.message for one in advice if "known already" in one.message] == ["+x up is known already."]
 

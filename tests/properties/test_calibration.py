@@ -84,7 +84,9 @@ readable = st.one_of(st.floats(-30.0, 30.0), st.sampled_from([0.0, GRAVITY, -GRA
 def test_costs_answer_any_finite_numbers_with_a_result_or_a_refusal(readings, variance, sides, misalignment):
     n = len(readings)
     variances = np.full((n, 3), variance)
-    targets = np.array([UP[SIDES[k % 6]] * GRAVITY for k in range(n)]).reshape(-1, 3) if sides else readings[::-1].copy()
+    targets = (
+        np.array([UP[SIDES[k % 6]] * GRAVITY for k in range(n)]).reshape(-1, 3) if sides else readings[::-1].copy()
+    )
     for call in (
         lambda: _imufit.vector_calibration(readings, variances, targets, GRAVITY),
         lambda: _imufit.magnitude_calibration(
