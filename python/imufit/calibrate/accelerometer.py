@@ -51,6 +51,39 @@ class Targets:
     tilt: Array | None
     source: str
 
+    def tilted(self, tilt: Array) -> Array:
+        """Return what the tilt (2,), rad, adds to the readings by their derivative, (n, 3).
+
+        Parameters
+        ----------
+        tilt : (2,) array
+            rad.
+        """
+        return (
+            np.zeros_like(self.readings)
+            if self.tilt is None
+            else self.tilt[:, :3] * tilt[0] + self.tilt[:, 3:] * tilt[1]
+        )
+
+    def about(self, tilt: Array, gravity: float) -> Targets:
+        """Return the targets linearised about this tilt: gravity keeps its length.
+
+        Parameters
+        ----------
+        tilt : (2,) array
+            rad.
+        gravity : float
+            m/s^2.
+        """
+        if self.tilt is None:
+            return self
+        up = self.readings + self.tilted(tilt)
+        up /= np.linalg.norm(up, axis=1)[:, None]
+        change = self.tilt.reshape(-1, 2, 3)
+        change = change - np.einsum("nkj,nj->nk", change, up)[:, :, None] * up[:, None, :]
+        level = gravity * up - np.einsum("nkj,k->nj", change, tilt)
+        return Targets(level, np.ascontiguousarray(change.reshape(-1, 6)), self.source)
+
 
 def nominal(poses: Sequence[Pose], gravity: float) -> Targets:
     """Targets of poses on a level table: the named axis points up.
@@ -105,13 +138,15 @@ def check_unit(poses: Sequence[Pose], gravity: float, file: object) -> None:
     length = float(np.median([np.linalg.norm(pose.mean) for pose in poses]))
     if 0.5 * gravity < length < 2.0 * gravity:
         return
-    unit = "g" if 0.5 < length < 2.0 else "mg" if 500.0 < length < 2000.0 else ""
+    unit = "g" if 0.5 < length < 2.0 else "mg" if 900.0 < length < 1100.0 else ""
     counts = next((c for c in (16384, 8192, 4096, 2048, 1024) if abs(length / c - 1.0) < 0.2), None)
+    looks = unit
     if counts is not None:
-        unit = f"{counts}LSB/g"
+        looks = f"{unit} or raw counts of {counts}LSB/g" if unit else f"raw counts of {counts}LSB/g"
+        unit = unit or f"{counts}LSB/g"
     axes = ",".join(f"acc_{axis}=acc_{axis}[{unit}]" for axis in _AXES)
     remedy = (
-        f"It looks like {'raw counts: ' if counts else ''}{unit}: map it, e.g. --map {axes}."
+        f"It looks like {looks}: map it, e.g. --map {axes}."
         if unit
         else "Give the unit in the mapping, e.g. --map acc_x=NAME[g]."
     )
@@ -237,14 +272,15 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
         The poses do not tell the parameters.
     """
     readings, variances = _stack(poses)
+    aims = targets
 
     def solve(tilted: bool, bias: bool, scale: bool) -> _Solution:
         return _imufit.vector_calibration(
             readings,
             variances,
-            targets.readings,
+            aims.readings,
             gravity,
-            targets.tilt if tilted else None,
+            aims.tilt if tilted else None,
             temperature.values if bias else None,
             scale,
         )
@@ -254,9 +290,12 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     tilted, tilt = False, None
     if targets.tilt is not None and 3 * len(poses) > 14:
         trial = solve(True, False, False)
+        aims = targets.about(np.array(trial["extra"]), gravity)
+        trial = solve(True, False, False)
         tilt, error = np.array(trial["extra"]), np.array(trial["extra_error"])
         determined = bool(np.all(error < np.radians(1.0))) and trial["condition"] < 30.0
         tilted = determined and bool(np.any(np.abs(tilt) > 3.0 * error))
+        aims = aims if tilted else targets
         if determined:
             extras["table_tilt"] = {"x": tilt[0], "y": tilt[1], "standard_errors": {"x": error[0], "y": error[1]}}
             shown = ", ".join(
@@ -270,13 +309,19 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     solution = solve(tilted, *chosen)
     if targets.source == "sides":
         extras["placement_deg"] = float(np.degrees(solution["excess"] / gravity))
-        if solution["freedom"] >= 1 and extras["placement_deg"] > 0.3:
+        if solution["freedom"] < 1:
+            remarks.append(
+                f"No pose is to spare that would show how well they were laid: {extras['placement_deg']:.1f} deg is "
+                "taken for the standard errors. Record all six sides."
+            )
+        elif extras["placement_deg"] > 0.3:
             remarks.append(
                 f"The poses scatter by {extras['placement_deg']:.1f} deg about the axes (placement, more than the "
                 "noise): the standard errors contain it."
             )
     residuals = np.linalg.norm(solution["residuals"], axis=1)
-    lengths = np.linalg.norm(targets.readings + solution["residuals"], axis=1)
+    ideal = aims.readings + (aims.tilted(np.array(solution["extra"])) if tilted else 0.0)
+    lengths = np.linalg.norm(ideal + solution["residuals"], axis=1)
     remarks += _weak_axes(poses)
     if _rms(lengths - gravity) > 1.5 * _rms(np.linalg.norm(readings, axis=1) - gravity) + 0.01:
         remarks.append(

@@ -241,7 +241,10 @@ def _pose(found: Any, log: Log, labels: Array | None, *, index: int, number: int
         label=label,
         attitude=_attitude(log, rows),
     )
-    return pose if found["flaw"] is None else pose.without(_flaw(*found["flaw"], hold))
+    if found["flaw"] is None:
+        return pose
+    kind, value = found["flaw"]
+    return pose.without(_flaw(kind, value, hold))
 
 
 def _flaw(kind: str, value: float, hold: float) -> str:

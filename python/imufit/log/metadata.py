@@ -185,7 +185,8 @@ def _gravity(value: Any, file: str | Path | None) -> float:
 
 
 def _mag_reference(value: Any, file: str | Path | None) -> tuple[float, ...]:
-    numbers = [_number(item) for item in value] if isinstance(value, list | tuple) else []
+    items = value.tolist() if hasattr(value, "tolist") else value
+    numbers = [_number(item) for item in items] if isinstance(items, list | tuple) else []
     if len(numbers) != 3 or None in numbers:
         raise InputError(
             f"metadata mag_reference is {value!r}, not three numbers",

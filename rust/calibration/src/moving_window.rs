@@ -15,6 +15,8 @@ pub struct MovingWindow {
     sum: Vector3<f64>,
     square: Vector3<f64>,
     since_renewal: usize,
+    /// Whether a reading has left: then the window is as long as it gets, also where readings are missing.
+    covered: bool,
 }
 
 impl MovingWindow {
@@ -28,6 +30,7 @@ impl MovingWindow {
             sum: Vector3::zeros(),
             square: Vector3::zeros(),
             since_renewal: 0,
+            covered: false,
         }
     }
 
@@ -47,6 +50,7 @@ impl MovingWindow {
             let d = old - self.anchor;
             self.sum -= d;
             self.square -= d.component_mul(&d);
+            self.covered = true;
             left(s, old);
         }
         self.since_renewal += 1;
@@ -83,14 +87,21 @@ impl MovingWindow {
         self.len() >= self.fewest
             && match (self.readings.front(), self.readings.back()) {
                 // One sample step is missing when the oldest has just left.
-                (Some((a, _)), Some((b, _))) => (b - a) * (1.0 + 1.5 / (self.len() - 1) as f64) >= self.length,
+                (Some((a, _)), Some((b, _))) => {
+                    self.covered || (b - a) * (1.0 + 1.5 / (self.len() - 1) as f64) >= self.length
+                }
                 _ => false,
             }
     }
 
     /// Time of the oldest reading, s.
     pub fn start(&self) -> Option<f64> {
-        self.readings.front().map(|(t, _)| *t)
+        self.time(0)
+    }
+
+    /// Time of reading `place`, counted from the oldest, s.
+    pub fn time(&self, place: usize) -> Option<f64> {
+        self.readings.get(place).map(|(t, _)| *t)
     }
 
     /// Mean reading.
@@ -108,11 +119,30 @@ impl MovingWindow {
         (variance.sum() / 3.0).max(0.0).sqrt()
     }
 
+    /// Number of the oldest readings that belong to what came before: from the middle back, up to the first reading
+    /// that stands off the newer half by more than chance.
+    pub fn tail(&self) -> usize {
+        const OFF: f64 = 3.5;
+        let middle = self.len() / 2;
+        let newer = || self.readings.iter().skip(middle).map(|(_, reading)| reading);
+        let n = (self.len() - middle) as f64;
+        if n < 3.0 {
+            return 0;
+        }
+        let mean = newer().sum::<Vector3<f64>>() / n;
+        let variance = newer().map(|v| (v - mean).norm_squared()).sum::<f64>() / (n - 1.0) / 3.0;
+        // The mean's own scatter, and the digits' where the newer half shows a single value.
+        let limit = OFF * OFF * variance * (1.0 + 1.0 / n) + 1e-6 * mean.norm_squared();
+        let older = self.readings.iter().take(middle).rev();
+        middle - older.take_while(|(_, v)| (*v - mean).norm_squared() <= limit).count()
+    }
+
     /// Takes all readings out, oldest first.
     pub fn drain(&mut self) -> impl Iterator<Item = (f64, Vector3<f64>)> {
         self.sum = Vector3::zeros();
         self.square = Vector3::zeros();
         self.since_renewal = 0;
+        self.covered = false;
         std::mem::take(&mut self.readings).into_iter()
     }
 }
@@ -120,6 +150,31 @@ impl MovingWindow {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_window_with_missing_readings_is_full_all_the_same() {
+        let mut window = MovingWindow::new(0.4, 5);
+        for i in (0..200).filter(|i| i % 7 != 0) {
+            window.push(f64::from(i) * 0.01, Vector3::repeat(1.0), |_, _| ());
+            assert!(window.is_full() || i < 42, "{i}");
+            assert!(!window.is_full() || i > 38, "{i}");
+        }
+    }
+
+    #[test]
+    fn the_end_of_a_turn_is_told_from_the_rest_after_it() {
+        let mut window = MovingWindow::new(0.4, 5);
+        for i in 0..40 {
+            let noise = f64::from(i * 7 % 5 - 2) * 0.01;
+            let turning = if i < 6 { 0.02 * f64::from(6 - i).powi(2) } else { 0.0 };
+            window.push(
+                f64::from(i) * 0.01,
+                Vector3::new(noise + turning, -noise, 9.8),
+                |_, _| (),
+            );
+        }
+        assert!((4..=6).contains(&window.tail()), "{}", window.tail());
+    }
 
     #[test]
     fn mean_and_deviation_are_those_of_the_readings_that_are_left() {

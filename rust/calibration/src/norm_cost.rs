@@ -3,6 +3,8 @@
 //!
 //! Lengths leave three rotations open: the symmetric form keeps the sensor's own axes. With the dip A is full.
 
+use std::collections::BTreeSet;
+
 use imufit_fit::normal_equations::NormalEquations;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
 
@@ -330,11 +332,11 @@ pub fn fit(
         (Vector3::new(error, dip.unwrap_or(0.0), 0.0), corrected.norm())
     };
     let residuals = (0..items.len()).map(|k| residual(k, &theta).0).collect();
-    let groups = items.iter().map(|item| item.group).max().map_or(0, |g| g + 1);
+    let groups: BTreeSet<usize> = items.iter().map(|item| item.group).collect();
     let mut held_out = vec![Vector3::repeat(f64::NAN); items.len()];
     let mut held_out_length = vec![f64::NAN; items.len()];
     let mut without = Vec::new();
-    for group in (0..groups).filter(|_| leave_out) {
+    for group in groups.into_iter().filter(|_| leave_out) {
         let left = items.iter().filter(|item| item.group != group).count();
         if left < p || left == items.len() {
             continue;

@@ -181,8 +181,8 @@ impl Sums {
     }
 }
 
-/// Share of the creep that is forgiven to a pose that ended by drifting away: a slow turn is no row of short poses.
-const DRIFT: f64 = 0.2;
+/// Share of the creep that is forgiven to a pose that ended by creeping away: a slow turn is no row of short poses.
+const CREPT: f64 = 0.25;
 
 /// A pose in the making.
 #[derive(Clone, Debug)]
@@ -190,6 +190,8 @@ pub struct OpenPose {
     start: f64,
     last: usize,
     end: f64,
+    /// What was read before this time (s) is motion.
+    from: f64,
     n: usize,
     mean: Vector3<f64>,
     force: Sums,
@@ -206,6 +208,7 @@ impl OpenPose {
             start,
             last: first,
             end: start,
+            from: start,
             n: 0,
             mean: Vector3::zeros(),
             force: Sums::default(),
@@ -217,6 +220,9 @@ impl OpenPose {
 
     /// Adds a reading of the accelerometer.
     pub fn add(&mut self, row: usize, t: f64, force: Vector3<f64>) {
+        if t < self.from {
+            return;
+        }
         self.force.add(row, t, force);
         let step = (force - self.mean) / (self.n + 1) as f64;
         self.n += 1;
@@ -227,7 +233,14 @@ impl OpenPose {
 
     /// Adds a reading of the gyro.
     pub fn add_rate(&mut self, t: f64, rate: Vector3<f64>) {
-        self.rate.add(0, t, rate);
+        if t >= self.from {
+            self.rate.add(0, t, rate);
+        }
+    }
+
+    /// Time of the last reading, s.
+    pub fn end(&self) -> f64 {
+        self.end
     }
 
     /// Leaves out what came since the last reading, a knock, and goes on at row `first`, time `start` (s).
@@ -242,6 +255,7 @@ impl OpenPose {
         }
         self.pause += (start - self.end).max(0.0);
         self.end = start;
+        self.from = start;
     }
 
     /// Mean specific force so far.
@@ -260,8 +274,13 @@ impl OpenPose {
     }
 
     /// The pose, judged, without the tails of movements at its ends; `None` if nothing was read.
-    /// `drifted`: it ended because the direction had left the mean, so that less is forgiven.
-    pub fn close(mut self, criteria: &Criteria, label: Option<Side>, drifted: bool) -> Option<Pose> {
+    /// One that `crept` away, or from another, without a disturbance may have crept by less itself.
+    pub fn close(mut self, criteria: &Criteria, label: Option<Side>, crept: bool) -> Option<Pose> {
+        let (creep, certain) = if crept {
+            (CREPT * criteria.creep, 3.0)
+        } else {
+            (criteria.creep, 5.0)
+        };
         for span in [self.rate.calm(), self.force.calm()].into_iter().flatten() {
             self.force.within(span);
             self.rate.within(span);
@@ -280,14 +299,7 @@ impl OpenPose {
         } else {
             self.force
                 .creep(&whole)
-                .filter(|(angle, error)| {
-                    let forgiven = if drifted {
-                        DRIFT * criteria.creep
-                    } else {
-                        criteria.creep
-                    };
-                    *angle > forgiven.max(5.0 * error)
-                })
+                .filter(|(angle, error)| *angle > creep.max(certain * error))
                 .map(|(angle, _)| Flaw::Crept(angle))
         };
         self.knocks

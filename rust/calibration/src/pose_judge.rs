@@ -97,6 +97,8 @@ pub struct PoseJudge {
     /// Rows of the readings in the window, oldest first.
     rows: std::collections::VecDeque<usize>,
     label: Option<Side>,
+    /// Whether the open pose took over from one that ended without a disturbance, or ends so itself.
+    crept: bool,
 }
 
 impl PoseJudge {
@@ -112,6 +114,7 @@ impl PoseJudge {
             last: None,
             rows: std::collections::VecDeque::new(),
             label: None,
+            crept: false,
             criteria,
         }
     }
@@ -165,7 +168,7 @@ impl PoseJudge {
         closed = closed.or(now);
         let open = self.pose.as_ref().filter(|_| self.disturbed.is_none());
         let held = open.map_or(0.0, |p| {
-            let waiting = self.force.start().map_or(0.0, |s| t - s);
+            let waiting = self.force.start().map_or(0.0, |s| t - s.max(p.end()));
             let n = (p.n() + self.force.len()) as f64 / self.criteria.fewest as f64;
             ((p.duration() + waiting) / self.criteria.hold).min(n)
         });
@@ -199,11 +202,12 @@ impl PoseJudge {
                 pose.add_rate(t, rate);
             }
         }
-        self.close(pose, false)
+        self.close(pose)
     }
 
-    fn close(&self, pose: OpenPose, drifted: bool) -> Option<Pose> {
-        pose.close(&self.criteria, self.label, drifted)
+    fn close(&mut self, pose: OpenPose) -> Option<Pose> {
+        let crept = std::mem::take(&mut self.crept);
+        pose.close(&self.criteria, self.label, crept)
     }
 
     /// A pause in the samples that ends a pose.
@@ -250,7 +254,7 @@ impl PoseJudge {
                 self.disturbed = Some(t);
             }
             let over = self.disturbed.is_some_and(|since| t - since > self.criteria.bridge);
-            return if over { self.close_disturbed(false) } else { None };
+            return if over { self.close_disturbed() } else { None };
         }
         let mean = self.force.mean();
         let disturbed = self.disturbed.is_some();
@@ -263,47 +267,60 @@ impl PoseJudge {
         };
         match (self.pose.as_ref().map(same), self.disturbed) {
             (None, _) => {
+                self.crept = false;
                 self.open();
                 None
             }
             (Some(true), None) => None,
             (Some(true), Some(_)) => {
                 self.disturbed = None;
-                let start = self.rows.front().zip(self.force.start());
-                if let (Some(pose), Some((first, start))) = (self.pose.as_mut(), start) {
-                    pose.leave_out_until(*first, start);
+                let settled = self.settled();
+                if let (Some(pose), Some((first, start))) = (self.pose.as_mut(), settled) {
+                    pose.leave_out_until(first, start);
                 }
                 None
             }
-            (Some(false), disturbed) => {
-                let closed = self.close_disturbed(disturbed.is_none());
+            (Some(false), _) => {
+                self.crept |= !disturbed;
+                let closed = self.close_disturbed();
                 self.open();
+                self.crept = !disturbed;
                 closed
             }
         }
     }
 
     fn open(&mut self) {
-        if let (Some(start), Some(first)) = (self.force.start(), self.rows.front()) {
-            self.pose = Some(OpenPose::new(*first, start));
+        if let Some((first, start)) = self.settled() {
+            self.pose = Some(OpenPose::new(first, start));
             self.disturbed = None;
         }
     }
 
-    fn close_disturbed(&mut self, drifted: bool) -> Option<Pose> {
+    /// Row and time at which the stillness of the present window began: the last of a turn hardly adds to the window's
+    /// scatter, but to its mean.
+    fn settled(&self) -> Option<(usize, f64)> {
+        let by_force = self.force.time(self.force.tail())?;
+        let by_rate = self.rate.time(self.rate.tail()).unwrap_or(by_force);
+        let place = (0..self.force.len()).find(|k| self.force.time(*k) >= Some(by_force.max(by_rate)))?;
+        Some((*self.rows.get(place)?, self.force.time(place)?))
+    }
+
+    fn close_disturbed(&mut self) -> Option<Pose> {
         self.disturbed = None;
         let pose = self.pose.take()?;
         // A pose shorter than the window is the end of a movement that passed for stillness.
         if pose.duration() < self.criteria.window {
             return None;
         }
-        self.close(pose, drifted)
+        self.close(pose)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pose::Flaw;
 
     struct Noise(u64);
 
@@ -385,6 +402,40 @@ mod tests {
     }
 
     #[test]
+    fn a_sensor_that_creeps_all_the_time_has_no_pose() {
+        let poses = run(
+            |t| {
+                let s = (0.2 * t).to_radians();
+                UP * s.cos() + SIDE * s.sin()
+            },
+            16.0,
+        );
+        assert!(poses.len() > 1, "{poses:#?}");
+        assert!(
+            poses
+                .iter()
+                .rev()
+                .skip(1)
+                .all(|p| matches!(p.flaw, Some(Flaw::Crept(_)))),
+            "{poses:#?}"
+        );
+    }
+
+    #[test]
+    fn a_rest_that_is_left_slowly_stays_a_pose() {
+        let poses = run(
+            |t| {
+                let s = 2.0 * (t - 6.0).clamp(0.0, 2.0).to_radians();
+                UP * s.cos() + SIDE * s.sin()
+            },
+            14.0,
+        );
+        assert_eq!(poses.first().map(|p| p.flaw.clone()), Some(None), "{poses:#?}");
+        assert!((poses[0].mean - UP).norm() < 0.01);
+        assert_eq!(poses.last().map(|p| p.flaw.clone()), Some(None), "{poses:#?}");
+    }
+
+    #[test]
     fn a_shaking_hand_is_no_pose() {
         let poses = run(|t| UP + SIDE * 0.05 * (20.0 * t).sin(), 10.0);
         assert!(poses.iter().all(|p| p.flaw.is_some()));
@@ -396,7 +447,7 @@ mod tests {
         let mut noise = Noise(3);
         let mut poses = Vec::new();
         for i in 0..1000 {
-            let t = i as f64 * 0.01 + if i >= 500 { 30.0 } else { 0.0 };
+            let t = f64::from(i) * 0.01 + if i >= 500 { 30.0 } else { 0.0 };
             let force = if i % 10 == 3 {
                 Vector3::repeat(f64::NAN)
             } else {

@@ -68,11 +68,11 @@ pub fn find(readings: &Readings<'_>, labels: Option<&[Option<Side>]>, criteria: 
     let end_segment =
         |judge: &mut PoseJudge, poses: &mut Vec<Pose>, found: usize, segment: Option<(usize, Side)>, end: usize| {
             poses.extend(judge.finish());
-            if let Some((first, label)) = segment
-                && poses.len() == found
-            {
+            let Some((first, label)) = segment else { return };
+            if poses.len() == found {
                 poses.extend(unsteady(readings, first, end, label, &criteria));
             }
+            moved(&mut poses[found..], criteria.creep);
         };
     for row in 0..n {
         let label = labels.and_then(|labels| labels[row]);
@@ -92,11 +92,16 @@ pub fn find(readings: &Readings<'_>, labels: Option<&[Option<Side>]>, criteria: 
         poses.extend(judge.step(readings.t[row], force, rate).closed);
     }
     end_segment(&mut judge, &mut poses, found, segment, n);
-    for pose in &mut poses {
-        for axis in 0..3 {
-            if let Some(step) = step[axis] {
-                pose.variance[axis] += quantisation::variance_of_mean(step, pose.deviation[axis]);
-            }
+    for axis in 0..3 {
+        let Some(step) = step[axis] else { continue };
+        // One pose's scatter depends on where its mean lies between two steps: all poses together tell the noise.
+        let still = poses.iter().filter(|pose| pose.flaw.is_none());
+        let (count, square) = still.fold((0.0, 0.0), |(n, sum), pose| {
+            (n + 1.0, sum + pose.deviation[axis].powi(2))
+        });
+        let noise = (square / f64::max(count, 1.0)).sqrt();
+        for pose in &mut poses {
+            pose.variance[axis] += quantisation::variance_of_mean(step, noise);
         }
     }
     if labels.is_none() {
@@ -143,6 +148,24 @@ fn noise(
     // A low quantile of the windows' scatter lies below the noise by chance alone.
     let low = 1.0 - 1.0 / (6.0 * fewest as f64).sqrt();
     Some(deviations[place] / low)
+}
+
+/// Poses of one labelled segment are one pose: where they point elsewhere the sensor moved, and none can be used.
+fn moved(poses: &mut [Pose], creep: f64) {
+    let still = poses.iter().any(|pose| pose.flaw.is_none());
+    let counts = |pose: &Pose| match pose.flaw {
+        None | Some(Flaw::Crept(_)) => true,
+        Some(Flaw::Short(_)) => !still,
+        Some(Flaw::Unsteady(_)) => false,
+    };
+    let means: Vec<_> = poses.iter().filter(|pose| counts(pose)).map(|pose| pose.mean).collect();
+    let angles = means.iter().flat_map(|a| means.iter().map(|b| a.angle(b)));
+    let angle = angles.fold(0.0, f64::max);
+    if angle > creep {
+        for pose in poses.iter_mut().filter(|pose| counts(pose)) {
+            pose.flaw = Some(Flaw::Crept(angle));
+        }
+    }
 }
 
 /// A labelled segment in which no rest was found: what it looks like.

@@ -173,11 +173,13 @@ impl Problem<'_> {
     }
 }
 
-/// Beyond this (rad) turns miss so far that an axis may be flipped.
-const ASTRAY: f64 = 0.35;
+/// Variance (rad^2) that is taken before the excess is known: half a degree keeps one bad turn from ruling.
+const GUESS: f64 = 0.5 * 0.5 * (std::f64::consts::PI / 180.0) * (std::f64::consts::PI / 180.0);
+/// Squared misfit per degree of freedom, in units of the guess, below which no other sign of an axis is looked for.
+const RIGHT: f64 = 9.0;
 
 /// The identity, or the signs of its axes that explain the turns far better.
-fn signs(turns: &[Turn]) -> DVector<f64> {
+fn signs(turns: &[Turn], freedom: f64) -> DVector<f64> {
     let mut problem = Problem {
         turns,
         start: DVector::zeros(9),
@@ -188,16 +190,15 @@ fn signs(turns: &[Turn]) -> DVector<f64> {
             problem.start[4 * axis] = if flips >> axis & 1 == 1 { -1.0 } else { 1.0 };
         }
         let from = problem.start.clone();
-        let Some((theta, linearised)) = problem.minimise(&from, 0.0) else {
+        let Some((theta, linearised)) = problem.minimise(&from, GUESS) else {
             continue;
         };
-        let square = problem.square(&linearised, &theta, 0.0);
-        // The right way round unless another is far better.
+        let square = problem.square(&linearised, &theta, GUESS);
         if square < 0.2 * least {
             (best, least) = (from, square);
         }
-        let missed = linearised.iter().map(|(error, _)| error.norm_squared()).sum::<f64>() / turns.len() as f64;
-        if flips == 0 && missed.sqrt() < ASTRAY && (&theta - &best).norm() < 0.5 {
+        // A flipped axis misses by tens of degrees: what fits the right way round is not flipped, whatever fits better.
+        if least < RIGHT * freedom.max(1.0) {
             break;
         }
     }
@@ -223,11 +224,11 @@ pub fn fit(turns: &[Turn]) -> Result<Solution, CalibrationError> {
     if !turns.iter().all(finite) {
         return Err(CalibrationError::NotFinite("a turn"));
     }
+    let freedom = (2.0 * turns.len() as f64 - 9.0).max(0.0);
     let problem = Problem {
         turns,
-        start: signs(turns),
+        start: signs(turns, freedom),
     };
-    let freedom = (2.0 * turns.len() as f64 - 9.0).max(0.0);
     let mut excess = 0.0;
     let (mut theta, mut linearised) = problem
         .minimise(&problem.start, excess)

@@ -327,7 +327,6 @@ fn magnitude_calibration<'py>(
         } else {
             Elements::Diagonal
         },
-        ..Form::FULL
     };
     let weighing = if weights.is_some() {
         Weighing::Poses
