@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -402,7 +402,7 @@ def fit_motion(acc: Array, gravity: float) -> SensorCalibration:
     if max(solution["bias_error"]) > MOTION_ERROR:
         raise InputError("the motion's accelerations hide gravity")
     lengths = gravity + solution["residuals"][:, 0]
-    return _result(
+    result = _result(
         "magnitude",
         acc,
         solution,
@@ -415,6 +415,14 @@ def fit_motion(acc: Array, gravity: float) -> SensorCalibration:
         ],
         {"misaligned": False, "from_motion": True},
         (False, False),
+    )
+    # Accelerations across gravity lengthen the specific force by their square: the scale may be off by that much.
+    lengthened = (result.after / gravity) ** 2
+    scale_errors = {axis: float(np.hypot(e, lengthened)) for axis, e in result.standard_errors["acc.scale"].items()}
+    return replace(
+        result,
+        scale_error=np.hypot(result.scale_error, lengthened),
+        standard_errors={**result.standard_errors, "acc.scale": scale_errors},
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -92,13 +93,20 @@ def _intervals(axes: Axes, readings: Readings, poses: Sequence[PoseMark], prefix
                 fontsize=8,
                 color=INK if used else VERMILION,
             )
+    ends = np.array([_last(acc[:, axis]) for axis in range(3)])
+    heights = _apart(ends, 0.07 * float(np.nanmax(acc) - np.nanmin(acc)))
     for axis, name in enumerate("xyz"):
         axes.plot(t[::step], acc[::step, axis], color=AXES[name], linewidth=0.8)
-        seen = acc[:, axis][~np.isnan(acc[:, axis])]
         axes.annotate(
-            f"acc_{name}", (1.0, float(seen[-1]) if seen.size else 0.0), xycoords=("axes fraction", "data"),
-            xytext=(3, 0), textcoords="offset points", color=AXES[name], fontsize=9, va="center",
-        )  # fmt: skip
+            f"acc_{name}",
+            (1.0, heights[axis]),
+            xycoords=("axes fraction", "data"),
+            xytext=(3, 0),
+            textcoords="offset points",
+            color=AXES[name],
+            fontsize=9,
+            va="center",
+        )
     tidy(axes)
     count = sum(pose[4] for pose in poses)
     axes.set_xlabel("t (s)")
@@ -106,6 +114,21 @@ def _intervals(axes: Axes, readings: Readings, poses: Sequence[PoseMark], prefix
     left_out = len(poses) - count
     text = f"{prefix}{count} poses found" + (f", {left_out} left out (×)" if left_out else "")
     axes.set_title(text, loc="left", fontsize=11, color=INK, pad=14)
+
+
+def _last(values: Array) -> float:
+    """Return the last reading that is not missing; zero without any."""
+    seen = values[~np.isnan(values)]
+    return float(seen[-1]) if seen.size else 0.0
+
+
+def _apart(heights: Array, least: float) -> Array:
+    """Move labels up until each is `least` above the one below."""
+    moved = heights.copy()
+    order = np.argsort(heights)
+    for below, above in itertools.pairwise(order):
+        moved[above] = max(moved[above], moved[below] + least)
+    return moved
 
 
 def _errors(axes: Axes, poses: Sequence[PoseMark], residuals: Sequence[float], gravity: float) -> None:
@@ -152,8 +175,8 @@ def _field(axes: Axes, logs: Sequence[Readings], correction: tuple[Array, Array]
         axes.plot(time, np.linalg.norm(raw, axis=1), ".", color=GREY, markersize=1.5)
         axes.plot(time, np.linalg.norm(raw @ matrix.T + bias, axis=1), ".", color=BLUE, markersize=1.5)
     axes.axhline(field, color=INK, linewidth=0.8)
-    axes.text(0.01, 0.95, "before", transform=axes.transAxes, color=GREY, va="top", fontsize=9)
-    axes.text(0.08, 0.95, "after", transform=axes.transAxes, color=BLUE, va="top", fontsize=9)
+    axes.text(0.93, 1.02, "before", transform=axes.transAxes, color=GREY, ha="right", va="bottom", fontsize=9)
+    axes.text(0.99, 1.02, "after", transform=axes.transAxes, color=BLUE, ha="right", va="bottom", fontsize=9)
     tidy(axes)
     axes.set_xlabel("t (s)")
     axes.set_ylabel("|m| (µT)")
