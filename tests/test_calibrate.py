@@ -7,7 +7,7 @@ import pytest
 from calibration_logs import FIELD, GRAVITY, SIDES, UP, Sensor, course, exp, joined, spread, tumbling, typical
 from cli_stand_in import strict_json
 from imufit import Log, SensorModel
-from imufit.calibrate import calibrate
+from imufit.calibrate import calibrate, find_poses
 from imufit.errors import InputError
 from imufit.simulate import simulate
 
@@ -580,3 +580,16 @@ def test_four_poses_of_unknown_placement_do_not_pretend_to_precision():
         values.append(pulls(result, sensor, *ACC))
     assert np.mean(np.abs(values) < 2.0) > 0.9
     assert np.max(np.abs(values)) < 5.0
+
+
+@pytest.mark.parametrize(("angle_deg", "duration"), [(2.0, 4.0), (3.0, 8.0), (1.5, 6.0), (10.0, 10.0)])
+def test_slow_turn_is_no_row_of_poses(angle_deg, duration):
+    rng = np.random.default_rng(0)
+    t = np.arange(0.0, 12.0 + duration, 0.01)
+    angle = np.radians(angle_deg) * np.clip((t - 6.0) / duration, 0.0, 1.0)
+    acc = 9.80665 * np.stack([np.sin(angle), 0.0 * t, np.cos(angle)], axis=1) + 0.03 * rng.normal(size=(t.size, 3))
+    gyr = 0.002 * rng.normal(size=(t.size, 3))
+    gyr[:, 1] += np.gradient(angle, t)
+    used = [pose for pose in find_poses(Log.from_arrays(t, acc=acc, gyr=gyr)).poses if pose.used]
+    shown = [np.degrees(np.arctan2(pose.mean[0], pose.mean[2])) for pose in used]
+    np.testing.assert_allclose(shown, [0.0, angle_deg], atol=0.1)

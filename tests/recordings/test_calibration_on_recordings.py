@@ -32,7 +32,7 @@ def rest_errors(log, result=None):
         ("mpu9150_unit1", 20, "magnitude", 0.2, 0.004),
         ("mpu9150_unit3", 20, "magnitude", 0.07, 0.004),
         ("xsens_mti_37_poses", 37, "magnitude", 1.0, 0.002),
-        ("mpu6050_poses", 12, "magnitude", 0.6, 0.05),
+        ("mpu6050_poses", 11, "magnitude", 0.6, 0.05),
     ],
 )
 def test_poses_left_out_come_to_gravity(name, poses, cost, least, most):

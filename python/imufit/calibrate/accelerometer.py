@@ -26,6 +26,8 @@ MOTION_ERROR = 0.04
 """Standard error of the bias (m/s^2) beyond which a motion told nothing."""
 MOTION_GROUPS = 20
 """Stretches of time that are left out in turn where there are no poses."""
+ENTANGLED = 0.9
+"""Correlation beyond which two parameters are named."""
 ASTRAY = 0.02
 """Placement scatter (share of g, about 1 degree) beyond which poses were not laid on a table."""
 _AXES = ("x", "y", "z")
@@ -482,6 +484,8 @@ def _result(
     for axis, value in zip(_AXES, scale, strict=True):
         if abs(value - 1.0) > 0.2 and value > 0.0:
             remarks.append(f"The scale of {axis} is {value:.3f}: no data sheet allows that; check unit and range.")
+    elements = 9 if cost == "vector" else 6 if "acc.misalignment" in effects else 3
+    remarks += _entangled(solution["correlation"], elements)
     held_out = solution["held_out_length"] - gravity
     left_out = held_out[np.isfinite(held_out)]
     return SensorCalibration(
@@ -508,6 +512,18 @@ def _result(
         remarks=tuple(remarks),
         extras=extras,
     )
+
+
+def _entangled(correlation: Array, elements: int) -> list[str]:
+    """Say which axes' scale and bias move together: one error would pass for the other."""
+    scales = (0, 4, 8) if elements == 9 else (0, 1, 2)
+    shares = [float(correlation[scale, elements + k]) for k, scale in enumerate(scales)]
+    return [
+        f"Scale and bias of {axis} are hard to tell apart here (correlation {share:+.2f}): add poses with {axis} "
+        "up and down."
+        for axis, share in zip(_AXES, shares, strict=True)
+        if abs(share) > ENTANGLED
+    ]
 
 
 def _rms(values: Array) -> float:

@@ -42,6 +42,8 @@ pub struct Pose {
     pub side: Side,
     /// The side that the log's label names.
     pub label: Option<Side>,
+    /// Whether it crept away, or from the pose before it, without a disturbance between them.
+    pub crept: bool,
     /// Why it is not used.
     pub flaw: Option<Flaw>,
 }
@@ -319,6 +321,7 @@ impl OpenPose {
                 .map(|rate| (rate.mean, self.rate.variance_of_mean(&rate))),
             side: Side::nearest(&whole.mean),
             label,
+            crept,
             flaw,
         })
     }

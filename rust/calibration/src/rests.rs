@@ -105,6 +105,9 @@ pub fn find(readings: &Readings<'_>, labels: Option<&[Option<Side>]>, criteria: 
         }
     }
     if labels.is_none() {
+        for chain in poses.chunk_by_mut(|a, b| a.crept && b.crept && b.time.0 - a.time.1 < 2.0 * criteria.window) {
+            crept(chain, &criteria);
+        }
         // Where nothing is labelled a rest of a moment is no pose that anybody meant.
         poses.retain(|pose| !matches!(pose.flaw, Some(Flaw::Short(s)) if s < 0.5 * criteria.hold));
     }
@@ -148,6 +151,19 @@ fn noise(
     // A low quantile of the windows' scatter lies below the noise by chance alone.
     let low = 1.0 - 1.0 / (6.0 * fewest as f64).sqrt();
     Some(deviations[place] / low)
+}
+
+/// Poses that follow each other without a movement between them: if the direction changes along them, the short ones are
+/// pieces of a slow turn. A long one is a rest that the turn began or ended with.
+fn crept(chain: &mut [Pose], criteria: &Criteria) {
+    let angles = chain.iter().flat_map(|a| chain.iter().map(|b| a.mean.angle(&b.mean)));
+    let angle = angles.fold(0.0, f64::max);
+    let short = |pose: &Pose| pose.flaw.is_none() && pose.time.1 - pose.time.0 < 3.0 * criteria.hold;
+    if angle > criteria.creep {
+        for pose in chain.iter_mut().filter(|pose| short(pose)) {
+            pose.flaw = Some(Flaw::Crept(angle));
+        }
+    }
 }
 
 /// Poses of one labelled segment are one pose: where they point elsewhere the sensor moved, and none can be used.
