@@ -57,8 +57,13 @@ def with_scipy(readings: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, n
 
 
 def many_poses(folder: Path) -> None:
-    print("magnitude cost, 9 unknowns   RMS of |f| - g left out, m/s^2       bare fit, ms          left out too, ms")
-    print("recording           poses   before    scipy     ours  ours/scipy  scipy   ours ratio     scipy   ours ratio")
+    print(
+        "magnitude cost, 9 unknowns   RMS of |f| - g left out, m/s^2             bare fit, ms          left out too, ms"
+    )
+    print("                                  scipy, weights        ours/scipy")
+    print(
+        "recording           poses   before    equal     ours     ours  equal  ours   scipy   ours ratio     scipy   ours ratio"
+    )
     for name in MANY:
         log = read(folder / "many_positions" / f"{name}.parquet")
         poses = [pose for pose in find_poses(log).poses if pose.used]
@@ -84,17 +89,18 @@ def many_poses(folder: Path) -> None:
         def ours_bare(y: np.ndarray = readings, g: np.ndarray = group, v: np.ndarray = variance) -> object:
             return _imufit.magnitude_calibration(y, g, G, variances=v, leave_out=False)
 
+        plain = theirs_left_out(readings, np.ones(len(poses)))
         left_out = theirs_left_out()
         lengths = ours()
         both = np.isfinite(lengths)
         before = rms(np.linalg.norm(readings, axis=1) - G)
-        peer, own = rms(left_out[both] - G), rms(lengths[both] - G)
+        equal, peer, own = rms(plain[both] - G), rms(left_out[both] - G), rms(lengths[both] - G)
         bare = best(theirs), best(ours_bare)
         whole = best(theirs_left_out, 3), best(ours)
         print(
-            f"{name:20}{len(poses):4d}  {before:8.4f}  {peer:.5f}  {own:.5f}   {own / peer:8.2f}  "
-            f"{1e3 * bare[0]:8.2f} {1e3 * bare[1]:6.3f} {bare[0] / bare[1]:5.0f}  "
-            f"{1e3 * whole[0]:8.1f} {1e3 * whole[1]:6.2f} {whole[0] / whole[1]:5.0f}"
+            f"{name:20}{len(poses):4d} {before:7.4f} {equal:.5f} {peer:.5f}  {own:.5f} "
+            f"{own / equal:5.2f} {own / peer:4.2f} {1e3 * bare[0]:6.2f} {1e3 * bare[1]:5.2f} {bare[0] / bare[1]:5.0f} "
+            f"{1e3 * whole[0]:7.1f} {1e3 * whole[1]:5.2f} {whole[0] / whole[1]:5.0f}"
         )
 
 
