@@ -57,12 +57,10 @@ def with_scipy(readings: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, n
 
 
 def many_poses(folder: Path) -> None:
+    print("magnitude cost, 9 unknowns: RMS of |f| - g left out, m/s^2; time of a bare fit and with leaving out, ms")
+    print("                                scipy, weights           ours/scipy     bare fit          left out too")
     print(
-        "magnitude cost, 9 unknowns   RMS of |f| - g left out, m/s^2             bare fit, ms          left out too, ms"
-    )
-    print("                                  scipy, weights        ours/scipy")
-    print(
-        "recording           poses   before    equal     ours     ours  equal  ours   scipy   ours ratio     scipy   ours ratio"
+        "recording           poses before   equal    ours     ours equal ours   scipy  ours ratio   scipy  ours ratio"
     )
     for name in MANY:
         log = read(folder / "many_positions" / f"{name}.parquet")
