@@ -24,6 +24,10 @@ Array = NDArray[np.float64]
 UNKNOWNS = {"vector": 12, "magnitude": 9}
 MOTION_ERROR = 0.04
 """Standard error of the bias (m/s^2) beyond which a motion told nothing."""
+MOTION_TIME = 30.0
+"""Shortest motion (s) from which scale and bias are told."""
+MOTION_SHARE = 0.1
+"""Share of the motion's accelerations that may pass for a bias."""
 MOTION_GROUPS = 20
 """Stretches of time that are left out in turn where there are no poses."""
 ENTANGLED = 0.9
@@ -418,13 +422,17 @@ def fit_motion(acc: Array, gravity: float) -> SensorCalibration:
         {"misaligned": False, "from_motion": True},
         (False, False),
     )
-    # Accelerations across gravity lengthen the specific force by their square: the scale may be off by that much.
+    # Accelerations go with the turning: a part of them looks like a bias, and those across gravity lengthen the
+    # specific force by their square.
+    taken = MOTION_SHARE * result.after
+    bias_errors = {axis: float(np.hypot(e, taken)) for axis, e in result.standard_errors["acc.bias"].items()}
     lengthened = (result.after / gravity) ** 2
     scale_errors = {axis: float(np.hypot(e, lengthened)) for axis, e in result.standard_errors["acc.scale"].items()}
     return replace(
         result,
         scale_error=np.hypot(result.scale_error, lengthened),
-        standard_errors={**result.standard_errors, "acc.scale": scale_errors},
+        bias_error=np.hypot(result.bias_error, taken),
+        standard_errors={**result.standard_errors, "acc.scale": scale_errors, "acc.bias": bias_errors},
     )
 
 

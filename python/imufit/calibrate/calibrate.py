@@ -223,7 +223,8 @@ class _Session:
             else "Lay each of the six sides up and keep the sensor still for 3 s each.",
         )
         acc = np.concatenate([log.acc[~np.isnan(log.acc).any(axis=1)] for log in self.logs if log.acc is not None])
-        if self.labelled or cost == "vector" or len(acc) < 1000:
+        time = sum(float(log.t[-1] - log.t[0]) for log in self.logs if log.acc is not None and log.n)
+        if self.labelled or cost == "vector" or time < accelerometer.MOTION_TIME or len(acc) < 1000:
             raise failed
         try:
             return accelerometer.fit_motion(acc, self.gravity)

@@ -272,8 +272,10 @@ def _saturated(poses: Sequence[Pose], acc: Array) -> list[Pose]:
 
     The end shows as the log's largest reading, taken again and again, without the noise that other poses have there.
     """
+    if not poses:
+        return []
     ends = (np.nanmax(acc, axis=0), np.nanmin(acc, axis=0))
-    usual = np.median([pose.deviation for pose in poses], axis=0) if poses else np.zeros(3)
+    usual = np.median([pose.deviation for pose in poses], axis=0)
     judged = []
     for pose in poses:
         readings = acc[pose.rows[0] : pose.rows[1] + 1]

@@ -43,6 +43,9 @@ pub fn independent(items: &[Item], gravity: f64) -> usize {
 /// Placement (rad, one axis) that is taken where no equation is to spare to show it: what a careful hand reaches.
 const UNSEEN_PLACEMENT: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
+/// Equations to spare below which they may agree by chance: then half of that is taken at least.
+const CHECKED: f64 = 4.0;
+
 /// Share of the placement's variance that is allowed along gravity: a pose askew by an angle reads less by its square,
 /// and whatever else the model does not know must have some room.
 const ALONG: f64 = 1e-3;
@@ -175,6 +178,10 @@ pub fn fit(
         if settled {
             break;
         }
+    }
+    if freedom < CHECKED && excess < (0.5 * UNSEEN_PLACEMENT * gravity).powi(2) {
+        excess = (0.5 * UNSEEN_PLACEMENT * gravity).powi(2);
+        roots = problem.roots(excess).ok_or(CalibrationError::Diverged)?;
     }
     let (theta, covariance, condition) = problem.solve(&roots, None).ok_or(CalibrationError::Diverged)?;
     let residuals = (0..items.len()).map(|k| problem.residual(k, &theta)).collect();
