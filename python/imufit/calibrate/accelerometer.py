@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -11,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.calibrate.calibration import SensorCalibration
-from imufit.calibrate.poses import SIDES, Pose, distinct, repeated
+from imufit.calibrate.calibration import AXES, SensorCalibration, named, off_diagonal, rms
+from imufit.calibrate.poses import SAME_DIRECTION, UP, Pose
 from imufit.calibrate.temperature import Temperature
 from imufit.errors import InputError
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-UNKNOWNS = {"vector": 12, "magnitude": 9}
 MOTION_ERROR = 0.04
 """Standard error of the bias (m/s^2) beyond which a motion told nothing."""
 MOTION_TIME = 30.0
@@ -34,9 +32,6 @@ ENTANGLED = 0.9
 """Correlation beyond which two parameters are named."""
 ASTRAY = 0.02
 """Placement scatter (share of g, about 1 degree) beyond which poses were not laid on a table."""
-_AXES = ("x", "y", "z")
-_OFF = ("xy", "xz", "yx", "yz", "zx", "zy")
-_DIRECTION = {side: np.eye(3)[k // 2] * (1.0 if k % 2 == 0 else -1.0) for k, side in enumerate(SIDES)}
 
 
 @dataclass(frozen=True)
@@ -101,7 +96,7 @@ def nominal(poses: Sequence[Pose], gravity: float) -> Targets:
     gravity : float
         m/s^2.
     """
-    return Targets(gravity * np.array([_DIRECTION[pose.name] for pose in poses]), None, "sides")
+    return Targets(gravity * np.array([UP[pose.name] for pose in poses]), None, "sides")
 
 
 def referenced(attitudes: Array, up: Array, gravity: float, source: str) -> Targets:
@@ -122,140 +117,6 @@ def referenced(attitudes: Array, up: Array, gravity: float, source: str) -> Targ
     tilts = [-gravity * (to_body @ np.cross(axis, up)) for axis in np.eye(3)[:2]]
     # R_true = exp([theta]x) R_ref, so that R_true^T up = R_ref^T (up - theta x up).
     return Targets(gravity * (to_body @ up), np.ascontiguousarray(np.hstack(tilts)), source)
-
-
-def check_unit(poses: Sequence[Pose], gravity: float, file: object) -> None:
-    """Refuse readings that cannot be m/s^2.
-
-    Parameters
-    ----------
-    poses : sequence of Pose
-        At least one.
-    gravity : float
-        m/s^2.
-    file : object
-        To name in the error.
-
-    Raises
-    ------
-    InputError
-        The length at rest is far from gravity's.
-    """
-    length = float(np.median([np.linalg.norm(pose.mean) for pose in poses]))
-    if 0.5 * gravity < length < 2.0 * gravity:
-        return
-    unit = "g" if 0.5 < length < 2.0 else "mg" if 900.0 < length < 1100.0 else ""
-    counts = next((c for c in (16384, 8192, 4096, 2048, 1024) if abs(length / c - 1.0) < 0.2), None)
-    looks = unit
-    if counts is not None:
-        looks = f"{unit} or raw counts of {counts}LSB/g" if unit else f"raw counts of {counts}LSB/g"
-        unit = unit or f"{counts}LSB/g"
-    axes = ",".join(f"acc_{axis}=acc_{axis}[{unit}]" for axis in _AXES)
-    remedy = (
-        f"It looks like {looks}: map it, e.g. --map {axes}."
-        if unit
-        else "Give the unit in the mapping, e.g. --map acc_x=NAME[g]."
-    )
-    raise InputError(
-        f"the accelerometer reads {length:.4g} at rest where gravity is {gravity:.4g} m/s²",
-        file=str(file),
-        column="acc_x",
-        remedy=remedy,
-    )
-
-
-def check_labels(poses: Sequence[Pose], file: object) -> tuple[list[Pose], list[str]]:
-    """Compare labels with the side that is up by the readings.
-
-    An axis of which both sides read the wrong way round is flipped: that is kept, and calibrated as a negative scale.
-
-    Parameters
-    ----------
-    poses : sequence of Pose
-        All of them.
-    file : object
-        To name in the error.
-
-    Returns
-    -------
-    poses : list of Pose
-        Those that contradict their label are left out.
-    remarks : list of str
-        Axes that are flipped.
-
-    Raises
-    ------
-    InputError
-        The labels name the axes in another order than the readings.
-    """
-    used = [pose for pose in poses if pose.used and pose.label]
-    seen = {side: {pose.side for pose in used if pose.label == side} for side in SIDES}
-    remarks, flipped = [], set()
-    for axis in _AXES:
-        plus, minus = seen[f"+{axis}"], seen[f"-{axis}"]
-        if plus == {f"-{axis}"} and minus == {f"+{axis}"}:
-            flipped.add(axis)
-            remarks.append(
-                f"Negative scale: axis {axis} is flipped (labelled +{axis}, it reads -{axis}, and the other way round)."
-            )
-    turned = {axis: {side[1] for sign in "+-" for side in seen[sign + axis]} - {axis} for axis in _AXES}
-    swapped = [axis for axis in _AXES if turned[axis] and not any(f"{s}{axis}" in seen[f"{s}{axis}"] for s in "+-")]
-    if len(swapped) >= 2:
-        pairs = ", ".join(f"{axis} up reads on {' and '.join(sorted(turned[axis]))}" for axis in swapped)
-        raise InputError(
-            f"the labels name other axes than the readings: {pairs}",
-            file=str(file),
-            column="pose",
-            remedy="The axes are swapped: correct the labels, or map the columns, e.g. --map acc_x=acc_y,acc_y=acc_x.",
-        )
-    judged = []
-    for pose in poses:
-        wrong = pose.used and pose.label is not None and pose.side != pose.label and pose.label[1] not in flipped
-        judged.append(pose.without(f"labelled {pose.label}, but {pose.side} points up") if wrong else pose)
-    return judged, remarks
-
-
-def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
-    """Refuse poses that cannot tell the parameters of a cost.
-
-    Parameters
-    ----------
-    poses : sequence of Pose
-        The usable ones.
-    cost : str
-        ``vector`` or ``magnitude``.
-    file : object
-        To name in the error.
-
-    Raises
-    ------
-    InputError
-        Says what is missing.
-    """
-    count = distinct(np.array([pose.direction for pose in poses]))
-    same = [f"{a.number} and {b.number} ({a.name})" for a, b in repeated(poses)]
-    doubled = f"; poses {', '.join(same[:3])} are the same" if same else ""
-    if count == 1:
-        every = {1: f"pose {poses[0].number} ({poses[0].name} up) is the only one", 2: "both poses are the same"}
-        which = every.get(len(poses), f"all {len(poses)} poses are the same ({poses[0].name} up)")
-        problem = f"{which}: bias and tilt can't be separated"
-        raise InputError(problem, file=str(file), remedy="Record at least six: each of the six sides up for 3 s.")
-    if cost == "magnitude" and count < UNKNOWNS["magnitude"]:
-        raise InputError(
-            "the magnitude cost has 9 unknowns (scale 3, non-orthogonality 3, bias 3) and each pose gives one "
-            f"equation: {count} different poses are too few{doubled}",
-            file=str(file),
-            remedy="Record at least nine attitudes, some of them oblique, or use --cost vector with the six sides up.",
-        )
-    sides = {pose.name for pose in poses}
-    axes = {side[1] for side in sides}
-    if cost == "vector" and (len(axes) < 3 or len(sides) < 4):
-        missing = [side for side in SIDES if side not in sides]
-        raise InputError(
-            f"12 unknowns cannot be found from the sides {' '.join(s for s in SIDES if s in sides)}{doubled}",
-            file=str(file),
-            remedy=f"Record also {' '.join(missing)} up.",
-        )
 
 
 def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperature: Temperature) -> SensorCalibration:
@@ -329,7 +190,7 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     ideal = aims.readings + (aims.tilted(np.array(solution["extra"])) if tilted else 0.0)
     lengths = np.linalg.norm(ideal + solution["residuals"], axis=1)
     remarks += _weak_axes(poses)
-    if _rms(lengths - gravity) > 1.5 * _rms(np.linalg.norm(readings, axis=1) - gravity) + 0.01:
+    if rms(lengths - gravity) > 1.5 * rms(np.linalg.norm(readings, axis=1) - gravity) + 0.01:
         remarks.append(
             "The lengths got worse: a tilted table or a crooked side passes for misalignment. Record one log with the "
             "gyro, so that headings are known, or nine attitudes for --cost magnitude."
@@ -361,7 +222,7 @@ def fit_magnitude(
     readings, variances = _stack(poses)
     directions = readings / np.linalg.norm(readings, axis=1)[:, None]
     # Poses that repeat a direction are left out together: else each would vouch for the other.
-    groups = np.array([np.argmax(directions @ d > np.cos(np.radians(8.0))) for d in directions], dtype=np.float64)
+    groups = np.array([np.argmax(directions @ d > np.cos(SAME_DIRECTION)) for d in directions], dtype=np.float64)
     along = np.sum(variances * directions**2, axis=1)
 
     def solve(bias: bool, scale: bool) -> _Solution:
@@ -444,7 +305,7 @@ def _weak_axes(poses: Sequence[Pose]) -> list[str]:
     """Say which axes rest on few poses."""
     sides = [pose.name for pose in poses]
     remarks = []
-    for axis in _AXES:
+    for axis in AXES:
         have = [side for side in (f"+{axis}", f"-{axis}") if side in sides]
         if len(have) == 1:
             missing = "-" if have[0][0] == "+" else "+"
@@ -470,32 +331,23 @@ def _result(
     temperature: tuple[bool, bool],
 ) -> SensorCalibration:
     gain, gain_error = np.array(solution["model_gain"]), np.array(solution["model_gain_error"])
-    effects: dict[str, dict[str, float]] = {
-        "acc.bias": dict(zip(_AXES, solution["model_bias"], strict=True)),
-        "acc.scale": dict(zip(_AXES, np.diag(gain).tolist(), strict=True)),
-    }
-    errors: dict[str, dict[str, float]] = {
-        "acc.bias": dict(zip(_AXES, solution["model_bias_error"], strict=True)),
-        "acc.scale": dict(zip(_AXES, np.diag(gain_error).tolist(), strict=True)),
-    }
+    effects = {"acc.bias": named(solution["model_bias"]), "acc.scale": named(np.diag(gain))}
+    errors = {"acc.bias": named(solution["model_bias_error"]), "acc.scale": named(np.diag(gain_error))}
     if extras.pop("misaligned", True):
-        off = list(itertools.permutations(range(3), 2))
-        effects["acc.misalignment"] = {name: float(gain[k]) for name, k in zip(_OFF, off, strict=True)}
-        errors["acc.misalignment"] = {name: float(gain_error[k]) for name, k in zip(_OFF, off, strict=True)}
+        effects["acc.misalignment"] = off_diagonal(gain)
+        errors["acc.misalignment"] = off_diagonal(gain_error)
     if temperature[0]:
-        effects["acc.bias_temperature"] = dict(zip(_AXES, solution["model_bias_temperature"], strict=True))
-        errors["acc.bias_temperature"] = dict(zip(_AXES, solution["model_bias_temperature_error"], strict=True))
+        effects["acc.bias_temperature"] = named(solution["model_bias_temperature"])
+        errors["acc.bias_temperature"] = named(solution["model_bias_temperature_error"])
     if temperature[1]:
-        effects["acc.scale_temperature"] = dict(zip(_AXES, solution["model_scale_temperature"], strict=True))
-        errors["acc.scale_temperature"] = dict(zip(_AXES, solution["model_scale_temperature_error"], strict=True))
+        effects["acc.scale_temperature"] = named(solution["model_scale_temperature"])
+        errors["acc.scale_temperature"] = named(solution["model_scale_temperature_error"])
     scale = np.array(solution["scale"])
-    for axis, value in zip(_AXES, scale, strict=True):
+    for axis, value in zip(AXES, scale, strict=True):
         if abs(value - 1.0) > 0.2 and value > 0.0:
             remarks.append(f"The scale of {axis} is {value:.3f}: no data sheet allows that; check unit and range.")
     elements = 9 if cost == "vector" else 6 if "acc.misalignment" in effects else 3
     remarks += _entangled(solution["correlation"], elements)
-    held_out = solution["held_out_length"] - gravity
-    left_out = held_out[np.isfinite(held_out)]
     return SensorCalibration(
         sensor="acc",
         cost=cost,
@@ -506,9 +358,9 @@ def _result(
         scale_error=np.array(solution["scale_error"]),
         bias_error=np.array(solution["bias_error"]),
         unit="m/s^2",
-        before=_rms(np.linalg.norm(readings, axis=1) - gravity),
-        after=_rms(lengths - gravity),
-        held_out=_rms(left_out) if left_out.size else np.nan,
+        before=rms(np.linalg.norm(readings, axis=1) - gravity),
+        after=rms(lengths - gravity),
+        held_out=rms(solution["held_out_length"] - gravity),
         error_unit="m/s^2",
         residuals=residuals,
         condition=solution["condition"],
@@ -529,10 +381,6 @@ def _entangled(correlation: Array, elements: int) -> list[str]:
     return [
         f"Scale and bias of {axis} are hard to tell apart here (correlation {share:+.2f}): add poses with {axis} "
         "up and down."
-        for axis, share in zip(_AXES, shares, strict=True)
+        for axis, share in zip(AXES, shares, strict=True)
         if abs(share) > ENTANGLED
     ]
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")

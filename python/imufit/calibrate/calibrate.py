@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from imufit import _imufit
-from imufit.calibrate import accelerometer, gyroscope
+from imufit.calibrate import accelerometer, checks, gyroscope
 from imufit.calibrate.calibration import Calibration, SensorCalibration
 from imufit.calibrate.magnetometer import fit_magnetometer
-from imufit.calibrate.poses import SIDES, Found, Pose, distinct, find_poses, repeated
+from imufit.calibrate.poses import Found, Pose, distinct, find_poses, repeated
 from imufit.calibrate.temperature import Temperature
 from imufit.errors import InputError
 from imufit.model.sensor_model import SensorModel
@@ -109,7 +109,7 @@ class _Session:
         failures: list[InputError] = []
         temperature: Temperature | None = None
         if self.poses and ("acc" in wanted or "gyr" in wanted):
-            accelerometer.check_unit(self.used or self.poses, self.gravity, self.file)
+            checks.check_unit(self.used or self.poses, self.gravity, self.file)
         for name in wanted:
             mean = np.nan if temperature is None or temperature.mean is None else temperature.mean
             try:
@@ -146,7 +146,7 @@ class _Session:
             self.notes.append(f"Left out: {'; '.join(texts)}{more}.")
 
     def _accelerometer(self, cost: str | None) -> tuple[SensorCalibration, Temperature | None]:
-        self.poses, flips = accelerometer.check_labels(self.poses, self.file)
+        self.poses, flips = checks.check_labels(self.poses, self.file)
         if not self.used:
             return self._from_motion(cost), None
         usable = self.used
@@ -156,11 +156,12 @@ class _Session:
             ]
             usable = self.used
         chosen = cost or self._cost(usable)
-        accelerometer.check_poses(usable, chosen, self.file)
+        checks.check_poses(usable, chosen, self.file)
         temperature = Temperature.of(usable)
         if chosen == "magnitude":
             result = accelerometer.fit_magnitude(usable, self.gravity, temperature)
-            return self._said(result, flips), temperature
+            self._say_of_poses(flips)
+            return result, temperature
         result = accelerometer.fit_vector(usable, self._targets(usable), self.gravity, temperature)
         strewn = result.excess > accelerometer.ASTRAY * self.gravity
         if cost is None and not self.labelled and strewn and len(usable) >= 7:
@@ -169,9 +170,11 @@ class _Session:
                 "The poses lie along the axes, but were not laid on a table: lengths tell scale and bias; misalignment "
                 "needs nine attitudes, some of them oblique."
             )
-        return self._said(result, flips), temperature
+        self._say_of_poses(flips)
+        return result, temperature
 
-    def _said(self, result: SensorCalibration, flips: Sequence[str]) -> SensorCalibration:
+    def _say_of_poses(self, flips: Sequence[str]) -> None:
+        """Note flipped axes first, repeated poses last."""
         same = [f"{a.number} and {b.number}" for a, b in repeated(self.used)]
         if same:
             self.notes.append(
@@ -179,13 +182,12 @@ class _Session:
                 "direction."
             )
         self.notes[:0] = flips
-        return result
 
     def _cost(self, poses: Sequence[Pose]) -> str:
         """Vector where directions are known; else by what the poses can tell."""
         if self.labelled or all(pose.attitude is not None for pose in poses):
             return "vector"
-        if distinct(np.array([pose.direction for pose in poses])) < accelerometer.UNKNOWNS["magnitude"]:
+        if distinct(np.array([pose.direction for pose in poses])) < checks.UNKNOWNS["magnitude"]:
             return "vector"
         try:
             accelerometer.fit_magnitude(poses, self.gravity, Temperature.of(()))
@@ -205,8 +207,7 @@ class _Session:
         turns = gyroscope.find_turns(self.logs[0], poses, self.found[0].gyr_noise, self.gravity)
         gyr = gyroscope.fit_gyroscope([turns], poses)
         matrix = np.eye(3) if gyr is None else gyr.matrix
-        directions = {side: np.eye(3)[k // 2] * (-1.0 if k % 2 else 1.0) for k, side in enumerate(SIDES)}
-        found = gyroscope.table_attitudes(turns, poses, directions, matrix)
+        found = gyroscope.table_attitudes(turns, poses, matrix)
         if found is None:
             return plain
         return accelerometer.referenced(found, np.array([0.0, 0.0, 1.0]), self.gravity, "sides")

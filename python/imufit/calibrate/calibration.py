@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,44 @@ if TYPE_CHECKING:
     from imufit.log import Log
 
 Array = NDArray[np.float64]
+
+
+AXES = ("x", "y", "z")
+_OFF_DIAGONAL = {row + column: (i, j) for i, row in enumerate(AXES) for j, column in enumerate(AXES) if i != j}
+
+
+def rms(values: Array) -> float:
+    """Return the root mean square of the numbers among the values; NaN without any.
+
+    Parameters
+    ----------
+    values : ndarray
+        Of any shape; NaN is left out.
+    """
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(np.square(known)))) if known.size else float("nan")
+
+
+def named(values: Sequence[float] | Array) -> dict[str, float]:
+    """Return three numbers by their axis.
+
+    Parameters
+    ----------
+    values : sequence of float
+        x, y, z.
+    """
+    return {axis: float(value) for axis, value in zip(AXES, values, strict=True)}
+
+
+def off_diagonal(matrix: Array) -> dict[str, float]:
+    """Return the elements of a misalignment by row and column.
+
+    Parameters
+    ----------
+    matrix : (3, 3) array
+        Its diagonal is left out.
+    """
+    return {name: float(matrix[place]) for name, place in _OFF_DIAGONAL.items()}
 
 
 @dataclass(frozen=True)
@@ -233,10 +272,7 @@ class Calibration:
         acc = self.sensors.get("acc")
         top = None if acc is None else acc.to_dict()
         keys = ("cost", "scale", "misalignment", "bias", "unit", "standard_errors", "condition")
-        names = {
-            pose.number: residual
-            for pose, residual in zip(self.used, [] if acc is None else acc.residuals.tolist(), strict=False)
-        }
+        residuals = self._residuals()
         return {
             **{key: None if top is None else top[key] for key in keys},
             "poses": [
@@ -246,7 +282,7 @@ class Calibration:
                     "t_start": pose.t_start,
                     "t_end": pose.t_end,
                     "n": pose.n,
-                    "residual": json_value(names.get(pose.number)),
+                    "residual": json_value(residuals.get(pose.number)),
                     "used": pose.used,
                     "reason": pose.reason,
                 }
@@ -261,16 +297,15 @@ class Calibration:
             "verdict": self.verdict,
         }
 
+    def _residuals(self) -> dict[int, float]:
+        """Return the accelerometer's residuals by the number of the pose; none where it was fitted in motion."""
+        acc = self.sensors.get("acc")
+        values = [] if acc is None else acc.residuals.tolist()
+        return {pose.number: value for pose, value in zip(self.used, values, strict=False)}
+
     def pose_table(self) -> Table:
         """List the poses with their readings and residuals."""
-        acc = self.sensors.get("acc")
-        residuals = dict(
-            zip(
-                [pose.number for pose in self.used],
-                [] if acc is None else acc.residuals.tolist(),
-                strict=False,
-            )
-        )
+        residuals = self._residuals()
         rows = tuple(
             (
                 str(pose.number),

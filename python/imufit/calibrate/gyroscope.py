@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.calibrate.calibration import SensorCalibration
-from imufit.calibrate.poses import Pose
+from imufit.calibrate.calibration import AXES, SensorCalibration, named, off_diagonal, rms
+from imufit.calibrate.poses import UP, Pose
 from imufit.calibrate.temperature import ENOUGH
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ LONGEST = 60.0
 """Longest time (s) between two rests over which the rate is integrated."""
 TOLD = 0.03
 """Standard error of A's elements beyond which the turns did not tell them."""
-_AXES = ("x", "y", "z")
-_OFF = ("xy", "xz", "yx", "yz", "zx", "zy")
 
 
 @dataclass(frozen=True)
@@ -163,11 +161,11 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
         far = [span for span, way in zip(spans, trial["way"], strict=True) if way > LEAST_WAY]
         if len(far) >= 3:
             told = _imufit.turn_calibration(t, gyr, far, bias)
-    effects: dict[str, dict[str, float]] = {"gyr.bias": dict(zip(_AXES, bias.tolist(), strict=True))}
-    errors: dict[str, dict[str, float]] = {"gyr.bias": dict(zip(_AXES, bias_error.tolist(), strict=True))}
+    effects: dict[str, dict[str, float]] = {"gyr.bias": named(bias)}
+    errors: dict[str, dict[str, float]] = {"gyr.bias": named(bias_error)}
     if slope is not None:
-        effects["gyr.bias_temperature"] = dict(zip(_AXES, slope[0].tolist(), strict=True))
-        errors["gyr.bias_temperature"] = dict(zip(_AXES, slope[1].tolist(), strict=True))
+        effects["gyr.bias_temperature"] = named(slope[0])
+        errors["gyr.bias_temperature"] = named(slope[1])
     nothing = np.zeros((3, 3))
     if told is None:
         remarks.append("Fewer than three turns between rests: the gyro's scale and misalignment stay as they are.")
@@ -177,7 +175,7 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
             tuple(remarks),
         )  # fmt: skip
     gain, gain_error = np.array(told["model_gain"]), np.array(told["model_gain_error"])
-    unsure = [_AXES[i] for i in range(3) if gain_error[i, i] > TOLD]
+    unsure = [AXES[i] for i in range(3) if gain_error[i, i] > TOLD]
     open_elements = gain_error > TOLD
     # What the turns leave open stays as the maker meant it: a guess must not get into the model.
     gain[open_elements], gain_error[open_elements] = 0.0, 0.0
@@ -186,7 +184,7 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
     misalignment_error = np.array(told["misalignment_error"])
     misalignment_error[open_elements] = 0.0
     scale_error = np.where(np.diag(open_elements), 0.0, told["scale_error"])
-    loose = [name for name, k in zip(_OFF, itertools.permutations(range(3), 2), strict=True) if open_elements[k]]
+    loose = [name for name, left_open in off_diagonal(open_elements.astype(np.float64)).items() if left_open]
     if unsure:
         remarks.append(
             f"The turns do not tell the gyro's scale of {', '.join(unsure)}: turn it about that axis while the axis is "
@@ -194,21 +192,19 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
         )
     if loose:
         remarks.append(f"The turns do not tell the gyro's misalignment {' '.join(loose)}.")
-    remarks += [f"Negative scale: gyro axis {_AXES[i]} is flipped." for i in range(3) if scale[i] < 0.0]
-    held_out = told["held_out"][:, 0]
-    left_out = held_out[np.isfinite(held_out)]
-    before, after = _rms(told["before"]), _rms(told["residuals"][:, 0])
-    worse = left_out.size and _rms(left_out) > before
+    remarks += [f"Negative scale: gyro axis {AXES[i]} is flipped." for i in range(3) if scale[i] < 0.0]
+    held_out = rms(told["held_out"][:, 0])
+    before, after = rms(told["before"]), rms(told["residuals"][:, 0])
+    worse = held_out > before
     if told["freedom"] < 1.0:
         remarks.append(f"{len(told['before'])} turns have no equation to spare: nothing checks the gyro's calibration.")
     if worse:
         remarks.append("The turns do not support a scale or misalignment of the gyro: only its bias is kept.")
     else:
-        effects["gyr.scale"] = dict(zip(_AXES, np.diag(gain).tolist(), strict=True))
-        errors["gyr.scale"] = dict(zip(_AXES, np.diag(gain_error).tolist(), strict=True))
-        off = list(itertools.permutations(range(3), 2))
-        effects["gyr.misalignment"] = {name: float(gain[k]) for name, k in zip(_OFF, off, strict=True)}
-        errors["gyr.misalignment"] = {name: float(gain_error[k]) for name, k in zip(_OFF, off, strict=True)}
+        effects["gyr.scale"] = named(np.diag(gain))
+        errors["gyr.scale"] = named(np.diag(gain_error))
+        effects["gyr.misalignment"] = off_diagonal(gain)
+        errors["gyr.misalignment"] = off_diagonal(gain_error)
     return SensorCalibration(
         sensor="gyr",
         cost="rest" if worse else "turns",
@@ -221,7 +217,7 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
         unit="rad/s",
         before=before,
         after=before if worse else after,
-        held_out=before if worse else (_rms(left_out) if left_out.size else np.nan),
+        held_out=before if worse else held_out,
         error_unit="rad",
         residuals=told["before"] if worse else told["residuals"][:, 0],
         condition=told["condition"],
@@ -272,7 +268,7 @@ def _bias(rests: Sequence[Pose]) -> tuple[Array, Array, tuple[Array, Array] | No
     return rates.mean(axis=0), error, (slope, slope_error)
 
 
-def table_attitudes(turns: Turns, poses: Sequence[Pose], sides: Mapping[str, Array], matrix: Array) -> Array | None:
+def table_attitudes(turns: Turns, poses: Sequence[Pose], matrix: Array) -> Array | None:
     """Attitudes (n, 3, 3), body to table, of poses whose headings follow from the turns between them; None else.
 
     Parameters
@@ -281,17 +277,11 @@ def table_attitudes(turns: Turns, poses: Sequence[Pose], sides: Mapping[str, Arr
         Of the one log that the poses are from.
     poses : sequence of Pose
         In the order of time.
-    sides : mapping
-        Direction of each side in the body frame.
     matrix : (3, 3) array
         The gyro's correction A.
     """
     if turns.log.gyr is None or any(span is None for span in turns.spans):
         return None
-    ups = np.array([sides[pose.name] for pose in poses])
+    ups = np.array([UP[pose.name] for pose in poses])
     found = _imufit.table_attitudes(turns.log.t, turns.log.gyr, list(turns.spans), ups, matrix.tolist())
     return None if found is None else found.reshape(-1, 3, 3)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.calibrate.calibration import SensorCalibration
+from imufit.calibrate.calibration import AXES, SensorCalibration, named, rms
 from imufit.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,8 +26,7 @@ NEW = 0.03
 """Share of the field by which a reading has to differ from the last one taken: dwelling must not weigh."""
 QUIET = 0.05
 """The specific force points up where its length is gravity's within this share."""
-_AXES = ("x", "y", "z")
-_NINE = tuple(row + column for row in _AXES for column in _AXES)
+_NINE = tuple(row + column for row in AXES for column in AXES)
 
 
 def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity: float) -> SensorCalibration:
@@ -85,7 +84,7 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
         except InputError:
             remarks.append("The dip could not be told: the magnetometer's rotation against the accelerometer is open.")
         else:
-            missed = {key: _rms(fit["held_out"][:, 0]) for key, fit in (("length", solution), ("dip", with_dip))}
+            missed = {key: rms(fit["held_out"][:, 0]) for key, fit in (("length", solution), ("dip", with_dip))}
             # The dip may cost the length a little; much means that "up" was not up.
             if missed["dip"] < 1.15 * missed["length"]:
                 solution = with_dip
@@ -113,9 +112,9 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
         scale_error=np.array(solution["scale_error"]),
         bias_error=bias_error,
         unit="uT",
-        before=_rms(before - expected),
-        after=_rms(solution["residuals"][:, 0]),
-        held_out=_rms(held_out),
+        before=rms(before - expected),
+        after=rms(solution["residuals"][:, 0]),
+        held_out=rms(held_out),
         error_unit="uT",
         residuals=solution["residuals"][:, 0],
         condition=solution["condition"],
@@ -123,11 +122,11 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
         excess=solution["excess"],
         items=len(readings),
         effects={
-            "mag.hard_iron": dict(zip(_AXES, solution["model_bias"], strict=True)),
+            "mag.hard_iron": named(solution["model_bias"]),
             "mag.soft_iron": dict(zip(_NINE, gain.ravel().tolist(), strict=True)),
         },
         standard_errors={
-            "mag.hard_iron": dict(zip(_AXES, solution["model_bias_error"], strict=True)),
+            "mag.hard_iron": named(solution["model_bias_error"]),
             "mag.soft_iron": dict(zip(_NINE, gain_error.ravel().tolist(), strict=True)),
         },
         remarks=tuple(remarks),
@@ -189,8 +188,3 @@ def _dip_errors(readings: Array, ups: Array, solution: _Solution) -> dict[str, f
         return float(np.degrees(np.std(np.arcsin(np.clip(sine, -1.0, 1.0)))))
 
     return {"before": spread(readings), "after": spread(readings @ matrix.T + bias)}
-
-
-def _rms(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(np.square(known)))) if known.size else float("nan")

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
+UP = {side: np.eye(3)[k // 2] * (1.0 if k % 2 == 0 else -1.0) for k, side in enumerate(SIDES)}
+"""Unit vector of each side in the body frame."""
 HOLD = 0.6
 """Shortest pose, s."""
 SAME_DIRECTION = np.radians(8.0)

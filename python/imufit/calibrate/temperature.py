@@ -94,10 +94,12 @@ class Temperature:
             return (False, False), [f"{shown}: too few poses to fit it. Take all sides cold, then all sides warm."]
         for trial in [(True, True), (True, False)] if to_spare >= 8 else [(True, False)]:
             solution = solve(*trial)
-            name = "model_scale_temperature" if trial[1] else "model_bias_temperature"
-            value = np.array(solution["model_scale_temperature" if trial[1] else "model_bias_temperature"])
-            error = np.array(solution["model_scale_temperature_error" if trial[1] else "model_bias_temperature_error"])
+            if trial[1]:
+                slopes = solution["model_scale_temperature"], solution["model_scale_temperature_error"]
+            else:
+                slopes = solution["model_bias_temperature"], solution["model_bias_temperature_error"]
+            value, error = np.array(slopes)
             if np.any(np.abs(value) > 4.0 * error) and solution["condition"] < 1e3:
-                what = "bias and scale depend" if name == "model_scale_temperature" else "the bias depends"
+                what = "bias and scale depend" if trial[1] else "the bias depends"
                 return trial, [f"{shown}: {what} on it, fitted along."]
         return (False, False), [f"{shown}: no dependence stands out from the noise."]

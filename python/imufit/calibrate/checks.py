@@ -1,0 +1,147 @@
+"""Checks of poses before a fit: unit, labels, and whether they can tell the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from imufit.calibrate.calibration import AXES
+from imufit.calibrate.poses import SIDES, Pose, distinct, repeated
+from imufit.errors import InputError
+
+UNKNOWNS = {"vector": 12, "magnitude": 9}
+
+
+def check_unit(poses: Sequence[Pose], gravity: float, file: object) -> None:
+    """Refuse readings that cannot be m/s^2.
+
+    Parameters
+    ----------
+    poses : sequence of Pose
+        At least one.
+    gravity : float
+        m/s^2.
+    file : object
+        To name in the error.
+
+    Raises
+    ------
+    InputError
+        The length at rest is far from gravity's.
+    """
+    length = float(np.median([np.linalg.norm(pose.mean) for pose in poses]))
+    if 0.5 * gravity < length < 2.0 * gravity:
+        return
+    unit = "g" if 0.5 < length < 2.0 else "mg" if 900.0 < length < 1100.0 else ""
+    counts = next((c for c in (16384, 8192, 4096, 2048, 1024) if abs(length / c - 1.0) < 0.2), None)
+    looks = unit
+    if counts is not None:
+        looks = f"{unit} or raw counts of {counts}LSB/g" if unit else f"raw counts of {counts}LSB/g"
+        unit = unit or f"{counts}LSB/g"
+    axes = ",".join(f"acc_{axis}=acc_{axis}[{unit}]" for axis in AXES)
+    remedy = (
+        f"It looks like {looks}: map it, e.g. --map {axes}."
+        if unit
+        else "Give the unit in the mapping, e.g. --map acc_x=NAME[g]."
+    )
+    raise InputError(
+        f"the accelerometer reads {length:.4g} at rest where gravity is {gravity:.4g} m/s²",
+        file=str(file),
+        column="acc_x",
+        remedy=remedy,
+    )
+
+
+def check_labels(poses: Sequence[Pose], file: object) -> tuple[list[Pose], list[str]]:
+    """Compare labels with the side that is up by the readings.
+
+    An axis of which both sides read the wrong way round is flipped: that is kept, and calibrated as a negative scale.
+
+    Parameters
+    ----------
+    poses : sequence of Pose
+        All of them.
+    file : object
+        To name in the error.
+
+    Returns
+    -------
+    poses : list of Pose
+        Those that contradict their label are left out.
+    remarks : list of str
+        Axes that are flipped.
+
+    Raises
+    ------
+    InputError
+        The labels name the axes in another order than the readings.
+    """
+    used = [pose for pose in poses if pose.used and pose.label]
+    seen = {side: {pose.side for pose in used if pose.label == side} for side in SIDES}
+    remarks, flipped = [], set()
+    for axis in AXES:
+        plus, minus = seen[f"+{axis}"], seen[f"-{axis}"]
+        if plus == {f"-{axis}"} and minus == {f"+{axis}"}:
+            flipped.add(axis)
+            remarks.append(
+                f"Negative scale: axis {axis} is flipped (labelled +{axis}, it reads -{axis}, and the other way round)."
+            )
+    turned = {axis: {side[1] for sign in "+-" for side in seen[sign + axis]} - {axis} for axis in AXES}
+    swapped = [axis for axis in AXES if turned[axis] and not any(f"{s}{axis}" in seen[f"{s}{axis}"] for s in "+-")]
+    if len(swapped) >= 2:
+        pairs = ", ".join(f"{axis} up reads on {' and '.join(sorted(turned[axis]))}" for axis in swapped)
+        raise InputError(
+            f"the labels name other axes than the readings: {pairs}",
+            file=str(file),
+            column="pose",
+            remedy="The axes are swapped: correct the labels, or map the columns, e.g. --map acc_x=acc_y,acc_y=acc_x.",
+        )
+    judged = []
+    for pose in poses:
+        wrong = pose.used and pose.label is not None and pose.side != pose.label and pose.label[1] not in flipped
+        judged.append(pose.without(f"labelled {pose.label}, but {pose.side} points up") if wrong else pose)
+    return judged, remarks
+
+
+def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
+    """Refuse poses that cannot tell the parameters of a cost.
+
+    Parameters
+    ----------
+    poses : sequence of Pose
+        The usable ones.
+    cost : str
+        ``vector`` or ``magnitude``.
+    file : object
+        To name in the error.
+
+    Raises
+    ------
+    InputError
+        Says what is missing.
+    """
+    count = distinct(np.array([pose.direction for pose in poses]))
+    same = [f"{a.number} and {b.number} ({a.name})" for a, b in repeated(poses)]
+    doubled = f"; poses {', '.join(same[:3])} are the same" if same else ""
+    if count == 1:
+        every = {1: f"pose {poses[0].number} ({poses[0].name} up) is the only one", 2: "both poses are the same"}
+        which = every.get(len(poses), f"all {len(poses)} poses are the same ({poses[0].name} up)")
+        problem = f"{which}: bias and tilt can't be separated"
+        raise InputError(problem, file=str(file), remedy="Record at least six: each of the six sides up for 3 s.")
+    if cost == "magnitude" and count < UNKNOWNS["magnitude"]:
+        raise InputError(
+            "the magnitude cost has 9 unknowns (scale 3, non-orthogonality 3, bias 3) and each pose gives one "
+            f"equation: {count} different poses are too few{doubled}",
+            file=str(file),
+            remedy="Record at least nine attitudes, some of them oblique, or use --cost vector with the six sides up.",
+        )
+    sides = {pose.name for pose in poses}
+    axes = {side[1] for side in sides}
+    if cost == "vector" and (len(axes) < 3 or len(sides) < 4):
+        missing = [side for side in SIDES if side not in sides]
+        raise InputError(
+            f"12 unknowns cannot be found from the sides {' '.join(s for s in SIDES if s in sides)}{doubled}",
+            file=str(file),
+            remedy=f"Record also {' '.join(missing)} up.",
+        )
