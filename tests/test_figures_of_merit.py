@@ -154,6 +154,17 @@ def test_swing_and_gain_of_a_vibration() -> None:
     assert found.vibration_gain == pytest.approx(0.1, rel=1e-3)
 
 
+def test_the_drift_of_an_integrated_rate_is_no_swing() -> None:
+    t = time(20.0)
+    error = 0.5 * t + np.where((t >= 10.0) & (t < 11.0), 0.2, 0.0)
+    rest = one_rest(t, [(1000, 1100)])
+    force = column(np.ones(t.size) * (t >= 10.0))
+    found = figures_of_merit(t, column(error), rest, by_force=force, bounded=False)
+    assert found is not None
+    assert found.vibration_deg == pytest.approx(0.2, abs=1e-9)
+    assert found.vibration_gain == pytest.approx(0.2, abs=1e-9)
+
+
 def test_a_vibration_is_no_noise() -> None:
     t = time(20.0)
     shaken = (t >= 15.0) & (t < 16.0)
@@ -165,7 +176,7 @@ def test_a_vibration_is_no_noise() -> None:
 
 def test_two_components_count_together() -> None:
     t = time(50.0)
-    error = [*np.random.default_rng(6).normal(0.0, 0.1, (t.size, 2)), 0.3, -0.4]
+    error = np.array([0.3, -0.4]) + np.random.default_rng(6).normal(0.0, 0.1, (t.size, 2))
     found = figures_of_merit(t, np.radians(error), one_rest(t))
     assert found is not None
     assert found.offset_deg == pytest.approx(0.5, abs=0.01)

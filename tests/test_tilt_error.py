@@ -131,7 +131,7 @@ def test_a_log_that_never_rests_has_no_rests() -> None:
 def test_a_blow_from_the_side_is_found_and_noise_is_not() -> None:
     t = 0.01 * np.arange(3000)
     rng = np.random.default_rng(3)
-    acc = [*rng.normal(0.0, 0.03, (3000, 3)), 0.0, 0.0, 9.81]
+    acc = np.array([0.0, 0.0, 9.81]) + rng.normal(0.0, 0.03, (3000, 3))
     still = np.zeros(3000)
     assert moved(still, acc).vibrations == ()
     blow = (t >= 12.0) & (t < 12.6)

@@ -9,7 +9,8 @@ sd                      about the mean of each rest, pooled over the rests (pape
 sd_moving               about the mean over the rows in motion
 drift                   Theil-Sen slope of the rests' means where there are eight rests or more; with fewer the median
                         of the slopes within the rests, each weighted by the cube of its length, which is the
-                        information it has; without rests the slope of the whole log
+                        information it has; without rests the median, without sign, of the slopes of the log's
+                        minutes
 noise_density           root of the one-sided power spectral density at rest (Welch, 128 rows, Hann window, straight
                         line taken off), averaged from a tenth of the Nyquist frequency up to it. For white noise this
                         is ``sd sqrt(2 dt)``
@@ -17,7 +18,8 @@ settling                from the end of a move until the error, averaged over a 
                         about its median over the last quarter of the rest, which ends with the first vibration; median
                         over the moves. A method that drifts without bound has the straight line of that rest taken
                         off first
-vibration               root mean square, over the vibrating rows, of the departure from the mean of the second before
+vibration               root mean square, over the vibrating rows, of the departure from the mean of the second before;
+                        for a method that drifts without bound, from the straight line through that second
 ======================  ====================================================================================
 
 Of each rest the first half, at most `SETTLE` seconds, is left to the methods to settle and is not counted in sd, drift
@@ -28,11 +30,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.signal import detrend, welch
+from scipy.signal import detrend
+from scipy.signal.windows import hann
 from scipy.stats import theilslopes
 
 from imufit.replay.stretches import Rest, Stretches
@@ -52,6 +55,7 @@ NOISE_BAND = (0.1, 1.0)
 
 _AFTER_VIBRATION = 2.0
 _BEFORE_VIBRATION = 1.0
+_LEAST_BEFORE = 8
 _WELCH_ROWS = 128
 _LEAST_WELCH_ROWS = 32
 _MANY_RESTS = 8
@@ -102,8 +106,8 @@ def figures_of_merit(
     mean = error[rows].mean(axis=0)
     calm = [_before_vibration(rest, stretches) for rest in stretches.moves]
     settling = [found for rows in calm if (found := _settling(t, error, rows, band_deg, bounded)) is not None]
-    swing = _swing(t, error, stretches)
-    force_swing = None if by_force is None else _swing(t, by_force, stretches)
+    swing = _swing(t, error, stretches, bounded)
+    force_swing = None if by_force is None else _swing(t, by_force, stretches, True)
     moving = known & stretches.moving
     return TiltFigures(
         rmse_deg=_degrees(np.sqrt(np.mean(np.sum(error[rows] ** 2, axis=1)))),
@@ -165,10 +169,18 @@ def _drift(t: Array, error: Array, quiet: Sequence[NDArray[np.intp]], known: Mas
         times = np.array([t[part].mean() for part in quiet])
         means = np.array([error[part].mean(axis=0) for part in quiet])
         return np.array([_slope(times, means[:, axis], len(quiet)) for axis in axes])
-    parts = list(quiet) or [np.flatnonzero(known)]
+    parts = list(quiet) or _minutes(t, np.flatnonzero(known))
     slopes = np.array([[_slope(t[part], error[part, axis]) for axis in axes] for part in parts])
+    if not quiet:
+        return np.asarray(np.median(np.abs(slopes), axis=0))
     weights = np.array([(t[part[-1]] - t[part[0]]) ** 3 for part in parts])
     return np.array([_weighted_median(slopes[:, axis], weights) for axis in axes])
+
+
+def _minutes(t: Array, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Rows of each whole minute; of a log that is shorter than two, all rows."""
+    count = max(1, int((t[rows[-1]] - t[rows[0]]) // 60.0))
+    return np.split(rows, np.searchsorted(t[rows], t[rows[0]] + 60.0 * np.arange(1, count)))
 
 
 def _slope(t: Array, values: Array, blocks: int = 60) -> float:
@@ -197,8 +209,7 @@ def _noise_density(t: Array, error: Array, quiet: Sequence[NDArray[np.intp]]) ->
     total, weight = 0.0, 0.0
     for part in parts:
         rate = (part.size - 1) / float(t[part[-1]] - t[part[0]])
-        rows = min(_WELCH_ROWS, part.size)
-        frequency, power = welch(error[part], rate, nperseg=rows, detrend=_straight, axis=0)
+        frequency, power = _spectrum(error[part], rate)
         nyquist = 0.5 * rate
         inside = (frequency >= NOISE_BAND[0] * nyquist) & (frequency < NOISE_BAND[1] * nyquist)
         total += part.size * float(np.sum(power[inside], axis=1).mean())
@@ -206,9 +217,17 @@ def _noise_density(t: Array, error: Array, quiet: Sequence[NDArray[np.intp]]) ->
     return _degrees(math.sqrt(total / weight))
 
 
-def _straight(values: NDArray[Any]) -> NDArray[Any]:
-    """Values without their straight line along the last axis."""
-    return np.asarray(detrend(values, axis=-1))
+def _spectrum(values: Array, rate: float) -> tuple[Array, Array]:
+    """One-sided power spectral density of (n, k) values: frequencies (m,) and densities (m, k).
+
+    Welch's method with half overlapping windows, all of them in one transform.
+    """
+    rows = min(_WELCH_ROWS, len(values))
+    parts = sliding_window_view(values, rows, axis=0)[:: rows // 2]
+    taper = hann(rows, sym=False)
+    power = np.abs(np.fft.rfft(detrend(parts, axis=-1) * taper, axis=-1)) ** 2
+    scale = 2.0 / (rate * float(np.sum(taper**2)))
+    return np.asarray(np.fft.rfftfreq(rows, 1.0 / rate)), np.asarray(scale * power.mean(axis=0).T, dtype=np.float64)
 
 
 def _before_vibration(rest: Rest, stretches: Stretches) -> tuple[int, int]:
@@ -251,21 +270,26 @@ def _running_mean(values: Array, width: int) -> Array:
     return np.asarray((sums[last] - sums[first]) / (last - first)[:, None])
 
 
-def _swing(t: Array, error: Array, stretches: Stretches) -> float | None:
+def _swing(t: Array, error: Array, stretches: Stretches, bounded: bool) -> float | None:
     """Root mean square departure during vibrations, rad; None without any."""
     total, count = 0.0, 0
+    known: Mask = np.asarray(np.isfinite(error).all(axis=1))
     for start, stop in stretches.vibrations:
-        part = error[start:stop]
-        part = part[np.isfinite(part).all(axis=1)]
         rest = next(rest for rest in stretches.rests if rest.start <= start < rest.stop)
         begin = max(rest.start, int(np.searchsorted(t, t[start] - _BEFORE_VIBRATION)))
-        before = error[begin:start]
-        before = before[np.isfinite(before).all(axis=1)]
-        if not len(part):
+        rows = start + np.flatnonzero(known[start:stop])
+        before = begin + np.flatnonzero(known[begin:start])
+        if not rows.size:
             continue
-        level = before.mean(axis=0) if len(before) >= 3 else np.median(part, axis=0)
-        total += float(np.sum((part - level) ** 2))
-        count += len(part)
+        level: Array = np.median(error[rows], axis=0)
+        if before.size >= _LEAST_BEFORE:
+            level = error[before].mean(axis=0)
+            if not bounded:
+                ago = t[before] - t[before].mean()
+                slope = ago @ error[before] / float(ago @ ago)
+                level = level + (t[rows] - t[before].mean())[:, None] * slope
+        total += float(np.sum((error[rows] - level) ** 2))
+        count += rows.size
     return math.sqrt(total / count) if count else None
 
 

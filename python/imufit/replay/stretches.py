@@ -35,7 +35,7 @@ SHAKEN = 3.0
 
 _MOST_STILL = np.radians(0.5)
 _LEAST_FLUCTUATION = 0.01
-"""m/s^2: below it a fluctuation is the sensor's resolution."""
+"""m/s^2: below it, and below half a step of the readings, a fluctuation is the sensor's resolution."""
 _WINDOW = 0.2
 _SLOW = 1.0
 _BESIDE_A_MOVE = 0.5
@@ -162,7 +162,7 @@ def _vibrations(t: Array, acc: Array, rests: tuple[Rest, ...], step: float) -> t
         power[rows] = np.maximum(uniform_filter1d(((force - slow) ** 2).sum(axis=1), window, mode="nearest"), 0.0)
     if not np.isfinite(power).any():
         return ()
-    usual = max(float(np.nanmedian(power)), 3.0 * _LEAST_FLUCTUATION**2)
+    usual = max(float(np.nanmedian(power)), 3.0 * max(_LEAST_FLUCTUATION, 0.5 * _resolution(acc)) ** 2)
     shaken = np.nan_to_num(power) > SHAKEN**2 * usual
     found: list[Rows] = []
     for rest in rests:
@@ -176,6 +176,13 @@ def _vibrations(t: Array, acc: Array, rests: tuple[Rest, ...], step: float) -> t
                 joined.append(run)
         found += joined
     return tuple(found)
+
+
+def _resolution(acc: Array) -> float:
+    """Step of the readings, m/s^2: hardly any two that differ do so by less."""
+    steps = np.abs(np.diff(acc, axis=0))
+    steps = steps[steps > 1e-9]
+    return float(np.quantile(steps, 0.01)) if steps.size else 0.0
 
 
 def _matrix(q: Array) -> Array:

@@ -120,7 +120,9 @@ def _notes(reference: TiltReference, stretches: Stretches, methods: Mapping[str,
             + (f", so {' and '.join(blind)} cannot be judged." if blind else ".")
         )
     if not stretches.rests:
-        notes.append("The reference never rests: no SD at rest, no noise density; the drift is that of the whole log.")
+        notes.append(
+            "The reference never rests: no SD at rest, no noise density; the drift is the median slope of its minutes."
+        )
     elif stretches.moves and not any(figures and figures.settling_moves for figures in methods.values()):
         notes.append(f"No move is followed by {SETTLING_REST:g} s of rest: no settling time.")
     unfinished = [

@@ -29,7 +29,7 @@ class TiltFigures:
     sd_moving_deg : float or None
         Standard deviation about the mean in motion, deg.
     drift_deg_per_min : float
-        Slope of the error, deg/min: at rest, or over the whole log where it never rests.
+        Slope of the error at rest, deg/min; where the log never rests the median of its minutes' slopes, without sign.
     noise_density_deg : float or None
         Noise density of the angle at rest, deg/sqrt(Hz), over the comparison's `noise_band_hz`.
     settling_s : float or None
