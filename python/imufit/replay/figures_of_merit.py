@@ -124,14 +124,16 @@ def figures_of_merit(
     )
 
 
-def noise_band(t: Array) -> tuple[float, float]:
-    """Band over which the noise density is averaged, Hz.
+def noise_band(t: Array) -> tuple[float, float] | None:
+    """Band over which the noise density is averaged, Hz; None for fewer than two rows.
 
     Parameters
     ----------
     t : (n,) array
         Times of the rows with an error, s.
     """
+    if t.size < 2:
+        return None
     nyquist = 0.5 / float(np.median(np.diff(t)))
     return NOISE_BAND[0] * nyquist, NOISE_BAND[1] * nyquist
 
