@@ -283,3 +283,17 @@ def test_the_command_refuses_in_one_line(tmp_path, capsys):
     assert "gyr_x" in said
     assert main(["apply", str(tmp_path / "m.toml"), str(tmp_path / "in.parquet")]) == 2
     assert main(["apply", str(tmp_path / "m.toml"), "x.csv", "-o", str(tmp_path / "o.csv")]) == 2
+
+
+def test_mount_of_the_sensor_is_turned_back_into_the_axes_of_the_body():
+    mount = {"x": 0.05, "y": -0.1, "z": 0.2}
+    silent = Noise(acc=SensorNoise(1e-12), gyr=SensorNoise(1e-12), mag=SensorNoise(1e-12))
+    turned = simulate.simulate(
+        "handheld", {"ref.alignment": mount, "acc.bias": {"x": 0.3}}, 3, 20.0, noise=silent
+    ).to_log()
+    straight = simulate.simulate("handheld", {}, 3, 20.0, noise=silent).to_log()
+    model = SensorModel(["acc.bias", "ref.alignment"], {"ref.alignment": mount, "acc.bias": {"x": 0.3}})
+    corrected = model.apply(turned)
+    for sensor in ("acc", "gyr", "mag"):
+        np.testing.assert_allclose(getattr(corrected, sensor), getattr(straight, sensor), atol=1e-9)
+    assert any("ref.alignment" in note for note in corrected.notes)

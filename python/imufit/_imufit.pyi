@@ -18,6 +18,7 @@ __all__ = [
     "Filter",
     "PoseJudge",
     "Problem",
+    "Profile",
     "Survey",
     "__version__",
     "attitude_errors",
@@ -130,6 +131,8 @@ class Effect:
     def sensors(self) -> list[str]: ...
     @property
     def parameters(self) -> list[tuple[str, str, float | None]]: ...
+    @property
+    def strongly_curved(self) -> bool: ...
     @property
     def whole(self) -> list[str]: ...
     def search(self, facts: Facts, found: Sequence[float] | None = None, round: int = 0) -> list[list[float]]: ...

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 ALPHA = 0.003
 MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
+CLEARLY_WORSE = 0.1
+"""Share of the drop in held-out error by which a fit must stay behind the best one to be out."""
 POWER = 0.84
 """Standard errors beyond the threshold at which an effect is seen with 80 % power."""
 
@@ -40,7 +42,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     analysis = fit.analysis
     ids = analysis.slots
     slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
-    result = analysis.problem.diagnose(analysis.fitted_slots, slots)
+    result = _decided_by_fits(fit, analysis.problem.diagnose(analysis.fitted_slots, slots))
     confounded: dict[str, list[Rival]] = {}
     for first, second, correlation in result["correlations"]:
         if correlation < MIN_CORRELATION:
@@ -82,6 +84,38 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         sentence=sentence,
         notes=notes(analysis),
     )
+
+
+def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Where columns taken at one point mislead, let fits decide between the best candidate and others of that kind.
+
+    A drive with play and a late reference look alike while a rig goes back and forth at one speed, and their columns
+    say little of how well they do at their full size.
+    """
+    analysis = fit.analysis
+    ids = analysis.slots
+    best = result["best"]
+    if best is None or not analysis.candidates[ids[best]].strongly_curved:
+        return result
+    items = {item["slot"]: dict(item) for item in result["screened"]}
+    close = [
+        slot for slot, item in items.items() if item["testable"] and analysis.candidates[ids[slot]].strongly_curved
+    ]
+    if len(close) < 2:
+        return result
+    for slot in close:
+        items[slot]["held_out_after"] = fit.moved(analysis.model.with_effect(ids[slot])).ratio
+    after = {slot: items[slot]["held_out_after"] for slot in close}
+    won = min(close, key=after.__getitem__)
+    lost = [slot for slot in close if after[slot] > after[won] + CLEARLY_WORSE * (fit.ratio - after[won])]
+    if best not in lost:
+        won = best
+    # Explaining more than a candidate that passed, by fits, is as significant.
+    items[won] |= {"passed": True, "p_value": min(items[won]["p_value"], items[best]["p_value"])}
+    rivals = [slot for slot in result["rivals"] if slot not in (won, *lost)]
+    word = "missing" if result["verdict"] == "ambiguous" and not rivals else result["verdict"]
+    rest = [items[item["slot"]] for item in result["screened"] if item["slot"] != won]
+    return {**result, "best": won, "rivals": rivals, "screened": [items[won], *rest], "verdict": word}
 
 
 def _candidate(

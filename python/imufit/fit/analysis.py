@@ -144,11 +144,13 @@ class Analysis:
         }
         model = model.starting_at(starts)
         found = search(self.passes, self.facts, _stack(model, nuisance), asked)
-        raw = _empty(self.facts, model, nuisance, _asked(asked, found), [[] for _ in CHANNELS])
-        self.passes.evidence(raw, self.facts, "taking evidence")
-        white = raw
-        if any(self.filters):
-            white = self.passes.evidence(raw.with_filters(self.filters), self.facts, "whitening the evidence")
+        white = _empty(self.facts, model, nuisance, _asked(asked, found), self.filters)
+        self.passes.evidence(white, self.facts, "taking evidence")
+        raw = white
+        # Between two iterations of a fit nobody asks for the residual as it stands.
+        if with_candidates and any(self.filters):
+            plain = white.with_filters([[] for _ in CHANNELS])
+            raw = self.passes.evidence(plain, self.facts, "taking evidence as it stands")
         # The noise is that of the first evidence, which every effect of the catalogue was fitted to.
         problem = _imufit.Problem(white, raw, self.variance, self.floors)
         return replace(

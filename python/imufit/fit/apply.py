@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.fit.passes import chunk_arrays, covariate_names
@@ -16,6 +19,7 @@ if TYPE_CHECKING:
 
 READ_ROWS = 65536
 SENSORS = ("acc", "gyr", "mag")
+ALIGNMENT = "ref.alignment"
 
 
 def apply(model: SensorModel, log: LogSource) -> Log:
@@ -51,6 +55,10 @@ def apply(model: SensorModel, log: LogSource) -> Log:
     acc, gyr, mag = (
         getattr(whole, name) if values is None else values for name, values in zip(SENSORS, readings, strict=True)
     )
+    if ALIGNMENT in model.effects:
+        mount = Rotation.from_rotvec([model.parameters[ALIGNMENT][axis] for axis in "xyz"])
+        acc, gyr, mag = (None if x is None else np.ascontiguousarray(mount.apply(x)) for x in (acc, gyr, mag))
+        notes.append(f"{ALIGNMENT}: readings turned into the axes of the body that the reference describes")
     return replace(whole, acc=acc, gyr=gyr, mag=mag, notes=(*whole.notes, *notes))
 
 
@@ -58,6 +66,7 @@ def _left_alone(model: SensorModel, log: Log) -> list[str]:
     """Say which effects of the model did nothing to the readings, and which means had to be taken from the log."""
     notes = []
     of_reference = [effect.id for effect, _ in model.stack() if _imufit.concerns_reference(effect)]
+    of_reference = [key for key in of_reference if key != ALIGNMENT]
     if of_reference:
         notes.append(f"{' and '.join(of_reference)} left alone: of the reference, not of the readings")
     for sensor in SENSORS:

@@ -181,8 +181,10 @@ class SensorModel:
 
         No reference is needed. What effects read of the motion is taken from the corrected readings themselves: an
         effect of one sensor on another uses the other one corrected, held or interpolated where that one is slower, and
-        derivatives come from local polynomials. Effects of the reference (``ref.delay``, ``ref.alignment``,
-        ``mag.field_reference``) change no reading; a note of the result names them.
+        derivatives come from local polynomials. ``ref.alignment``, the mount of the sensor on the body that the
+        reference describes, turns the corrected readings into the axes of that body. The other effects of the
+        reference (``ref.delay``, ``ref.tilt``, ``mag.field_reference``) and of the rig change no reading; a note of the
+        result names them.
 
         Parameters
         ----------

@@ -17,6 +17,8 @@ use crate::normal_equations::NormalEquations;
 const PART: usize = 2048;
 /// How often the weights of the channels are taken from what the best trial leaves.
 const ROUNDS: usize = 3;
+/// Rows that a search looks at, at most about: parts spread evenly over the log.
+const ROWS: usize = 1 << 15;
 
 /// Sums of one channel: `[fitted columns | residual]` with themselves and with the columns of each trial.
 #[derive(Clone, Default)]
@@ -98,7 +100,11 @@ impl Profile {
 
     /// Adds the core rows of a window.
     pub fn add(&mut self, window: &Window) -> Result<(), EffectError> {
-        let starts: Vec<usize> = (window.begin..window.end).step_by(PART).collect();
+        let every = self.facts.n.div_ceil(ROWS).max(1);
+        let starts: Vec<usize> = (window.begin..window.end)
+            .step_by(PART)
+            .filter(|begin| ((window.offset + begin) / PART).is_multiple_of(every))
+            .collect();
         let parts: Vec<Result<Vec<Sums>, EffectError>> = starts
             .into_par_iter()
             .map(|begin| self.sums(&window.part(begin, (begin + PART).min(window.end), self.facts.margin())))

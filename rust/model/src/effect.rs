@@ -155,6 +155,11 @@ pub trait Effect: Send + Sync {
         self.columns(rows, sensor, trial, out)
     }
 
+    /// True if its columns around one value say little of larger ones, so that only a fit tells how much it explains.
+    fn strongly_curved(&self) -> bool {
+        false
+    }
+
     /// Trial values for parameters that no linear step finds (a period, a width): at first a grid over all that can be,
     /// then, around what the round before `round` found best, a finer one. Empty: nothing to search, or done.
     fn search(&self, _facts: &LogFacts, _found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {

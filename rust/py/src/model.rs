@@ -59,6 +59,12 @@ impl PyEffect {
         self.0.search(&facts.facts, found.as_deref().map(|f| (f, round)))
     }
 
+    /// True if its columns around one value say little of larger ones: only a fit tells how much it explains.
+    #[getter]
+    fn strongly_curved(&self) -> bool {
+        self.0.strongly_curved()
+    }
+
     /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new
     /// values.
     #[getter]

@@ -175,6 +175,10 @@ impl Effect for Reference {
         Ok(())
     }
 
+    fn strongly_curved(&self) -> bool {
+        self.kind == Kind::Delay
+    }
+
     fn reference_change(&self, parameters: &[f64]) -> ReferenceChange {
         match self.kind {
             Kind::Delay => ReferenceChange {

@@ -213,6 +213,10 @@ impl Effect for RigEffect {
         Ok(())
     }
 
+    fn strongly_curved(&self) -> bool {
+        self.kind == Kind::Backlash
+    }
+
     fn search(&self, facts: &LogFacts, found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {
         let Some(rig) = &facts.rig else { return Vec::new() };
         let reach = travel(rig);
