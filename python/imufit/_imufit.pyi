@@ -32,6 +32,7 @@ __all__ = [
     "find_effect",
     "find_rests",
     "frame_vectors",
+    "kalman_steady_state",
     "magnitude_calibration",
     "matrix_from_quaternion_rows",
     "python_effect",
@@ -46,6 +47,7 @@ __all__ = [
     "saturate",
     "sphere",
     "table_attitudes",
+    "tilt_angles",
     "turn_calibration",
     "vector_calibration",
 ]
@@ -124,6 +126,8 @@ class Filter:
 
 def filter_descriptions() -> dict[str, _Description]: ...
 def replay_rules() -> dict[str, _Setting]: ...
+def tilt_angles(acc: _Array) -> _Array: ...
+def kalman_steady_state(dt: float, settings: Mapping[str, float] | None = None) -> tuple[float, float, float]: ...
 
 # --- model
 
