@@ -63,6 +63,16 @@ class TestFound:
         swings = [np.ptp(result.euler("complementary")[400:, 1]) for result in (used, not_known)]
         assert swings[0] < 0.8 * swings[1]
 
+    @settings(max_examples=20, deadline=None)
+    @given(SEEDS)
+    def test_blows_of_a_single_row_at_coarse_resolution(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        acc = rng.normal([0.0, 0.0, G], 0.1, (20_000, 3))
+        blows = rng.choice(20_000, 300, replace=False)
+        acc[blows, 1] += rng.uniform(8.0, 24.0, 300)
+        assert end_of_range(np.minimum(quantised(acc, 0.01 * G), 2 * G), 1.5 * G) == pytest.approx(2 * G)
+        assert end_of_range(quantised(acc, 0.01 * G), 1.5 * G) is None
+
 
 class TestNoFalseAlarm:
     """Readings that stand still for other reasons."""

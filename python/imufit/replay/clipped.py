@@ -9,9 +9,14 @@ value for other reasons too:
 - a column that is held until the next sample comes: all axes stand together
 - a column of zeros, or a constant one: there is nothing to come from
 
-An axis counts as clipped at the largest value of the log, of one sign, where that stands in at least `ROWS` consecutive
-rows while another axis changes from each of at least `ROWS` samples to the next, by more than `STEPS` steps of the
-resolution and a thousandth of the value in all, and where the row before or after differs by more than `STEPS` steps.
+An axis counts as clipped at the largest value of the log, of one sign, where
+
+- that stands in at least `ROWS` consecutive rows while another axis changes from each of at least `ROWS` samples to the
+  next, by more than `STEPS` steps of the resolution and a thousandth of the value in all, and where the row before or
+  after differs by more than `STEPS` steps; or
+- readings pile up there: at least `PILE` of them, more than within the next `WINDOW` of the value below, most of them
+  peaks of one or two rows that stand out by more than a thousandth. So short blows show.
+
 Below 1.5 times gravity and 1 rad/s, less than any common range, nothing counts.
 
 Readings that were mixed across axes afterwards (a correction of misalignment) are no longer the same from row to row:
@@ -33,6 +38,8 @@ Array = NDArray[np.float64]
 
 ROWS: Final = 3
 STEPS: Final = 8
+PILE: Final = 10
+WINDOW: Final = 0.05
 _LEAST_IN_GRAVITY: Final = 1.5
 _LEAST_RATE: Final = 1.0
 
@@ -82,12 +89,18 @@ def end_of_range(column: Array, least: float) -> float | None:
         The smallest of the ends that were found on any axis; None where nothing is cut off.
     """
     largest = [(axis, sign, _largest(sign * column[:, axis])) for axis in range(3) for sign in (1.0, -1.0)]
-    possible = [(axis, sign, end) for axis, sign, end in largest if end >= least]
-    runs = [(axis, end, _runs(sign * column[:, axis] == end)) for axis, sign, end in possible]
-    if not any(len(spans) for _, _, spans in runs):
-        return None
-    step = _resolution(column)
-    ends = [end for axis, end, spans in runs if any(_is_cut(column, axis, span, end, step) for span in spans)]
+    step: float | None = None
+    ends = []
+    for axis, sign, end in largest:
+        if end < least:
+            continue
+        values = sign * column[:, axis]
+        runs = _runs(values == end)
+        long = runs[runs[:, 1] - runs[:, 0] >= ROWS]
+        if len(long) and step is None:
+            step = _resolution(column)
+        if _is_pile(values, runs, end) or any(_is_cut(column, axis, span, end, step or 0.0) for span in long):
+            ends.append(end)
     return min(ends, default=None)
 
 
@@ -97,9 +110,8 @@ def _largest(values: Array) -> float:
 
 
 def _runs(at_end: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """First row and row after the last of each stretch of at least `ROWS` true rows, (k, 2)."""
-    edges = np.flatnonzero(np.diff(at_end, prepend=False, append=False)).reshape(-1, 2)
-    return edges[edges[:, 1] - edges[:, 0] >= ROWS]
+    """First row and row after the last of each stretch of true rows, (k, 2)."""
+    return np.flatnonzero(np.diff(at_end, prepend=False, append=False)).reshape(-1, 2)
 
 
 def _resolution(column: Array) -> float:
@@ -118,6 +130,15 @@ def _is_cut(column: Array, axis: int, span: NDArray[np.intp], end: float, step: 
     moved = np.ptp(others, axis=0).max() > max(STEPS * step, 1e-3 * end)
     around = [abs(abs(column[row, axis]) - end) for row in (start - 1, stop) if 0 <= row < len(column)]
     return bool(np.count_nonzero(changes) >= ROWS - 1 and moved and any(jump > STEPS * step for jump in around))
+
+
+def _is_pile(values: Array, runs: NDArray[np.intp], end: float) -> bool:
+    lengths = runs[:, 1] - runs[:, 0]
+    if lengths.sum() < PILE or np.count_nonzero(values > (1.0 - WINDOW) * end) >= 2 * lengths.sum():
+        return False
+    before, after = values[np.maximum(runs[:, 0] - 1, 0)], values[np.minimum(runs[:, 1], len(values) - 1)]
+    peaks = (lengths < ROWS) & (np.maximum(before, after) < (1.0 - 1e-3) * end)
+    return bool(2 * np.count_nonzero(peaks) > len(runs))
 
 
 def _checked(name: str, value: object, log: Log) -> float:
