@@ -1,7 +1,9 @@
 """Filters over logs and live rows: attitude for every row and its error against a reference."""
 
 from imufit.replay.replay import DEFAULT_FILTERS, FILTERS, SETTINGS, Replay, estimate_mag_reference, replay
+from imufit.replay.replay_many import replay_many
 from imufit.replay.steady_state import SteadyState, kalman_steady_state
+from imufit.replay.stream import Stream
 from imufit.replay.tilt_angles import tilt_angles
 
 __all__ = [
@@ -10,8 +12,10 @@ __all__ = [
     "SETTINGS",
     "Replay",
     "SteadyState",
+    "Stream",
     "estimate_mag_reference",
     "kalman_steady_state",
     "replay",
+    "replay_many",
     "tilt_angles",
 ]
