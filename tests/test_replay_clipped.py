@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from imufit import InputError, Log
 from imufit.replay import replay
 from imufit.replay.clipped import end_of_range, ranges
+from imufit.simulate import simulate
 
 G = 9.80665
 SEEDS = st.integers(0, 10**6)
@@ -38,6 +39,12 @@ class TestFound:
         end = quantised(part * np.abs(motion).max(), step)
         cut = np.clip(quantised(motion, step), -end, end)
         assert end_of_range(cut, 1.0) == pytest.approx(end)
+
+    @pytest.mark.parametrize("scenario", ["handheld", "arm", "poses"])
+    def test_a_simulated_gyro_that_saturates(self, scenario: str) -> None:
+        made = simulate(scenario, {"gyr.saturation": None}, seed=0, duration=60.0)
+        found = ranges(Log.from_arrays(made.t, acc=made.acc, gyr=made.gyr))
+        assert found == {"gyr_range": pytest.approx(made.truth.effects["gyr.saturation"]["range"])}
 
     def test_the_asymmetric_ends_of_two_s_complement_are_one_range(self) -> None:
         counts = np.clip(np.round(swing(2, 200.0, 6.0, 0.01) * 131.0 * 57.3), -32768, 32767)
@@ -98,6 +105,21 @@ class TestNoFalseAlarm:
         motion = swing(seed, 50.0, 5.0, 0.0)
         held = np.repeat(quantised(motion, step) if step else motion, rows, axis=0)
         assert end_of_range(held, 1.0) is None
+
+    def test_a_noisy_top_that_happens_to_stand_for_three_rows(self) -> None:
+        top = [[7679, -2962, 4927], [7701, -2852, 4604], [7722, -2726, 4274], [7731, -2613, 3974], [7731, -2488, 3647]]
+        top += [[7731, -2371, 3352], [7715, -2246, 3017], [7694, -2102, 2676], [7682, -1975, 2359]]
+        rest = [[0, 0, 0], [1, 1, 1]]  # shows the resolution
+        assert end_of_range(np.array([*rest, *top]) * 2.66e-4, 1.0) is None
+        beyond = np.array([*top, *rest])
+        beyond[[0, 1, 2, 6, 7, 8], 0] -= [2100, 1500, 900, 1100, 1700, 2300]  # the same rows on the way past the end
+        assert end_of_range(beyond * 2.66e-4, 1.0) == pytest.approx(7731 * 2.66e-4)
+
+    @pytest.mark.parametrize("scenario", ["handheld", "arm", "tilt", "poses"])
+    def test_simulated_motion_with_realistic_noise(self, scenario: str) -> None:
+        for seed in range(4):
+            made = simulate(scenario, {}, seed=seed, duration=20.0, realistic=True)
+            assert ranges(Log.from_arrays(made.t, acc=made.acc, gyr=made.gyr)) == {}
 
     def test_steps_from_pose_to_pose_and_rate_to_rate_without_noise(self) -> None:
         levels = np.repeat([[0.0, 0.0, 20.0], [20.0, 0.0, 0.0], [0.0, -20.0, 0.0], [0.0, 0.0, 20.0]], 50, axis=0)

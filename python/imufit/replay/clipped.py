@@ -5,15 +5,16 @@ axes go on, and it comes there or leaves with a jump. Each part is needed, for a
 value for other reasons too:
 
 - a sensor at rest, or turning evenly, whose noise is below its resolution: its other axes stand as well
-- the flat top of a slow swing between two steps of the resolution: it is reached step by step
+- the flat top of a slow swing between two steps of the resolution: the rows around it lead up to it and not beyond
 - a column that is held until the next sample comes: all axes stand together
 - a column of zeros, or a constant one: there is nothing to come from
 
 An axis counts as clipped at the largest value of the log, of one sign, where
 
 - that stands in at least `ROWS` consecutive rows while another axis changes from each of at least `ROWS` samples to the
-  next, by more than `STEPS` steps of the resolution and a thousandth of the value in all, and where the row before or
-  after differs by more than `STEPS` steps; or
+  next, by more than `STEPS` steps of the resolution and a thousandth of the value in all, and where the rows before and
+  after tell that the value went on: one differs by more than `WINDOW` of it, or by `STEPS` steps while the parabola
+  through two rows on either side passes `BEYOND` of the value above it; or
 - readings pile up there: at least `PILE` of them, more than within the next `WINDOW` of the value below, most of them
   peaks of one or two rows that stand out by more than a thousandth. So short blows show.
 
@@ -40,6 +41,7 @@ ROWS: Final = 3
 STEPS: Final = 8
 PILE: Final = 10
 WINDOW: Final = 0.05
+BEYOND: Final = 0.003
 _LEAST_IN_GRAVITY: Final = 1.5
 _LEAST_RATE: Final = 1.0
 
@@ -128,8 +130,21 @@ def _is_cut(column: Array, axis: int, span: NDArray[np.intp], end: float, step: 
         return False
     changes = (np.diff(others, axis=0) != 0.0).any(axis=1)
     moved = np.ptp(others, axis=0).max() > max(STEPS * step, 1e-3 * end)
-    around = [abs(abs(column[row, axis]) - end) for row in (start - 1, stop) if 0 <= row < len(column)]
-    return bool(np.count_nonzero(changes) >= ROWS - 1 and moved and any(jump > STEPS * step for jump in around))
+    return bool(np.count_nonzero(changes) >= ROWS - 1 and moved and _goes_beyond(column[:, axis], start, stop, step))
+
+
+def _goes_beyond(values: Array, start: int, stop: int, step: float) -> bool:
+    """Whether the rows around those from `start` to `stop` tell that the true top is above them."""
+    if start < 2 or stop + 2 > len(values):
+        return False
+    end = abs(values[start])
+    outer, inner = np.abs(values[[start - 2, stop + 1]]).mean(), np.abs(values[[start - 1, stop]])
+    jump = end - inner.min()
+    # The parabola through two rows on either side has its top in the middle.
+    near, far = 0.5 * (stop - start) + 0.5, 0.5 * (stop - start) + 1.5
+    top = inner.mean() + (inner.mean() - outer) * near**2 / (far**2 - near**2)
+    smallest = STEPS * step
+    return bool(jump > max(smallest, WINDOW * end) or (jump > smallest and top - end > max(smallest, BEYOND * end)))
 
 
 def _is_pile(values: Array, runs: NDArray[np.intp], end: float) -> bool:
