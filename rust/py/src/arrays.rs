@@ -5,7 +5,7 @@
 //! the array meanwhile is the caller's fault.
 
 use numpy::{
-    Element, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray,
+    Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray,
     PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -84,6 +84,31 @@ impl<'py> Mask<'py> {
     }
 }
 
+/// A borrowed run of bytes, shape (n,), dtype uint8.
+pub struct Bytes<'py> {
+    array: PyReadonlyArrayDyn<'py, u8>,
+    name: &'static str,
+}
+
+impl<'py> Bytes<'py> {
+    /// The argument `name`.
+    pub fn new(name: &'static str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let (array, _) = borrow::<u8, 1>(name, value, "uint8")?;
+        Ok(Self { array, name })
+    }
+
+    /// The bytes.
+    pub fn values(&self) -> PyResult<&[u8]> {
+        self.array.as_slice().map_err(|_| not_contiguous(self.name))
+    }
+}
+
+/// A table of rows with `C` values each that takes over the memory of `values`.
+pub fn table<T: Element, const C: usize>(py: Python<'_>, values: Vec<T>) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let n = values.len() / C;
+    PyArray1::from_vec(py, values).reshape([n, C])
+}
+
 /// A new table of `n` rows with `C` numbers each, filled by `fill`, which runs without the GIL.
 pub fn filled_rows<const C: usize, T, E>(
     py: Python<'_>,
@@ -119,6 +144,19 @@ fn fill_array<D: numpy::ndarray::Dimension, R: Send>(
 /// Three numbers `[x, y, z]`, finite, from any sequence.
 pub fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
     numbers(name, value, "three numbers x, y, z")
+}
+
+/// Three numbers `[x, y, z]` from an array or any other sequence; NaN and infinity pass.
+pub fn reading(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
+    if let Ok(array) = value.cast::<PyArray1<f64>>()
+        && let Ok(values) = array.try_readonly()
+        && let Ok(&[x, y, z]) = values.as_slice()
+    {
+        return Ok([x, y, z]);
+    }
+    let refuse = |came: String| PyValueError::new_err(format!("{name} is {came}: pass three numbers x, y, z"));
+    let values: Vec<f64> = value.extract().map_err(|_| refuse(describe(value)))?;
+    <[f64; 3]>::try_from(values).map_err(|values| refuse(format!("{} numbers", values.len())))
 }
 
 /// A quaternion `[w, x, y, z]` from any sequence.
