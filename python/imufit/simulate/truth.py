@@ -226,12 +226,29 @@ class Trajectory:
     arms : for each link the vector (3,) from its hinge to the next one, m, in its own turned frame; empty = all zero.
     shift : three signals added to the position, reference frame, m; empty = none.
     rig_axis : index of the body axis of a one-axis rig whose angle is that of the last joint, or None.
+    unreported, unreported_arms : links and arms on which the chain stands in reality, unknown to the reference.
     """
 
     links: Sequence[Link]
     arms: Sequence[Array] = ()
     shift: Sequence[Signal] = ()
     rig_axis: int | None = field(default=None)
+    unreported: Sequence[Link] = ()
+    unreported_arms: Sequence[Array] = ()
+
+    @property
+    def actual(self) -> Trajectory:
+        """The motion that really happens: this one, which is reported, carried by what the reference does not know."""
+        if not self.unreported:
+            return self
+        own = self.arms or [np.zeros(3)] * len(self.links)
+        return replace(
+            self,
+            links=[*self.unreported, *self.links],
+            arms=[*self.unreported_arms, *own],
+            unreported=(),
+            unreported_arms=(),
+        )
 
     def at(self, t: Array) -> Kinematics:
         """Return the exact motion at times `t` (s), shape (n,); any time is allowed.
