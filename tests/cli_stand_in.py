@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 from imufit.cli import engine
 from imufit.cli.app import main
+from imufit.figures.style import new_figure
 from imufit.log import Log
 from imufit.simulate import Grade, ParameterGrade
 from loop_results import BIAS, addition, card, comparison, diagnosis, ladder
@@ -61,8 +62,14 @@ class Study:
 class Replay:
     """A replay of one filter with errors and one without."""
 
-    def to_dict(self):
+    def comparison(self, band_deg):
+        return None
+
+    def to_dict(self, comparison):
         return {"n": 100, "skipped": {"gap": 2}, "filters": {"mahony": {"total_deg": 1.5}, "gyro": None}}
+
+    def plot(self):
+        return new_figure(2.0, 1.0)
 
     def to_log(self):
         return "log"

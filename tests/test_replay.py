@@ -44,9 +44,9 @@ def test_the_default_filters_follow_the_reference() -> None:
 
 def test_json_has_the_fixed_keys() -> None:
     value = json.loads(json.dumps(replay(made_log()).to_dict(), allow_nan=False))
-    assert list(value) == ["n", "skipped", "filters"]
+    assert list(value) == ["n", "skipped", "filters", "tilt", "ranks"]
     assert value["n"] == 2000
-    keys = ["total_deg", "heading_deg", "inclination_deg", "roll_deg", "pitch_deg", "yaw_deg", "sd_deg"]
+    keys = ["total_deg", "heading_deg", "inclination_deg", "roll_deg", "pitch_deg", "yaw_deg", "sd_deg", "tilt"]
     assert all(list(errors) == keys for errors in value["filters"].values())
     without = replay(made_log(reference=False)).to_dict()
     assert without["filters"] == {"gyro": None, "triad": None, "mahony": None}

@@ -89,11 +89,32 @@ def load_effects(path: Path) -> None:
         raise InputError(f"the effects cannot be loaded: {type(error).__name__}: {error}", file=path) from error
 
 
-def replay(log: Any, filters: Sequence[str], progress: Progress) -> Any:
-    """Run attitude filters over a log."""
+def filter_settings() -> Mapping[str, Mapping[str, Any]]:
+    """Return the settings of each filter and of the replay's rules: default, unit, meaning by name."""
+    from imufit.replay import SETTINGS  # noqa: PLC0415
+
+    return SETTINGS
+
+
+def replay(
+    log: Any, filters: Sequence[str], progress: Progress, settings: Mapping[str, Mapping[str, float]] | None = None
+) -> Any:
+    """Run attitude filters over a log.
+
+    Raises
+    ------
+    InputError
+        A filter lacks its sensor, or a setting cannot be.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
     from imufit.replay import replay  # noqa: PLC0415
 
-    return replay(log, filters=tuple(filters), progress=progress)
+    try:
+        return replay(log, filters=tuple(filters), settings=settings, progress=progress)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(str(error), file=log.path) from error
 
 
 def write_log(log: Any, path: Path) -> None:

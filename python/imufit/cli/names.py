@@ -68,6 +68,20 @@ class Known(click.ParamType):  # type: ignore[type-arg]
         return str(value)
 
 
+class KnownList(Known):
+    """Names out of such a list, separated by commas."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:  # type: ignore[override]
+        """Return the names, or fail with the one that was probably meant."""
+        if isinstance(value, tuple):
+            return value
+        names = [name.strip() for name in str(value).split(",")]
+        given = [name for name in names if name]
+        if not given:
+            self.fail(f"{str(value)!r} names no {self.name}", param, ctx)
+        return tuple(super(KnownList, self).convert(name, param, ctx) for name in given)
+
+
 def check_effects(effects: Sequence[str]) -> None:
     """Refuse effects that are not in the catalogue.
 

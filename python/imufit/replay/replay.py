@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, TypedDict
+from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 import numpy as np
 import pandas as pd
@@ -29,6 +29,11 @@ from scipy.spatial.transform import Rotation
 from imufit import _imufit
 from imufit.log import Log
 from imufit.progress import Progress, silent
+from imufit.replay.tilt_comparison import compare_tilt, tilt_errors
+from imufit.results.tilt import TiltComparison
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Settings = Mapping[str, Mapping[str, float]]
@@ -43,6 +48,8 @@ SETTINGS: Final[dict[str, dict[str, _imufit._Setting]]] = {
     "replay": _imufit.replay_rules(),
 }
 """The settings of each filter, and of the rules for gaps and free fall: default, unit, meaning."""
+
+_NEEDS: Final = {name: entry["needs"] for name, entry in _DESCRIPTIONS.items()}
 
 DEFAULT_FILTERS: Final[tuple[str, ...]] = ("gyro", "triad", "mahony")
 
@@ -137,13 +144,87 @@ class Replay:
         ref = np.full_like(q, np.nan) if self.log.ref_q is None else self.log.ref_q
         return _imufit.attitude_errors(q, ref)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what goes into JSON: n, skipped, and errors (deg) per filter."""
-        return {
+    def tilt_error(self, name: str) -> Array:
+        """Error of one filter's tilt row by row, rad; see `imufit.replay.tilt_error` for its definition.
+
+        Parameters
+        ----------
+        name : str
+            The filter.
+
+        Returns
+        -------
+        (n, 1) array
+            About the metadata's `rig_axis`: estimated angle = reference angle + error.
+        (n, 2) array
+            Without a rig axis: horizontal components of the inclination's error, reference frame.
+
+        Raises
+        ------
+        ValueError
+            The filter was not replayed, the log has no reference, or the filter does not show this angle: a rig that
+            turns about the vertical, for the accelerometer.
+        """
+        found = tilt_errors(self.log, {name: self._of(name)}, _NEEDS)
+        if found is None:
+            raise ValueError("the log has no reference attitude, so that no tilt has an error")
+        error = found[1][name]
+        if error is None:
+            raise ValueError(f"the rig turns about the vertical, which {name} does not see")
+        return error
+
+    def comparison(self, band_deg: float = 0.1) -> TiltComparison | None:
+        """Figures of merit of each filter's tilt (paper B, Tables 3 to 5), and ranks; None without a reference.
+
+        RMSE, offset, SD at rest, drift, noise density, settling time and vibration gain, defined in
+        `imufit.replay.figures_of_merit`. RMSE and offset are taken over the rows of `errors`.
+
+        Parameters
+        ----------
+        band_deg : float
+            Half width of the band of the settling time, deg.
+
+        Raises
+        ------
+        ValueError
+            The band is not positive.
+        """
+        return compare_tilt(self.log, self.attitude, _NEEDS, _counted_rows(self.log), band_deg)
+
+    def plot(self) -> Figure:
+        """Tilt of all filters over time with the reference, and its error: paper B's Figures 3 to 5.
+
+        Panels for the whole log, the first move and the strongest vibration, as far as the log holds them.
+
+        Raises
+        ------
+        InputError
+            No filter was replayed whose tilt could be drawn.
+        """
+        from imufit.replay.tilt_figure import tilt_figure_of  # noqa: PLC0415
+
+        return tilt_figure_of(self.log, self.attitude, _NEEDS)
+
+    def to_dict(self, comparison: TiltComparison | None = None) -> dict[str, Any]:
+        """Return what goes into JSON: n, skipped, errors (deg) and figures of the tilt per filter, ranks.
+
+        Parameters
+        ----------
+        comparison : TiltComparison, optional
+            From `comparison`; without it with the usual band.
+        """
+        value: dict[str, Any] = {
             "n": self.log.n,
             "skipped": dict(self.skipped),
             "filters": {name: None if errors is None else dict(errors) for name, errors in self.errors.items()},
         }
+        compared = self.comparison() if comparison is None else comparison
+        if compared is None:
+            return value
+        for name, figures in compared.methods.items():
+            if value["filters"][name] is not None:
+                value["filters"][name]["tilt"] = None if figures is None else figures.to_dict()
+        return {**value, **compared.to_dict()}
 
     def to_dataframe(self) -> pd.DataFrame:
         """Table of n rows: `t` (s), `columns`, and with a reference ``F_total_deg F_heading_deg F_inclination_deg``."""

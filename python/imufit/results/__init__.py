@@ -10,6 +10,7 @@ from imufit.results.effect_card import EffectCard
 from imufit.results.ladder import Ladder, Step
 from imufit.results.parameter import Parameter
 from imufit.results.table import Table
+from imufit.results.tilt import Mark, TiltComparison, TiltFigures
 
 __all__ = [
     "Addition",
@@ -19,12 +20,15 @@ __all__ = [
     "Diagnosis",
     "EffectCard",
     "Ladder",
+    "Mark",
     "Panel",
     "Parameter",
     "Rival",
     "Spectrum",
     "Step",
     "Table",
+    "TiltComparison",
+    "TiltFigures",
     "Unexplained",
     "Where",
 ]
