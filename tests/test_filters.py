@@ -282,6 +282,42 @@ class TestRules:
         ]
         assert np.concatenate(rows).tobytes() == whole.tobytes()
 
+    @settings(max_examples=30, deadline=None)
+    @given(st.integers(0, 10**6), st.lists(st.tuples(st.integers(1, 40), st.booleans()), max_size=12))
+    def test_single_steps_and_pieces_in_any_order_give_the_bits_of_one_batch(
+        self, seed: int, pieces: list[tuple[int, bool]]
+    ) -> None:
+        rng = np.random.default_rng(seed)
+        motion = Motion(200, seed=seed, noise=3.0)
+        motion.t[rng.integers(1, 200) :] += 2.0
+        motion.t[rng.integers(0, 200)] = rng.choice([np.nan, -1.0])
+        acc, gyr, mag = (spoiled_column(rng, column) for column in (motion.acc, motion.gyr, motion.mag))
+        for name in NAMES:
+            whole, counted = _imufit.Filter(name).run(motion.t, acc, gyr, mag)
+            live, found, at = _imufit.Filter(name), [], 0
+            for rows, single in [*pieces, (200, False)]:
+                part = slice(at, min(at + rows, 200))
+                if single:
+                    found += [live.step(motion.t[k], acc[k], gyr[k], mag[k])[None] for k in range(200)[part]]
+                else:
+                    found.append(live.run(motion.t[part], acc[part], gyr[part], mag[part])[0])
+                at = part.stop
+            assert np.concatenate(found).tobytes() == whole.tobytes()
+            assert live.skipped == counted
+
+    def test_a_step_takes_lists_and_arrays_and_names_what_it_cannot_take(self) -> None:
+        made = _imufit.Filter("complementary")
+        first = made.step(0.0, [0.0, 0.0, -G], (0.1, 0.0, 0.0))
+        np.testing.assert_allclose(first, [1.0, 0.0, 0.0, 0.0], atol=1e-15)
+        second = made.step(0.01, np.array([0.0, 0.0, -G]), np.array([0.1, 0.0, 0.0, 9.0])[:3])
+        assert second[1] == pytest.approx(0.97 * 0.0005, rel=1e-3)
+        with pytest.raises(ValueError, match="gyr is 2 numbers: pass three numbers"):
+            made.step(0.02, [0.0, 0.0, -G], [0.1, 0.0])
+        with pytest.raises(ValueError, match="acc is of type str"):
+            made.step(0.02, "up", [0.1, 0.0, 0.0])
+        with pytest.raises(ValueError, match="complementary needs acc"):
+            made.step(0.02, gyr=[0.1, 0.0, 0.0])
+
     def test_a_log_longer_than_a_window_is_the_same_as_its_pieces(self) -> None:
         n = (1 << 18) + 1000
         rng = np.random.default_rng(0)

@@ -14,18 +14,27 @@
 #![cfg_attr(test, allow(clippy::float_cmp))]
 
 pub mod accel;
+pub mod columns;
 pub mod complementary;
 pub mod filter;
 pub mod gyro;
 pub mod kalman;
 pub mod mahony;
+mod memory;
 pub mod replay;
+pub mod rules;
 pub mod sample;
+pub mod skipped;
+pub mod start;
 pub mod triad;
 
+pub use columns::{Columns, Row};
 pub use filter::{Description, FILTERS, Filter, Parameter};
-pub use replay::{Columns, Replay, Rules, Skipped, Start};
+pub use replay::Replay;
+pub use rules::Rules;
 pub use sample::{AngularRate, Environment, FluxDensity, Reading, Sample, Sensor, SpecificForce};
+pub use skipped::Skipped;
+pub use start::Start;
 
 /// What stops a filter before its first row.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

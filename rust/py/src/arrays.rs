@@ -5,7 +5,7 @@
 //! the array meanwhile is the caller's fault.
 
 use numpy::{
-    Element, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray,
+    Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArray,
     PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -119,6 +119,19 @@ fn fill_array<D: numpy::ndarray::Dimension, R: Send>(
 /// Three numbers `[x, y, z]`, finite, from any sequence.
 pub fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
     numbers(name, value, "three numbers x, y, z")
+}
+
+/// Three numbers `[x, y, z]` from an array or any other sequence; NaN and infinity pass.
+pub fn reading(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
+    if let Ok(array) = value.cast::<PyArray1<f64>>()
+        && let Ok(values) = array.try_readonly()
+        && let Ok(&[x, y, z]) = values.as_slice()
+    {
+        return Ok([x, y, z]);
+    }
+    let refuse = |came: String| PyValueError::new_err(format!("{name} is {came}: pass three numbers x, y, z"));
+    let values: Vec<f64> = value.extract().map_err(|_| refuse(describe(value)))?;
+    <[f64; 3]>::try_from(values).map_err(|values| refuse(format!("{} numbers", values.len())))
 }
 
 /// A quaternion `[w, x, y, z]` from any sequence.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use imufit_attitude::Frame;
 use imufit_filters::filter::{self, FILTERS, Parameter};
-use imufit_filters::{Columns, Environment, FilterError, Replay, Rules, Skipped, Start};
+use imufit_filters::{Columns, Environment, FilterError, Replay, Row, Rules, Skipped, Start};
 use nalgebra::Vector3;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -20,6 +20,8 @@ const WINDOW: usize = 1 << 18;
 #[pyclass(name = "Filter", module = "imufit._imufit")]
 struct PyFilter {
     replay: Replay,
+    /// Of all rows since the last reset.
+    skipped: Skipped,
 }
 
 type Run<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyDict>);
@@ -61,6 +63,7 @@ impl PyFilter {
         };
         Ok(Self {
             replay: build().map_err(from_filters)?,
+            skipped: Skipped::default(),
         })
     }
 
@@ -105,13 +108,43 @@ impl PyFilter {
                 Stop::Signal(error) => error,
             },
         )?;
-        let reasons = PyDict::new(py);
-        for (reason, rows) in skipped.by_reason() {
-            if rows > 0 {
-                reasons.set_item(reason, rows)?;
-            }
-        }
-        Ok((attitude, reasons))
+        self.skipped += skipped;
+        Ok((attitude, reasons(py, &skipped)?))
+    }
+
+    /// The attitude (4,), scalar first, after one more row; NaN before the start. The same step as in `run`.
+    ///
+    /// `t` s; `acc`, `gyr`, `mag` three numbers each in m/s^2, rad/s, uT: None for a sensor that is not there at all, NaN
+    /// for one that has no reading in this row.
+    #[pyo3(signature = (t, acc=None, gyr=None, mag=None))]
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        t: f64,
+        acc: Option<&Bound<'py, PyAny>>,
+        gyr: Option<&Bound<'py, PyAny>>,
+        mag: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let reading = |name, value: Option<&Bound<'py, PyAny>>| {
+            value
+                .map(|value| arrays::reading(name, value).map(Vector3::from))
+                .transpose()
+        };
+        let row = Row {
+            t,
+            acc: reading("acc", acc)?,
+            gyr: reading("gyr", gyr)?,
+            mag: reading("mag", mag)?,
+        };
+        let (attitude, skipped) = self.replay.step(&row).map_err(from_filters)?;
+        self.skipped += skipped;
+        Ok(PyArray1::from_slice(py, &attitude))
+    }
+
+    /// Rows of which something was not used, by reason, since the filter was made or reset.
+    #[getter]
+    fn skipped<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        reasons(py, &self.skipped)
     }
 
     /// All that the next row depends on, (k,): hand it to another filter with the same settings.
@@ -129,7 +162,19 @@ impl PyFilter {
     /// Back to before the first row.
     fn reset(&mut self) {
         self.replay.reset();
+        self.skipped = Skipped::default();
     }
+}
+
+/// The reasons that there were, with their rows.
+fn reasons<'py>(py: Python<'py>, skipped: &Skipped) -> PyResult<Bound<'py, PyDict>> {
+    let reasons = PyDict::new(py);
+    for (reason, rows) in skipped.by_reason() {
+        if rows > 0 {
+            reasons.set_item(reason, rows)?;
+        }
+    }
+    Ok(reasons)
 }
 
 /// What ends a run early.
@@ -195,7 +240,7 @@ fn filter_descriptions(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
 /// The settings of the rules for gaps and free fall, with default, unit and meaning.
 #[pyfunction]
 fn replay_rules(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-    describe(py, imufit_filters::replay::PARAMETERS)
+    describe(py, imufit_filters::rules::PARAMETERS)
 }
 
 /// Adds this file's class and functions to the module.

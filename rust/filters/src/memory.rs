@@ -1,0 +1,75 @@
+//! What a replay remembers from row to row.
+
+use nalgebra::Vector3;
+
+/// Times are NaN where there is none.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Memory {
+    pub started: bool,
+    /// First good row, for the limits of [`Start::Vectors`](crate::Start::Vectors).
+    pub first: f64,
+    /// Last good row.
+    pub last: f64,
+    pub t_acc: f64,
+    pub t_gyr: f64,
+    pub t_mag: f64,
+    /// The rate at `t_gyr`.
+    pub omega: Vector3<f64>,
+}
+
+impl Memory {
+    /// Numbers of a memory that is written down.
+    pub const LENGTH: usize = 10;
+
+    pub const EMPTY: Self = Self {
+        started: false,
+        first: f64::NAN,
+        last: f64::NAN,
+        t_acc: f64::NAN,
+        t_gyr: f64::NAN,
+        t_mag: f64::NAN,
+        omega: Vector3::new(0.0, 0.0, 0.0),
+    };
+
+    /// After a gap: nothing is bridged.
+    pub fn forget_readings(&mut self) {
+        let Self { started, first, .. } = *self;
+        *self = Self {
+            started,
+            first,
+            ..Self::EMPTY
+        };
+    }
+
+    pub fn to_array(self) -> [f64; Self::LENGTH] {
+        let Self {
+            started,
+            first,
+            last,
+            t_acc,
+            t_gyr,
+            t_mag,
+            omega,
+        } = self;
+        let started = if started { 1.0 } else { 0.0 };
+        [
+            started, first, last, t_acc, t_gyr, t_mag, omega.x, omega.y, omega.z, 0.0,
+        ]
+    }
+
+    /// `None` where the numbers are no memory.
+    pub fn from_slice(numbers: &[f64]) -> Option<Self> {
+        let &[started, first, last, t_acc, t_gyr, t_mag, x, y, z, _] = numbers else {
+            return None;
+        };
+        (x + y + z).is_finite().then(|| Self {
+            started: started > 0.5,
+            first,
+            last,
+            t_acc,
+            t_gyr,
+            t_mag,
+            omega: Vector3::new(x, y, z),
+        })
+    }
+}
