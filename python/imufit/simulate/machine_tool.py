@@ -16,11 +16,11 @@ from imufit.simulate.noise import Noise
 from imufit.simulate.scenario import Plan, Scenario
 from imufit.simulate.truth import Joint, Trajectory
 
-SPEED = float(np.radians(5.0))
-"""Speed of the axis, rad/s, where the path is long enough for it."""
+POSITIONING = (float(np.radians(20.0)), 0.25)
+"""Largest speed (rad/s) of the axis on its way to an angle, and the time (s) in which it starts and stops."""
 
-RAMP = 0.6
-"""Time (s) in which the axis comes to its speed, and to rest, where the path is long enough for it."""
+SWEEPING = (float(np.radians(5.0)), 0.6)
+"""The same for the wide sweep, which is driven gently."""
 
 REACH = (float(np.radians(-110.0)), float(np.radians(30.0)))
 """Ends of the wide sweep, rad."""
@@ -32,23 +32,24 @@ CONTACT = 0.004
 """Time (s) for which the hammer's soft tip pushes."""
 
 
-def _axis(plan: Plan, start: list[float], targets: list[float]) -> Trajectory:
+def _axis(plan: Plan, start: list[float], targets: list[float], drive: tuple[float, float]) -> Trajectory:
     """Drive the axis from zero to each target (rad) in turn, beginning at `start` (s)."""
+    fastest, ramp = drive
     begin: list[float] = []
-    rates, length, angle = [0.0], [], 0.0
+    rates, angle = [0.0], 0.0
     for t, target in zip(start, targets, strict=True):
-        speed = min(SPEED, abs(target - angle) / RAMP)
-        begin += [t, t + abs(target - angle) / speed]
-        length += [RAMP, RAMP]
-        rates += [np.sign(target - angle) * speed, 0.0]
+        way = target - angle
+        speed = min(fastest, abs(way) / ramp)
+        begin += [t, t + abs(way) / speed]
+        rates += [np.sign(way) * speed, 0.0]
         angle = target
-    path = Cruise(np.array(begin), np.array(length), np.array(rates))
+    path = Cruise(np.array(begin), np.full(len(begin), ramp), np.array(rates))
     return Trajectory([Joint(np.eye(3)[plan.rig_axis], path)], rig_axis=plan.rig_axis)
 
 
 def _moved(degrees: float, share: float) -> Callable[[Plan], Trajectory]:
     """Stand at zero for `share` of the time, drive to an angle, stand there."""
-    return lambda plan: _axis(plan, [share * plan.duration], [float(np.radians(degrees))])
+    return lambda plan: _axis(plan, [share * plan.duration], [float(np.radians(degrees))], POSITIONING)
 
 
 def _swept(plan: Plan) -> Trajectory:
@@ -56,16 +57,16 @@ def _swept(plan: Plan) -> Trajectory:
     rng = plan.rng
     start: list[float] = []
     targets: list[float] = []
-    now, angle, way = 2.0, 0.0, 1.0
+    (speed, ramp), now, angle, way = SWEEPING, 2.0, 0.0, 1.0
     while not start or now < plan.duration:
         target = float(np.clip(angle + way * rng.uniform(0.15, 0.3), *REACH))
         start.append(now)
         targets.append(target)
-        now += max(abs(target - angle) / SPEED, RAMP) + RAMP + rng.uniform(1.2, 2.0)
+        now += max(abs(target - angle) / speed, ramp) + ramp + rng.uniform(1.2, 2.0)
         angle = target
         if angle in REACH:
             way = -way
-    return _axis(plan, start, targets)
+    return _axis(plan, start, targets, SWEEPING)
 
 
 def _struck(plan: Plan) -> Trajectory:

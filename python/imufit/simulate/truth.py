@@ -41,7 +41,7 @@ def quaternion_from_matrix(rotation: Array) -> Array:
 
 def turn(rotation: Array, vector: Array) -> Array:
     """Return R x for matrices (n, 3, 3) or (3, 3) and vectors (n, 3) or (3,)."""
-    return np.asarray((rotation @ vector[..., None])[..., 0], dtype=np.float64)
+    return np.asarray(np.einsum("...ij,...j->...i", rotation, vector), dtype=np.float64)
 
 
 def turn_back(rotation: Array, vector: Array) -> Array:
@@ -75,6 +75,8 @@ class Kinematics:
         r : ndarray
             (3,) the point, body frame, m.
         """
+        if not np.any(r):
+            return self
         swing = np.cross(self.omega, r)
         return replace(
             self,
@@ -91,6 +93,8 @@ class Kinematics:
         mount : ndarray
             (3, 3) rotation from the new frame's axes to this body's.
         """
+        if np.array_equal(mount, np.eye(3)):
+            return self
         return replace(
             self,
             rotation=self.rotation @ mount,
@@ -106,6 +110,8 @@ class Kinematics:
         base : ndarray
             (3, 3) rotation of the base, reference frame.
         """
+        if np.array_equal(base, np.eye(3)):
+            return self
         return replace(
             self,
             rotation=base @ self.rotation,
