@@ -39,8 +39,8 @@ RANKS = {
 RATE = 180.0
 """Rows per second. Not published; see `settings_of_the_low_pass`."""
 SETTINGS = {
-    # Eq. (5): a = 0.97 and b = 0.03 in every row.
-    "complementary": {"a": 0.97, "step": 1.0 / RATE},
+    # Eq. (5): a = 0.97 and b = 0.03 in every row, whatever its interval.
+    "complementary": {"a": 0.97, "step": 0.0},
     # R from the accelerometer's noise density, 350 ug/sqrt(Hz) one-sided. Q, which is not published: five times the
     # gyroscope's own density, the value that gives the published deviation. The bias is known to 0.06 deg/s.
     "kalman": {

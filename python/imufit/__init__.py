@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from imufit import calibrate as calibrate
+    from imufit import device as device
     from imufit import diagnose as diagnose
     from imufit import errors as errors
     from imufit import export as export
@@ -34,6 +35,7 @@ else:
 
     _MODULES = (
         "calibrate",
+        "device",
         "diagnose",
         "errors",
         "export",

@@ -32,8 +32,11 @@ __all__ = [
     "find_effect",
     "find_rests",
     "frame_vectors",
+    "kalman_steady_state",
     "magnitude_calibration",
     "matrix_from_quaternion_rows",
+    "mpu6050_decode",
+    "mpu6050_facts",
     "python_effect",
     "quaternion_from_euler",
     "quaternion_from_matrix_rows",
@@ -46,6 +49,7 @@ __all__ = [
     "saturate",
     "sphere",
     "table_attitudes",
+    "tilt_angles",
     "turn_calibration",
     "vector_calibration",
 ]
@@ -82,6 +86,21 @@ def convert_frame(q: _Array, source: str, target: str) -> _Array: ...
 def frame_vectors(frame: str) -> _FrameVectors: ...
 def attitude_errors(estimate: _Array, reference: _Array) -> _Array: ...
 def attitude_rmse(estimate: _Array, reference: _Array, mask: NDArray[np.bool_] | None = None) -> _Rmse | None: ...
+
+# --- device: bytes (uint8) to acc (n, 3) m/s^2, gyr (n, 3) rad/s, temp (n,) degC, and what is clipped
+
+class _Mpu6050(TypedDict):
+    address: int
+    address_ad0_high: int
+    registers: dict[str, int]
+    acc: list[tuple[float, float]]
+    gyr: list[tuple[float, float]]
+    low_pass: list[tuple[float, float, float, float, float]]
+
+def mpu6050_decode(
+    data: NDArray[np.uint8], afs_sel: int = 0, fs_sel: int = 0, temperature: bool = True
+) -> tuple[_Array, _Array, _Array | None, NDArray[np.bool_], NDArray[np.bool_]]: ...
+def mpu6050_facts() -> _Mpu6050: ...
 
 # --- filters
 
@@ -124,6 +143,8 @@ class Filter:
 
 def filter_descriptions() -> dict[str, _Description]: ...
 def replay_rules() -> dict[str, _Setting]: ...
+def tilt_angles(acc: _Array) -> _Array: ...
+def kalman_steady_state(dt: float, settings: Mapping[str, float] | None = None) -> tuple[float, float, float]: ...
 
 # --- model
 

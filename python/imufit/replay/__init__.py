@@ -1,5 +1,17 @@
-"""Filters over logs: attitude for every row and its error against a reference."""
+"""Filters over logs and live rows: attitude for every row and its error against a reference."""
 
 from imufit.replay.replay import DEFAULT_FILTERS, FILTERS, SETTINGS, Replay, estimate_mag_reference, replay
+from imufit.replay.steady_state import SteadyState, kalman_steady_state
+from imufit.replay.tilt_angles import tilt_angles
 
-__all__ = ["DEFAULT_FILTERS", "FILTERS", "SETTINGS", "Replay", "estimate_mag_reference", "replay"]
+__all__ = [
+    "DEFAULT_FILTERS",
+    "FILTERS",
+    "SETTINGS",
+    "Replay",
+    "SteadyState",
+    "estimate_mag_reference",
+    "kalman_steady_state",
+    "replay",
+    "tilt_angles",
+]

@@ -29,6 +29,7 @@ from scipy.spatial.transform import Rotation
 from imufit import _imufit
 from imufit.log import Log
 from imufit.progress import Progress, silent
+from imufit.replay.clipped import ranges
 from imufit.replay.tilt_comparison import compare_tilt, tilt_errors
 from imufit.results.tilt import TiltComparison
 
@@ -258,7 +259,9 @@ def replay(
         mahony for which the log has the sensors. None or an empty sequence: every filter for which it has them.
     settings : mapping of mappings, optional
         ``{"mahony": {"k_p": 1.0}, "replay": {"max_gap": 0.5}}``: filter (or "replay"), name and value as in
-        `SETTINGS`. Without `max_gap` a gap is a step longer than 1 s and than ten usual steps of the log.
+        `SETTINGS`. Without `max_gap` a gap is a step longer than 1 s and than ten usual steps of the log. Without
+        `acc_range` and `gyr_range` the metadata or the readings themselves tell where the ranges end
+        (`imufit.replay.clipped`); 0 takes every reading for unclipped.
     initial : (4,) array, Rotation, "vectors" or "reference", optional
         Attitude at the first row, scalar first, body to reference frame; or where to take it from. Without it the
         rules at the head of this module apply.
@@ -284,7 +287,7 @@ def replay(
     sensors = {name: _present(getattr(log, name)) for name in ("acc", "gyr", "mag")}
     names = _choose(filters, sensors)
     given = _checked(settings)
-    rules = {"max_gap": max(1.0, 10.0 * _usual_step(log.t)), **given.get("replay", {})}
+    rules = {"max_gap": max(1.0, 10.0 * _usual_step(log.t)), **ranges(log), **given.get("replay", {})}
     field = _mag_reference(log)
     q0, t0 = _start(log, sensors, initial)
     counted = _counted_rows(log)

@@ -2,7 +2,7 @@
 //!
 //! The paper takes each angle as an arc tangent of a quotient, which loses the quadrant and mixes two definitions:
 //! eq. (2) is the angle of the body's y axis to the horizontal plane, not the roll of `Rz Ry Rx`. Its "yaw", eq. (3), is
-//! the inclination of z from the vertical: gravity carries no heading. The filter uses the quadrant-safe form
+//! the [`inclination`] of z from the vertical: gravity carries no heading. The filter uses the quadrant-safe form
 //!
 //! ```text
 //! up_b = f / |f|,   third row of R times the sign of up:   pitch = asin-free atan2,   roll = atan2
@@ -19,14 +19,33 @@ use crate::{Environment, Sample, SpecificForce};
 /// None: the filter has no memory.
 pub const PARAMETERS: &[Parameter] = &[];
 
-/// Angles as eqs. (1) to (3) print them, rad: `[pitch, roll, inclination of z]`.
+/// The angle between the body's z axis and the upward vertical, rad, in [0, pi]: eq. (3), which the paper calls yaw.
 ///
-/// Pitch and roll lie in [-pi/2, pi/2] whichever way up the sensor is.
+/// The printed arc tangent of a quotient agrees with it as long as z points up; upside down it is less by pi.
+pub fn inclination(f: &SpecificForce) -> f64 {
+    f.0.x.hypot(f.0.y).atan2(f.0.z)
+}
+
+/// Angles as eqs. (1) to (3) print them, rad: pitch, roll, [`inclination`].
+///
+/// Pitch and roll are the angles of the body's x and y axes above the horizontal plane: they lie in [-pi/2, pi/2]
+/// whichever way up the sensor is.
 pub fn tilt_as_printed(f: &SpecificForce) -> [f64; 3] {
-    let f = f.0;
-    let pitch = f.x.atan2(f.y.hypot(f.z));
-    let roll = f.y.atan2(f.x.hypot(f.z));
-    [pitch, roll, f.x.hypot(f.y).atan2(f.z)]
+    let (x, y, z) = (f.0.x, f.0.y, f.0.z);
+    [x.atan2(y.hypot(z)), y.atan2(x.hypot(z)), inclination(f)]
+}
+
+/// [`tilt_as_printed`] for n readings, row by row; NaN where a reading shows no direction.
+pub fn tilt_rows(acc: &[f64], out: &mut [f64]) {
+    for (reading, angles) in acc.chunks_exact(3).zip(out.chunks_exact_mut(3)) {
+        let f = Vector3::from_column_slice(reading);
+        let usable = f.norm_squared().is_finite() && f != Vector3::zeros();
+        angles.copy_from_slice(&if usable {
+            tilt_as_printed(&SpecificForce(f))
+        } else {
+            [f64::NAN; 3]
+        });
+    }
 }
 
 /// Roll and pitch of `R = Rz Ry Rx` for which the reading points up, in all quadrants, and the given yaw.

@@ -119,8 +119,8 @@ pub fn find(name: &str) -> Result<&'static Description, FilterError> {
 }
 
 impl Description {
-    /// The filter with the settings given by name, the others at their defaults. Every setting is a finite number
-    /// that is not negative.
+    /// The filter with the settings given by name, the others at their defaults. Every setting is a number from 0 to
+    /// 1e50.
     pub fn build(
         &'static self,
         environment: &Environment,
@@ -130,6 +130,9 @@ impl Description {
         Ok((self.make)(environment, &values))
     }
 }
+
+/// Beyond any use, and its square times that of a reading is still a number of the machine.
+const LARGEST: f64 = 1e50;
 
 /// The values of `parameters` in their order, from settings by name.
 pub(crate) fn fill(
@@ -152,8 +155,8 @@ pub(crate) fn fill(
                 known,
             });
         };
-        if !(value.is_finite() && *value >= 0.0) {
-            let (name, range) = (parameters[at].name, "a finite number that is not negative");
+        if !(0.0..=LARGEST).contains(value) {
+            let (name, range) = (parameters[at].name, "a number from 0 to 1e50");
             return Err(FilterError::Setting {
                 filter,
                 name,

@@ -10,11 +10,18 @@
 //! plane of the reference frame, that makes the specific force point up. Its two axes have the same noises, so one
 //! 2 x 2 covariance `[[p_aa, p_ab], [p_ab, p_bb]]` serves both, and for rotations about one horizontal axis the filter is the
 //! cited one. The heading is that of the integrated rate.
+//!
+//! Q and R follow from noise densities and the time that a step or a reading stands for, so that they are the sensor's and
+//! not the log's. With `adaptive` R is the power of the vibration where that is more than the sensor's noise
+//! ([`crate::vibration`]); with `steady` the gain is the one of the settled filter from the first reading on
+//! ([`crate::steady_state`]).
 
 use imufit_attitude::Quaternion;
 use nalgebra::Vector3;
 
 use crate::filter::{Filter, Parameter, Usage, split_state};
+use crate::steady_state;
+use crate::vibration::Vibration;
 use crate::{Environment, Sample};
 
 /// Noise densities, so that the filter does not depend on the rate of the log, and the first uncertainties.
@@ -49,49 +56,120 @@ pub const PARAMETERS: &[Parameter] = &[
         unit: "rad/s",
         meaning: "uncertainty of the initial bias of zero",
     },
+    Parameter {
+        name: "adaptive",
+        default: 0.0,
+        unit: "1",
+        meaning: "weight of the measured vibration in the variance of the accelerometer's angle: 0 takes it at its noise, 1 for as bad as it shakes, larger for worse",
+    },
+    Parameter {
+        name: "vibration_time",
+        default: 0.5,
+        unit: "s",
+        meaning: "time over which vibration is measured, with `adaptive`: larger distrusts longer after a blow and takes slower accelerations for vibration",
+    },
+    Parameter {
+        name: "steady",
+        default: 0.0,
+        unit: "1",
+        meaning: "1: the gain of the settled filter from the first reading on, whatever the initial uncertainties; 0: the gain of the covariance",
+    },
 ];
+
+/// The noises that the gains follow from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Noise {
+    /// Density of the rate, rad/s/sqrt(Hz).
+    pub gyr: f64,
+    /// Random walk of the bias, rad/s/sqrt(s).
+    pub walk: f64,
+    /// Density of the measured angle, rad*sqrt(s).
+    pub acc: f64,
+}
+
+impl Noise {
+    /// Out of the values of [`PARAMETERS`].
+    pub fn from_values(values: &[f64]) -> Self {
+        let value = |at: usize| values.get(at).copied().unwrap_or(PARAMETERS[at].default);
+        Self {
+            gyr: value(0),
+            walk: value(1),
+            acc: value(2),
+        }
+    }
+
+    /// Variance of a measured angle that stands for `dt`, rad^2.
+    pub fn angle_variance(&self, dt: f64) -> f64 {
+        self.acc * self.acc / dt
+    }
+}
 
 /// The filter.
 #[derive(Debug, Clone)]
 pub struct Kalman {
     environment: Environment,
-    values: [f64; 5],
+    noise: Noise,
+    angle_start: f64,
+    bias_start: f64,
+    adaptive: f64,
+    vibration_time: f64,
+    steady: bool,
     q: Quaternion,
     bias: Vector3<f64>,
     /// p_aa, p_ab, p_bb.
     covariance: [f64; 3],
+    vibration: Vibration,
 }
 
 impl Kalman {
     /// With the values of [`PARAMETERS`] in their order.
     pub fn new(environment: &Environment, values: &[f64]) -> Self {
-        let defaults = [0, 1, 2, 3, 4].map(|at| PARAMETERS[at].default);
-        let values = <[f64; 5]>::try_from(values).unwrap_or(defaults);
+        let value = |at: usize| values.get(at).copied().unwrap_or(PARAMETERS[at].default);
         let mut filter = Self {
             environment: *environment,
-            values,
+            noise: Noise::from_values(values),
+            angle_start: value(3),
+            bias_start: value(4),
+            adaptive: value(5),
+            vibration_time: value(6),
+            steady: value(7) > 0.0,
             q: Quaternion::IDENTITY,
             bias: Vector3::zeros(),
             covariance: [0.0; 3],
+            vibration: Vibration::NONE,
         };
         filter.reset(Quaternion::IDENTITY);
         filter
     }
 
     fn predict(&mut self, dt: f64) {
-        let [gyr_noise, bias_walk, ..] = self.values;
+        let Noise { gyr, walk, .. } = self.noise;
         let [p_aa, p_ab, p_bb] = self.covariance;
         self.covariance = [
-            p_aa + dt * (dt * p_bb - 2.0 * p_ab) + gyr_noise * gyr_noise * dt,
+            p_aa + dt * (dt * p_bb - 2.0 * p_ab) + gyr * gyr * dt,
             p_ab - dt * p_bb,
-            p_bb + bias_walk * bias_walk * dt,
+            p_bb + walk * walk * dt,
         ];
     }
 
-    /// The gains of angle and bias for a reading that stands for `dt`, and the covariance after it (Joseph form).
-    fn gains(&self, dt: f64) -> Option<([f64; 2], [f64; 3])> {
+    /// The variance of the angle that this reading shows, rad^2.
+    fn angle_variance(&mut self, f: &Vector3<f64>, dt: f64) -> f64 {
+        let r = self.noise.angle_variance(dt);
+        if self.adaptive == 0.0 {
+            return r;
+        }
+        let reading = f / self.environment.gravity();
+        let shaken = self.vibration.variance(&reading, dt, self.vibration_time);
+        r.max(self.adaptive * shaken)
+    }
+
+    /// The gains of angle and bias for a reading of variance `r`, and the covariance after it (Joseph form).
+    fn gains(&self, dt: f64, r: f64) -> Option<([f64; 2], [f64; 3])> {
+        if self.steady {
+            let (k_a, k_b) = steady_state::gains(&self.noise, dt, r)?;
+            return Some(([k_a, k_b], self.covariance));
+        }
         let [p_aa, p_ab, p_bb] = self.covariance;
-        let r = self.values[2] * self.values[2] / dt;
         let (k_a, k_b) = (p_aa / (p_aa + r), p_ab / (p_aa + r));
         let keep = 1.0 - k_a;
         let after = [
@@ -107,11 +185,19 @@ impl Kalman {
 impl Filter for Kalman {
     fn step(&mut self, sample: &Sample) -> Usage {
         if let Some(omega) = sample.omega {
-            self.q = self.q.turned(&(omega.value.0 - self.bias), omega.dt);
+            let rate = omega.value.0 - self.bias;
+            self.q = self.q.turned(&rate, omega.dt);
             self.predict(omega.dt);
+            if self.adaptive > 0.0 {
+                self.vibration.turn(&rate, omega.dt);
+            }
         }
-        if let Some(f) = sample.f.filter(|f| f.dt > 0.0)
-            && let Some(([k_a, k_b], after)) = self.gains(f.dt)
+        let Some(f) = sample.f else {
+            return Usage::Full;
+        };
+        let r = self.angle_variance(&f.value.0, f.dt);
+        if f.dt > 0.0
+            && let Some(([k_a, k_b], after)) = self.gains(f.dt, r)
         {
             let innovation = Quaternion::between(&self.q.rotate(&f.value.0), &self.environment.up()).log();
             self.bias += self.q.rotate_back(&innovation) * k_b;
@@ -126,21 +212,28 @@ impl Filter for Kalman {
     }
 
     fn reset(&mut self, attitude: Quaternion) {
-        let [_, _, _, angle_start, bias_start] = self.values;
-        (self.q, self.bias) = (attitude, Vector3::zeros());
-        self.covariance = [angle_start * angle_start, 0.0, bias_start * bias_start];
+        (self.q, self.bias, self.vibration) = (attitude, Vector3::zeros(), Vibration::NONE);
+        self.covariance = [
+            self.angle_start * self.angle_start,
+            0.0,
+            self.bias_start * self.bias_start,
+        ];
     }
 
     fn state(&self) -> Vec<f64> {
         let mut state = self.q.to_array().to_vec();
-        state.extend(self.bias.iter().chain(&self.covariance));
+        let Vibration { mean, power } = self.vibration;
+        state.extend(self.bias.iter().chain(&self.covariance).chain(mean.iter()));
+        state.push(power);
         state
     }
 
     fn set_state(&mut self, state: &[f64]) -> bool {
         let found = split_state(state);
-        if let Some((q, [x, y, z, p_aa, p_ab, p_bb])) = found {
+        if let Some((q, [x, y, z, p_aa, p_ab, p_bb, m_x, m_y, m_z, power])) = found {
             (self.q, self.bias, self.covariance) = (q, Vector3::new(x, y, z), [p_aa, p_ab, p_bb]);
+            let mean = Vector3::new(m_x, m_y, m_z);
+            self.vibration = Vibration { mean, power };
         }
         found.is_some()
     }

@@ -26,7 +26,9 @@ pub mod rules;
 pub mod sample;
 pub mod skipped;
 pub mod start;
+pub mod steady_state;
 pub mod triad;
+pub mod vibration;
 
 pub use columns::{Columns, Row};
 pub use filter::{Description, FILTERS, Filter, Parameter};
@@ -35,6 +37,7 @@ pub use rules::Rules;
 pub use sample::{AngularRate, Environment, FluxDensity, Reading, Sample, Sensor, SpecificForce};
 pub use skipped::Skipped;
 pub use start::Start;
+pub use steady_state::{SteadyState, steady_state_gain};
 
 /// What stops a filter before its first row.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

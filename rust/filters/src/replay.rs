@@ -7,7 +7,10 @@
 //!    used. The next rate is integrated over the whole time since the last one (trapezoidal rule) as long as that is no
 //!    gap, which also is the rule for a gyro slower than the log; a direction stands for the time since the last one.
 //! 4. **Free fall.** A specific force shorter than `free_fall` times gravity shows no vertical and is not used.
-//! 5. **Start.** See [`Start`]. Rows before it have no attitude: NaN.
+//! 5. **Clipped readings.** A specific force with a component at the end of the accelerometer's range (`acc_range`) points
+//!    somewhere else than the true one and is not used. A rate at the end of the gyro's range (`gyr_range`) is too small
+//!    but closer than any guess: it is used and counted.
+//! 6. **Start.** See [`Start`]. Rows before it have no attitude: NaN.
 //!
 //! The output is causal and depends only on the rows and the state: cut anywhere, hand the state over, and the result
 //! is the same bit by bit.
@@ -18,6 +21,7 @@ use nalgebra::Vector3;
 use crate::columns::{Columns, Row};
 use crate::filter::{Description, Filter, Usage};
 use crate::memory::Memory;
+use crate::rules::clipped;
 use crate::triad::attitude_from_vectors;
 use crate::{
     AngularRate, Environment, FilterError, FluxDensity, Reading, Rules, Sample, Sensor, Skipped, SpecificForce, Start,
@@ -210,6 +214,7 @@ impl Replay {
         let memory = &mut self.memory;
         let mut sample = Sample::default();
         if let Some(omega) = gyr {
+            skipped.gyr_clipped += usize::from(clipped(&omega, self.rules.gyr_range));
             if t - memory.t_gyr <= max_gap {
                 let value = AngularRate((memory.omega + omega) * 0.5);
                 sample.omega = Some(Reading {
@@ -222,7 +227,9 @@ impl Replay {
             (memory.t_gyr, memory.omega) = (t, omega);
         }
         if let Some(f) = acc {
-            if f.norm() > self.rules.free_fall * self.environment.gravity() {
+            if clipped(&f, self.rules.acc_range) {
+                skipped.acc_clipped += 1;
+            } else if f.norm() > self.rules.free_fall * self.environment.gravity() {
                 sample.f = Some(Reading {
                     value: SpecificForce(f),
                     dt: since(memory.t_acc),

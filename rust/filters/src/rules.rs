@@ -1,5 +1,7 @@
 //! The settings of the rules that [`replay`](crate::replay) states.
 
+use nalgebra::Vector3;
+
 use crate::FilterError;
 use crate::filter::{Parameter, fill};
 
@@ -17,7 +19,23 @@ pub const PARAMETERS: &[Parameter] = &[
         unit: "1",
         meaning: "a specific force shorter than this part of gravity is not used: larger refuses more of a throw",
     },
+    Parameter {
+        name: "acc_range",
+        default: 0.0,
+        unit: "m/s^2",
+        meaning: "end of the accelerometer's range: a specific force with a component there is clipped and not used. 0: not known",
+    },
+    Parameter {
+        name: "gyr_range",
+        default: 0.0,
+        unit: "rad/s",
+        meaning: "end of the gyro's range: a rate with a component there is clipped; it is used, being the best there is, and counted. 0: not known",
+    },
 ];
+
+/// A reading this close to the end of the range is at it: the last step of a 12 bit converter, so that a range counts
+/// as reached whether it is given as its nominal value or as the largest number that the sensor delivers.
+const END: f64 = 1.0 - 1.0 / 2048.0;
 
 /// [`PARAMETERS`] with values.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +44,10 @@ pub struct Rules {
     pub max_gap: f64,
     /// Least specific force that shows the vertical, in parts of gravity.
     pub free_fall: f64,
+    /// End of the accelerometer's range, m/s^2; 0 where it is not known.
+    pub acc_range: f64,
+    /// End of the gyro's range, rad/s; 0 where it is not known.
+    pub gyr_range: f64,
 }
 
 impl Default for Rules {
@@ -33,6 +55,8 @@ impl Default for Rules {
         Self {
             max_gap: PARAMETERS[0].default,
             free_fall: PARAMETERS[1].default,
+            acc_range: PARAMETERS[2].default,
+            gyr_range: PARAMETERS[3].default,
         }
     }
 }
@@ -45,6 +69,13 @@ impl Rules {
         Ok(Self {
             max_gap: value(0),
             free_fall: value(1),
+            acc_range: value(2),
+            gyr_range: value(3),
         })
     }
+}
+
+/// Whether a component of the reading stands at the end of the range or beyond it.
+pub(crate) fn clipped(reading: &Vector3<f64>, range: f64) -> bool {
+    range > 0.0 && reading.amax() >= range * END
 }

@@ -23,6 +23,10 @@ pub struct Skipped {
     pub mag_missing: usize,
     /// A field with an infinite or absurd value.
     pub mag_not_finite: usize,
+    /// A specific force at the end of the accelerometer's range: not used.
+    pub acc_clipped: usize,
+    /// An angular rate at the end of the gyro's range: used as it is.
+    pub gyr_clipped: usize,
     /// Specific force too short to show the vertical.
     pub free_fall: usize,
     /// Field too close to the vertical to show a heading.
@@ -33,7 +37,7 @@ pub struct Skipped {
 
 impl Skipped {
     /// Reason and rows, in a fixed order.
-    pub fn by_reason(&self) -> [(&'static str, usize); 12] {
+    pub fn by_reason(&self) -> [(&'static str, usize); 14] {
         [
             ("time_not_finite", self.time_not_finite),
             ("time_not_increasing", self.time_not_increasing),
@@ -44,6 +48,8 @@ impl Skipped {
             ("gyr_not_finite", self.gyr_not_finite),
             ("mag_missing", self.mag_missing),
             ("mag_not_finite", self.mag_not_finite),
+            ("acc_clipped", self.acc_clipped),
+            ("gyr_clipped", self.gyr_clipped),
             ("free_fall", self.free_fall),
             ("no_heading", self.no_heading),
             ("not_started", self.not_started),
@@ -62,6 +68,8 @@ impl AddAssign for Skipped {
         self.gyr_not_finite += other.gyr_not_finite;
         self.mag_missing += other.mag_missing;
         self.mag_not_finite += other.mag_not_finite;
+        self.acc_clipped += other.acc_clipped;
+        self.gyr_clipped += other.gyr_clipped;
         self.free_fall += other.free_fall;
         self.no_heading += other.no_heading;
         self.not_started += other.not_started;

@@ -84,6 +84,31 @@ impl<'py> Mask<'py> {
     }
 }
 
+/// A borrowed run of bytes, shape (n,), dtype uint8.
+pub struct Bytes<'py> {
+    array: PyReadonlyArrayDyn<'py, u8>,
+    name: &'static str,
+}
+
+impl<'py> Bytes<'py> {
+    /// The argument `name`.
+    pub fn new(name: &'static str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let (array, _) = borrow::<u8, 1>(name, value, "uint8")?;
+        Ok(Self { array, name })
+    }
+
+    /// The bytes.
+    pub fn values(&self) -> PyResult<&[u8]> {
+        self.array.as_slice().map_err(|_| not_contiguous(self.name))
+    }
+}
+
+/// A table of rows with `C` values each that takes over the memory of `values`.
+pub fn table<T: Element, const C: usize>(py: Python<'_>, values: Vec<T>) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let n = values.len() / C;
+    PyArray1::from_vec(py, values).reshape([n, C])
+}
+
 /// A new table of `n` rows with `C` numbers each, filled by `fill`, which runs without the GIL.
 pub fn filled_rows<const C: usize, T, E>(
     py: Python<'_>,

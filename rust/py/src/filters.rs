@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use imufit_attitude::Frame;
+use imufit_filters::accel::tilt_rows;
 use imufit_filters::filter::{self, FILTERS, Parameter};
-use imufit_filters::{Columns, Environment, FilterError, Replay, Row, Rules, Skipped, Start};
+use imufit_filters::{Columns, Environment, FilterError, Replay, Row, Rules, Skipped, Start, steady_state_gain};
 use nalgebra::Vector3;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -243,9 +244,33 @@ fn replay_rules(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     describe(py, imufit_filters::rules::PARAMETERS)
 }
 
+/// Angles of n readings (n, 3) of specific force as eqs. (1) to (3) of paper B have them, (n, 3), rad: pitch, roll,
+/// inclination of z; NaN where a reading shows no direction.
+#[pyfunction]
+fn tilt_angles<'py>(py: Python<'py>, acc: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let acc = Rows::<3>::new("acc", acc)?;
+    let values = acc.values()?;
+    let fill = |out: &mut [f64]| {
+        tilt_rows(values, out);
+        Ok::<_, FilterError>(())
+    };
+    Ok(filled_rows::<3, _, _>(py, acc.len(), fill, from_filters)?.0)
+}
+
+/// The Kalman filter when it has settled with readings `dt` s apart: gain of the angle, gain of the bias (1/s) and time
+/// constant (s).
+#[pyfunction]
+#[pyo3(signature = (dt, settings=None))]
+fn kalman_steady_state(dt: f64, settings: Option<HashMap<String, f64>>) -> PyResult<(f64, f64, f64)> {
+    let found = steady_state_gain(&sorted(settings), dt).map_err(from_filters)?;
+    Ok((found.angle, found.bias, found.time_constant))
+}
+
 /// Adds this file's class and functions to the module.
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<PyFilter>()?;
     m.add_function(wrap_pyfunction!(filter_descriptions, m)?)?;
+    m.add_function(wrap_pyfunction!(tilt_angles, m)?)?;
+    m.add_function(wrap_pyfunction!(kalman_steady_state, m)?)?;
     m.add_function(wrap_pyfunction!(replay_rules, m)?)
 }

@@ -5,6 +5,7 @@ mod arrays;
 mod attitude;
 mod calibration;
 mod correction;
+mod device;
 mod errors;
 mod filters;
 mod fit;
@@ -20,6 +21,7 @@ fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     attitude::register(m)?;
     calibration::register(m)?;
+    device::register(m)?;
     filters::register(m)?;
     model::register(m)?;
     correction::register(m)?;
