@@ -96,15 +96,15 @@ MACHINE_TOOL: Mapping[str, Scenario] = {
     # gyroscope make the published errors of its angle.
     "machine_at_1": _scenario(
         "A machine tool's table stands at zero for half of the time, drives to 1 degree and stands there.",
-        _moved(1.0, 0.507),
+        _moved(1.0, 0.502),
     ),
     "machine_at_1.5": _scenario(
         "A machine tool's table stands at zero for four fifths of the time, drives to 1.5 degrees and stands there.",
-        _moved(1.5, 0.792),
+        _moved(1.5, 0.787),
     ),
     "machine_at_5": _scenario(
         "A machine tool's table stands at zero for two fifths of the time, drives to 5 degrees and stands there.",
-        _moved(5.0, 0.421),
+        _moved(5.0, 0.415),
     ),
     "machine_move": _scenario(
         "A machine tool's table stands at zero for half of the time, drives to -5 degrees and stands there.",

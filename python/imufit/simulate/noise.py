@@ -160,7 +160,7 @@ class Noise:
 
         Densities are those of the data sheet (gyroscope 0.005 deg/s/sqrt(Hz); accelerometer 400 ug/sqrt(Hz), of which
         paper B's sensor has seven eighths), steps those of 16 bit over +-2 g and +-250 deg/s. The gyroscope's bias
-        wanders by 0.1 millidegrees per second in five minutes.
+        wanders by 0.05 millidegrees per second in five minutes.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class Noise:
         return cls(
             acc=SensorNoise.from_density(350e-6 * 9.80665, acc_bandwidth, resolution=9.80665 / 16384),
             gyr=SensorNoise.from_density(
-                float(np.radians(0.005)), gyr_bandwidth, random_walk=1e-7, resolution=float(np.radians(1 / 131))
+                float(np.radians(0.005)), gyr_bandwidth, random_walk=5e-8, resolution=float(np.radians(1 / 131))
             ),
             temperature_resolution=1 / 340,
         )
