@@ -181,6 +181,31 @@ def test_what_cannot_be_replayed_is_one_line(capsys, tmp_path, log):
     assert "no reference attitude" in err[0]
 
 
+@pytest.mark.parametrize("rows", [1, 2, 10, 60])
+def test_a_short_log_has_what_it_can_have(rows):
+    comparison = replay(rig().rows(0, rows), METHODS).comparison()
+    assert comparison is not None
+    assert comparison.rests == (rows == 60)
+    assert all(figures is not None for figures in comparison.methods.values())
+    assert str(comparison)
+
+
+def test_where_no_row_counts_the_note_says_so():
+    full = rig()
+    marked = Log.from_arrays(
+        full.t,
+        acc=full.acc,
+        gyr=full.gyr,
+        ref_angle=full.ref_angle,
+        covariates={"movement": np.zeros(full.n)},
+        rig_axis="x",
+    )
+    comparison = replay(marked, METHODS).comparison()
+    assert comparison is not None
+    assert set(comparison.methods.values()) == {None}
+    assert comparison.notes[0].startswith("No row counts")
+
+
 def test_results_in_python():
     result = replay(rig(), METHODS)
     comparison = result.comparison()

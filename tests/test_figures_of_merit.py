@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from imufit.replay.figures_of_merit import figures_of_merit, noise_band
 from imufit.replay.stretches import Rest, Stretches
+from scipy.signal import welch
 
 DT = 0.01
 
@@ -63,6 +64,18 @@ def test_the_density_of_filtered_noise_is_that_of_the_band() -> None:
     found = figures_of_merit(t, column(filtered), one_rest(t))
     assert found is not None
     assert found.noise_density_deg == pytest.approx(expected, rel=0.05)
+
+
+def test_the_density_is_that_of_welch() -> None:
+    """scipy.signal.welch on the part that counts: the second half of the rest."""
+    t = time(40.0)
+    error = np.cumsum(np.random.default_rng(8).normal(0.0, 0.01, t.size))
+    part = np.radians(error[t >= 0.5 * t[-1]])
+    frequency, power = welch(part, 1.0 / DT, nperseg=128, detrend="linear")
+    inside = (frequency >= 5.0) & (frequency < 50.0)
+    found = figures_of_merit(t, column(error), one_rest(t))
+    assert found is not None
+    assert found.noise_density_deg == pytest.approx(np.degrees(np.sqrt(power[inside].mean())), rel=1e-6)
 
 
 @settings(max_examples=30, deadline=None)

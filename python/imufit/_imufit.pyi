@@ -157,6 +157,9 @@ class Effect:
     @property
     def parameters(self) -> list[tuple[str, str, float | None]]: ...
     @property
+    def whole(self) -> list[str]: ...
+    def search(self, facts: Facts, found: Sequence[float] | None = None, round: int = 0) -> list[list[float]]: ...
+    @property
     def nonlinear(self) -> bool: ...
     @property
     def stage(self) -> str: ...
@@ -227,11 +230,29 @@ def concerns_reference(effect: Effect) -> bool: ...
 @final
 class Survey:
     def __new__(
-        cls, n: int, frame: str, gravity: float, mag_reference: Sequence[float] | None, covariates: Sequence[str]
+        cls,
+        n: int,
+        frame: str,
+        gravity: float,
+        mag_reference: Sequence[float] | None,
+        covariates: Sequence[str],
+        rig: tuple[int, Sequence[float]] | None = None,
     ) -> Survey: ...
     def add(self, chunk: _Chunk) -> None: ...
     def widths(self) -> tuple[list[float], list[float]]: ...
     def finish(self) -> Facts: ...
+
+@final
+class Profile:
+    def __new__(
+        cls,
+        facts: Facts,
+        effects: Sequence[tuple[Effect, Sequence[float]]],
+        candidate: Effect,
+        trials: Sequence[Sequence[float]],
+    ) -> Profile: ...
+    def add(self, chunk: _Chunk) -> None: ...
+    def best(self) -> tuple[int, list[float], float] | None: ...
 
 @final
 class Evidence:
@@ -239,7 +260,7 @@ class Evidence:
         cls,
         facts: Facts,
         effects: Sequence[tuple[Effect, Sequence[float]]],
-        candidates: Sequence[Effect],
+        candidates: Sequence[tuple[Effect, Sequence[float]]],
         blocks: int,
         filters: Sequence[Sequence[float]],
     ) -> Evidence: ...

@@ -18,6 +18,7 @@ from imufit.simulate import Truth, hidden
 from imufit.simulate import grade as grade_answer
 
 SCENARIOS = ("turntable", "poses", "arm", "handheld")
+"""Motions of the protocol unless others are asked for; `tilt`, a rig with one axis, is the other one."""
 SIZES = ("large", "medium", "small")
 
 FIRST_EFFECTS = (
@@ -34,7 +35,11 @@ FIRST_EFFECTS = (
     "mag.hard_iron",
     "mag.soft_iron",
     "ref.alignment",
+    "ref.tilt",
     "ref.delay",
+    "rig.backlash",
+    "rig.flexure",
+    "rig.periodic",
     "acc.column:vbat",
     "gyr.column:motor_current",
     "mag.column:vbat",
@@ -201,10 +206,11 @@ def _errors(truth: Truth, parameters: Sequence[Any]) -> tuple[float, ...]:
     )
 
 
-def plan(logs: int, nothing: int, seed: int) -> list[tuple[str, int, str]]:
+def plan(logs: int, nothing: int, seed: int, scenarios: Sequence[str] = SCENARIOS) -> list[tuple[str, int, str]]:
     """Scenario, seed and size of each blind log: scenarios and sizes in turn, all seeds different."""
-    jobs = [(SCENARIOS[k % 4], seed + k, SIZES[(k // 4) % 3]) for k in range(logs)]
-    return jobs + [(SCENARIOS[k % 4], seed + logs + k, NOTHING) for k in range(nothing)]
+    count = len(scenarios)
+    jobs = [(scenarios[k % count], seed + k, SIZES[(k // count) % 3]) for k in range(logs)]
+    return jobs + [(scenarios[k % count], seed + logs + k, NOTHING) for k in range(nothing)]
 
 
 def grade(
@@ -212,6 +218,7 @@ def grade(
     logs: int = 60,
     nothing: int = 30,
     seed: int = 0,
+    scenarios: Sequence[str] = SCENARIOS,
     processes: int | None = None,
     progress: Progress | None = None,
     **options: Any,
@@ -224,6 +231,8 @@ def grade(
         Number of logs with one hidden effect and with none.
     seed : int
         First seed; the same seed gives the same logs.
+    scenarios : sequence of str
+        Motions in turn, of `imufit.simulate.SCENARIOS`.
     processes : int, optional
         Logs worked on at a time; default: one per processor.
     progress : callable, optional
@@ -237,7 +246,7 @@ def grade(
         The marks, and how well the parameters were recovered.
     """
     tell = progress or silent
-    jobs = plan(logs, nothing, seed)
+    jobs = plan(logs, nothing, seed, scenarios)
     trials: list[Trial] = []
     # A fresh interpreter for each worker: the compiled core's threads do not survive a fork.
     with ProcessPoolExecutor(processes or os.cpu_count(), mp_context=get_context("spawn")) as pool:

@@ -44,6 +44,21 @@ def test_standard_errors_are_what_they_say(marks: BlindGrade) -> None:
     assert 0.90 <= marks.coverage <= 0.99, f"IMUFIT_SEED={SEED}\n{marks}"
 
 
+@pytest.fixture(scope="module")
+def tilt_rig() -> BlindGrade:
+    result = grade(logs=20, nothing=6, seed=SEED + 500_000, scenarios=["tilt"], processes=2)
+    print(f"IMUFIT_SEED={SEED}\n{result}")
+    return result
+
+
+def test_on_a_tilt_rig_sensor_and_rig_effects_are_named(tilt_rig: BlindGrade) -> None:
+    trials = [trial for trial in tilt_rig.trials if trial.size != NOTHING]
+    right = [trial for trial in trials if trial.mark in ("right", "named among rivals")]
+    assert len(trials) == 20
+    assert len(right) >= 19, f"IMUFIT_SEED={SEED}\n{tilt_rig}"
+    assert all(trial.mark == "right" for trial in tilt_rig.of(NOTHING)), f"IMUFIT_SEED={SEED}\n{tilt_rig}"
+
+
 def test_every_first_effect_is_drawn_in_the_long_run() -> None:
     seeds = [seed for _, seed, _ in plan(60, 30, 0)]
     assert len(set(seeds)) == 90

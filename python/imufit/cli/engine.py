@@ -250,8 +250,8 @@ def grade_answer(truth: Truth, answer: Mapping[str, Any]) -> Grade:
     return grade(truth, answer)
 
 
-def grade_blind(*, logs: int, nothing: int, seed: int, progress: Progress) -> Any:
+def grade_blind(*, logs: int, nothing: int, seed: int, scenarios: Sequence[str], progress: Progress) -> Any:
     """Run the blind protocol on many hidden logs."""
-    from imufit.grade import grade  # noqa: PLC0415
+    from imufit.grade import SCENARIOS, grade  # noqa: PLC0415
 
-    return grade(logs=logs, nothing=nothing, seed=seed, progress=progress)
+    return grade(logs=logs, nothing=nothing, seed=seed, scenarios=scenarios or SCENARIOS, progress=progress)

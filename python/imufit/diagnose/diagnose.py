@@ -13,6 +13,7 @@ from imufit import _imufit
 from imufit.diagnose import sentences
 from imufit.diagnose.compare import notes
 from imufit.fit.analysis import BLOCKS, Analysis
+from imufit.fit.profile import Found
 from imufit.model.catalogue import card_of
 from imufit.results import Candidate, Diagnosis, Parameter, Rival, Unexplained
 
@@ -48,7 +49,13 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         confounded.setdefault(ids[second], []).append(Rival(ids[first], correlation))
     tested = max(sum(item["testable"] for item in result["screened"]), 1)
     candidates = [
-        _candidate(item, analysis.candidates[ids[item["slot"]]], confounded.get(ids[item["slot"]], []), tested)
+        _candidate(
+            item,
+            analysis.candidates[ids[item["slot"]]],
+            confounded.get(ids[item["slot"]], []),
+            tested,
+            analysis.found.get(ids[item["slot"]]),
+        )
         for item in result["screened"]
     ]
     by_id = {candidate.effect: candidate for candidate in candidates}
@@ -77,9 +84,13 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     )
 
 
-def _candidate(item: Mapping[str, Any], effect: _imufit.Effect, rivals: list[Rival], tested: int) -> Candidate:
+def _candidate(
+    item: Mapping[str, Any], effect: _imufit.Effect, rivals: list[Rival], tested: int, found: Found | None
+) -> Candidate:
+    searched = {} if found is None else dict(zip((name for name, _, _ in effect.parameters), found.trial, strict=True))
+    whole = {name: searched[name] for name in effect.whole if name in searched}
     parameters = tuple(
-        Parameter(effect.id, name, value, error, unit, typical)
+        Parameter(effect.id, name, whole.get(name, value), 0.0 if name in whole else error, unit, typical)
         for (name, unit, typical), (value, error) in zip(effect.parameters, item["parameters"], strict=True)
     )
     threshold = float(student.isf(ALPHA / tested / 2, BLOCKS - 1)) + POWER

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.fit.passes import CHANNELS, MIN_COVERAGE, Passes
+from imufit.fit.profile import Found, search
 from imufit.fit.users_effects import check_users_effects
 from imufit.log import LogSource
 from imufit.model.catalogue import COLUMN, column_effects, effects, find_effect
@@ -60,6 +61,7 @@ class Analysis:
     model: SensorModel
     nuisance: dict[str, list[float]]
     candidates: dict[str, _imufit.Effect]
+    found: dict[str, Found]
     refused: dict[str, str]
     raw: _imufit.Evidence
     white: _imufit.Evidence
@@ -97,7 +99,9 @@ class Analysis:
         nuisance = {}
         if facts.field_estimated and FIELD_REFERENCE not in model.effects:
             nuisance = {FIELD_REFERENCE: [0.0, 0.0, 0.0]}
-        raw = _empty(facts, model, nuisance, candidates, [[] for _ in CHANNELS])
+        model = _started(passes, facts, model, nuisance)
+        found = search(passes, facts, _stack(model, nuisance), candidates)
+        raw = _empty(facts, model, nuisance, _asked(candidates, found), [[] for _ in CHANNELS])
         passes.evidence(raw, facts, "taking evidence")
         step, raw_variance = _imufit.saturate(raw)
         _check_samples(log, model, raw_variance)
@@ -114,6 +118,7 @@ class Analysis:
             model,
             nuisance,
             candidates,
+            found,
             refused,
             raw,
             white,
@@ -134,7 +139,12 @@ class Analysis:
         known = {**self.candidates, **dict(zip(self.model.effects, (e for e, _ in self.model.stack()), strict=True))}
         candidates = {key: effect for key, effect in known.items() if key not in model.effects and key not in nuisance}
         asked = candidates if with_candidates else {}
-        raw = _empty(self.facts, model, nuisance, asked, [[] for _ in CHANNELS])
+        starts = {
+            key: self.found[key].start for key in model.effects if key in self.found and key not in self.model.effects
+        }
+        model = model.starting_at(starts)
+        found = search(self.passes, self.facts, _stack(model, nuisance), asked)
+        raw = _empty(self.facts, model, nuisance, _asked(asked, found), [[] for _ in CHANNELS])
         self.passes.evidence(raw, self.facts, "taking evidence")
         white = raw
         if any(self.filters):
@@ -142,7 +152,14 @@ class Analysis:
         # The noise is that of the first evidence, which every effect of the catalogue was fitted to.
         problem = _imufit.Problem(white, raw, self.variance, self.floors)
         return replace(
-            self, model=model, nuisance=dict(nuisance), candidates=candidates, raw=raw, white=white, problem=problem
+            self,
+            model=model,
+            nuisance=dict(nuisance),
+            candidates=candidates,
+            found=found,
+            raw=raw,
+            white=white,
+            problem=problem,
         )
 
     @property
@@ -184,9 +201,11 @@ class Analysis:
         ids = self.slots
         parameters, errors = {}, {}
         for slot in range(len(self.model.effects)):
-            names = [name for name, _, _ in find_effect(ids[slot]).parameters]
+            effect = find_effect(ids[slot])
+            names = [name for name, _, _ in effect.parameters]
             parameters[ids[slot]] = dict(zip(names, map(float, estimate.values[slot]), strict=True))
             errors[ids[slot]] = dict(zip(names, map(float, estimate.errors[slot]), strict=True))
+            errors[ids[slot]] |= dict.fromkeys(effect.whole, 0.0)
         nuisance = {
             ids[slot]: [float(v) for v in estimate.values[slot]]
             for slot in self.fitted_slots
@@ -279,11 +298,35 @@ def _empty(
     facts: _imufit.Facts,
     model: SensorModel,
     nuisance: Mapping[str, list[float]],
-    candidates: Mapping[str, _imufit.Effect],
+    candidates: list[tuple[_imufit.Effect, list[float]]],
     filters: list[list[float]],
 ) -> _imufit.Evidence:
-    stack = [*model.stack(), *((find_effect(key), values) for key, values in nuisance.items())]
-    return _imufit.Evidence(facts, stack, list(candidates.values()), BLOCKS, filters)
+    return _imufit.Evidence(facts, _stack(model, nuisance), candidates, BLOCKS, filters)
+
+
+def _stack(model: SensorModel, nuisance: Mapping[str, list[float]]) -> list[tuple[_imufit.Effect, list[float]]]:
+    return [*model.stack(), *((find_effect(key), values) for key, values in nuisance.items())]
+
+
+def _asked(
+    candidates: Mapping[str, _imufit.Effect], found: Mapping[str, Found]
+) -> list[tuple[_imufit.Effect, list[float]]]:
+    return [
+        (effect, found[key].trial if key in found else [0.0] * len(effect.parameters))
+        for key, effect in candidates.items()
+    ]
+
+
+def _started(
+    passes: Passes, facts: _imufit.Facts, model: SensorModel, nuisance: Mapping[str, list[float]]
+) -> SensorModel:
+    """Find where to start for effects of the model that need a search and have no values yet."""
+    for effect, values in model.stack():
+        if not any(values) and effect.search(facts):
+            others = [(e, v) for e, v in _stack(model, nuisance) if e.id != effect.id]
+            found = search(passes, facts, others, {effect.id: effect})
+            model = model.starting_at({key: item.start for key, item in found.items()})
+    return model
 
 
 def _floors(log: LogSource, variance: list[float]) -> list[float]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
 from imufit.errors import InputError
@@ -92,6 +93,7 @@ class Passes:
             metadata.gravity,
             None if metadata.mag_reference is None else tuple(metadata.mag_reference),
             self.covariates,
+            self._rig(),
         )
         reference = 0
         known = np.zeros(len(self.covariates) + 1)
@@ -113,6 +115,23 @@ class Passes:
         if not facts.sensors:
             raise InputError("no sensor of the log has a sample", file=log.path)
         return facts, dict(zip(["temp", *self.covariates], known / log.n, strict=True))
+
+    def _rig(self) -> tuple[int, list[float]] | None:
+        """Axis of a one-axis rig and its attitude at the angle zero; None for a log of anything else."""
+        axis = self.log.metadata.rig_axis
+        if axis is None:
+            return None
+        number = "xyz".index(axis)
+        for chunk in self.log.chunks(CHUNK_ROWS, 0):
+            q, angle = chunk.log.ref_q, chunk.log.ref_angle
+            if q is None or angle is None:
+                break
+            rows = np.flatnonzero(np.isfinite(q[:, 0]) & np.isfinite(angle))
+            if rows.size:
+                turned_back = Rotation.from_rotvec(-angle[rows[0]] * np.eye(3)[number])
+                zero = Rotation.from_quat(q[rows[0], [1, 2, 3, 0]]) * turned_back
+                return number, zero.as_quat()[[3, 0, 1, 2]].tolist()
+        return number, [1.0, 0.0, 0.0, 0.0]
 
     def evidence(self, evidence: _imufit.Evidence, facts: _imufit.Facts, label: str) -> _imufit.Evidence:
         """Fill empty evidence with the whole log."""

@@ -109,6 +109,24 @@ class SensorModel:
             raise InputError(f"effect {effect_id} is in the model already", remedy="Nothing needs to be added.")
         return SensorModel([*self.effects, effect_id], self.parameters, constants=self.constants)
 
+    def starting_at(self, values: Mapping[str, list[float]]) -> SensorModel:
+        """Return the same model with other values of some effects, to start a fit from.
+
+        Parameters
+        ----------
+        values : mapping of str to list of float
+            By effect, one value for each of its parameters, SI units.
+        """
+        if not values:
+            return self
+        named = {
+            key: dict(zip((name for name, _, _ in self._effects[key].parameters), given, strict=True))
+            for key, given in values.items()
+        }
+        return SensorModel(
+            self.effects, self.parameters | named, constants=self.constants, standard_errors=self.standard_errors
+        )
+
     def fit(self, log: LogSource, progress: Progress | None = None) -> Fit:
         """Fit the parameters to a log with reference, starting from the present values.
 

@@ -34,9 +34,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.signal import detrend
-from scipy.signal.windows import hann
-from scipy.stats import theilslopes
 
 from imufit.replay.stretches import Rest, Stretches
 from imufit.results.tilt import TiltFigures
@@ -124,14 +121,16 @@ def figures_of_merit(
     )
 
 
-def noise_band(t: Array) -> tuple[float, float]:
-    """Band over which the noise density is averaged, Hz.
+def noise_band(t: Array) -> tuple[float, float] | None:
+    """Band over which the noise density is averaged, Hz; None for fewer than two rows.
 
     Parameters
     ----------
     t : (n,) array
         Times of the rows with an error, s.
     """
+    if t.size < 2:
+        return None
     nyquist = 0.5 / float(np.median(np.diff(t)))
     return NOISE_BAND[0] * nyquist, NOISE_BAND[1] * nyquist
 
@@ -190,7 +189,8 @@ def _slope(t: Array, values: Array, blocks: int = 60) -> float:
     edges = np.linspace(0, t.size, min(blocks, t.size) + 1).astype(np.intp)
     counts = np.diff(edges)
     times, means = (np.add.reduceat(each, edges[:-1]) / counts for each in (t - t[0], values))
-    return float(theilslopes(means, times).slope)
+    first, second = np.triu_indices(counts.size, 1)
+    return float(np.median((means[second] - means[first]) / (times[second] - times[first])))
 
 
 def _weighted_median(values: Array, weights: Array) -> float:
@@ -224,10 +224,17 @@ def _spectrum(values: Array, rate: float) -> tuple[Array, Array]:
     """
     rows = min(_WELCH_ROWS, len(values))
     parts = sliding_window_view(values, rows, axis=0)[:: rows // 2]
-    taper = hann(rows, sym=False)
-    power = np.abs(np.fft.rfft(detrend(parts, axis=-1) * taper, axis=-1)) ** 2
+    taper = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(rows) / rows)  # Hann
+    power = np.abs(np.fft.rfft(_without_line(parts) * taper, axis=-1)) ** 2
     scale = 2.0 / (rate * float(np.sum(taper**2)))
     return np.asarray(np.fft.rfftfreq(rows, 1.0 / rate)), np.asarray(scale * power.mean(axis=0).T, dtype=np.float64)
+
+
+def _without_line(values: Array) -> Array:
+    """Values less their straight line by least squares along the last axis."""
+    place = np.arange(values.shape[-1]) - 0.5 * (values.shape[-1] - 1)
+    level = values - values.mean(axis=-1, keepdims=True)
+    return np.asarray(level - (level @ place)[..., None] * (place / float(place @ place)))
 
 
 def _before_vibration(rest: Rest, stretches: Stretches) -> tuple[int, int]:
@@ -248,13 +255,13 @@ def _settling(
         return None
     since = t[rows] - t[start]
     width = max(3, round(SMOOTHING * (rows.size - 1) / (since[-1] - since[0])))
-    values = error[rows] if bounded else detrend(error[rows], axis=0)
+    values = error[rows] if bounded else _without_line(error[rows].T).T
     smooth = _running_mean(values, width)
     last = smooth[since >= 0.75 * length]
     if len(last) < 4:
         return None
     departure = np.linalg.norm(smooth - np.median(last, axis=0), axis=1)
-    spread = float(np.sqrt(np.sum(np.var(detrend(last, axis=0), axis=0))))
+    spread = float(np.sqrt(np.sum(np.var(_without_line(last.T), axis=1))))
     outside = np.flatnonzero(departure > max(np.radians(band_deg), _MARGIN * spread))
     if not outside.size:
         return 0.0, False

@@ -113,6 +113,8 @@ def compare_tilt(
 
 def _notes(reference: TiltReference, stretches: Stretches, methods: Mapping[str, TiltFigures | None]) -> list[str]:
     notes = []
+    if not any(methods.values()) and reference.kind != "heading":
+        return ["No row counts: none has both an estimate and a reference, with movement = 1 where the log says so."]
     if reference.kind == "heading":
         blind = [name for name, figures in methods.items() if figures is None]
         notes.append(
@@ -123,7 +125,7 @@ def _notes(reference: TiltReference, stretches: Stretches, methods: Mapping[str,
         notes.append(
             "The reference never rests: no SD at rest, no noise density; the drift is the median slope of its minutes."
         )
-    elif stretches.moves and not any(figures and figures.settling_moves for figures in methods.values()):
+    elif stretches.moves and not any(figures.settling_moves for figures in methods.values() if figures is not None):
         notes.append(f"No move is followed by {SETTLING_REST:g} s of rest: no settling time.")
     unfinished = [
         f"{name} after {figures.settling_unfinished} of {figures.settling_moves}"

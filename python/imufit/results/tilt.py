@@ -131,7 +131,7 @@ class TiltComparison:
         Time at rest, s.
     band_deg : float
         Band of the settling time, deg.
-    noise_band_hz : tuple of float
+    noise_band_hz : tuple of float or None
         Band of the noise density, Hz.
     notes : tuple of str
         What is to be known about the figures.
@@ -145,7 +145,7 @@ class TiltComparison:
     vibrations: int
     rest_s: float
     band_deg: float
-    noise_band_hz: tuple[float, float]
+    noise_band_hz: tuple[float, float] | None
     notes: tuple[str, ...] = field(default=())
 
     def ranks(self, tie: float = TIE) -> dict[str, dict[str, Mark]]:
@@ -179,7 +179,7 @@ class TiltComparison:
                 "vibrations": self.vibrations,
                 "rest_s": self.rest_s,
                 "band_deg": self.band_deg,
-                "noise_band_hz": list(self.noise_band_hz),
+                "noise_band_hz": json_value(self.noise_band_hz),
                 "notes": list(self.notes),
             },
             "ranks": {

@@ -58,12 +58,16 @@ OBSERVABLE: Mapping[str, Mapping[str, str]] = {
     # turned against the reference shows at rest in acc and mag alike.
     "poses": {**_ANYWHERE, **_ALL_ATTITUDES, **_ALL_RATES, "ref.alignment": _LIVELY["ref.alignment"]},
     # One axis: half of the gains are never excited, an offset in acc or mag is also a gain times what stays constant,
-    # a tilted table is also a zero of the angle, a gyroscope's bias is also its sensitivity to a gravity that keeps
-    # much of its direction. What remains does not depend on attitude, or follows the drive.
+    # a gyroscope's bias is also its sensitivity to a gravity that keeps much of its direction. What remains does not
+    # depend on attitude, or follows the drive, or is seen by acc and mag alike.
     "tilt": {
         **{effect: reason for effect, reason in _ANYWHERE.items() if effect != "gyr.bias"},
         "rig.backlash": "Changes sign with the direction of travel and stays while the rig rests, unlike a delay.",
+        "rig.flexure": "All sensors turn by the same angle, zero in the middle of the travel, which no tilt has.",
         "rig.periodic": "Several periods within the travel, which no gain, offset or flexure has.",
+        "ref.tilt": "Across the axis it turns with the rig, unlike a mount; acc and mag lean by the same angle.",
+        "ref.delay": "All sensors late by the same time while the rig moves, right at rest.",
+        "gyr.scale": "The axis turns both ways and at several rates.",
     },
     "handheld": {**_ANYWHERE, **_ALL_ATTITUDES, **_ALL_RATES, **_LIVELY},
 }

@@ -7,6 +7,8 @@ pub mod bins;
 pub mod evidence;
 pub mod noise;
 pub mod normal_equations;
+pub mod profile;
 pub mod reference_width;
 pub mod survey;
+pub mod travel;
 pub mod whitening;

@@ -68,6 +68,17 @@ fn unexplained(rows: &[Regressed]) -> f64 {
 /// An axis turns if its rate stands out of the reference's noise by this factor.
 const TURNING: f64 = 2.5;
 
+/// Body axes along which a vector fixed in the reference frame never stands out of the noise of the attitude, rad.
+pub fn silent_axes(rows: &SampledRows, v: &Vector3<f64>, noise: f64) -> [bool; 3] {
+    let mut square = Vector3::<f64>::zeros();
+    for row in rows.values() {
+        let x = row.attitude.inverse_transform_vector(v);
+        square += x.component_mul(&x);
+    }
+    let limit = TURNING * noise * v.norm();
+    std::array::from_fn(|axis| (square[axis] / rows.len().max(1) as f64).sqrt() < limit)
+}
+
 /// Axes whose rates are nothing but noise of the reference at the width chosen.
 pub fn still_axes(widths: &Bandwidth, chosen: Smoothing) -> [bool; 3] {
     let noise = widths.derivative_noise(chosen);

@@ -2,12 +2,15 @@
 
 use imufit_model::bandwidth::Bandwidth;
 use imufit_model::facts::LogFacts;
+use imufit_model::rig::Rig;
 use imufit_model::sensor::Sensor;
+use imufit_model::smoothing::Smoothing;
 use imufit_model::window::Window;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::bins::Bins;
 use crate::reference_width::{self, SampledRow, SampledRows};
+use crate::travel::Travel;
 
 /// Rows looked at more closely, at most.
 const SAMPLES: usize = 8192;
@@ -25,6 +28,8 @@ pub struct Given {
     pub field: Option<Vector3<f64>>,
     /// Names of the covariates.
     pub covariates: Vec<String>,
+    /// The one-axis rig, its knots still to be found.
+    pub rig: Option<Rig>,
 }
 
 /// Running sums of the first pass.
@@ -44,6 +49,7 @@ pub struct Survey {
     has_position: bool,
     width_rows: SampledRows,
     samples: Vec<Vec<f64>>,
+    travel: Option<Travel>,
 }
 
 /// A sensor's reading at a row and its change from two rows before to two rows after; NaN where not known.
@@ -85,6 +91,7 @@ impl Survey {
             has_position: false,
             width_rows: SampledRows::new(),
             samples: vec![Vec::new(); axes],
+            travel: given.rig.clone().map(Travel::new),
             given,
         }
     }
@@ -140,6 +147,14 @@ impl Survey {
                     let q = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
                     self.field.0 += q * m;
                     self.field.1 += 1;
+                }
+            }
+            if let (Some(travel), Some(q)) = (self.travel.as_mut(), window.attitude) {
+                let q = &q[4 * i..4 * i + 4];
+                let measured = window.reference_exact.is_none_or(|e| e[i] > 0.5);
+                if measured && q.iter().all(|v| v.is_finite()) {
+                    let q = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
+                    travel.add(window.t[i], &q);
                 }
             }
             if self.sampled(row, SAMPLES) {
@@ -227,10 +242,11 @@ impl Survey {
             has_temperature: self.temperature.1 > 0,
             attitude_smoothing,
             position_smoothing,
-            still_axes: reference_width::still_axes(&self.attitude_width, attitude_smoothing),
+            silent_axes: self.silent_axes(attitude_smoothing, field),
             attitude_columns: self.attitude_width.for_columns(attitude_smoothing),
             position_columns: position_smoothing.map(|s| self.position_width.for_columns(s)),
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),
+            rig: self.travel.take().map(|t| t.finish(self.attitude_width.noise())),
             covariates: self.given.covariates.clone(),
         };
         let rate = self.attitude_width.derivative_noise(facts.attitude_smoothing);
@@ -240,6 +256,23 @@ impl Survey {
                 .map_or(0.0, |s| self.position_width.derivative_noise(s));
         let bins = Bins::new(&self.given.covariates, &mut self.samples, rate, force);
         (facts, bins)
+    }
+
+    /// For each sensor the axes along which its ideal reading is nothing but the noise of the reference.
+    fn silent_axes(&self, attitude: Smoothing, field: Vector3<f64>) -> [[bool; 3]; 3] {
+        let noise = self.attitude_width.noise();
+        let silent = |v: Vector3<f64>| reference_width::silent_axes(&self.width_rows, &v, noise);
+        // A body that translates is accelerated along every axis.
+        let acc = if self.has_position {
+            [false; 3]
+        } else {
+            silent(-self.given.gravity)
+        };
+        [
+            acc,
+            reference_width::still_axes(&self.attitude_width, attitude),
+            silent(field),
+        ]
     }
 
     /// How the widths of the reference polynomials compare: noise and excess differences (attitude, position).

@@ -77,7 +77,11 @@ fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[
     let base = screening::base(problem, &fitted);
     let mut screened: Vec<Screened> = candidates
         .par_iter()
-        .map(|s| screening::screen(problem, &fitted, &base, *s, &indices(slots, &[*s])))
+        .map(|s| {
+            let mut screened = screening::screen(problem, &fitted, &base, *s, &indices(slots, &[*s]));
+            screened.p_value = (screened.p_value * slots[*s].tried as f64).min(1.0);
+            screened
+        })
         .collect();
     let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
     let passed = |s: &Screened| passes(s, s.p_value * tried);
@@ -145,7 +149,8 @@ pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidate
             let c = confounding::correlation(problem, &fitted, &own, &beta, &theirs);
             correlations.push((first.slot, other.slot, c));
             if other.gain >= RIVAL_SHARE * first.gain
-                && confounding::p_value_given(problem, &fitted, &theirs, &own) * tried > ALPHA
+                && confounding::p_value_given(problem, &fitted, &theirs, &own) * tried * slots[other.slot].tried as f64
+                    > ALPHA
             {
                 rivals.push(other.slot);
             }

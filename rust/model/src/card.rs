@@ -9,6 +9,8 @@ pub struct Parameter {
     pub unit: String,
     /// Size that low-cost sensors typically show; `None` if nobody can tell.
     pub typical: Option<f64>,
+    /// True if it is a whole number, which only a search finds and no step moves.
+    pub whole: bool,
 }
 
 /// Where in the chain from truth to reading an effect acts.
@@ -62,6 +64,7 @@ pub fn parameters(names: &[&str], unit: &str, typical: f64) -> Vec<Parameter> {
             name: (*name).to_string(),
             unit: unit.to_string(),
             typical: Some(typical),
+            whole: false,
         })
         .collect()
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::effect::Effect;
 use crate::effects::{
-    bias, covariate, field, g_sensitivity, iron, lever_arm, misalignment, reference, scale, temperature,
+    bias, covariate, field, g_sensitivity, iron, lever_arm, misalignment, reference, rig, scale, temperature,
 };
 use crate::sensor::Sensor;
 
@@ -29,7 +29,11 @@ pub fn built_in() -> Vec<Arc<dyn Effect>> {
         Arc::new(temperature::scale_temperature(Sensor::Mag)),
         Arc::new(field::field_reference()),
         Arc::new(reference::alignment()),
+        Arc::new(reference::tilt()),
         Arc::new(reference::delay()),
+        Arc::new(rig::backlash()),
+        Arc::new(rig::flexure()),
+        Arc::new(rig::periodic()),
     ]
 }
 

@@ -41,7 +41,13 @@ pub fn check(effect: &Arc<dyn Effect>, at: &[f64], window: &Window, facts: &LogF
             }
         }
     }
-    for (parameter, card) in effect.card().parameters.iter().enumerate() {
+    for (parameter, card) in effect
+        .card()
+        .parameters
+        .iter()
+        .enumerate()
+        .filter(|(_, card)| !card.whole)
+    {
         let h = 1e-3 * card.typical.unwrap_or(1.0);
         let (mut above, mut below) = (at.to_vec(), at.to_vec());
         above[parameter] += h;

@@ -142,6 +142,25 @@ pub trait Effect: Send + Sync {
     /// Columns d reading / d parameter of `sensor`, at the given parameter values.
     fn columns(&self, rows: &Rows, sensor: Sensor, parameters: &[f64], out: &mut Columns) -> Result<(), EffectError>;
 
+    /// Columns for a candidate that is not in the model, at trial values of the parameters inside it: what each
+    /// parameter's column would have to be for the effect of that size. The same as [`Effect::columns`] where the
+    /// reading is proportional to the parameters.
+    fn candidate_columns(
+        &self,
+        rows: &Rows,
+        sensor: Sensor,
+        trial: &[f64],
+        out: &mut Columns,
+    ) -> Result<(), EffectError> {
+        self.columns(rows, sensor, trial, out)
+    }
+
+    /// Trial values for parameters that no linear step finds (a period, a width): at first a grid over all that can be,
+    /// then, around what the round before `round` found best, a finer one. Empty: nothing to search, or done.
+    fn search(&self, _facts: &LogFacts, _found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
     /// What the effect does to the reference; only for [`crate::card::Stage::Reference`], whose value lies there.
     fn reference_change(&self, _parameters: &[f64]) -> ReferenceChange {
         ReferenceChange::default()

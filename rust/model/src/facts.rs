@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use crate::rig::Rig;
 use crate::smoothing::{NARROWEST, Smoothing};
 use crate::window::Window;
 
@@ -45,11 +46,13 @@ pub struct LogFacts {
     pub attitude_columns: Smoothing,
     /// The same for derivatives of the position above the second.
     pub position_columns: Option<Smoothing>,
-    /// Body axes about which the log never turns by more than the noise of the reference: their rates are noise, and a column made of noise
-    /// would give a scale of -1.
-    pub still_axes: [bool; 3],
+    /// For each sensor the body axes along which its ideal reading never exceeds the noise of the reference (a rig that never turns
+    /// about an axis, an axis that stays level): those readings are noise, and a column made of noise would give a scale of -1.
+    pub silent_axes: [[bool; 3]; 3],
     /// Median time between reference samples, s.
     pub reference_dt: f64,
+    /// The one-axis rig that moves the sensor; `None` where the log names no rig axis.
+    pub rig: Option<Rig>,
 }
 
 /// Mean of the finite values; NaN without any.
@@ -98,8 +101,9 @@ impl LogFacts {
             position_smoothing: None,
             attitude_columns: NARROWEST,
             position_columns: None,
-            still_axes: [false; 3],
+            silent_axes: [[false; 3]; 3],
             reference_dt: dt,
+            rig: None,
         }
     }
 

@@ -6,6 +6,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::facts::LogFacts;
 use crate::reference::{self, Kinematics, Widths};
+use crate::rig::{Play, RigError, Slack};
 use crate::triple::Triple;
 use crate::window::Window;
 
@@ -16,8 +17,10 @@ pub struct ReferenceChange {
     pub delay: f64,
     /// Turns vectors of the reference's body frame into the sensor's: x_sensor = alignment^-1 x.
     pub alignment: UnitQuaternion<f64>,
-    /// Turns vectors of the true reference frame into the recorded one (a table that is not level).
+    /// Turns vectors of the recorded reference frame into the true one (a table that is not level).
     pub tilt: UnitQuaternion<f64>,
+    /// By how much a one-axis rig misses its commanded angle.
+    pub rig: RigError,
 }
 
 impl Default for ReferenceChange {
@@ -26,6 +29,7 @@ impl Default for ReferenceChange {
             delay: 0.0,
             alignment: UnitQuaternion::identity(),
             tilt: UnitQuaternion::identity(),
+            rig: RigError::default(),
         }
     }
 }
@@ -38,6 +42,7 @@ impl ReferenceChange {
             delay: self.delay + other.delay,
             alignment: self.alignment * other.alignment,
             tilt: self.tilt * other.tilt,
+            rig: self.rig.and(other.rig),
         }
     }
 }
@@ -59,6 +64,21 @@ pub struct Ideal {
     pub m_rate: Triple,
     /// Attitude of the sensor, body to reference frame.
     pub attitude: Vec<UnitQuaternion<f64>>,
+    /// What the one-axis rig was told to do; empty without a rig.
+    pub command: Vec<Command>,
+    /// Axis of the rig in the sensor's frame; zero without a rig.
+    pub rig_axis: Vector3<f64>,
+}
+
+/// What a one-axis rig was told to do in a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Command {
+    /// Time on the clock of the reference, s.
+    pub t: f64,
+    /// Commanded angle, rad, in (-pi, pi].
+    pub angle: f64,
+    /// Its rate, rad/s.
+    pub rate: f64,
 }
 
 impl Ideal {
@@ -79,10 +99,58 @@ impl Ideal {
             change.delay,
         );
         let mut ideal = Self::default();
-        for k in &rows {
-            ideal.push(k.as_ref(), facts, change);
+        let mut rig = facts.rig.as_ref().map(|rig| {
+            ideal.rig_axis = change.alignment.inverse_transform_vector(&rig.axis);
+            let first = window.t.get(window.begin).copied().unwrap_or_default() + change.delay;
+            (rig, Play::new(rig, change.rig.width, first))
+        });
+        for (k, t) in rows.into_iter().zip(&window.t[window.begin..window.end]) {
+            let moved = k.map(|k| match rig.as_mut() {
+                None => k,
+                Some((rig, play)) => ideal.moved_by_rig(k, t + change.delay, rig, play, change),
+            });
+            if moved.is_none() && rig.is_some() {
+                ideal.command.push(Command {
+                    t: t + change.delay,
+                    angle: f64::NAN,
+                    rate: f64::NAN,
+                });
+            }
+            ideal.push(moved.as_ref(), facts, change);
         }
         ideal
+    }
+
+    /// Where the rig really stands; what it was told to do is kept.
+    fn moved_by_rig(
+        &mut self,
+        k: Kinematics,
+        t: f64,
+        rig: &crate::rig::Rig,
+        play: &mut Play,
+        change: &ReferenceChange,
+    ) -> Kinematics {
+        let (angle, rate, acceleration) = (rig.angle(&k.attitude), k.omega.dot(&rig.axis), k.alpha.dot(&rig.axis));
+        self.command.push(Command { t, angle, rate });
+        if change.rig.is_none() {
+            return k;
+        }
+        let slack = if change.rig.width == 0.0 {
+            Slack::NONE
+        } else {
+            play.at(t, angle)
+        };
+        let [error, error_rate, error_acceleration] = change.rig.at(angle, rate, acceleration, slack);
+        let turn = UnitQuaternion::from_scaled_axis(rig.axis * error);
+        let omega = turn.inverse_transform_vector(&k.omega);
+        Kinematics {
+            attitude: k.attitude * turn,
+            omega: omega + rig.axis * error_rate,
+            alpha: turn.inverse_transform_vector(&k.alpha)
+                + omega.cross(&rig.axis) * error_rate
+                + rig.axis * error_acceleration,
+            ..k
+        }
     }
 
     fn push(&mut self, k: Option<&Kinematics>, facts: &LogFacts, change: &ReferenceChange) {
@@ -104,8 +172,9 @@ impl Ideal {
         let attitude = change.tilt * k.attitude * change.alignment;
         let omega = change.alignment.inverse_transform_vector(&k.omega);
         let alpha = change.alignment.inverse_transform_vector(&k.alpha);
-        let f = attitude.inverse_transform_vector(&(k.acceleration - facts.gravity));
-        let f_rate = attitude.inverse_transform_vector(&k.jerk) - omega.cross(&f);
+        // Position and its derivatives are recorded in the frame that is not level.
+        let f = attitude.inverse_transform_vector(&(change.tilt * k.acceleration - facts.gravity));
+        let f_rate = attitude.inverse_transform_vector(&(change.tilt * k.jerk)) - omega.cross(&f);
         let m = attitude.inverse_transform_vector(&facts.field);
         self.omega.push(&omega);
         self.alpha.push(&alpha);

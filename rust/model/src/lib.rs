@@ -13,6 +13,7 @@ pub mod effects;
 pub mod facts;
 pub mod ideal;
 pub mod reference;
+pub mod rig;
 pub mod sensor;
 pub mod sensor_model;
 pub mod smoothing;

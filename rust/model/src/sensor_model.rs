@@ -7,7 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::card::Stage;
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
-use crate::ideal::{Ideal, ReferenceChange};
+use crate::ideal::{Command, Ideal, ReferenceChange};
 use crate::sensor::{CHANNELS, Sensor};
 use crate::triple::Triple;
 use crate::window::{Window, held};
@@ -20,12 +20,24 @@ type AxisColumns = [Vec<Vec<f64>>; 3];
 pub struct Slot {
     /// The effect.
     pub effect: Arc<dyn Effect>,
-    /// Present values; zero for a candidate.
+    /// Present values; for a candidate the values that its columns are taken for.
     pub parameters: Vec<f64>,
     /// True if the effect is part of the model; false for a candidate that is only asked for its columns.
     pub in_model: bool,
     /// Index of its first parameter among all parameters.
     pub first: usize,
+    /// How many values of its inner parameters were tried before these: each could have been a chance finding.
+    pub tried: usize,
+}
+
+impl Slot {
+    fn columns(&self, rows: &Rows, sensor: Sensor, out: &mut Columns) -> Result<(), EffectError> {
+        if self.in_model {
+            self.effect.columns(rows, sensor, &self.parameters, out)
+        } else {
+            self.effect.candidate_columns(rows, sensor, &self.parameters, out)
+        }
+    }
 }
 
 /// Effects of the model and candidates, each parameter with a fixed place.
@@ -74,15 +86,16 @@ pub struct Evaluation {
 }
 
 impl SensorModel {
-    /// A model of the given effects (with parameters) and candidates.
+    /// A model of the given effects (with parameters) and candidates (with trial values).
     pub fn new(
         effects: Vec<(Arc<dyn Effect>, Vec<f64>)>,
-        candidates: Vec<Arc<dyn Effect>>,
+        candidates: Vec<(Arc<dyn Effect>, Vec<f64>)>,
         facts: &LogFacts,
     ) -> Result<Self, EffectError> {
         let mut slots = Vec::new();
         let mut first = 0;
-        for (effect, parameters) in effects {
+        let asked = effects.into_iter().map(|e| (e, true));
+        for ((effect, parameters), in_model) in asked.chain(candidates.into_iter().map(|e| (e, false))) {
             let count = effect.card().parameters.len();
             if parameters.len() != count {
                 let message = format!("takes {count} parameters, got {}", parameters.len());
@@ -92,19 +105,10 @@ impl SensorModel {
                 });
             }
             slots.push(Slot {
+                tried: effect.search(facts, None).len().max(1),
                 effect,
                 parameters,
-                in_model: true,
-                first,
-            });
-            first += count;
-        }
-        for effect in candidates {
-            let count = effect.card().parameters.len();
-            slots.push(Slot {
-                effect,
-                parameters: vec![0.0; count],
-                in_model: false,
+                in_model,
                 first,
             });
             first += count;
@@ -157,7 +161,13 @@ impl SensorModel {
                 triple.push(&v);
             }
             ideal.attitude.push(UnitQuaternion::from_scaled_axis(v * 0.1));
+            ideal.command.push(Command {
+                t: facts.t_start + facts.dt * f64::from(i),
+                angle: 0.3 * f64::from(i),
+                rate: 0.2,
+            });
         }
+        ideal.rig_axis = facts.rig.as_ref().map_or_else(Vector3::zeros, |rig| rig.axis);
         let t: Vec<f64> = (0..4).map(|i| facts.t_start + facts.dt * f64::from(i)).collect();
         let ones = vec![1.0, 2.0, -1.0, 0.5];
         let covariates = vec![ones.clone(); facts.covariates.len()];
@@ -173,7 +183,7 @@ impl SensorModel {
             };
             for slot in self.slots.iter().filter(|s| s.effect.sensors().contains(&sensor)) {
                 columns.reset(4, slot.parameters.len());
-                slot.effect.columns(&rows, sensor, &slot.parameters, &mut columns)?;
+                slot.columns(&rows, sensor, &mut columns)?;
                 for axis in 0..3 {
                     let list = &mut self.active[3 * sensor.index() + axis];
                     list.extend(
@@ -209,10 +219,13 @@ impl SensorModel {
             .iter()
             .map(|c| core.clone().map(|i| held(c, i)).collect())
             .collect();
-        // Readings are modelled from the rates as they are; columns of axes that never turn would be noise.
-        let seen = facts.still_axes.contains(&true).then(|| Ideal {
-            omega: ideal.omega.without(facts.still_axes),
-            alpha: ideal.alpha.without(facts.still_axes),
+        // Readings are modelled from the quantities as they are; columns of silent axes would be noise.
+        let [acc, gyr, mag] = facts.silent_axes;
+        let seen = facts.silent_axes.iter().any(|s| s.contains(&true)).then(|| Ideal {
+            omega: ideal.omega.without(gyr),
+            alpha: ideal.alpha.without(gyr),
+            f: ideal.f.without(acc),
+            m: ideal.m.without(mag),
             ..ideal.clone()
         });
         let mut channels: Vec<Option<ChannelColumns>> = vec![None; CHANNELS];
@@ -270,17 +283,13 @@ impl SensorModel {
     /// Modelled readings of one sensor and the columns of its three channels, stage after stage.
     fn predict(&self, rows: Rows, mut x: Triple, sensor: Sensor) -> Result<(Triple, AxisColumns), EffectError> {
         let n = rows.len();
-        let still = if sensor == Sensor::Gyr {
-            rows.facts.still_axes
-        } else {
-            [false; 3]
-        };
+        let silent = rows.facts.silent_axes[sensor.index()];
         let mut out: AxisColumns =
             std::array::from_fn(|axis| vec![Vec::new(); self.active[3 * sensor.index() + axis].len()]);
         let mut columns = Columns::default();
         for stage in [Stage::Reference, Stage::Input, Stage::Gain, Stage::Offset] {
             let mut after: Option<Triple> = None;
-            let seen = still.contains(&true).then(|| x.without(still));
+            let seen = silent.contains(&true).then(|| x.without(silent));
             for slot in &self.slots {
                 if slot.effect.card().stage != stage || !slot.effect.sensors().contains(&sensor) {
                     continue;
@@ -290,7 +299,7 @@ impl SensorModel {
                     x: seen.as_ref().unwrap_or(&x),
                     ..rows
                 };
-                slot.effect.columns(&rows, sensor, &slot.parameters, &mut columns)?;
+                slot.columns(&rows, sensor, &mut columns)?;
                 for axis in 0..3 {
                     let list = &self.active[3 * sensor.index() + axis];
                     let from = list.partition_point(|p| *p < slot.first);

@@ -4,9 +4,38 @@
 use imufit_model::catalogue;
 use imufit_model::contract::check;
 use imufit_model::facts::LogFacts;
+use imufit_model::rig::{Knot, Rig, wrapped};
 use imufit_model::smoothing::NARROWEST;
 use imufit_model::window::Window;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+/// A rig about an axis of its own, with the reversals that the motion makes about it.
+fn rig(t: &[f64], attitude: &[f64]) -> Rig {
+    let mut rig = Rig {
+        axis: Vector3::new(0.6, 0.0, 0.8),
+        zero: UnitQuaternion::from_euler_angles(0.1, -0.2, 0.3),
+        knots: vec![],
+    };
+    let mut last = 0.0;
+    let angles: Vec<f64> = attitude
+        .chunks(4)
+        .map(|q| {
+            let angle = rig.angle(&UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3])));
+            last += wrapped(angle - last);
+            last
+        })
+        .collect();
+    for i in 0..t.len() {
+        let turns = i == 0 || i + 1 == t.len() || (angles[i] - angles[i - 1]) * (angles[i + 1] - angles[i]) < 0.0;
+        if turns || i % 20 == 0 {
+            rig.knots.push(Knot {
+                t: t[i],
+                angle: angles[i],
+            });
+        }
+    }
+    rig
+}
 
 #[test]
 fn every_built_in_effect_keeps_the_contract() {
@@ -56,8 +85,9 @@ fn every_built_in_effect_keeps_the_contract() {
         position_smoothing: Some(NARROWEST),
         attitude_columns: NARROWEST,
         position_columns: Some(NARROWEST),
-        still_axes: [false; 3],
+        silent_axes: [[false; 3]; 3],
         reference_dt: 0.01,
+        rig: Some(rig(&t, &attitude)),
     };
     let mut effects = catalogue::built_in();
     for sensor in ["acc", "gyr", "mag"] {
@@ -70,7 +100,10 @@ fn every_built_in_effect_keeps_the_contract() {
             .parameters
             .iter()
             .enumerate()
-            .map(|(k, p)| p.typical.unwrap_or(0.3) * (1.0 - 0.3 * k as f64))
+            .map(|(k, p)| {
+                let size = p.typical.unwrap_or(0.3) * (1.0 - 0.3 * k as f64);
+                if p.whole { 7.0 } else { size }
+            })
             .collect();
         for at in [zero, typical] {
             if let Err(e) = check(effect, &at, &window, &facts) {

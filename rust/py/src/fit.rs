@@ -5,11 +5,13 @@ use std::sync::Arc;
 use imufit_attitude::Frame;
 use imufit_fit::evidence::{Evidence, Layout};
 use imufit_fit::noise::Autocovariance;
+use imufit_fit::profile::Profile;
 use imufit_fit::survey::{Given, Survey};
 use imufit_fit::whitening::filter_from_autocovariance;
+use imufit_model::rig::Rig;
 use imufit_model::sensor::CHANNELS;
 use imufit_model::sensor_model::SensorModel;
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -18,6 +20,19 @@ use crate::errors::{from_effect, value_error};
 use crate::model::{PyEffect, PyFacts};
 use crate::window::ChunkArrays;
 
+/// The rig of a log from the number of its axis and the attitude at the angle zero.
+fn rig_of((axis, zero): (usize, [f64; 4])) -> PyResult<Rig> {
+    if axis > 2 || !zero.iter().all(|v| v.is_finite()) {
+        return Err(value_error("rig must be an axis (0, 1, 2) and a quaternion"));
+    }
+    let [w, x, y, z] = zero;
+    Ok(Rig {
+        axis: Vector3::ith(axis, 1.0),
+        zero: UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)),
+        knots: Vec::new(),
+    })
+}
+
 /// First pass over a log.
 #[pyclass(name = "Survey", module = "imufit._imufit")]
 pub struct PySurvey(Survey);
@@ -25,13 +40,15 @@ pub struct PySurvey(Survey);
 #[pymethods]
 impl PySurvey {
     #[new]
-    #[pyo3(signature = (n, frame, gravity, mag_reference, covariates))]
+    /// `rig`: axis of a one-axis rig (x, y or z of the body) and the reference attitude at its angle zero.
+    #[pyo3(signature = (n, frame, gravity, mag_reference, covariates, rig=None))]
     fn new(
         n: usize,
         frame: &str,
         gravity: f64,
         mag_reference: Option<[f64; 3]>,
         covariates: Vec<String>,
+        rig: Option<(usize, [f64; 4])>,
     ) -> PyResult<Self> {
         let frame: Frame = frame.parse().map_err(value_error)?;
         Ok(Self(Survey::new(Given {
@@ -39,6 +56,7 @@ impl PySurvey {
             gravity: -frame.up() * gravity,
             field: mag_reference.map(Vector3::from),
             covariates,
+            rig: rig.map(rig_of).transpose()?,
         })))
     }
 
@@ -77,13 +95,13 @@ pub struct PyEvidence(pub Evidence);
 
 #[pymethods]
 impl PyEvidence {
-    /// `effects` with their parameters are the model; `candidates` are asked for their columns only; `filters` has the
-    /// taps of a whitening filter for each of the nine channels.
+    /// `effects` with their parameters are the model; `candidates` are asked for their columns only, at the values given
+    /// (which matter for parameters that are searched for); `filters` has the taps of a whitening filter for each of the nine channels.
     #[new]
     fn new(
         facts: &PyFacts,
         effects: Vec<(PyRef<'_, PyEffect>, Vec<f64>)>,
-        candidates: Vec<PyRef<'_, PyEffect>>,
+        candidates: Vec<(PyRef<'_, PyEffect>, Vec<f64>)>,
         blocks: usize,
         filters: Vec<Vec<f64>>,
     ) -> PyResult<Self> {
@@ -91,7 +109,7 @@ impl PyEvidence {
             return Err(value_error(format!("need at least 2 blocks and {CHANNELS} filters")));
         }
         let effects = effects.into_iter().map(|(e, p)| (e.0.clone(), p)).collect();
-        let candidates = candidates.into_iter().map(|e| e.0.clone()).collect();
+        let candidates = candidates.into_iter().map(|(e, p)| (e.0.clone(), p)).collect();
         let model = SensorModel::new(effects, candidates, &facts.facts).map_err(from_effect)?;
         let layout = Layout {
             model,
@@ -158,6 +176,41 @@ impl PyEvidence {
             py,
             numpy::ndarray::Array2::from_shape_fn((n, n), |(i, j)| sum[(i, j)]),
         ))
+    }
+}
+
+/// Search for a parameter inside a candidate effect: each trial's columns against the residual of a model.
+#[pyclass(name = "Profile", module = "imufit._imufit")]
+pub struct PyProfile(Profile);
+
+#[pymethods]
+impl PyProfile {
+    /// `effects` with their parameters are the model; `trials` are values of every parameter of the candidate.
+    #[new]
+    fn new(
+        facts: &PyFacts,
+        effects: Vec<(PyRef<'_, PyEffect>, Vec<f64>)>,
+        candidate: &PyEffect,
+        trials: Vec<Vec<f64>>,
+    ) -> PyResult<Self> {
+        let effects = effects.into_iter().map(|(e, p)| (e.0.clone(), p)).collect();
+        let trials = trials.into_iter().map(|p| (candidate.0.clone(), p)).collect();
+        let model = SensorModel::new(effects, trials, &facts.facts).map_err(from_effect)?;
+        Ok(Self(Profile::new(model, facts.facts.clone())))
+    }
+
+    /// Adds the core rows of a chunk.
+    fn add(&mut self, py: Python<'_>, chunk: &Bound<'_, PyDict>) -> PyResult<()> {
+        let arrays = ChunkArrays::new(chunk)?;
+        let window = arrays.window()?;
+        py.detach(|| self.0.add(&window)).map_err(from_effect)
+    }
+
+    /// Number of the best trial, the candidate's parameters as a step finds them, and the drop of the sum of squares in
+    /// units of the noise; None where no sample can be used.
+    fn best(&self, py: Python<'_>) -> Option<(usize, Vec<f64>, f64)> {
+        let best = py.detach(|| self.0.best())?;
+        Some((best.trial, best.parameters, best.gain))
     }
 }
 
@@ -233,6 +286,7 @@ impl PyAutocovariance {
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<PySurvey>()?;
     m.add_class::<PyEvidence>()?;
+    m.add_class::<PyProfile>()?;
     m.add_class::<PyAutocovariance>()?;
     m.add_function(wrap_pyfunction!(evaluate, m)?)?;
     Ok(())

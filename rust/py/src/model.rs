@@ -45,6 +45,20 @@ impl PyEffect {
             .collect()
     }
 
+    /// Names of parameters that are whole numbers, which a search finds and no step moves.
+    #[getter]
+    fn whole(&self) -> Vec<String> {
+        let parameters = &self.0.card().parameters;
+        parameters.iter().filter(|p| p.whole).map(|p| p.name.clone()).collect()
+    }
+
+    /// Trial values of every parameter, where some can only be found by a search: at first a grid, then, around what
+    /// the round before the given one found best, a finer one. Empty: nothing to search, or done.
+    #[pyo3(signature = (facts, found=None, round=0))]
+    fn search(&self, facts: &PyFacts, found: Option<Vec<f64>>, round: usize) -> Vec<Vec<f64>> {
+        self.0.search(&facts.facts, found.as_deref().map(|f| (f, round)))
+    }
+
     /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new
     /// values.
     #[getter]
@@ -275,7 +289,12 @@ fn python_effect(
         stage,
         parameters: parameters
             .into_iter()
-            .map(|(name, unit, typical)| Parameter { name, unit, typical })
+            .map(|(name, unit, typical)| Parameter {
+                name,
+                unit,
+                typical,
+                whole: false,
+            })
             .collect(),
     };
     Ok(PyEffect(Arc::new(PythonEffect {

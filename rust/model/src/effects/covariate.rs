@@ -35,6 +35,7 @@ pub fn column(sensor: Sensor, name: &str) -> Covariate {
             name: (*v).to_string(),
             unit: format!("{}/{name}", sensor.unit()),
             typical: None,
+            whole: false,
         })
         .collect();
     Covariate {

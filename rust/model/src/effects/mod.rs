@@ -8,6 +8,7 @@ pub mod iron;
 pub mod lever_arm;
 pub mod misalignment;
 pub mod reference;
+pub mod rig;
 pub mod scale;
 pub mod temperature;
 

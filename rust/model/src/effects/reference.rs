@@ -1,4 +1,4 @@
-//! The reference itself is off: turned against the sensor, or late.
+//! The reference itself is off: turned against the sensor, not level, or late.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -14,6 +14,7 @@ use crate::triple::Triple;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Alignment,
+    Tilt,
     Delay,
 }
 
@@ -40,6 +41,26 @@ pub fn alignment() -> Reference {
             parameters(&VECTOR, "rad", 0.02),
         ),
         kind: Kind::Alignment,
+    }
+}
+
+/// `ref.tilt`: rotation vector (x, y, 0) in the reference frame with R = exp([tau]) R_reference.
+pub fn tilt() -> Reference {
+    let words = Words {
+        name: "table that is not level",
+        physics: "the reference frame is not level: the table, the rig's base or the camera's axes lean against the vertical",
+        formula: "R^T exp(-[tau]) (-g) + R^T g on acc, the same for the field on mag, tau horizontal",
+        signature: "a residual that is constant in the reference frame and turns with the attitude in the body frame, in acc and mag alike",
+        mistaken_for: "acc.bias when the attitude hardly changes, mag.field_reference if only the magnetometer is looked at, ref.alignment on a rig with one axis",
+        confirm: "turn the sensor by 180 deg about the vertical on the same table: a leaning table changes the sign in the body, a bias does not",
+    };
+    Reference {
+        card: words.card(
+            "ref.tilt".to_string(),
+            Stage::Reference,
+            parameters(&["x", "y"], "rad", 0.02),
+        ),
+        kind: Kind::Tilt,
     }
 }
 
@@ -84,7 +105,10 @@ impl Effect for Reference {
     }
 
     fn sensors(&self) -> &[Sensor] {
-        &Sensor::ALL
+        match self.kind {
+            Kind::Tilt => &[Sensor::Acc, Sensor::Mag],
+            Kind::Alignment | Kind::Delay => &Sensor::ALL,
+        }
     }
 
     fn not_testable(&self, _: &LogFacts) -> Option<String> {
@@ -102,6 +126,33 @@ impl Effect for Reference {
             Kind::Delay => {
                 for axis in 0..3 {
                     out.set(0, axis, rate.axis(axis).iter().copied());
+                }
+            }
+            Kind::Tilt => {
+                // f = R_r^T (a - T^T g), m = R_r^T T^T m_ref with R_r the recorded attitude; T exp([J_r d]) makes
+                // (T^T v) x J_r d of T^T v.
+                let tau = Vector3::new(parameters[0], parameters[1], 0.0);
+                let tilt = UnitQuaternion::from_scaled_axis(tau);
+                let jacobian = right_jacobian(&tau);
+                let v = match sensor {
+                    Sensor::Mag => rows.facts.field,
+                    Sensor::Acc | Sensor::Gyr => -rows.facts.gravity,
+                };
+                let level = tilt.inverse_transform_vector(&v);
+                for parameter in 0..2 {
+                    let change = level.cross(&jacobian.column(parameter).into_owned());
+                    for axis in 0..3 {
+                        out.column(parameter, axis);
+                    }
+                    for row in 0..rows.len() {
+                        let recorded = tilt.inverse() * rows.attitude(row);
+                        // Where the reference is not known the ideal reading is NaN, and so is the column.
+                        let known = x.axis(0)[row] * 0.0;
+                        let column = recorded.inverse_transform_vector(&change);
+                        for axis in 0..3 {
+                            out.column(parameter, axis)[row] = column[axis] + known;
+                        }
+                    }
                 }
             }
             Kind::Alignment => {
@@ -128,6 +179,10 @@ impl Effect for Reference {
         match self.kind {
             Kind::Delay => ReferenceChange {
                 delay: parameters[0],
+                ..ReferenceChange::default()
+            },
+            Kind::Tilt => ReferenceChange {
+                tilt: UnitQuaternion::from_scaled_axis(Vector3::new(parameters[0], parameters[1], 0.0)),
                 ..ReferenceChange::default()
             },
             Kind::Alignment => ReferenceChange {

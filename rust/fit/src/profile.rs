@@ -1,0 +1,234 @@
+//! Profile search: parameters inside an effect (a period, a width), which no linear step finds, are tried on a grid.
+//!
+//! For each trial the columns' own Gram matrix and their products with the fitted columns and the residual are summed;
+//! from these follows by how much the sum of squares would drop, everything fitted moving along.
+
+use imufit_model::effect::EffectError;
+use imufit_model::facts::LogFacts;
+use imufit_model::sensor::CHANNELS;
+use imufit_model::sensor_model::SensorModel;
+use imufit_model::window::Window;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::normal_equations::NormalEquations;
+
+/// Rows worked on at a time.
+const PART: usize = 2048;
+/// How often the weights of the channels are taken from what the best trial leaves.
+const ROUNDS: usize = 3;
+
+/// Sums of one channel: `[fitted columns | residual]` with themselves and with the columns of each trial.
+#[derive(Clone, Default)]
+struct Sums {
+    n: usize,
+    base: DMatrix<f64>,
+    cross: Vec<DMatrix<f64>>,
+    own: Vec<DMatrix<f64>>,
+}
+
+impl Sums {
+    fn add(&mut self, other: Self) {
+        if self.n == 0 {
+            *self = other;
+        } else if other.n > 0 {
+            self.n += other.n;
+            self.base += other.base;
+            for (a, b) in self.cross.iter_mut().zip(other.cross) {
+                *a += b;
+            }
+            for (a, b) in self.own.iter_mut().zip(other.own) {
+                *a += b;
+            }
+        }
+    }
+}
+
+/// What a search found.
+#[derive(Clone, Debug)]
+pub struct Best {
+    /// Number of the trial.
+    pub trial: usize,
+    /// The candidate's parameters as a step from zero along the trial's columns finds them.
+    pub parameters: Vec<f64>,
+    /// Drop of the sum of squares in units of the noise that the trial leaves.
+    pub gain: f64,
+}
+
+/// A search for the best trial of one candidate on top of a model.
+pub struct Profile {
+    /// The model, then the candidate once for each trial.
+    model: SensorModel,
+    facts: LogFacts,
+    /// Parameters of the model.
+    fitted: usize,
+    trials: usize,
+    channels: Vec<Sums>,
+}
+
+/// Active parameters of a channel that belong to one trial (`None`: to the model), by their place among the active ones.
+fn places(model: &SensorModel, channel: usize, range: &std::ops::Range<usize>) -> Vec<usize> {
+    let active = &model.active()[channel];
+    (0..active.len()).filter(|k| range.contains(&active[*k])).collect()
+}
+
+impl Profile {
+    /// A search over the candidate slots of `model`, which are trials of one effect.
+    pub fn new(model: SensorModel, facts: LogFacts) -> Self {
+        let fitted = model
+            .slots()
+            .iter()
+            .filter(|s| s.in_model)
+            .map(|s| s.parameters.len())
+            .sum();
+        let trials = model.slots().iter().filter(|s| !s.in_model).count();
+        Self {
+            model,
+            facts,
+            fitted,
+            trials,
+            channels: vec![Sums::default(); CHANNELS],
+        }
+    }
+
+    fn range(&self, trial: usize) -> std::ops::Range<usize> {
+        let slot = self.model.slots().iter().filter(|s| !s.in_model).nth(trial);
+        slot.map_or(0..0, |s| s.first..s.first + s.parameters.len())
+    }
+
+    /// Adds the core rows of a window.
+    pub fn add(&mut self, window: &Window) -> Result<(), EffectError> {
+        let starts: Vec<usize> = (window.begin..window.end).step_by(PART).collect();
+        let parts: Vec<Result<Vec<Sums>, EffectError>> = starts
+            .into_par_iter()
+            .map(|begin| self.sums(&window.part(begin, (begin + PART).min(window.end), self.facts.margin())))
+            .collect();
+        // Summed in the order of time, so that the result does not depend on the number of threads.
+        for part in parts {
+            for (sums, more) in self.channels.iter_mut().zip(part?) {
+                sums.add(more);
+            }
+        }
+        Ok(())
+    }
+
+    fn sums(&self, window: &Window) -> Result<Vec<Sums>, EffectError> {
+        let evaluation = self.model.evaluate(window, &self.facts)?;
+        let of_channel = |channel: usize| {
+            let Some(found) = &evaluation.channels[channel] else {
+                return Sums::default();
+            };
+            let rows: Vec<usize> = (0..found.residual.len())
+                .filter(|i| found.residual[*i].is_finite() && found.columns.iter().all(|c| c[*i].is_finite()))
+                .collect();
+            let matrix =
+                |columns: &[&Vec<f64>]| DMatrix::from_fn(rows.len(), columns.len(), |i, k| columns[k][rows[i]]);
+            let fitted = places(&self.model, channel, &(0..self.fitted));
+            let mut columns: Vec<&Vec<f64>> = fitted.iter().map(|k| &found.columns[*k]).collect();
+            columns.push(&found.residual);
+            let base = matrix(&columns);
+            let mut sums = Sums {
+                n: rows.len(),
+                base: base.tr_mul(&base),
+                ..Sums::default()
+            };
+            for trial in 0..self.trials {
+                let own = places(&self.model, channel, &self.range(trial));
+                let own = matrix(&own.iter().map(|k| &found.columns[*k]).collect::<Vec<_>>());
+                sums.cross.push(base.tr_mul(&own));
+                sums.own.push(own.tr_mul(&own));
+            }
+            sums
+        };
+        Ok((0..CHANNELS).map(of_channel).collect())
+    }
+
+    /// Equations of the model and one trial over all channels.
+    fn equations(&self, trial: usize, weights: &[f64; CHANNELS]) -> NormalEquations {
+        let range = self.range(trial);
+        let mut out = NormalEquations::zeros(self.fitted + range.len());
+        for (channel, sums) in self.channels.iter().enumerate().filter(|(_, s)| s.n > 0) {
+            let active = &self.model.active()[channel];
+            let (w, fitted) = (weights[channel], places(&self.model, channel, &(0..self.fitted)));
+            let own = places(&self.model, channel, &range);
+            let last = fitted.len();
+            let at = |k: usize| active[k];
+            let of_trial = |k: usize| self.fitted + active[k] - range.start;
+            for (i, a) in fitted.iter().enumerate() {
+                for (j, b) in fitted.iter().enumerate() {
+                    out.gram[(at(*a), at(*b))] += w * sums.base[(i, j)];
+                }
+                for (j, b) in own.iter().enumerate() {
+                    out.gram[(at(*a), of_trial(*b))] += w * sums.cross[trial][(i, j)];
+                    out.gram[(of_trial(*b), at(*a))] += w * sums.cross[trial][(i, j)];
+                }
+                out.right[at(*a)] += w * sums.base[(i, last)];
+            }
+            for (i, a) in own.iter().enumerate() {
+                for (j, b) in own.iter().enumerate() {
+                    out.gram[(of_trial(*a), of_trial(*b))] += w * sums.own[trial][(i, j)];
+                }
+                out.right[of_trial(*a)] += w * sums.cross[trial][(last, i)];
+            }
+            out.square += w * sums.base[(last, last)];
+            out.n += sums.n as f64;
+        }
+        out
+    }
+
+    /// Mean square of a channel's residual after a step of the model and one trial.
+    fn mean_square(&self, trial: usize, step: &DVector<f64>, channel: usize) -> f64 {
+        let sums = &self.channels[channel];
+        let mut weights = [0.0; CHANNELS];
+        weights[channel] = 1.0;
+        let square = self.equations(trial, &weights).residual_square(step);
+        square.max(0.0) / sums.n.max(1) as f64
+    }
+
+    /// The trial that lowers the sum of squares most; `None` without trials or samples.
+    pub fn best(&self) -> Option<Best> {
+        let mut found: Option<(usize, DVector<f64>)> = None;
+        let mut gain = 0.0;
+        for _ in 0..ROUNDS {
+            let mut weights = [0.0; CHANNELS];
+            for (channel, weight) in weights.iter_mut().enumerate() {
+                let sums = &self.channels[channel];
+                if sums.n == 0 {
+                    continue;
+                }
+                let last = sums.base.nrows() - 1;
+                let present = sums.base[(last, last)] / sums.n as f64;
+                let left = found
+                    .as_ref()
+                    .map_or(present, |(trial, step)| self.mean_square(*trial, step, channel));
+                // A noiseless channel must not outweigh the rest beyond what numbers can hold.
+                *weight = 1.0 / left.max(1e-12 * present).max(f64::MIN_POSITIVE);
+            }
+            let solved: Vec<(usize, f64, DVector<f64>)> = (0..self.trials)
+                .into_par_iter()
+                .filter_map(|trial| {
+                    let equations = self.equations(trial, &weights);
+                    let precision = DVector::zeros(equations.parameters());
+                    let step = equations.solve(&precision)?.solution;
+                    let square = equations.residual_square(&step);
+                    square.is_finite().then_some((trial, square, step))
+                })
+                .collect();
+            let (trial, square, step) = solved.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+            let alone = self
+                .equations(trial, &weights)
+                .selected(&(0..self.fitted).collect::<Vec<_>>());
+            let without = alone.solve(&DVector::zeros(self.fitted))?.solution;
+            gain = alone.residual_square(&without) - square;
+            found = Some((trial, step));
+        }
+        found.map(|(trial, step)| {
+            let own = step.rows(self.fitted, step.len() - self.fitted);
+            Best {
+                trial,
+                parameters: own.iter().copied().collect(),
+                gain,
+            }
+        })
+    }
+}

@@ -1,0 +1,264 @@
+//! A one-axis rig does not go where it is told to: play in its drive, bending under load, eccentric gears.
+//!
+//! Each is an error `delta` of the angle about the rig's axis u, seen by every sensor:
+//! `R = R_reference exp(u delta)`, hence `f x u delta`, `m x u delta` and `omega x u delta + u d(delta)/dt`.
+
+use super::Words;
+use crate::card::{Card, Parameter, Stage, parameters};
+use crate::effect::{Columns, Effect, EffectError, Rows};
+use crate::facts::LogFacts;
+use crate::ideal::{Command, ReferenceChange};
+use crate::rig::{Play, Rig, RigError};
+use crate::sensor::Sensor;
+
+/// What is wrong with the rig.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Backlash,
+    Flexure,
+    Periodic,
+}
+
+/// An effect of the rig on every sensor.
+pub struct RigEffect {
+    card: Card,
+    kind: Kind,
+}
+
+/// `rig.backlash`: half the width behind the drive, on the side it comes from.
+pub fn backlash() -> RigEffect {
+    let words = Words {
+        name: "backlash of the drive",
+        physics: "the drive has play: after a reversal the axis stands still until the drive has crossed it",
+        formula: "angle error -(w/2) sign(direction of travel) about rig_axis, with memory",
+        signature: "at the same commanded angle the residual has one sign on the way up and the other on the way down, and keeps it at rest",
+        mistaken_for: "ref.delay, which vanishes at rest; a bias, if every position is approached from the same side",
+        confirm: "approach the same angle from below and from above and rest there: the readings differ by the width",
+    };
+    RigEffect {
+        card: words.card(
+            "rig.backlash".to_string(),
+            Stage::Reference,
+            parameters(&["width"], "rad", 5e-3),
+        ),
+        kind: Kind::Backlash,
+    }
+}
+
+/// `rig.flexure`.
+pub fn flexure() -> RigEffect {
+    let words = Words {
+        name: "flexure of the axis",
+        physics: "the axis or its table bends under its own weight, most where the load stands out sideways",
+        formula: "angle error k sin(angle) about rig_axis",
+        signature: "a residual that grows with the sine of the commanded angle, seen as a rotation by every sensor",
+        mistaken_for: "rig.periodic with a long period, acc.scale or acc.misalignment if only the accelerometer is looked at",
+        confirm: "repeat with the table unloaded, or with a counterweight: flexure follows the load",
+    };
+    RigEffect {
+        card: words.card(
+            "rig.flexure".to_string(),
+            Stage::Reference,
+            parameters(&["k"], "rad", 5e-3),
+        ),
+        kind: Kind::Flexure,
+    }
+}
+
+/// `rig.periodic`.
+pub fn periodic() -> RigEffect {
+    let words = Words {
+        name: "periodic error of the drive",
+        physics: "an eccentric gear or a worm with pitch error repeats with every turn of the wheel, N times in a turn of the axis",
+        formula: "angle error a cos(N angle) + b sin(N angle) about rig_axis",
+        signature: "a residual that is a wave of the commanded angle, the same at every speed and on the way up and down",
+        mistaken_for: "a vibration, if the axis always moves at the same speed",
+        confirm: "move at two speeds: the wave keeps its period in angle, a vibration keeps its period in time",
+    };
+    let mut list = parameters(&["a", "b"], "rad", 2e-3);
+    list.push(Parameter {
+        name: "N".to_string(),
+        unit: "1".to_string(),
+        typical: None,
+        whole: true,
+    });
+    RigEffect {
+        card: words.card("rig.periodic".to_string(), Stage::Reference, list),
+        kind: Kind::Periodic,
+    }
+}
+
+/// Periods in a turn that are tried: below, a wave is a flexure or a tilt.
+const ORDERS: std::ops::RangeInclusive<u32> = 2..=64;
+/// The travel must hold this part of a period.
+const LEAST_PERIODS: f64 = 1.5;
+/// Widths tried at first, rad, in equal ratios.
+const WIDTHS: (f64, f64, u32) = (5e-5, 0.1, 18);
+/// Rounds in which the grid of widths is narrowed, and its number of steps to each side.
+const ROUNDS: usize = 3;
+const STEPS: i32 = 8;
+
+/// Range of the commanded angle, rad.
+fn travel(rig: &Rig) -> f64 {
+    let angles = || rig.knots.iter().map(|k| k.angle);
+    angles().fold(f64::NEG_INFINITY, f64::max) - angles().fold(f64::INFINITY, f64::min)
+}
+
+/// Fills the columns of `P` parameters from d delta / dp and d (d delta / dt) / dp of each row.
+fn turned<const P: usize>(rows: &Rows, sensor: Sensor, out: &mut Columns, slopes: impl Iterator<Item = [[f64; 2]; P]>) {
+    let ideal = rows.ideal;
+    let (u, x) = (
+        ideal.rig_axis,
+        match sensor {
+            Sensor::Acc => &ideal.f,
+            Sensor::Gyr => &ideal.omega,
+            Sensor::Mag => &ideal.m,
+        },
+    );
+    let slopes: Vec<_> = slopes.collect();
+    for axis in 0..3 {
+        let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+        let along = if sensor == Sensor::Gyr { u[axis] } else { 0.0 };
+        let (xj, xk) = (x.axis(j), x.axis(k));
+        for parameter in 0..P {
+            let values = slopes.iter().zip(xj.iter().zip(xk)).map(|(slope, (a, b))| {
+                let [angle, rate] = slope[parameter];
+                (a * u[k] - b * u[j]) * angle + along * rate
+            });
+            out.set(parameter, axis, values);
+        }
+    }
+}
+
+/// Play of a width over the rows: change of error and of its rate per rad of width.
+fn play_columns<'a>(
+    rows: &'a Rows,
+    width: f64,
+    slope: impl Fn(crate::rig::Slack, &Command) -> [f64; 2] + 'a,
+) -> impl Iterator<Item = [[f64; 2]; 1]> + 'a {
+    let command = &rows.ideal.command;
+    let first = command.first().map_or(0.0, |c| c.t);
+    let mut play = rows.facts.rig.as_ref().map(|rig| Play::new(rig, width, first));
+    command.iter().map(move |c| match play.as_mut() {
+        Some(play) if c.angle.is_finite() => [slope(play.at(c.t, c.angle), c)],
+        _ => [[f64::NAN; 2]],
+    })
+}
+
+impl Effect for RigEffect {
+    fn card(&self) -> &Card {
+        &self.card
+    }
+
+    fn sensors(&self) -> &[Sensor] {
+        &Sensor::ALL
+    }
+
+    fn not_testable(&self, facts: &LogFacts) -> Option<String> {
+        let Some(rig) = &facts.rig else {
+            return Some("the log names no rig_axis".to_string());
+        };
+        match self.kind {
+            Kind::Backlash if rig.knots.len() < 3 => Some("the rig never reverses".to_string()),
+            Kind::Periodic if self.search(facts, None).is_empty() => Some("the rig hardly travels".to_string()),
+            _ => None,
+        }
+    }
+
+    fn columns(&self, rows: &Rows, sensor: Sensor, parameters: &[f64], out: &mut Columns) -> Result<(), EffectError> {
+        let command = &rows.ideal.command;
+        match self.kind {
+            Kind::Backlash => {
+                // The end of a crossing shifts with the width, which no slope can tell: the rate has none.
+                let slopes = play_columns(rows, parameters[0], |slack, _| [slack.slope, 0.0]);
+                turned(rows, sensor, out, slopes);
+            }
+            Kind::Flexure => {
+                let slopes = command.iter().map(|c| {
+                    let (sin, cos) = c.angle.sin_cos();
+                    [[sin, cos * c.rate]]
+                });
+                turned(rows, sensor, out, slopes);
+            }
+            Kind::Periodic => {
+                let n = parameters[2];
+                if n == 0.0 {
+                    return Ok(());
+                }
+                let slopes = command.iter().map(|c| {
+                    let (sin, cos) = (n * c.angle).sin_cos();
+                    [[cos, -n * sin * c.rate], [sin, n * cos * c.rate]]
+                });
+                turned(rows, sensor, out, slopes);
+            }
+        }
+        Ok(())
+    }
+
+    fn candidate_columns(
+        &self,
+        rows: &Rows,
+        sensor: Sensor,
+        trial: &[f64],
+        out: &mut Columns,
+    ) -> Result<(), EffectError> {
+        let width = trial[0];
+        if self.kind != Kind::Backlash || width == 0.0 {
+            return self.columns(rows, sensor, trial, out);
+        }
+        let secants = play_columns(rows, width, move |slack, c| {
+            [slack.error / width, slack.follow * c.rate / width]
+        });
+        turned(rows, sensor, out, secants);
+        Ok(())
+    }
+
+    fn search(&self, facts: &LogFacts, found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {
+        let Some(rig) = &facts.rig else { return Vec::new() };
+        let reach = travel(rig);
+        match (self.kind, found) {
+            (Kind::Backlash, None) => {
+                let (low, high, count) = WIDTHS;
+                let ratio = (high / low).powf(1.0 / f64::from(count));
+                let widths = (0..=count).map(|k| low * ratio.powf(f64::from(k)));
+                widths
+                    .filter(|w| *w < reach)
+                    .flat_map(|w| [vec![w], vec![-w]])
+                    .collect()
+            }
+            (Kind::Backlash, Some((&[at], round))) if round < ROUNDS => {
+                let (low, high, count) = WIDTHS;
+                let ratio = (high / low).powf(1.0 / f64::from(count));
+                let step = at.abs() * (ratio - 1.0) / f64::from(STEPS).powi(i32::try_from(round + 1).unwrap_or(1));
+                (-STEPS..=STEPS).map(|k| vec![at + f64::from(k) * step]).collect()
+            }
+            (Kind::Periodic, None) => ORDERS
+                .map(f64::from)
+                .filter(|n| n * reach >= LEAST_PERIODS * std::f64::consts::TAU)
+                .map(|n| vec![0.0, 0.0, n])
+                .collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    fn reference_change(&self, parameters: &[f64]) -> ReferenceChange {
+        let rig = match self.kind {
+            Kind::Backlash => RigError {
+                width: parameters[0],
+                ..RigError::default()
+            },
+            Kind::Flexure => RigError {
+                flexure: parameters[0],
+                ..RigError::default()
+            },
+            Kind::Periodic => RigError {
+                periodic: [parameters[0], parameters[1], parameters[2]],
+                ..RigError::default()
+            },
+        };
+        ReferenceChange {
+            rig,
+            ..ReferenceChange::default()
+        }
+    }
+}
