@@ -351,9 +351,15 @@ def print_corrected(
     for angle in SD:
         pairs = [(m, before[angle][:, 0, METHODS.index(m)].mean(), after[angle][0, METHODS.index(m)]) for m in chosen]
         print(f"{angle:4g} deg  " + "".join(f"{method:>15} {was:.3f} -> {now:.3f}" for method, was, now in pairs))
-    print("RMSE of the Kalman filter at rest in deg, another wide sweep:")
-    for name, model in (("as it is", None), ("small tilts' model", small), ("wide sweep's model", wide)):
-        print(f"  {name:20}{wide_error(None if model is None else model.fit.model):.3f}")
+    print("RMSE of the Kalman filter at rest in deg   at 5 deg   in another wide sweep")
+    at = METHODS.index("kalman")
+    tilted = corrected(small.fit.model, 5.0, HELD_OUT)[0, at]
+    for name, model, five in (
+        ("as it is", None, before[5.0][:, 0, at].mean()),
+        ("small tilts' model applied", small.fit.model, tilted),
+        ("wide sweep's model applied", wide.fit.model, after[5.0][0, at]),
+    ):
+        print(f"  {name:40} {five:8.3f}   {wide_error(model):8.3f}")
 
 
 def main(folder: str | None = None, seeds: str = "1") -> None:
