@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from engine import swaying
 from imufit import InputError, Log, SensorModel, simulate
-from imufit.simulate import SCENARIOS, Noise, SensorNoise
+from imufit.simulate import OBSERVABLE, Noise, SensorNoise
 from scipy.spatial.transform import Rotation
 from test_fit import FIRST_EFFECTS
 
@@ -25,7 +25,7 @@ def test_each_effect_is_named_when_it_is_missing(effect):
         assert abs(p.value - sim.truth.effects[effect][p.name]) < 5.0 * p.standard_error
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", OBSERVABLE)
 def test_nothing_is_missing_from_an_ideal_sensor(scenario):
     for seed in range(2):
         log = simulate.simulate(

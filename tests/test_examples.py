@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from test_readme import PAGES
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 SHOWS = {
@@ -14,10 +15,15 @@ SHOWS = {
     "paper_a_calibration.py": ("published as 0.995", "of the twelve parameters within 2 standard errors"),
     "own_effect.py": ("gyr.fan is missing", "+ acc.bias"),
 }
+ON_A_PAGE = {"paper_b_tilt.py": "docs/tilt.md"}
+"""Examples whose whole output stands on a page, where `test_readme.py` runs them."""
 
 
 def test_every_example_is_tested():
-    assert {path.name for path in EXAMPLES.glob("*.py")} == set(SHOWS)
+    assert {path.name for path in EXAMPLES.glob("*.py")} == {*SHOWS, *ON_A_PAGE}
+    for name, page in ON_A_PAGE.items():
+        assert page in PAGES
+        assert f"python examples/{name}" in (EXAMPLES.parent / page).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", SHOWS)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from engine import residuals, swaying
 from imufit import SensorModel, simulate
-from imufit.simulate import SCENARIOS, Noise, SensorNoise
+from imufit.simulate import OBSERVABLE, Noise, SensorNoise
 from scipy.spatial.transform import Slerp
 
 QUIET = Noise(acc=SensorNoise(0.0), gyr=SensorNoise(0.0), mag=SensorNoise(0.0), temperature=0.0)
@@ -39,7 +39,7 @@ def test_motion_worked_out_on_paper_leaves_no_residual(frame, timing):
 
 
 @pytest.mark.parametrize("timing", TIMING)
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", OBSERVABLE)
 def test_exact_simulated_motion_leaves_no_residual(scenario, timing):
     # Steps of the simulated motions jump in the fourth derivative of the angle, which no polynomial follows: where they
     # carry the body along, the acceleration is off by some millionths for a few rows.
@@ -57,7 +57,7 @@ def test_far_from_the_origin_and_late_in_the_day_as_well():
     assert max(relative(moved, worst=True).values()) < 3e-6
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", OBSERVABLE)
 def test_noise_of_the_reference_is_not_taken_for_an_effect(scenario):
     for seed in range(3):
         noise = Noise(attitude_deg=0.02)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from imufit import SensorModel, ladder, simulate
-from imufit.simulate import SCENARIOS, Noise
+from imufit.simulate import OBSERVABLE, Noise
 from scipy.spatial.transform import Rotation
 from test_diagnose import static
 
@@ -32,7 +32,7 @@ def test_two_missing_effects_are_both_found(scenario, effects, realistic):
         assert abs(p.value - sim.truth.effects[p.effect][p.name]) < 5.0 * p.standard_error, str(p)
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", OBSERVABLE)
 def test_nothing_is_added_to_an_ideal_sensor(scenario):
     answer = ladder(simulate.simulate(scenario, {}, 5, 60.0, noise=Noise.realistic()).to_log())
     assert (answer.steps, answer.model, answer.verdict) == ((), (), "adequate")

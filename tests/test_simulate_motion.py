@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from imufit.simulate.environment import FRAMES, GRAVITY, Temperature, field_vector, gravity_vector
-from imufit.simulate.motion import Cruise, Product, Sinusoids, Steps, Sum
+from imufit.simulate.motion import Cruise, Product, Ringing, Sinusoids, Steps, Sum
 from imufit.simulate.rig import Backlash, Flexure, Periodic
 from imufit.simulate.scenarios import SCENARIOS, build
 from imufit.simulate.truth import Kinematics, quaternion_from_matrix, rotation_from_vector
@@ -32,7 +32,7 @@ def motion(name, seed, t):
     return build(name, np.random.default_rng(seed), 60.0).at(t)
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", [name for name in SCENARIOS if name != "machine_struck"])  # which stands still
 @settings(max_examples=5, deadline=None)
 @given(seed=st.integers(0, 2**31))
 def test_rates_and_accelerations_are_the_derivatives_of_attitude_and_position(name, seed):
@@ -62,6 +62,7 @@ def test_each_scalar_motion_knows_its_derivatives(seed):
         steps,
         cruise,
         Product(steps, swing),
+        Product(steps, Ringing(0.5, 0.02, 3.0, 0.04)),
         Sum([cruise, swing]),
         Flexure(swing, 0.01),
         Periodic(cruise, 0.01, -0.02, 9),

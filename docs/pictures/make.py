@@ -1,8 +1,9 @@
-"""Draw the pictures of the documents: the error falling in a simulated log, the six sides, a calibration.
+"""Draw the pictures of the documents: the error falling in a simulated log, six sides, a calibration, a machine tool.
 
 python docs/pictures/make.py [FOLDER]
 """
 
+import runpy
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -61,6 +62,12 @@ def calibration() -> "Figure":
     return imufit.calibrate.calibrate(log).plot(log)
 
 
+def tilt(folder: Path) -> None:
+    """Draw the pictures of docs/tilt.md: the example does."""
+    example = Path(__file__).resolve().parents[2] / "examples" / "paper_b_tilt.py"
+    runpy.run_path(str(example))["main"](str(folder), "5")
+
+
 def _seen(point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Project a point of the room on the paper: what is further away lies further up and to the right."""
     return np.array([point[0] + 0.40 * point[1], point[2] + 0.30 * point[1]])
@@ -110,3 +117,4 @@ if __name__ == "__main__":
     ladder().plot().savefig(folder / "ladder.png", dpi=110)
     sides().savefig(folder / "sides.png", dpi=90)
     calibration().savefig(folder / "calibration.png", dpi=90)
+    tilt(folder)

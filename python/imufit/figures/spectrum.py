@@ -53,7 +53,7 @@ def residual_spectra(spectra: Sequence[SpectrumLike]) -> Figure:
     sensors = list(dict.fromkeys(spectrum.channel.split("_")[0] for spectrum in spectra))
     if not sensors:
         return style.empty("The log is too short for a spectrum of the residual.")
-    figure = style.new_figure(max(5.2, 10.4 * len(sensors) / 3), 3.4)
+    figure = style.new_figure(max(5.2, 4.2 * len(sensors)), 3.4)
     grid = figure.subplots(1, len(sensors), squeeze=False, sharey=True)[0]
     for axes, sensor in zip(grid, sensors, strict=True):
         _sensor(axes, sensor, [spectrum for spectrum in spectra if spectrum.channel.split("_")[0] == sensor])
@@ -85,7 +85,7 @@ def _sensor(axes: Axes, sensor: str, spectra: Sequence[SpectrumLike]) -> None:
     if peak > 0.0:
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.legend(frameon=False, fontsize=8, ncols=3, loc="upper right")
+        axes.legend(frameon=False, fontsize=8, ncols=3, loc="best")
     name = _NAMES.get(sensor, sensor)
     style.title(
         axes,

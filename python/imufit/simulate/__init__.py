@@ -9,7 +9,8 @@ from imufit.simulate.grade import Grade, ParameterGrade, grade
 from imufit.simulate.hidden import OBSERVABLE, hidden
 from imufit.simulate.injections import INJECTIONS, Injection, injection
 from imufit.simulate.noise import Noise, SensorNoise
-from imufit.simulate.scenarios import SCENARIOS, Scenario
+from imufit.simulate.scenario import Scenario
+from imufit.simulate.scenarios import SCENARIOS
 from imufit.simulate.sealed import Truth, seal, sealed_path, unseal
 from imufit.simulate.simulation import Simulation, simulate
 from imufit.simulate.size import SIZES

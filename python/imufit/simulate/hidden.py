@@ -88,7 +88,7 @@ def hidden(
 
     Parameters
     ----------
-    scenario : one of `SCENARIOS`.
+    scenario : one of `OBSERVABLE`.
     seed : of everything; the same seed gives the same log.
     size : "large", "medium", "small" or a number; None draws one of the names.
     nothing : True hides nothing, False hides something; None leaves it to chance if `allow_nothing`, else hides one.
@@ -106,7 +106,9 @@ def hidden(
         If no candidate is distinguishable in this log with this size, or as `simulate`.
     """
     if scenario not in SCENARIOS:
-        raise ValueError(f"unknown scenario {scenario!r}: use one of {', '.join(SCENARIOS)}")
+        raise ValueError(f"unknown scenario {scenario!r}: use one of {', '.join(OBSERVABLE)}")
+    if scenario not in OBSERVABLE:
+        raise ValueError(f"{scenario} shows no effect apart from all others: use one of {', '.join(OBSERVABLE)}")
     rng = stream(seed, f"hidden {scenario}")
     options = _with_columns(options)
     setting = {key: value for key, value in options.items() if key != "noise_in_metadata"}

@@ -137,6 +137,32 @@ class Cruise:
 
 
 @dataclass(frozen=True)
+class Ringing:
+    """A mode of a structure that rings out: ``amplitude exp(-d w s) sin(w sqrt(1 - d^2) s)``, s the time since `start`.
+
+    w = 2 pi `frequency` (Hz), d = `damping` as a fraction of the critical one; before the start it is zero.
+    """
+
+    start: float
+    amplitude: float
+    frequency: float
+    damping: float
+
+    def at(self, t: Array) -> Sample:
+        """Return value, rate and acceleration at times `t` (s), shape (n,)."""
+        natural = 2.0 * np.pi * self.frequency
+        decay, omega = self.damping * natural, natural * float(np.sqrt(1.0 - self.damping**2))
+        since = t - self.start
+        rung = np.where(since > 0.0, self.amplitude * np.exp(-decay * np.maximum(since, 0.0)), 0.0)
+        sine, cosine = np.sin(omega * since), np.cos(omega * since)
+        return Sample(
+            rung * sine,
+            rung * (omega * cosine - decay * sine),
+            rung * ((decay**2 - omega**2) * sine - 2.0 * decay * omega * cosine),
+        )
+
+
+@dataclass(frozen=True)
 class Product:
     """The product of two signals, such as an envelope and a swing."""
 

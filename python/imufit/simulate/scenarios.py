@@ -2,49 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from imufit.simulate.environment import north_and_down
+from imufit.simulate.machine_tool import MACHINE_TOOL
 from imufit.simulate.motion import Array, Cruise, Product, Signal, Sinusoids, Steps, Sum
+from imufit.simulate.scenario import Plan, Scenario
 from imufit.simulate.truth import Fixed, Joint, Legs, Trajectory, rotation_from_vector
 
 X, Y, Z = np.eye(3)
 LABELS = ("+x", "-x", "+y", "-y", "+z", "-z")
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a scenario is built from: random stream, duration (s), reference frame, rig axis (index)."""
-
-    rng: np.random.Generator
-    duration: float
-    frame: str
-    rig_axis: int
-
-
-@dataclass(frozen=True)
-class Scenario:
-    """A kind of motion.
-
-    Attributes
-    ----------
-    description : one sentence.
-    build : makes the trajectory.
-    position : whether the reference records a position (otherwise the body does not translate).
-    poses : whether static poses are labelled in the log.
-    rig : whether the motion is that of a one-axis rig with a commanded angle.
-    """
-
-    description: str
-    build: Callable[[Plan], Trajectory]
-    position: bool = False
-    poses: bool = False
-    rig: bool = False
 
 
 def _random_rotation(rng: np.random.Generator) -> Array:
@@ -225,6 +196,7 @@ SCENARIOS: Mapping[str, Scenario] = {
         _handheld,
         position=True,
     ),
+    **MACHINE_TOOL,
 }
 
 

@@ -128,8 +128,8 @@ class Setup:
 
     @classmethod
     def ideal(cls, trajectory: Trajectory, environment: Environment) -> Setup:
-        """Return perfect sensors and a perfect reference."""
-        return cls(trajectory, environment, environment, trajectory)
+        """Return perfect sensors and a reference that reports `trajectory`."""
+        return cls(trajectory, environment, environment, trajectory.actual)
 
     def felt(self, kinematics: Kinematics) -> Kinematics:
         """Return the motion of the sensors' axes in the world, from that of the body in the reference's frame."""

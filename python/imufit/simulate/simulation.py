@@ -80,7 +80,7 @@ def simulate(
     *,
     size: str | float = "medium",
     frame: str = "NED",
-    sensors: Sequence[str] = ("acc", "gyr", "mag", "temp"),
+    sensors: Sequence[str] | None = None,
     covariates: Sequence[str] = (),
     noise: Noise | None = None,
     realistic: bool = False,
@@ -97,9 +97,9 @@ def simulate(
     duration, rate : s, Hz.
     size : "large", "medium", "small" or a number: root mean square of a drawn effect over its sensor's white noise.
     frame : reference frame: "NED", "ENU" or "NWU".
-    sensors : which of "acc", "gyr", "mag", "temp" the log has.
+    sensors : which of "acc", "gyr", "mag", "temp" the log has; default those of the scenario.
     covariates : further columns, such as "motor_current" and "vbat"; those that an effect needs are there anyhow.
-    noise : random errors; default white noise.
+    noise : random errors; default those of the scenario: white noise, on a machine tool an MPU6050's.
     realistic : whether the default is `Noise.realistic()` instead.
     rig_axis : axis of a one-axis rig: "x", "y" or "z".
     noise_in_metadata : whether the metadata tells the white noise.

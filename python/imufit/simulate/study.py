@@ -17,7 +17,7 @@ from imufit.simulate.environment import (
 )
 from imufit.simulate.injections import Run, injection
 from imufit.simulate.noise import Noise, magnetometer_rows, sampling_times
-from imufit.simulate.scenarios import build
+from imufit.simulate.scenarios import SCENARIOS, build
 from imufit.simulate.sensor import SENSORS, Rows
 from imufit.simulate.size import SIZES, Scale
 
@@ -44,7 +44,7 @@ class Study:
         rate: float = 100.0,
         *,
         frame: str = "NED",
-        sensors: Sequence[str] = (*SENSORS, "temp"),
+        sensors: Sequence[str] | None = None,
         covariates: Sequence[str] = (),
         noise: Noise | None = None,
         realistic: bool = False,
@@ -55,9 +55,10 @@ class Study:
         if rig_axis not in AXES:
             raise ValueError(f"rig_axis is {rig_axis!r}: use x, y or z")
         self.seed, self.rate = seed, rate
-        self.names = _known_sensors(sensors)
-        self.noise = noise or (Noise.realistic() if realistic else Noise())
         self.trajectory = build(scenario, stream(seed, f"motion {scenario}"), duration, frame, AXES.index(rig_axis))
+        kind = SCENARIOS[scenario]
+        self.names = kind.sensors if sensors is None else _known_sensors(sensors)
+        self.noise = noise or (Noise.realistic() if realistic else kind.noise())
         self.environment = _environment(effects, seed, duration, rate, frame=frame, covariates=covariates)
         t = sampling_times(self.noise, seed, duration, rate)
         self.rows, self.run = Rows(t), Run(frame, float(t[0]), float(t[-1]))

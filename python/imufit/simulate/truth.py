@@ -41,7 +41,7 @@ def quaternion_from_matrix(rotation: Array) -> Array:
 
 def turn(rotation: Array, vector: Array) -> Array:
     """Return R x for matrices (n, 3, 3) or (3, 3) and vectors (n, 3) or (3,)."""
-    return np.asarray((rotation @ vector[..., None])[..., 0], dtype=np.float64)
+    return np.asarray(np.einsum("...ij,...j->...i", rotation, vector), dtype=np.float64)
 
 
 def turn_back(rotation: Array, vector: Array) -> Array:
@@ -75,6 +75,8 @@ class Kinematics:
         r : ndarray
             (3,) the point, body frame, m.
         """
+        if not np.any(r):
+            return self
         swing = np.cross(self.omega, r)
         return replace(
             self,
@@ -91,6 +93,8 @@ class Kinematics:
         mount : ndarray
             (3, 3) rotation from the new frame's axes to this body's.
         """
+        if np.array_equal(mount, np.eye(3)):
+            return self
         return replace(
             self,
             rotation=self.rotation @ mount,
@@ -106,6 +110,8 @@ class Kinematics:
         base : ndarray
             (3, 3) rotation of the base, reference frame.
         """
+        if np.array_equal(base, np.eye(3)):
+            return self
         return replace(
             self,
             rotation=base @ self.rotation,
@@ -226,12 +232,29 @@ class Trajectory:
     arms : for each link the vector (3,) from its hinge to the next one, m, in its own turned frame; empty = all zero.
     shift : three signals added to the position, reference frame, m; empty = none.
     rig_axis : index of the body axis of a one-axis rig whose angle is that of the last joint, or None.
+    unreported, unreported_arms : links and arms on which the chain stands in reality, unknown to the reference.
     """
 
     links: Sequence[Link]
     arms: Sequence[Array] = ()
     shift: Sequence[Signal] = ()
     rig_axis: int | None = field(default=None)
+    unreported: Sequence[Link] = ()
+    unreported_arms: Sequence[Array] = ()
+
+    @property
+    def actual(self) -> Trajectory:
+        """The motion that really happens: this one, which is reported, carried by what the reference does not know."""
+        if not self.unreported:
+            return self
+        own = self.arms or [np.zeros(3)] * len(self.links)
+        return replace(
+            self,
+            links=[*self.unreported, *self.links],
+            arms=[*self.unreported_arms, *own],
+            unreported=(),
+            unreported_arms=(),
+        )
 
     def at(self, t: Array) -> Kinematics:
         """Return the exact motion at times `t` (s), shape (n,); any time is allowed.
