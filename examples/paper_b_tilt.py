@@ -221,7 +221,7 @@ def corrected(model: imufit.SensorModel, angle: float, seed: int) -> np.ndarray:
 
 def noise_that_is_left(model: imufit.SensorModel, seed: int) -> imufit.Comparison:
     """Return what the loop sees of the standing sensor after the model's effects are taken out of its readings."""
-    still = simulate("machine_at_1", ACCELEROMETER | GYROSCOPE, seed, 60.0, RATE, frame="ENU").to_log()
+    still = simulate("machine_at_1", ACCELEROMETER | GYROSCOPE, seed, 300.0, RATE, frame="ENU").to_log()
     return imufit.SensorModel().fit(model.apply(still)).compare()
 
 
