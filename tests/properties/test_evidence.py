@@ -52,7 +52,8 @@ def rugged():
 
 
 def taken(analysis, filters, chunks: Iterable[dict]) -> _imufit.Evidence:
-    evidence = _imufit.Evidence(analysis.facts, [], list(analysis.candidates.values()), BLOCKS, filters)
+    asked = [(effect, [0.0] * len(effect.parameters)) for effect in analysis.candidates.values()]
+    evidence = _imufit.Evidence(analysis.facts, [], asked, BLOCKS, filters)
     for chunk in chunks:
         evidence.add(chunk)
     return evidence
@@ -101,10 +102,10 @@ def test_chunks_of_any_size_give_the_same_evidence(rugged, rows, extra):
 def test_evidence_of_different_questions_cannot_be_added():
     log = swaying(duration=5.0, noise=1.0)
     facts = analysis_of(log).facts
-    bias, scale = (_imufit.find_effect(key) for key in ("gyr.bias", "acc.lever_arm"))
+    bias, arm = ((_imufit.find_effect(key), [0.0, 0.0, 0.0]) for key in ("gyr.bias", "acc.lever_arm"))
     one = _imufit.Evidence(facts, [], [bias], BLOCKS, NO_FILTERS)
     for other in (
-        _imufit.Evidence(facts, [], [scale], BLOCKS, NO_FILTERS),
+        _imufit.Evidence(facts, [], [arm], BLOCKS, NO_FILTERS),
         _imufit.Evidence(facts, [], [bias], BLOCKS + 1, NO_FILTERS),
         _imufit.Evidence(facts, [], [bias], BLOCKS, FILTERS),
     ):

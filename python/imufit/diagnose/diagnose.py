@@ -104,7 +104,7 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     if len(close) < 2:
         return result
     for slot in close:
-        items[slot]["held_out_after"] = fit.moved(analysis.model.with_effect(ids[slot])).ratio
+        items[slot]["held_out_after"] = fit.ratio_with(analysis.model.with_effect(ids[slot]))
     after = {slot: items[slot]["held_out_after"] for slot in close}
     won = min(close, key=after.__getitem__)
     lost = [slot for slot in close if after[slot] > after[won] + CLEARLY_WORSE * (fit.ratio - after[won])]

@@ -82,11 +82,10 @@ def residual_panels(panels: Sequence[PanelLike], limit: int = 12, columns: int =
         return style.empty("There is no residual to show against a covariate.")
     columns = min(columns, len(chosen))
     rows = -(-len(chosen) // columns)
-    figure = style.new_figure(max(4.2, 10.4 * columns / 4), 2.45 * rows + 0.5)
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for axes, panel in zip(grid.flat, chosen, strict=False):
+    figure, grid = style.new_grid(rows, columns, max(4.2, 10.4 * columns / 4) / columns, 2.45)
+    for axes, panel in zip(grid, chosen, strict=False):
         _panel(axes, panel)
-    for axes in grid.flat[len(chosen) :]:
+    for axes in grid[len(chosen) :]:
         axes.set_visible(False)
     worst = chosen[0]
     if np.isfinite(worst.share) and worst.share >= 0.05:
@@ -136,6 +135,7 @@ def _panel(axes: Axes, panel: PanelLike) -> None:
             fontsize=7,
             color="#555555",
         )
-    style.title(axes, _claim(panel), 8.5)
+    # From the edge of its cell on, where there is room; a height that is given need not be searched for.
+    axes.set_title(_claim(panel), loc="left", fontsize=8.5, color=style.INK, x=-0.38, y=1.03)
     axes.set_xlabel(f"{panel.covariate}, {x_unit}" if x_unit else panel.covariate, fontsize=8)
     axes.set_ylabel(f"residual, {y_unit}", fontsize=8)

@@ -44,6 +44,41 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
+def new_grid(rows: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
+    """Axes of one size on a figure of their own, with room for their labels and for a title of the figure.
+
+    A fixed layout: finding one for many axes takes longer than drawing them.
+
+    Parameters
+    ----------
+    rows, columns : int
+        How many axes beneath and beside each other.
+    width, height : float
+        Of each with its labels, inches.
+
+    Returns
+    -------
+    Figure
+        Not registered with pyplot.
+    list of Axes
+        Row by row.
+    """
+    left, right, top, bottom, head = 0.74, 0.12, 0.3, 0.48, 0.5
+    whole, tall = width * columns, height * rows + head
+    figure = Figure(figsize=(whole, tall), dpi=100)
+    figure.patch.set_facecolor("white")
+    inner, high = width - left - right, height - top - bottom
+    figure.subplots_adjust(
+        left=left / whole,
+        right=1.0 - right / whole,
+        top=1.0 - (head + top) / tall,
+        bottom=bottom / tall,
+        wspace=(left + right) / inner,
+        hspace=(top + bottom) / high,
+    )
+    return figure, list(figure.subplots(rows, columns, squeeze=False).flat)
+
+
 def tidy(axes: Axes) -> None:
     """Take away what carries no information: the box's upper and right edge."""
     axes.spines[["top", "right"]].set_visible(False)

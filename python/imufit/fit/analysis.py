@@ -130,15 +130,21 @@ class Analysis:
         )
 
     def around(
-        self, model: SensorModel, nuisance: Mapping[str, list[float]], *, with_candidates: bool = True
+        self,
+        model: SensorModel,
+        nuisance: Mapping[str, list[float]],
+        *,
+        with_candidates: bool = True,
+        lean: bool = False,
     ) -> Analysis:
         """Evidence of the same log around other parameter values or another stack of effects.
 
-        Without candidates it is quicker to take, and enough for the next iteration of a fit.
+        Without candidates it is quicker to take; lean, for the next iteration of a fit, it does not tell the residual
+        as it stands either, only whitened.
         """
         known = {**self.candidates, **dict(zip(self.model.effects, (e for e, _ in self.model.stack()), strict=True))}
         candidates = {key: effect for key, effect in known.items() if key not in model.effects and key not in nuisance}
-        asked = candidates if with_candidates else {}
+        asked = candidates if with_candidates and not lean else {}
         starts = {
             key: self.found[key].start for key in model.effects if key in self.found and key not in self.model.effects
         }
@@ -147,8 +153,7 @@ class Analysis:
         white = _empty(self.facts, model, nuisance, _asked(asked, found), self.filters)
         self.passes.evidence(white, self.facts, "taking evidence")
         raw = white
-        # Between two iterations of a fit nobody asks for the residual as it stands.
-        if with_candidates and any(self.filters):
+        if not lean and any(self.filters):
             plain = white.with_filters([[] for _ in CHANNELS])
             raw = self.passes.evidence(plain, self.facts, "taking evidence as it stands")
         # The noise is that of the first evidence, which every effect of the catalogue was fitted to.
@@ -241,16 +246,29 @@ class Analysis:
 
     def solved(self) -> tuple[Analysis, Estimate]:
         """Evidence around the best parameters, by Gauss and Newton's iteration where the effects are not linear."""
+        best, estimate = self._iterated()
+        if best is not self:
+            best = best.around(*best.moved_to(estimate))
+            estimate = best.estimate()
+        return best, estimate
+
+    def solved_for(
+        self, model: SensorModel, nuisance: Mapping[str, list[float]], *, with_candidates: bool = True
+    ) -> tuple[Analysis, Estimate]:
+        """Evidence around the best parameters of another stack of effects.
+
+        Without candidates it is quicker to take, and enough to know how well that stack does.
+        """
+        best, estimate = self.around(model, nuisance, lean=True)._iterated()
+        best = best.around(*best.moved_to(estimate), with_candidates=with_candidates)
+        return best, best.estimate()
+
+    def _iterated(self) -> tuple[Analysis, Estimate]:
         analysis, estimate = self, self.estimate()
-        if analysis.linear:
-            return analysis, estimate
-        iterations = 0
-        while iterations < MAX_ITERATIONS and not analysis.converged(estimate):
-            analysis = analysis.around(*analysis.moved_to(estimate), with_candidates=False)
-            estimate = analysis.estimate()
-            iterations += 1
-        if iterations:
-            analysis = analysis.around(*analysis.moved_to(estimate))
+        for _ in range(MAX_ITERATIONS):
+            if analysis.linear or analysis.converged(estimate):
+                break
+            analysis = analysis.around(*analysis.moved_to(estimate), lean=True)
             estimate = analysis.estimate()
         return analysis, estimate
 

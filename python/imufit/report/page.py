@@ -17,6 +17,7 @@ from imufit.results.parameter import in_lines, parameter_table
 if TYPE_CHECKING:
     from imufit.results import Addition, Candidate, Comparison, Diagnosis, Ladder, Panel
 
+_COVARIATES = 6
 _PANELS_AT_FIRST = 8
 _CANDIDATES = 20
 _WORST = {"missing": "warn", "ambiguous": "warn", "unknown": "stop", "adequate": "good"}
@@ -57,6 +58,7 @@ def page(
         lstrip_blocks=True,
     )
     environment.globals.update(q=quantity, svg=inline_svg, in_lines=in_lines, plot_panels=plot_panels)
+    by_covariate = _by_covariate(comparison)
     last = ladder.diagnosis if ladder is not None else diagnosis
     return environment.get_template("page.html.j2").render(
         title=title,
@@ -65,7 +67,8 @@ def page(
         comparison_end=ladder.comparison_end if ladder is not None else None,
         channels_end=_ratios(ladder.comparison_end if ladder is not None else None),
         worst=_worst(comparison),
-        by_covariate=_by_covariate(comparison),
+        by_covariate=by_covariate[:_COVARIATES],
+        other_covariates=[(name, share) for name, share, _ in by_covariate[_COVARIATES:]],
         panels_at_first=_PANELS_AT_FIRST,
         diagnosis=diagnosis,
         candidates=_candidates(diagnosis),

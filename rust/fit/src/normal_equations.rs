@@ -55,12 +55,29 @@ impl NormalEquations {
         self.n += factor * other.n;
     }
 
-    /// Equations in new parameters `beta = basis * gamma`.
+    /// Equations of the parameters `kept`, then of directions in the parameters `others`: `beta = directions * gamma`.
     #[must_use]
-    pub fn reduced(&self, basis: &DMatrix<f64>) -> Self {
+    pub fn reduced(&self, kept: &[usize], others: &[usize], directions: &DMatrix<f64>) -> Self {
+        let (p, m) = (kept.len(), directions.ncols());
+        let mut gram = DMatrix::zeros(p + m, p + m);
+        let inner = |rows: &[usize], columns: &[usize]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.gram[(rows[i], columns[j])])
+        };
+        gram.view_mut((0, 0), (p, p)).copy_from(&inner(kept, kept));
+        let mut right = DVector::zeros(p + m);
+        right.rows_mut(0, p).copy_from(&self.right.select_rows(kept));
+        if m > 0 {
+            let cross = inner(kept, others) * directions;
+            gram.view_mut((0, p), (p, m)).copy_from(&cross);
+            gram.view_mut((p, 0), (m, p)).copy_from(&cross.transpose());
+            let own = directions.tr_mul(&(inner(others, others) * directions));
+            gram.view_mut((p, p), (m, m)).copy_from(&own);
+            let of_others = self.right.select_rows(others);
+            right.rows_mut(p, m).copy_from(&directions.tr_mul(&of_others));
+        }
         Self {
-            gram: basis.tr_mul(&(&self.gram * basis)),
-            right: basis.tr_mul(&self.right),
+            gram,
+            right,
             square: self.square,
             n: self.n,
         }
@@ -70,7 +87,9 @@ impl NormalEquations {
     #[must_use]
     pub fn selected(&self, parameters: &[usize]) -> Self {
         Self {
-            gram: self.gram.select_rows(parameters).select_columns(parameters),
+            gram: DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| {
+                self.gram[(parameters[i], parameters[j])]
+            }),
             right: self.right.select_rows(parameters),
             square: self.square,
             n: self.n,

@@ -4,6 +4,7 @@ use imufit_fit::evidence::Evidence;
 use imufit_fit::normal_equations::NormalEquations;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use crate::held_out::{self, HeldOut};
 use crate::problem::{Problem, Question};
@@ -45,11 +46,12 @@ fn contrasts(bins: usize) -> DMatrix<f64> {
     q
 }
 
-/// Equations of the model's parameters and the contrasts of one covariate in one channel.
+/// Equations of the model's parameters (`fitted`, block by block) and the contrasts of one covariate in one channel.
 fn question(
     problem: &Problem,
     evidence: &Evidence,
     model: &[usize],
+    fitted: &[NormalEquations],
     channel: usize,
     covariate: usize,
 ) -> Option<Question> {
@@ -63,8 +65,12 @@ fn question(
     let active = &evidence.layout.model.active()[channel];
     let width = active.len() + 1;
     let mut white = Vec::with_capacity(problem.blocks());
-    for (b, equations) in problem.white.iter().enumerate() {
-        let inner = equations.selected(model);
+    let columns: Vec<(usize, usize)> = model
+        .iter()
+        .enumerate()
+        .filter_map(|(k, parameter)| active.binary_search(parameter).ok().map(|a| (k, a)))
+        .collect();
+    for (b, inner) in fitted.iter().enumerate() {
         let mut out = NormalEquations::zeros(p + m);
         out.gram.view_mut((0, 0), (p, p)).copy_from(&inner.gram);
         out.right.rows_mut(0, p).copy_from(&inner.right);
@@ -77,12 +83,10 @@ fn question(
                     for j in 0..m {
                         out.gram[(p + i, p + j)] += qi * counts[bin] * q[(bin, j)];
                     }
-                    for (k, parameter) in model.iter().enumerate() {
-                        if let Ok(a) = active.binary_search(parameter) {
-                            let v = qi * sums[bin * width + a];
-                            out.gram[(p + i, k)] += v;
-                            out.gram[(k, p + i)] += v;
-                        }
+                    for (k, a) in &columns {
+                        let v = qi * sums[bin * width + a];
+                        out.gram[(p + i, *k)] += v;
+                        out.gram[(*k, p + i)] += v;
                     }
                     out.right[p + i] += qi * sums[bin * width + width - 1];
                 }
@@ -147,41 +151,47 @@ pub fn test(
     base: &HeldOut,
     channels: &[usize],
 ) -> (Vec<Dependence>, usize) {
-    let covariates = evidence.layout.bins.names.len();
-    let mut tried = 0;
-    let mut found = Vec::new();
-    for &channel in channels.iter().filter(|c| **c < CHANNELS && problem.weights[**c] > 0.0) {
-        for covariate in 0..covariates {
-            let Some(q) = question(problem, evidence, model, channel, covariate) else {
-                continue;
-            };
-            tried += 1;
-            if drop(&q) < 25.0 {
-                continue;
-            }
-            let with = held_out::held_out(&q);
-            let (gain, _) = held_out::gain(base, &with);
-            if gain <= 0.0 {
-                continue;
-            }
-            let p_value = screening::p_value(&q);
-            let shape = q.solve(&q.total()).map_or_else(Vec::new, |b| {
-                b.rows(model.len() + 1, b.len() - model.len() - 1)
-                    .iter()
-                    .copied()
-                    .collect()
-            });
-            found.push(Dependence {
-                channel,
-                covariate,
-                p_value,
-                gain,
-                shape,
-            });
-        }
-    }
+    let fitted: Vec<NormalEquations> = problem.white.iter().map(|b| b.selected(model)).collect();
+    let asked: Vec<(usize, usize)> = channels
+        .iter()
+        .filter(|c| **c < CHANNELS && problem.weights[**c] > 0.0)
+        .flat_map(|c| (0..evidence.layout.bins.names.len()).map(|k| (*c, k)))
+        .collect();
+    let answers: Vec<Option<Dependence>> = asked
+        .par_iter()
+        .filter_map(|(channel, covariate)| {
+            let q = question(problem, evidence, model, &fitted, *channel, *covariate)?;
+            Some(found(&q, base, *channel, *covariate))
+        })
+        .collect();
+    let tried = answers.len();
+    let mut found: Vec<Dependence> = answers.into_iter().flatten().collect();
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     (found, tried)
+}
+
+/// What there is of one dependence, if it is worth a full test.
+fn found(q: &Question, base: &HeldOut, channel: usize, covariate: usize) -> Option<Dependence> {
+    if drop(q) < 25.0 {
+        return None;
+    }
+    let with = held_out::held_out(q);
+    let (gain, _) = held_out::gain(base, &with);
+    if gain <= 0.0 {
+        return None;
+    }
+    let p_value = screening::p_value(q);
+    let shape = q.solve(&q.total()).map_or_else(Vec::new, |b| {
+        let first = q.model + 1;
+        b.rows(first, b.len() - first).iter().copied().collect()
+    });
+    Some(Dependence {
+        channel,
+        covariate,
+        p_value,
+        gain,
+        shape,
+    })
 }
 
 /// A word for a shape from its contrasts (degree 1 first).

@@ -120,19 +120,27 @@ pub fn channel_sums(white: &Evidence, weights: &[f64; CHANNELS]) -> Vec<ChannelS
 }
 
 impl ChannelSums {
-    /// The same in other parameters: `beta = basis * gamma` of the parameters chosen.
+    /// The same for the parameters `kept`, then for directions in the parameters `others`.
     #[must_use]
-    pub fn reduced(&self, chosen: &[usize], basis: &DMatrix<f64>) -> Self {
-        Self {
-            sums: self.sums.select_columns(chosen) * basis,
-            ..self.clone()
-        }
+    pub fn reduced(&self, kept: &[usize], others: &[usize], directions: &DMatrix<f64>) -> Self {
+        let mut sums = DMatrix::zeros(self.sums.nrows(), kept.len() + directions.ncols());
+        sums.columns_mut(0, kept.len()).copy_from(&self.columns(kept));
+        sums.columns_mut(kept.len(), directions.ncols())
+            .copy_from(&(self.columns(others) * directions));
+        self.with_sums(sums)
     }
 
     /// The same with other sums.
     #[must_use]
     pub fn with_sums(&self, sums: DMatrix<f64>) -> Self {
-        Self { sums, ..self.clone() }
+        Self {
+            channel: self.channel,
+            weight: self.weight,
+            sums,
+            right: self.right.clone(),
+            count: self.count.clone(),
+            strengths: self.strengths.clone(),
+        }
     }
 
     /// Sums of some of the parameters already in these sums.

@@ -43,6 +43,13 @@ fn left_out(question: &Question, group: usize) -> Option<Vec<DVector<f64>>> {
         .collect()
 }
 
+/// True if a question has something to ask and blocks enough for a p-value.
+pub fn possible(question: &Question) -> bool {
+    let m = question.precision.len() - question.model;
+    let blocks = question.white.iter().filter(|b| b.n > 0.0).count();
+    m > 0 && blocks >= m + SPARE_BLOCKS
+}
+
 /// Jackknife variance of every parameter of a question.
 pub fn scatter(question: &Question) -> Option<DVector<f64>> {
     let estimates = left_out(question, 1)?;

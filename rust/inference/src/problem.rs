@@ -104,8 +104,7 @@ impl Problem {
     /// The same with the wandering of zeros taken into account.
     pub fn total_without_drift(&self, parameters: &[usize]) -> NormalEquations {
         let mut total = self.total(parameters);
-        let basis = DMatrix::identity(parameters.len(), parameters.len());
-        let sums: Vec<ChannelSums> = self.sums.iter().map(|s| s.reduced(parameters, &basis)).collect();
+        let sums: Vec<ChannelSums> = self.sums.iter().map(|s| s.with_sums(s.columns(parameters))).collect();
         drift::take_out(&sums, &mut total);
         total
     }
@@ -143,19 +142,18 @@ impl Problem {
 
     /// The question of a candidate (in the given directions) on top of a model.
     pub fn question(&self, model: &[usize], candidate: &[usize], directions: &DMatrix<f64>) -> Question {
-        let all: Vec<usize> = model.iter().chain(candidate).copied().collect();
         let (p, m) = (model.len(), directions.ncols());
-        let mut basis = DMatrix::zeros(all.len(), p + m);
-        for j in 0..p {
-            basis[(j, j)] = 1.0;
-        }
-        basis.view_mut((p, p), (candidate.len(), m)).copy_from(directions);
-        let reduce = |blocks: &[NormalEquations]| blocks.iter().map(|b| b.selected(&all).reduced(&basis)).collect();
+        let reduce =
+            |blocks: &[NormalEquations]| blocks.iter().map(|b| b.reduced(model, candidate, directions)).collect();
         let mut precision = DVector::from_element(p + m, 1.0);
         for (k, j) in model.iter().enumerate() {
             precision[k] = self.precision(*j);
         }
-        let sums = self.sums.iter().map(|s| s.reduced(&all, &basis)).collect();
+        let sums = self
+            .sums
+            .iter()
+            .map(|s| s.reduced(model, candidate, directions))
+            .collect();
         Question {
             white: reduce(&self.white),
             raw: reduce(&self.raw),

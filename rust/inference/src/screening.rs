@@ -126,10 +126,17 @@ fn halves_agree(question: &Question, whole: &Jackknife) -> bool {
     difference <= scatter * (mf + HALVES_CHANCE * (2.0 * mf).sqrt()) || difference <= HALVES * size(&beta)
 }
 
-/// Screens one candidate on top of the model's parameters.
-pub fn screen(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, candidate: &[usize]) -> Screened {
+/// A candidate whose held-out gain is known, before it is asked whether that can be chance.
+pub struct Weighed {
+    question: Question,
+    answer: Screened,
+}
+
+/// Weighs one candidate on top of the model's parameters.
+pub fn weigh(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, candidate: &[usize]) -> Weighed {
     let directions = problem.directions(model, candidate);
-    let mut out = Screened {
+    let question = problem.question(model, candidate, &directions);
+    let mut answer = Screened {
         slot,
         gain: 0.0,
         gain_error: 0.0,
@@ -137,44 +144,61 @@ pub fn screen(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, c
         held_out: (base.ratio, base.ratio),
         expected_ratio: base.ratio,
         parameters: vec![(0.0, f64::NAN); candidate.len()],
-        testable: directions.ncols() > 0,
+        testable: jackknife::possible(&question),
         stable: true,
         plausible: true,
         directions,
     };
-    if !out.testable {
-        return out;
+    if answer.testable {
+        let with = held_out::held_out(&question);
+        (answer.gain, answer.gain_error) = held_out::gain(base, &with);
+        answer.held_out.1 = with.ratio;
     }
-    let question = problem.question(model, candidate, &out.directions);
-    let Some(fine) = jackknife::jackknife(&question, 1) else {
-        out.testable = false;
-        return out;
-    };
-    out.p_value = p_value_beside(&question, fine.p_value);
-    let with = held_out::held_out(&question);
-    (out.gain, out.gain_error) = held_out::gain(base, &with);
-    out.held_out.1 = with.ratio;
-    let m = out.directions.ncols();
-    if out.p_value < CLEARLY_CHANCE {
-        out.stable = halves_agree(&question, &fine);
+    Weighed { question, answer }
+}
+
+impl Weighed {
+    /// What is known so far.
+    pub const fn so_far(&self) -> &Screened {
+        &self.answer
     }
-    let beta = fine.estimate.rows(question.model, m).into_owned();
-    let values: DVector<f64> = &out.directions * &beta;
-    let covariance = &out.directions * &fine.covariance * out.directions.transpose();
-    out.parameters = (0..candidate.len())
-        .map(|j| (values[j], covariance[(j, j)].max(0.0).sqrt()))
-        .collect();
-    out.plausible = candidate.iter().zip(&out.parameters).all(|(j, (value, error))| {
-        let limit = BEYOND * problem.plausible[*j];
-        !problem.typical[*j] || value.abs() - 3.0 * error <= limit
-    });
-    let (mut square, mut n) = (0.0, 0.0);
-    for block in &question.raw {
-        square += block.residual_square(&fine.estimate).max(0.0);
-        n += block.n;
+
+    /// Asks whether it can be chance, whether both halves agree, and what its parameters are.
+    pub fn judged(self, problem: &Problem, candidate: &[usize]) -> Screened {
+        let Self {
+            question,
+            answer: mut out,
+        } = self;
+        if !out.testable {
+            return out;
+        }
+        let Some(fine) = jackknife::jackknife(&question, 1) else {
+            out.testable = false;
+            return out;
+        };
+        out.p_value = p_value_beside(&question, fine.p_value);
+        let m = out.directions.ncols();
+        if out.p_value < CLEARLY_CHANCE {
+            out.stable = halves_agree(&question, &fine);
+        }
+        let beta = fine.estimate.rows(question.model, m).into_owned();
+        let values: DVector<f64> = &out.directions * &beta;
+        let covariance = &out.directions * &fine.covariance * out.directions.transpose();
+        out.parameters = (0..candidate.len())
+            .map(|j| (values[j], covariance[(j, j)].max(0.0).sqrt()))
+            .collect();
+        out.plausible = candidate.iter().zip(&out.parameters).all(|(j, (value, error))| {
+            let limit = BEYOND * problem.plausible[*j];
+            !problem.typical[*j] || value.abs() - 3.0 * error <= limit
+        });
+        let (mut square, mut n) = (0.0, 0.0);
+        for block in &question.raw {
+            square += block.residual_square(&fine.estimate).max(0.0);
+            n += block.n;
+        }
+        out.expected_ratio = (square / (n - fine.estimate.len() as f64).max(1.0)).sqrt();
+        out
     }
-    out.expected_ratio = (square / (n - fine.estimate.len() as f64).max(1.0)).sqrt();
-    out
 }
 
 /// Held-out error of the model alone.

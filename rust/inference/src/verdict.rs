@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::confounding;
 use crate::dependence::{self, Dependence};
 use crate::problem::Problem;
-use crate::screening::{self, Screened, parameters_of};
+use crate::screening::{self, Screened, Weighed, parameters_of};
 
 /// Chance of any false alarm over all candidates tried.
 pub const ALPHA: f64 = 0.003;
@@ -71,19 +71,30 @@ fn indices(slots: &[Slot], chosen: &[usize]) -> Vec<usize> {
     parameters
 }
 
-/// Screens all candidates on top of a model: those that passed first, each group by held-out gain.
-fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> (Vec<Screened>, Vec<f64>) {
+/// Weighs all candidates on top of a model, and says how many can be tested.
+fn weigh_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> (Vec<Weighed>, f64) {
     let fitted = indices(slots, model);
     let base = screening::base(problem, &fitted);
-    let mut screened: Vec<Screened> = candidates
+    let weighed: Vec<Weighed> = candidates
         .par_iter()
-        .map(|s| {
-            let mut screened = screening::screen(problem, &fitted, &base, *s, &indices(slots, &[*s]));
-            screened.p_value = (screened.p_value * slots[*s].tried as f64).min(1.0);
-            screened
-        })
+        .map(|s| screening::weigh(problem, &fitted, &base, *s, &indices(slots, &[*s])))
         .collect();
-    let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
+    let tried = weighed.iter().filter(|w| w.so_far().testable).count().max(1) as f64;
+    (weighed, tried)
+}
+
+/// Judges a weighed candidate; where a search went before, each of its trials counts.
+fn judge(problem: &Problem, slots: &[Slot], weighed: Weighed) -> Screened {
+    let slot = weighed.so_far().slot;
+    let mut screened = weighed.judged(problem, &indices(slots, &[slot]));
+    screened.p_value = (screened.p_value * slots[slot].tried as f64).min(1.0);
+    screened
+}
+
+/// Screens all candidates on top of a model: those that passed first, each group by held-out gain.
+fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> (Vec<Screened>, Vec<f64>) {
+    let (weighed, tried) = weigh_all(problem, slots, model, candidates);
+    let mut screened: Vec<Screened> = weighed.into_par_iter().map(|w| judge(problem, slots, w)).collect();
     let passed = |s: &Screened| passes(s, s.p_value * tried);
     screened.sort_by(|a, b| {
         passed(b)
@@ -95,9 +106,26 @@ fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[
     (screened, adjusted)
 }
 
-/// True if a candidate is no chance finding and lowers the held-out error, whitened and as it stands.
+/// The best candidate that passes on top of a model; none below it is judged.
+fn best_of(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> Option<usize> {
+    let (mut weighed, tried) = weigh_all(problem, slots, model, candidates);
+    weighed.sort_by(|a, b| b.so_far().gain.total_cmp(&a.so_far().gain));
+    weighed
+        .into_iter()
+        .filter(|w| promising(w.so_far()))
+        .map(|w| judge(problem, slots, w))
+        .find(|s| passes(s, s.p_value * tried))
+        .map(|s| s.slot)
+}
+
+/// True if a candidate lowers the held-out error and is no chance finding.
 fn significant(s: &Screened, adjusted: f64) -> bool {
-    s.testable && adjusted <= ALPHA && s.gain > 0.0 && s.held_out.1 < s.held_out.0
+    adjusted <= ALPHA && promising(s)
+}
+
+/// True if a candidate can be tested and lowers the held-out error, whitened and as it stands.
+fn promising(s: &Screened) -> bool {
+    s.testable && s.gain > 0.0 && s.held_out.1 < s.held_out.0
 }
 
 /// True if a candidate is significant, of a size that sensors have, and both halves of the log agree about it.
@@ -127,8 +155,7 @@ pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidate
             break;
         }
         let left: Vec<usize> = candidates.iter().copied().filter(|c| !stack.contains(c)).collect();
-        let (again, p) = screen_all(problem, slots, &stack, &left);
-        next = again.first().filter(|s| passes(s, p[0])).map(|s| s.slot);
+        next = best_of(problem, slots, &stack, &left);
     }
 
     let fitted = indices(slots, &stack);
