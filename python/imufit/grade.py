@@ -206,6 +206,11 @@ def _errors(truth: Truth, parameters: Sequence[Any]) -> tuple[float, ...]:
     )
 
 
+def _share_processors(threads: int) -> None:
+    """Let the compiled core of this worker use its share of the processors, unless the user says otherwise."""
+    os.environ.setdefault("RAYON_NUM_THREADS", str(threads))
+
+
 def plan(logs: int, nothing: int, seed: int, scenarios: Sequence[str] = SCENARIOS) -> list[tuple[str, int, str]]:
     """Scenario, seed and size of each blind log: scenarios and sizes in turn, all seeds different."""
     count = len(scenarios)
@@ -249,7 +254,9 @@ def grade(
     jobs = plan(logs, nothing, seed, scenarios)
     trials: list[Trial] = []
     # A fresh interpreter for each worker: the compiled core's threads do not survive a fork.
-    with ProcessPoolExecutor(processes or os.cpu_count(), mp_context=get_context("spawn")) as pool:
+    workers = processes or os.cpu_count() or 1
+    threads = max(1, (os.cpu_count() or 1) // workers)
+    with ProcessPoolExecutor(workers, get_context("spawn"), _share_processors, (threads,)) as pool:
         futures = [pool.submit(trial, *job, options) for job in jobs]
         for future in futures:
             trials.append(future.result())

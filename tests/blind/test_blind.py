@@ -56,7 +56,8 @@ def test_on_a_tilt_rig_sensor_and_rig_effects_are_named(tilt_rig: BlindGrade) ->
     right = [trial for trial in trials if trial.mark in ("right", "named among rivals")]
     assert len(trials) == 20
     assert len(right) >= 19, f"IMUFIT_SEED={SEED}\n{tilt_rig}"
-    assert all(trial.mark == "right" for trial in tilt_rig.of(NOTHING)), f"IMUFIT_SEED={SEED}\n{tilt_rig}"
+    alarms = [trial for trial in tilt_rig.of(NOTHING) if trial.mark == "false alarm"]
+    assert len(alarms) <= 1, f"IMUFIT_SEED={SEED}\n{tilt_rig}"
 
 
 def test_every_first_effect_is_drawn_in_the_long_run() -> None:
