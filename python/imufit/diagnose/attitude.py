@@ -146,7 +146,8 @@ def _tilts(run: Replay, name: str) -> list[Array]:
     found = np.full((run.log.n, 3), np.nan)
     known = np.isfinite(run.row_errors(name)[:, 0])
     reference = Rotation.from_quat(np.asarray(run.log.ref_q)[known][:, [1, 2, 3, 0]])
-    vector = np.degrees((run.rotation(name)[known] * reference.inv()).as_rotvec())
+    estimate = Rotation.from_quat(run.attitude[name][known][:, [1, 2, 3, 0]])
+    vector = np.degrees((estimate * reference.inv()).as_rotvec())
     vector[:, 2] = 0.0
     found[known] = vector
     along_body = np.full_like(found, np.nan)

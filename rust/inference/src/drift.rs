@@ -188,6 +188,18 @@ impl ChannelSums {
             .collect()
     }
 
+    /// Covariance that a walk of one strength, from zero at the start, gives to the sums over the parameters' columns.
+    fn spread(&self, strength: usize) -> DMatrix<f64> {
+        // A walk is the sum of its steps, and a step is seen by all blocks from its own on.
+        let mut later = self.sums.clone();
+        for b in (0..later.nrows().saturating_sub(1)).rev() {
+            let next = later.row(b + 1).into_owned();
+            let mut row = later.row_mut(b);
+            row += next;
+        }
+        later.tr_mul(&later) * (self.weight * self.strengths[strength].kappa)
+    }
+
     /// Takes the wandering mean of one strength out of equations over the same parameters.
     fn take_out(&self, strength: usize, equations: &mut NormalEquations) {
         let smoother = &self.strengths[strength].smoother;
@@ -199,10 +211,9 @@ impl ChannelSums {
     }
 }
 
-/// Takes wandering zeros out of the equations of a question, one strength per sensor; true if a zero wanders that puts the answer in doubt.
-/// The offset of a magnetometer is iron, which does not wander; the field does, from place to place, and counts for less where it does.
-pub fn take_out(channels: &[ChannelSums], equations: &mut NormalEquations) -> bool {
-    let mut wanders = false;
+/// The strength of the walk of each sensor's zeros that is likeliest, for the channels it applies to.
+fn likeliest(channels: &[ChannelSums]) -> Vec<(&ChannelSums, usize)> {
+    let mut found = Vec::new();
     for sensor in 0..3 {
         let own: Vec<&ChannelSums> = channels
             .iter()
@@ -220,13 +231,31 @@ pub fn take_out(channels: &[ChannelSums], equations: &mut NormalEquations) -> bo
             .max_by(|a, b| total[*a].total_cmp(&total[*b]))
             .unwrap_or(0);
         if first.strengths[best].kappa > 0.0 {
-            wanders |= sensor != Sensor::Mag.index();
-            for channel in own {
-                channel.take_out(best, equations);
-            }
+            found.extend(own.into_iter().map(|channel| (channel, best)));
         }
     }
-    wanders
+    found
+}
+
+/// Takes wandering zeros out of the equations of a question, one strength per sensor; true if a zero wanders that puts the answer in doubt.
+/// The offset of a magnetometer is iron, which does not wander; the field does, from place to place, and counts for less where it does.
+pub fn take_out(channels: &[ChannelSums], equations: &mut NormalEquations) -> bool {
+    let wandering = likeliest(channels);
+    for (channel, strength) in &wandering {
+        channel.take_out(*strength, equations);
+    }
+    wandering
+        .iter()
+        .any(|(channel, _)| channel.channel / 3 != Sensor::Mag.index())
+}
+
+/// What wandering zeros add to the covariance of `X^T y` of equations over the same parameters.
+pub fn spread(channels: &[ChannelSums], parameters: usize) -> DMatrix<f64> {
+    let mut sum = DMatrix::zeros(parameters, parameters);
+    for (channel, strength) in likeliest(channels) {
+        sum += channel.spread(strength);
+    }
+    sum
 }
 
 #[cfg(test)]

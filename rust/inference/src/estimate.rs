@@ -17,12 +17,15 @@ pub struct Estimate {
 /// Blocks of white noise give a jackknife variance this much above the expected one in one of a thousand cases.
 const SCATTER: f64 = 1.7;
 
-/// Fits the model's parameters. The covariance is that of whitened observations of unit variance whose zeros may wander.
+/// Fits the model's parameters to all whitened observations alike, as the held-out error is judged: a zero that wanders, and a
+/// mean that is no drift but something missing, must not decide what a constant is. The covariance is that of such an
+/// estimate from observations of unit variance whose zeros do wander.
 pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
-    let total = problem.total_without_drift(model);
+    let total = problem.total(model);
     let precision = DVector::from_iterator(model.len(), model.iter().map(|j| 0.01 * problem.precision(*j)));
     let solved = total.solve(&precision)?;
-    let mut covariance = solved.covariance();
+    let inverse = solved.covariance();
+    let mut covariance = &inverse + &inverse * problem.drift_spread(model) * &inverse;
     // Where the blocks scatter more than whitened noise does, they are believed.
     let question = problem.question(model, &[], &DMatrix::zeros(0, 0));
     if let Some(blocks) = jackknife::scatter(&question) {

@@ -101,12 +101,10 @@ impl Problem {
         total
     }
 
-    /// The same with the wandering of zeros taken into account.
-    pub fn total_without_drift(&self, parameters: &[usize]) -> NormalEquations {
-        let mut total = self.total(parameters);
+    /// What wandering zeros add to the covariance of the right-hand side for some parameters.
+    pub fn drift_spread(&self, parameters: &[usize]) -> DMatrix<f64> {
         let sums: Vec<ChannelSums> = self.sums.iter().map(|s| s.with_sums(s.columns(parameters))).collect();
-        drift::take_out(&sums, &mut total);
-        total
+        drift::spread(&sums, parameters.len())
     }
 
     /// Directions in which a candidate can be told from the model: columns of a matrix over the candidate's parameters, each
