@@ -5,6 +5,9 @@ import math
 import numpy as np
 from imufit.results import (
     Addition,
+    AttitudeBins,
+    AttitudeComparison,
+    AttitudeDependence,
     Candidate,
     ChannelResidual,
     Comparison,
@@ -32,6 +35,23 @@ BIAS = tuple(
     Parameter("gyr.bias", name, value, 2e-5, "rad/s", 0.02)
     for name, value in zip("xyz", (0.01, -0.02, 0.004), strict=True)
 )
+
+
+def attitude(before, after):
+    """Errors of a filter whose heading goes with the rate."""
+    errors = [
+        None if total is None else {"total": total, "heading": 0.8 * total, "inclination": 0.6 * total}
+        for total in (before, after)
+    ]
+    x = np.linspace(0.0, 200.0, 10)
+    bins = tuple(
+        AttitudeBins(part, "angular_rate", "deg/s", x, before * x / 200.0, (after or before) * x / 200.0)
+        for part in ("heading", "inclination")
+    )
+    goes_with = (AttitudeDependence("heading", "angular_rate", 0.83, 0.05),)
+    return AttitudeComparison(
+        "mahony", *errors, goes_with, bins, "filter", f"The attitude of mahony is off by {before}."
+    )
 
 
 def panel(channel, covariate, unit, share, shape):
@@ -100,7 +120,7 @@ def comparison():
         ("gyr.bias",),
         channels,
         {"acc": 1.01, "gyr": 1.38},
-        {"before_deg": 3.21},
+        attitude(3.21, None),
         (Where("gyr_x", "acc_y", 0.63, 120.0, 900.0), Where("gyr_y", "temp", 0.21, 0.0, 300.5)),
         tuple(panels),
         spectra,
@@ -169,7 +189,7 @@ def ladder(large=True):
         "adequate",
         23.1 if large else 1.01,
         1.07 if large else 1.01,
-        {"before_deg": 3.2, "after_deg": 0.41} if large else None,
+        attitude(3.2, 0.41) if large else None,
         diagnosis("adequate"),
         comparison(),
         comparison(),

@@ -64,7 +64,9 @@ def test_add_and_ladder_json_have_the_published_keys():
     value = strict(ladder().to_dict())
     assert {"steps", "model", "verdict", "ratio_start", "ratio_end", "attitude"} <= set(value)
     assert set(value["steps"][0]) >= {"effect", "before", "expected", "after"}
-    assert value["attitude"] == {"before_deg": 3.2, "after_deg": 0.41}
+    assert (value["attitude"]["before_deg"], value["attitude"]["after_deg"]) == (3.2, 0.41)
+    assert value["attitude"]["heading_after_deg"] == pytest.approx(0.328)
+    assert value["attitude"]["where"][0]["quantity"] == "angular_rate"
 
 
 def test_numpy_scalars_become_plain_numbers():

@@ -33,8 +33,9 @@ def compare(
     with ProgressBar() as progress:
         opened = engine.open_log(log, mapping)
         comparison = engine.sensor_model(path=model).compare(opened, progress=progress)
-    output.say(comparison.sentence, bold=True)
-    output.say(*comparison.notes)
+    first, *others = comparison.sentences()
+    output.say(first, bold=True)
+    output.say(*others)
     output.tables(comparison.tables())
     output.json(comparison.to_dict())
     if plot_file is not None:

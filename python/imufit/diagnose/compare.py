@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
+from imufit.diagnose.attitude import attitude_comparison
 from imufit.fit.analysis import Analysis
 from imufit.fit.passes import CHANNELS, UNITS
 from imufit.progress import Progress
@@ -46,7 +48,7 @@ def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
         analysis, step = fit.analysis, fit.estimate.step
     else:
         return compare_model(fit.model, log, progress)
-    return comparison(analysis, step)
+    return _with_attitude(comparison(analysis, step), fit.model, fit.log, progress)
 
 
 def compare_model(model: SensorModel, log: LogSource, progress: Progress) -> Comparison:
@@ -62,7 +64,12 @@ def compare_model(model: SensorModel, log: LogSource, progress: Progress) -> Com
         Called with (rows done, rows in all, what is being done).
     """
     analysis = Analysis.of(model, log, progress, keep_constants=True)
-    return comparison(analysis, analysis.estimate_unnamed().step)
+    found = comparison(analysis, analysis.estimate_unnamed().step)
+    return _with_attitude(found, model, log, progress)
+
+
+def _with_attitude(found: Comparison, model: SensorModel, log: LogSource, progress: Progress) -> Comparison:
+    return replace(found, attitude=attitude_comparison(model, log, progress=progress))
 
 
 def comparison(analysis: Analysis, step: Array) -> Comparison:

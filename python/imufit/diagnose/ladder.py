@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from imufit.diagnose.add import add
+from imufit.diagnose.attitude import attitude_comparison
 from imufit.diagnose.compare import comparison
 from imufit.diagnose.diagnose import diagnose
 from imufit.fit import Fit
 from imufit.log import LogSource
 from imufit.model import SensorModel
-from imufit.progress import Progress
+from imufit.progress import Progress, silent
 from imufit.results import Candidate, Diagnosis, Ladder, Step
 
 MAX_STEPS = 12
@@ -61,7 +62,7 @@ def ladder(log: LogSource, model: SensorModel | None = None, progress: Progress 
         verdict=diagnosis.verdict,
         ratio_start=start,
         ratio_end=fit.ratio,
-        attitude=None,
+        attitude=attitude_comparison(fit.model, log, progress=progress or silent),
         diagnosis=diagnosis,
         comparison_start=comparison(first_fit.analysis, first_fit.estimate.step),
         comparison_end=comparison(fit.analysis, fit.estimate.step),

@@ -4,6 +4,7 @@ Every ``ratio`` and held-out value is residual RMS over noise floor: 1.0 is at t
 """
 
 from imufit.results.addition import Addition
+from imufit.results.attitude import AttitudeBins, AttitudeComparison, AttitudeDependence
 from imufit.results.comparison import ChannelResidual, Comparison, Panel, Spectrum, Where
 from imufit.results.diagnosis import Candidate, Diagnosis, Rival, Unexplained
 from imufit.results.effect_card import EffectCard
@@ -14,6 +15,9 @@ from imufit.results.tilt import Mark, TiltComparison, TiltFigures
 
 __all__ = [
     "Addition",
+    "AttitudeBins",
+    "AttitudeComparison",
+    "AttitudeDependence",
     "Candidate",
     "ChannelResidual",
     "Comparison",

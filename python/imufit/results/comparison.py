@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from imufit.results.attitude import AttitudeComparison
+
 
 @dataclass(frozen=True)
 class ChannelResidual:
@@ -182,8 +184,8 @@ class Comparison:
         Residual by channel.
     sensors : dict
         Ratio by sensor.
-    attitude : dict or None
-        Attitude errors in degrees, where the log allows them.
+    attitude : AttitudeComparison or None
+        How far an attitude filter is off, where the log allows to tell.
     where : tuple of Where
         Covariates that explain the excess, largest share first.
     panels : tuple of Panel
@@ -201,7 +203,7 @@ class Comparison:
     model: tuple[str, ...]
     channels: tuple[ChannelResidual, ...]
     sensors: dict[str, float]
-    attitude: dict[str, float] | None
+    attitude: AttitudeComparison | None
     where: tuple[Where, ...]
     panels: tuple[Panel, ...]
     spectra: tuple[Spectrum, ...]
@@ -231,7 +233,7 @@ class Comparison:
             "model": list(self.model),
             "channels": {channel.channel: channel.to_dict() for channel in self.channels},
             "sensors": {name: {"ratio": json_value(ratio)} for name, ratio in self.sensors.items()},
-            "attitude": json_value(self.attitude),
+            "attitude": None if self.attitude is None else self.attitude.to_dict(),
             "where": [where.to_dict() for where in self.where],
             "segments": [
                 {
@@ -306,20 +308,18 @@ class Comparison:
         )
         return Table("Worst segments", (">time", "channel", ">over floor"), rows)
 
-    def attitude_table(self) -> Table:
-        """Attitude errors, where there are any."""
-        rows = tuple(
-            (name.removesuffix("_deg").replace("_", " "), f"{quantity.number(value)} deg")
-            for name, value in (self.attitude or {}).items()
-        )
-        return Table("Attitude error", ("", ">RMSE"), rows)
-
     def tables(self) -> tuple[Table, ...]:
         """Every table, most important first."""
-        return (self.channel_table(), self.where_table(), self.segment_table(), self.attitude_table())
+        tables = (self.channel_table(), self.where_table(), self.segment_table())
+        return tables if self.attitude is None else (*tables, self.attitude.table())
+
+    def sentences(self) -> list[str]:
+        """Return the result, what it does to the attitude, and the notes."""
+        attitude = [] if self.attitude is None else [self.attitude.sentence]
+        return [self.sentence, *attitude, *self.notes]
 
     def _repr_html_(self) -> str:
-        return html([self.sentence, *self.notes], self.tables())
+        return html(self.sentences(), self.tables())
 
     def __str__(self) -> str:
-        return page([self.sentence, *self.notes], self.tables())
+        return page(self.sentences(), self.tables())

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from imufit.results.attitude import AttitudeComparison
+
 
 @dataclass(frozen=True)
 class Step:
@@ -63,8 +65,8 @@ class Ladder:
         Verdict after the last step.
     ratio_start, ratio_end : float
         Held-out residual over noise floor before the first and after the last step.
-    attitude : dict or None
-        ``before_deg`` and ``after_deg``, where the log allows them.
+    attitude : AttitudeComparison or None
+        How far an attitude filter is off without and with the final model, where the log allows to tell.
     diagnosis : Diagnosis
         After the last step.
     comparison_start, comparison_end : Comparison or None
@@ -82,7 +84,7 @@ class Ladder:
     verdict: str
     ratio_start: float
     ratio_end: float
-    attitude: dict[str, float] | None
+    attitude: AttitudeComparison | None
     diagnosis: Diagnosis
     comparison_start: Comparison | None = None
     comparison_end: Comparison | None = None
@@ -98,7 +100,7 @@ class Ladder:
             "verdict": self.verdict,
             "ratio_start": json_value(self.ratio_start),
             "ratio_end": json_value(self.ratio_end),
-            "attitude": json_value(self.attitude),
+            "attitude": None if self.attitude is None else self.attitude.to_dict(),
             "ambiguous_with": list(self.diagnosis.ambiguous_with),
             "unexplained": [item.to_dict() for item in self.diagnosis.unexplained],
             "experiment": self.diagnosis.experiment,
@@ -158,12 +160,7 @@ class Ladder:
             f"Held-out error {quantity.ratio(self.ratio_start)} -> {quantity.ratio(self.ratio_end)} "
             f"times the noise floor with {' + '.join(self.model) or 'the ideal sensor'}."
         )
-        attitude = ""
-        if self.attitude:
-            words = (
-                f"{name.removesuffix('_deg')} {quantity.number(value)} deg" for name, value in self.attitude.items()
-            )
-            attitude = f"Attitude error: {', '.join(words)}."
+        attitude = "" if self.attitude is None else self.attitude.sentence
         verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
         return [verdict, result, attitude, *self.warnings(), experiment]
 
