@@ -10,11 +10,13 @@ pub mod euler;
 pub mod frame;
 pub mod matrix;
 pub mod quaternion;
+pub mod real;
 
 pub use attitude_error::{AttitudeError, Rmse};
 pub use euler::Euler;
 pub use frame::Frame;
 pub use quaternion::Quaternion;
+pub use real::{Lanes, Real};
 
 /// What cannot be turned into an attitude or a frame.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
