@@ -94,7 +94,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn angles_to_quaternion_and_back(roll in -3.1..3.1, pitch in -1.57..1.5, yaw in -3.1..3.1) {
+        fn angles_to_quaternion_and_back(roll in -3.1_f64..3.1, pitch in -1.57..1.5, yaw in -3.1..3.1) {
             let back = Euler::from_quaternion(Euler { roll, pitch, yaw }.to_quaternion());
             let loss = 1e-14 / f64::cos(pitch);
             prop_assert!((back.roll - roll).abs() < loss);
@@ -103,7 +103,7 @@ mod tests {
         }
 
         #[test]
-        fn the_order_is_yaw_then_pitch_then_roll(roll in -3.0..3.0, pitch in -1.5..1.5, yaw in -3.0..3.0) {
+        fn the_order_is_yaw_then_pitch_then_roll(roll in -3.0_f64..3.0, pitch in -1.5..1.5, yaw in -3.0..3.0) {
             let ours = matrix_from_quaternion(Euler { roll, pitch, yaw }.to_quaternion());
             let product = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw)
                 * Rotation3::from_axis_angle(&Vector3::y_axis(), pitch)
@@ -115,7 +115,7 @@ mod tests {
 
         #[test]
         fn near_and_at_gimbal_lock_the_angles_still_compose_to_the_attitude(
-            roll in -3.0..3.0, below in 0.0..1e-6, sign in prop::sample::select(vec![-1.0, 1.0]), yaw in -3.0..3.0
+            roll in -3.0_f64..3.0, below in 0.0..1e-6, sign in prop::sample::select(vec![-1.0, 1.0]), yaw in -3.0..3.0
         ) {
             let q = Euler { roll, pitch: sign * (FRAC_PI_2 - below), yaw }.to_quaternion();
             let back = Euler::from_quaternion(q).to_quaternion();
@@ -124,7 +124,7 @@ mod tests {
 
         #[test]
         fn rate_matrix_is_the_derivative_of_the_angles(
-            roll in -3.0..3.0, pitch in -1.2..1.2, yaw in -3.0..3.0, x in -2.0..2.0, y in -2.0..2.0, z in -2.0..2.0
+            roll in -3.0_f64..3.0, pitch in -1.2..1.2, yaw in -3.0..3.0, x in -2.0..2.0, y in -2.0..2.0, z in -2.0..2.0
         ) {
             let (h, omega) = (1e-6_f64, Vector3::<f64>::new(x, y, z));
             let angles = Euler { roll, pitch, yaw };

@@ -54,36 +54,6 @@ impl Quaternion {
         }
     }
 
-    /// The components as they were written by [`Quaternion::to_array`], bit by bit, for a state that is handed over.
-    /// `None` where they are not a unit quaternion.
-    pub fn from_unit(components: [f64; 4]) -> Option<Self> {
-        let [w, x, y, z] = components;
-        let q = Self {
-            w,
-            v: Vector3::new(x, y, z),
-        };
-        ((q.norm_squared() - 1.0).abs() < 1e-9).then_some(q)
-    }
-
-    /// The shortest rotation that takes the direction of `from` into that of `to`.
-    ///
-    /// Opposite directions leave the axis open: one perpendicular to `from` is taken. A zero vector gives the identity.
-    pub fn between(from: &Vector3<f64>, to: &Vector3<f64>) -> Self {
-        let (Some(a), Some(b)) = (from.try_normalize(0.0), to.try_normalize(0.0)) else {
-            return Self::IDENTITY;
-        };
-        let w = 1.0 + a.dot(&b);
-        if w > 1e-12 {
-            return Self { w, v: a.cross(&b) }.renormalised();
-        }
-        let axis = if a.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
-        Self {
-            w: 0.0,
-            v: a.cross(&axis),
-        }
-        .renormalised()
-    }
-
     /// The same attitude in every lane.
     pub fn splat<T: Real>(self) -> Quaternion<T> {
         Quaternion {
@@ -129,7 +99,7 @@ impl<T: Real> Quaternion<T> {
         self.v
     }
 
-    #[inline]
+    #[inline(always)]
     fn norm_squared(self) -> T {
         self.w * self.w + self.v.dot(&self.v)
     }
@@ -139,6 +109,43 @@ impl<T: Real> Quaternion<T> {
             w: self.w * scale,
             v: self.v * scale,
         }
+    }
+
+    /// The components as they were written by [`Quaternion::to_array`], bit by bit, for a state that is handed over.
+    /// `None` where they are not a unit quaternion.
+    pub fn from_unit(components: [T; 4]) -> Option<Self> {
+        let [w, x, y, z] = components;
+        let q = Self {
+            w,
+            v: Vector3::new(x, y, z),
+        };
+        let off = (q.norm_squared() - T::splat(1.0)).simd_abs();
+        off.simd_lt(T::splat(1e-9)).all().then_some(q)
+    }
+
+    /// The shortest rotation that takes the direction of `from` into that of `to`.
+    ///
+    /// Opposite directions leave the axis open: one perpendicular to `from` is taken. A zero vector gives the identity.
+    pub fn between(from: &Vector3<T>, to: &Vector3<T>) -> Self {
+        let (zero, one) = (T::splat(0.0), T::splat(1.0));
+        let (length_from, length_to) = (from.norm(), to.norm());
+        let (a, b) = (from / length_from, to / length_to);
+        let w = one + a.dot(&b);
+        let opposite = w.simd_le(T::splat(1e-12));
+        let found = Self { w, v: a.cross(&b) };
+        let found = if opposite.any() {
+            let x_is_across = a.x.simd_abs().simd_lt(T::splat(0.6));
+            let axis = Vector3::new(one.select(x_is_across, zero), zero.select(x_is_across, one), zero);
+            let half_turn = Self {
+                w: zero,
+                v: a.cross(&axis),
+            };
+            half_turn.select(opposite, found)
+        } else {
+            found
+        };
+        let directions = length_from.simd_gt(zero) & length_to.simd_gt(zero);
+        found.renormalised().select(directions, Self::default())
     }
 
     /// From components of any length that is a number of the machine; the identity where it is not or is zero.
@@ -161,13 +168,14 @@ impl<T: Real> Quaternion<T> {
 
     /// Back onto the unit sphere from close to it: one step of Newton's method for the inverse square root, which leaves
     /// the square of an error. What products of unit quaternions lose in rounding disappears.
-    #[inline]
-    fn kept(self) -> Self {
+    #[inline(always)]
+    #[must_use]
+    pub fn kept(self) -> Self {
         self.scaled(T::splat(1.5) - self.norm_squared() * T::splat(0.5))
     }
 
-    /// The product without the renormalisation: for chains of products that end with a `*`.
-    #[inline]
+    /// The product without the renormalisation: for chains of products that end with [`Quaternion::kept`].
+    #[inline(always)]
     #[must_use]
     pub fn times(self, other: Self) -> Self {
         Self {
@@ -193,7 +201,7 @@ impl<T: Real> Quaternion<T> {
     ///
     /// Up to 0.2 rad, which is a step of any filter, from the series of cosine and sine, whose first term left out is
     /// below 3e-17; beyond that from the functions themselves.
-    #[inline]
+    #[inline(always)]
     pub fn exp(r: &Vector3<T>) -> Self {
         let square = r.dot(r) * T::splat(0.25);
         let series = Self::series(r, square);
@@ -205,7 +213,7 @@ impl<T: Real> Quaternion<T> {
     }
 
     /// [`Quaternion::exp`] for a half angle whose square is small.
-    #[inline]
+    #[inline(always)]
     fn series(r: &Vector3<T>, square: T) -> Self {
         let c = T::splat;
         let fourth = square * square;
@@ -247,14 +255,14 @@ impl<T: Real> Quaternion<T> {
     }
 
     /// Takes a vector from the body into the reference frame.
-    #[inline]
+    #[inline(always)]
     pub fn rotate(self, x: &Vector3<T>) -> Vector3<T> {
         let t = self.v.cross(x) * T::splat(2.0);
         x + t * self.w + self.v.cross(&t)
     }
 
     /// Takes a vector from the reference into the body frame.
-    #[inline]
+    #[inline(always)]
     pub fn rotate_back(self, x: &Vector3<T>) -> Vector3<T> {
         self.inverse().rotate(x)
     }
@@ -274,7 +282,7 @@ impl<T: Real> Quaternion<T> {
 
     /// The attitude after turning with the constant body rate `omega` (rad/s) for `dt` s: the exact solution of
     /// `dq/dt = T_q omega`.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn turned(self, omega: &Vector3<T>, dt: T) -> Self {
         self * Self::exp(&(omega * dt))
@@ -284,7 +292,7 @@ impl<T: Real> Quaternion<T> {
 impl<T: Real> Mul for Quaternion<T> {
     type Output = Self;
 
-    #[inline]
+    #[inline(always)]
     fn mul(self, other: Self) -> Self {
         self.times(other).kept()
     }
@@ -343,7 +351,7 @@ mod tests {
 
     #[test]
     fn opposite_directions_turn_by_half_a_turn() {
-        for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+        for axis in [Vector3::<f64>::x(), Vector3::y(), Vector3::z()] {
             assert_relative_eq!(Quaternion::between(&axis, &-axis).rotate(&axis), -axis, epsilon = 1e-15);
         }
     }

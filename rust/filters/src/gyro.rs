@@ -38,7 +38,7 @@ impl Filter for Gyro {
     }
 
     fn set_state(&mut self, state: &[f64]) -> bool {
-        let found = split_state::<0>(state);
+        let found = split_state::<f64, 0>(state);
         if let Some((q, [])) = found {
             self.q = q;
         }
