@@ -2,9 +2,9 @@
 
 Prints ratios (ours / the other), which carry over to other machines, with rows per second for orientation. Then paper
 B's filters on one axis: eq. (5) as `scipy.signal.lfilter`, angle and bias as filterpy's `KalmanFilter`. Those give one
-angle, ours the whole attitude, and `lfilter` has the accelerometer's angle computed for it. Then every filter beside vqf,
-qmt, imufusion and ahrs, and beside a plain C loop of Mahony's filter that is compiled on the spot (`mahony.c`): what the
-machine can do. Last, rows fed one by one from Python, and logs replayed on several threads.
+angle, ours the whole attitude, and `lfilter` has the accelerometer's angle computed for it. Then every filter beside
+vqf, qmt, imufusion and ahrs, and beside a plain C loop of Mahony's filter that is compiled on the spot (`mahony.c`):
+what the machine can do. Last, rows fed one by one from Python, and logs replayed on several threads.
 Run: ``python benches/filters.py [ROWS]``.
 """
 

@@ -13,9 +13,14 @@ from pathlib import Path
 import ahrs
 import imufusion
 import numpy as np
-import qmt
 import vqf
-from qmt.cpp.madgwick import MahonyAHRS
+
+try:
+    import qmt
+    from qmt.cpp.madgwick import MahonyAHRS
+except ImportError:
+    # Its wheels are made for NumPy 1: `pip install --no-binary qmt qmt` makes one for the NumPy that is there.
+    qmt = MahonyAHRS = None
 
 Array = np.ndarray
 SOURCE = Path(__file__).with_name("mahony.c")
@@ -40,10 +45,11 @@ def qmt_loop(dt: float, gyr: Array, acc: Array, mag: Array) -> Array:
 
 def imufusion_ahrs(dt: float, gyr: Array, acc: Array, mag: Array) -> Array:
     made, out = imufusion.Ahrs(), np.empty((len(gyr), 4))
+    made.set_sample_period(dt)
     degrees, gravities = np.degrees(gyr), acc / 9.80665
     for k in range(len(gyr)):
-        made.update(degrees[k], gravities[k], mag[k], dt)
-        out[k] = made.quaternion
+        made.update(degrees[k], gravities[k], mag[k])
+        out[k] = made.get_quaternion()
     return out
 
 
@@ -54,8 +60,7 @@ def ahrs_mahony(dt: float, gyr: Array, acc: Array, mag: Array) -> Array:
 PEERS: dict[str, tuple[Callable[..., Array], int]] = {
     "vqf, online": (vqf_online, 1_000_000),
     "vqf, offline": (vqf_offline, 200_000),
-    "qmt, Mahony": (qmt_mahony, 1_000_000),
-    "qmt, its loop": (qmt_loop, 1_000_000),
+    **({} if qmt is None else {"qmt, Mahony": (qmt_mahony, 1_000_000), "qmt, its loop": (qmt_loop, 1_000_000)}),
     "imufusion": (imufusion_ahrs, 100_000),
     "ahrs, Mahony": (ahrs_mahony, 5_000),
 }

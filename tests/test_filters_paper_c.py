@@ -216,7 +216,7 @@ class TestFaults:
         left = error[rows.start : rows.stop + 1].max() if fault != "gap" else error[rows.start]
         stated = 1 if case == "seeded" and fault == "gap" else STATED_ROWS[case]
         after = rows.stop - (1 if fault == "gap" and stated == 1 else 0) + stated
-        assert error[:rows.start].max() < 2e-3
+        assert error[: rows.start].max() < 2e-3
         assert error[after : after + 200].max() < left / 10.0 + 2e-3
 
     def test_the_faults_hurt(self) -> None:

@@ -1,5 +1,6 @@
 """Filters over logs and live rows: attitude for every row and its error against a reference."""
 
+from imufit.replay.frames import convert_frame
 from imufit.replay.replay import DEFAULT_FILTERS, FILTERS, SETTINGS, Replay, estimate_mag_reference, replay
 from imufit.replay.replay_many import replay_many
 from imufit.replay.steady_state import SteadyState, kalman_steady_state
@@ -13,6 +14,7 @@ __all__ = [
     "Replay",
     "SteadyState",
     "Stream",
+    "convert_frame",
     "estimate_mag_reference",
     "kalman_steady_state",
     "replay",

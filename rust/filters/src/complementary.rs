@@ -15,7 +15,8 @@
 use imufit_attitude::Quaternion;
 
 use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::{Environment, Sample};
+use crate::intake::{Intake, all_rows};
+use crate::{Columns, Environment, Sample, Skipped};
 
 /// Weight and the step it belongs to, or a time constant.
 pub const PARAMETERS: &[Parameter] = &[
@@ -106,6 +107,10 @@ impl Filter for Complementary {
 
     fn reset(&mut self, attitude: Quaternion) {
         self.q = attitude;
+    }
+
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [f64], skipped: &mut Skipped) {
+        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<f64> {

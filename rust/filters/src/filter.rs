@@ -37,8 +37,7 @@ pub trait Filter<T: Real = f64>: Send + Sync {
 
     /// All rows of `columns` one after the other, and the attitude after each of them, `w x y z`.
     ///
-    /// It stands here, and not where it is called, so that each filter has a loop of its own into which the compiler can
-    /// put its step.
+    /// A filter that can be cloned has a loop of its own with its step inside: [`all_rows`](crate::intake::all_rows).
     #[doc(hidden)]
     fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
         for (k, out) in attitude.chunks_exact_mut(4).enumerate() {

@@ -30,8 +30,9 @@ use imufit_attitude::{Quaternion, Real};
 use nalgebra::{SimdBool, Vector3};
 
 use crate::filter::{Filter, Parameter, Usage};
+use crate::intake::{Intake, all_rows};
 use crate::mahony::{self, Mahony, square_of_sine};
-use crate::{Environment, Sample, triad};
+use crate::{Columns, Environment, Sample, Skipped, triad};
 
 /// Those of [`mahony`](crate::mahony) and the choice between the two readings.
 pub const PARAMETERS: &[Parameter] = &[
@@ -109,6 +110,10 @@ impl<T: Real> Filter<T> for Seeded<T> {
     fn reset(&mut self, attitude: Quaternion) {
         self.mahony.reset(attitude);
         self.waiting = T::splat(1.0);
+    }
+
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
+        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<T> {
@@ -194,6 +199,10 @@ impl<T: Real> Filter<T> for Driven<T> {
 
     fn reset(&mut self, attitude: Quaternion) {
         self.mahony.reset(attitude);
+    }
+
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
+        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<T> {

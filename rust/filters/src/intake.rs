@@ -15,7 +15,7 @@
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::Vector3;
 
-use crate::columns::Row;
+use crate::columns::{Columns, Row};
 use crate::filter::{Filter, Usage};
 use crate::memory::Memory;
 use crate::rules::clipped;
@@ -48,6 +48,62 @@ pub struct Intake {
     pub(crate) memory: Memory,
 }
 
+/// All rows of `columns` for a filter one after the other, and the attitude after each of them, `w x y z`.
+pub(crate) fn all_rows<T: Real, F: Filter<T> + Clone>(
+    filter: &mut F,
+    intake: &mut Intake,
+    columns: &Columns<'_>,
+    attitude: &mut [T],
+    skipped: &mut Skipped,
+) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has what the function is compiled for.
+        #[allow(unsafe_code)]
+        unsafe {
+            with_avx2(filter, intake, columns, attitude, skipped);
+        }
+        return;
+    }
+    one_by_one(filter, intake, columns, attitude, skipped);
+}
+
+/// The same operations with the same results, in fewer instructions.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn with_avx2<T: Real, F: Filter<T> + Clone>(
+    filter: &mut F,
+    intake: &mut Intake,
+    columns: &Columns<'_>,
+    attitude: &mut [T],
+    skipped: &mut Skipped,
+) {
+    one_by_one(filter, intake, columns, attitude, skipped);
+}
+
+#[inline(always)]
+fn one_by_one<T: Real, F: Filter<T> + Clone>(
+    filter: &mut F,
+    intake: &mut Intake,
+    columns: &Columns<'_>,
+    attitude: &mut [T],
+    skipped: &mut Skipped,
+) {
+    let mut k = 0;
+    while k < columns.t.len() {
+        k += intake.full_rows(filter, columns, k, attitude, skipped);
+        if let Some(out) = attitude.get_mut(4 * k..4 * k + 4) {
+            intake.advance(filter, &columns.row(k), out, skipped);
+        }
+        k += 1;
+    }
+}
+
+/// The readings of a column from row `from` on.
+fn threes(column: &[f64], from: usize) -> &[[f64; 3]] {
+    column.get(3 * from..).unwrap_or_default().as_chunks().0
+}
+
 impl Intake {
     pub(crate) fn new(environment: Environment, rules: Rules, start: Start) -> Self {
         Self {
@@ -60,7 +116,7 @@ impl Intake {
     }
 
     /// One row for the filter, and the attitude after it, `w x y z`.
-    #[inline(always)]
+    #[inline(never)]
     pub(crate) fn advance<T: Real, F: Filter<T> + ?Sized>(
         &mut self,
         filter: &mut F,
@@ -77,7 +133,80 @@ impl Intake {
         }
     }
 
+    /// Rows to which no rule applies, from row `from` on: all three sensors, after a row of the same kind. What
+    /// [`Intake::advance`] would do with them, in fewer steps and with the filter in the registers. How many there were.
     #[inline(always)]
+    fn full_rows<T: Real, F: Filter<T> + Clone>(
+        &mut self,
+        filter: &mut F,
+        columns: &Columns<'_>,
+        from: usize,
+        attitude: &mut [T],
+        skipped: &mut Skipped,
+    ) -> usize {
+        let Memory {
+            started,
+            mut last,
+            t_acc,
+            t_gyr,
+            t_mag,
+            mut omega,
+            ..
+        } = self.memory;
+        let (Some(acc), Some(gyr), Some(mag)) = (columns.acc, columns.gyr, columns.mag) else {
+            return 0;
+        };
+        // A sensor that has read at the last row; NaN, none yet, fails every comparison.
+        if !(started && t_acc >= last && t_gyr >= last && t_mag >= last) {
+            return 0;
+        }
+        let (rules, least_square) = (self.rules, self.least_square);
+        let mut running = filter.clone();
+        let (mut rows, mut no_heading) = (0, 0);
+        let readings = threes(acc, from).iter().zip(threes(gyr, from)).zip(threes(mag, from));
+        let (outs, _) = attitude.get_mut(4 * from..).unwrap_or_default().as_chunks_mut::<4>();
+        for ((t, ((acc, gyr), mag)), out) in columns.t.iter().skip(from).zip(readings).zip(outs) {
+            let [acc, gyr, mag] = [acc, gyr, mag].map(|xyz| Vector3::from(*xyz));
+            let (dt, square) = (t - last, acc.norm_squared());
+            // NaN fails every comparison.
+            let usable = dt > 0.0
+                && dt <= rules.max_gap
+                && square > least_square
+                && square <= f64::MAX
+                && gyr.norm_squared() <= f64::MAX
+                && mag.norm_squared() <= f64::MAX;
+            if !usable || clipped(&acc, rules.acc_range) || clipped(&gyr, rules.gyr_range) {
+                break;
+            }
+            let sample = Sample {
+                omega: Some(Reading {
+                    value: AngularRate((omega + gyr) * 0.5),
+                    dt,
+                }),
+                f: Some(Reading {
+                    value: SpecificForce(acc),
+                    dt,
+                }),
+                m: Some(Reading {
+                    value: FluxDensity(mag),
+                    dt,
+                }),
+            };
+            no_heading += usize::from(running.step(&sample) == Usage::NoHeading);
+            *out = running.attitude().to_array();
+            (last, omega) = (*t, gyr);
+            rows += 1;
+        }
+        if rows > 0 {
+            *filter = running;
+            skipped.no_heading += no_heading;
+            let memory = &mut self.memory;
+            (memory.last, memory.t_acc, memory.t_gyr, memory.t_mag) = (last, last, last, last);
+            memory.omega = omega;
+        }
+        rows
+    }
+
     fn take<T: Real, F: Filter<T> + ?Sized>(&mut self, filter: &mut F, row: &Row, skipped: &mut Skipped) {
         let t = row.t;
         if !t.is_finite() {
@@ -108,7 +237,6 @@ impl Intake {
     }
 
     /// What is usable of a row, with the time that it stands for.
-    #[inline(always)]
     fn sample(&mut self, row: &Row, skipped: &mut Skipped) -> Sample {
         let Skipped {
             acc_missing,

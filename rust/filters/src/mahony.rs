@@ -36,7 +36,8 @@ use imufit_attitude::{Quaternion, Real};
 use nalgebra::{SimdBool, Vector3};
 
 use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::{Environment, Sample};
+use crate::intake::{Intake, all_rows};
+use crate::{Columns, Environment, Sample, Skipped};
 
 /// The gains, named as printed, and the limit of the field.
 pub const PARAMETERS: &[Parameter] = &[
@@ -153,7 +154,11 @@ impl<T: Real> Mahony<T> {
         self.q = predicted.kept().times(Quaternion::exp(&(w_mes * (limit * self.k_p))));
         let bias = self.bias - w_mes * (limit * self.half_k_i);
         let finite = bias.dot(&bias).simd_le(T::splat(f64::MAX));
-        self.bias = bias.zip_map(&self.bias, |new, old| new.select(finite, old));
+        self.bias = if finite.all() {
+            bias
+        } else {
+            bias.zip_map(&self.bias, |new, old| new.select(finite, old))
+        };
     }
 
     /// Eq. (5).
@@ -211,6 +216,10 @@ impl<T: Real> Filter<T> for Mahony<T> {
 
     fn reset(&mut self, attitude: Quaternion) {
         (self.q, self.bias) = (attitude.splat(), Vector3::repeat(T::splat(0.0)));
+    }
+
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
+        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<T> {
