@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from imufit import _imufit
+from imufit.replay import PAPER_C_GAINS
 from scipy.spatial.transform import Rotation
 from test_filters import FIELD, FRAMES, UP, G, Motion, angles, rotation_of, scalar_first
 
@@ -127,6 +128,15 @@ class TestHybrid:
         assert angles(rotation_of(mahony), rotation_of(seeded)).max() < 1e-12
         assert angles(rotation_of(plain[:20]), rotation_of(seeded[:20])).max() > 0.1
 
+    def test_the_papers_gains_are_settings_of_both_filters(self) -> None:
+        printed = {"figure_3": [1, 1, 0.2, 20], "figure_4": [5, 0.1, 0.2, 10]}
+        motion = Motion(50)
+        for figure, gains in printed.items():
+            assert list(PAPER_C_GAINS[figure].values()) == gains
+            for name in ("mahony", "hybrid"):
+                q, _ = motion.run(name, settings=PAPER_C_GAINS[figure])
+                assert angles(motion.truth, rotation_of(q)).max() < 1e-3
+
     @pytest.mark.parametrize("driven", [0.0, 1.0])
     def test_a_slow_magnetometer_pulls_the_heading_as_fast_as_a_quick_one(self, driven: float) -> None:
         n = 2000
@@ -226,3 +236,15 @@ class TestFaults:
             q, _ = motion.run("hybrid", settings=SOFT, **options)
             found[fault] = angles(motion.truth, rotation_of(q)).max()
         assert min(found.values()) > 0.05
+
+
+@pytest.mark.parametrize(("name", "driven"), [("gyro", None), ("mahony", None), ("hybrid", 0.0), ("hybrid", 1.0)])
+def test_the_norm_stays_one_over_a_million_steps(name: str, driven: float | None) -> None:
+    """`benches/norm.py` takes 1e8 steps."""
+    rng, n = np.random.default_rng(6), 100_000
+    t, gyr = 0.005 * np.arange(1, n + 1), rng.normal(0.0, 3.0, (n, 3))
+    acc, mag = rng.normal(0.0, 10.0, (n, 3)), rng.normal(0.0, 40.0, (n, 3))
+    made = _imufit.Filter(name, settings={} if driven is None else {"driven": driven})
+    for piece in range(10):
+        q, _ = made.run(t + piece * t[-1], acc, gyr, mag)
+        assert np.abs(np.linalg.norm(q, axis=1) - 1.0).max() < 1e-12

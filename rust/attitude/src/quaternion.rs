@@ -198,33 +198,36 @@ impl<T: Real> Quaternion<T> {
     }
 
     /// Exponential map: the rotation by the vector `r` (axis times angle, rad); the identity where that is not finite.
+    #[inline(always)]
+    pub fn exp(r: &Vector3<T>) -> Self {
+        Self::exp_of_half(&(r * T::splat(0.5)))
+    }
+
+    /// The rotation by twice the vector `h`.
     ///
     /// Up to 0.2 rad, which is a step of any filter, from the series of cosine and sine, whose first term left out is
     /// below 3e-17; beyond that from the functions themselves.
     #[inline(always)]
-    pub fn exp(r: &Vector3<T>) -> Self {
-        let square = r.dot(r) * T::splat(0.25);
-        let series = Self::series(r, square);
+    pub fn exp_of_half(h: &Vector3<T>) -> Self {
+        let square = h.dot(h);
+        let series = Self::series(h, square);
         let small = square.simd_le(T::splat(SERIES));
         if small.all() {
             return series;
         }
-        series.select(small, Self::circle(r))
+        series.select(small, Self::circle(&(h + h)))
     }
 
-    /// [`Quaternion::exp`] for a half angle whose square is small.
+    /// [`Quaternion::exp_of_half`] for a half angle whose square is small.
     #[inline(always)]
-    fn series(r: &Vector3<T>, square: T) -> Self {
+    fn series(h: &Vector3<T>, square: T) -> Self {
         let c = T::splat;
         let fourth = square * square;
         let cosine = (c(1.0) - square * c(1.0 / 2.0))
             + fourth * ((c(1.0 / 24.0) - square * c(1.0 / 720.0)) + fourth * c(1.0 / 40_320.0));
-        let half_sinc = (c(0.5) - square * c(1.0 / 12.0))
-            + fourth * ((c(1.0 / 240.0) - square * c(1.0 / 10_080.0)) + fourth * c(1.0 / 725_760.0));
-        Self {
-            w: cosine,
-            v: r * half_sinc,
-        }
+        let sinc = (c(1.0) - square * c(1.0 / 6.0))
+            + fourth * ((c(1.0 / 120.0) - square * c(1.0 / 5_040.0)) + fourth * c(1.0 / 362_880.0));
+        Self { w: cosine, v: h * sinc }
     }
 
     /// [`Quaternion::exp`] for any angle but zero.
@@ -257,14 +260,22 @@ impl<T: Real> Quaternion<T> {
     /// Takes a vector from the body into the reference frame.
     #[inline(always)]
     pub fn rotate(self, x: &Vector3<T>) -> Vector3<T> {
-        let t = self.v.cross(x) * T::splat(2.0);
-        x + t * self.w + self.v.cross(&t)
+        let t = (self.v + self.v).cross(x);
+        (x + t * self.w) + self.v.cross(&t)
     }
 
     /// Takes a vector from the reference into the body frame.
     #[inline(always)]
     pub fn rotate_back(self, x: &Vector3<T>) -> Vector3<T> {
         self.inverse().rotate(x)
+    }
+
+    /// The z axis of the reference frame, seen from the body: the third row of the matrix.
+    #[inline(always)]
+    pub fn vertical(self) -> Vector3<T> {
+        let (w, v, one) = (self.w, self.v, T::splat(1.0));
+        let (x2, y2) = (v.x + v.x, v.y + v.y);
+        Vector3::new(x2 * v.z - y2 * w, y2 * v.z + x2 * w, one - (x2 * v.x + y2 * v.y))
     }
 
     /// The part of the rotation about a unit axis (twist); the rest is `self * twist^-1` (swing).

@@ -31,7 +31,6 @@
 //! a slow robot arm. The defaults are softer: found on hand-moved recordings with optical reference (BROAD), where they
 //! give 1.5 to 4 degrees on rotations and slow translations.
 
-use imufit_attitude::matrix::matrix_from_quaternion;
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::{SimdBool, Vector3};
 
@@ -142,7 +141,8 @@ impl<T: Real> Mahony<T> {
             return self.q;
         };
         let rate = omega.value.0.map(T::splat) - self.bias;
-        self.q.times(Quaternion::exp(&(rate * T::splat(omega.dt))))
+        self.q
+            .times(Quaternion::exp_of_half(&(rate * T::splat(0.5 * omega.dt))))
     }
 
     /// Turns attitude and bias by an innovation, by no more than the error it shows.
@@ -151,7 +151,8 @@ impl<T: Real> Mahony<T> {
         let one = T::splat(1.0);
         let limit = one.simd_min(one / (self.k_p * weight));
         // The renormalisation does not wait for the innovation.
-        self.q = predicted.kept().times(Quaternion::exp(&(w_mes * (limit * self.k_p))));
+        let half = w_mes * (limit * self.k_p * T::splat(0.5));
+        self.q = predicted.kept().times(Quaternion::exp_of_half(&half));
         let bias = self.bias - w_mes * (limit * self.half_k_i);
         let finite = bias.dot(&bias).simd_le(T::splat(f64::MAX));
         self.bias = if finite.all() {
@@ -165,8 +166,7 @@ impl<T: Real> Mahony<T> {
     #[inline(always)]
     fn innovation(&self, q: Quaternion<T>, sample: &Sample) -> Innovation<T> {
         let zero = T::splat(0.0);
-        let r = matrix_from_quaternion(q);
-        let up = r.row(2).transpose() * self.up_z;
+        let up = q.vertical() * self.up_z;
         let (mut w_mes, mut weight, mut usage) = (Vector3::repeat(zero), zero, Usage::Full);
         if let Some(f) = sample.f {
             let length = f.value.0.norm();
@@ -177,8 +177,8 @@ impl<T: Real> Mahony<T> {
             }
         }
         if let Some(m) = sample.m {
-            let m_b = m.value.0.map(T::splat);
-            let (x, y) = (r.row(0).transpose().dot(&m_b), r.row(1).transpose().dot(&m_b));
+            let m_n = q.rotate(&m.value.0.map(T::splat));
+            let (x, y) = (m_n.x, m_n.y);
             let square = x * x + y * y;
             let whole = T::splat(m.value.0.norm_squared());
             let shows = square.simd_ge(self.least_square * whole) & square.simd_gt(zero);
@@ -186,8 +186,8 @@ impl<T: Real> Mahony<T> {
                 usage = Usage::NoHeading;
             }
             let gain = (self.half_weights[1] * T::splat(m.dt)).select(shows, zero);
-            let sine = (self.across[0] * x + self.across[1] * y) / square.simd_sqrt();
-            w_mes += up * (sine.select(shows, zero) * gain);
+            let heading = ((self.across[0] * x + self.across[1] * y) * gain) / square.simd_sqrt();
+            w_mes += up * heading.select(shows, zero);
             weight += gain;
         }
         Innovation { w_mes, weight, usage }
