@@ -3,7 +3,7 @@
 //! Rows, rules and start are the same for all of them; only the numbers of the filter differ. Each result has the bits of a
 //! replay of its own.
 
-use imufit_attitude::{Lanes, Quaternion, Real};
+use imufit_attitude::{Lanes, Quaternion};
 use nalgebra::SimdValue;
 
 use crate::columns::Columns;
