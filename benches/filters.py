@@ -2,8 +2,9 @@
 
 Prints ratios (ours / the other), which carry over to other machines, with rows per second for orientation. Then paper
 B's filters on one axis: eq. (5) as `scipy.signal.lfilter`, angle and bias as filterpy's `KalmanFilter`. Those give one
-angle, ours the whole attitude, and `lfilter` has the accelerometer's angle computed for it. Last, rows fed one by one
-from Python, and logs replayed on several threads.
+angle, ours the whole attitude, and `lfilter` has the accelerometer's angle computed for it. Then every filter beside
+vqf, qmt, imufusion and ahrs, and beside a plain C loop of Mahony's filter that is compiled on the spot (`mahony.c`):
+what the machine can do. Last, rows fed one by one from Python, and logs replayed on several threads.
 Run: ``python benches/filters.py [ROWS]``.
 """
 
@@ -15,6 +16,7 @@ import numpy as np
 from filterpy.kalman import KalmanFilter
 from imufit import Log, _imufit
 from imufit.replay import Stream, replay_many
+from peers import PEERS, CLoop
 from scipy.signal import lfilter
 
 G = 9.80665
@@ -161,6 +163,7 @@ LOOPS: dict[str, Callable[..., np.ndarray]] = {
 
 METHODS: tuple[tuple[str, str, dict[str, float]], ...] = (
     *((name, name, {}) for name in _imufit.filter_descriptions()),
+    ("hybrid, seeded", "hybrid", {"driven": 0.0}),
     ("kalman, adaptive", "kalman", {"adaptive": 1.0}),
     ("kalman, steady", "kalman", {"steady": 1.0}),
 )
@@ -214,6 +217,35 @@ def one_axis(rows: int, few: int) -> None:
         print(f"{name:<22}{ours:>12.3g}  {other:<16}{theirs:>10.3g}{ours / theirs:>9.2g}{difference:>26.1e}")
 
 
+def beside_others(t: np.ndarray, acc: np.ndarray, gyr: np.ndarray, mag: np.ndarray, start: np.ndarray) -> None:
+    """Time of one core; all take their turns, the best of each counts."""
+    rows, dt, gains = len(t), float(t[1] - t[0]), np.array([1.0, 1.0, 0.005, 0.5])
+    loop, made = CLoop(), {label: _imufit.Filter(name, initial=start.tolist(), settings=settings)
+                           for label, name, settings in METHODS}  # fmt: skip
+    runs: dict[str, tuple[Callable[[], object], int]] = {
+        f"C, {form}": (lambda form=form: loop.run(form, t, gyr, acc, mag, gains, start), rows) for form in loop.FORMS
+    }
+    for label, one in made.items():
+        runs[f"imufit {label}"] = (lambda one=one: (one.reset(), one.run(t, acc, gyr, mag)), rows)
+    for label, (peer, most) in PEERS.items():
+        n = min(rows, most)
+        runs[label] = (lambda peer=peer, n=n: peer(dt, gyr[:n], acc[:n], mag[:n]), n)
+    best = dict.fromkeys(runs, np.inf)
+    for _ in range(5):
+        for label, (run, n) in runs.items():
+            before = time.process_time()
+            run()
+            best[label] = min(best[label], (time.process_time() - before) / n)
+    limit = best["C, first_order"]
+    print(f"\nnine axes, {rows} rows, one core\n{'filter':<28}{'million rows/s':>16}{'of the C loop':>16}")
+    for label, each in sorted(best.items(), key=lambda item: item[1]):
+        print(f"{label:<28}{1e-6 / each:>16.4g}{limit / each:>16.3f}")
+    exact, ours = loop.run("exact", t, gyr, acc, mag, gains, start), made["mahony"]
+    ours.reset()
+    apart = _imufit.attitude_errors(ours.run(t, acc, gyr, mag)[0], exact)[:, 0].max()
+    print(f"imufit mahony and C, exact: largest difference {apart:.1e} rad")
+
+
 def live_and_many(t: np.ndarray, acc: np.ndarray, gyr: np.ndarray) -> None:
     names = ("accel", "gyro", "complementary", "kalman")
     few = 20_000
@@ -265,6 +297,7 @@ def main(rows: int) -> None:
         difference = _imufit.attitude_errors(found, np.ascontiguousarray(expected))[:, 0].max()
         print(f"{label:<22}{ours:>12.3g}{theirs:>14.3g}{ours / theirs:>8.0f}{difference:>26.1e}")
     one_axis(rows, few)
+    beside_others(t, acc, gyr, mag, start)
     live_and_many(t, acc, gyr)
 
 

@@ -1,4 +1,4 @@
-"""Draw the pictures of the documents: the error falling in a simulated log, six sides, a calibration, a machine tool.
+"""Draw the pictures of the documents: an error falling, six sides, three frames, a calibration, a machine tool.
 
 python docs/pictures/make.py [FOLDER]
 """
@@ -30,6 +30,12 @@ LYING = {
     "-y": ("+x", "-z", "+y"),
 }
 """For each side that is up: where the box's x, y and z point in the room (x right, y away, z up)."""
+FRAMES = {
+    "NED": {"x": (0.0, 1.0, 0.0), "y": (1.0, 0.0, 0.0), "z": (0.0, 0.0, -1.0)},
+    "ENU": {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)},
+    "NWU": {"x": (0.0, 1.0, 0.0), "y": (-1.0, 0.0, 0.0), "z": (0.0, 0.0, 1.0)},
+}
+"""Axes of the reference frames in the room: east to the right, north away, up."""
 SENSOR = {
     "acc.bias": {"x": 0.15, "y": -0.1, "z": 0.2},
     "acc.scale": {"x": 0.02, "y": -0.015, "z": 0.01},
@@ -56,6 +62,14 @@ def sides() -> "Figure":
     return figure
 
 
+def frames() -> "Figure":
+    """Draw the axes of the three reference frames over a map: x of the room is east, y is north."""
+    figure = new_figure(9.0, 2.6)
+    for place, (name, axes_of) in enumerate(FRAMES.items()):
+        _frame(figure.add_subplot(1, 3, place + 1), name, axes_of)
+    return figure
+
+
 def calibration() -> "Figure":
     """Calibrate the sensor of docs/calibration.md."""
     log = imufit.simulate.simulate("poses", SENSOR, duration=60.0, seed=1).to_log()
@@ -71,6 +85,33 @@ def tilt(folder: Path) -> None:
 def _seen(point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Project a point of the room on the paper: what is further away lies further up and to the right."""
     return np.array([point[0] + 0.40 * point[1], point[2] + 0.30 * point[1]])
+
+
+def _on_map(point: tuple[float, float, float]) -> tuple[float, float]:
+    """Project a point of the room as seen from steeply above: north lies up and to the right."""
+    return point[0] + 0.55 * point[1], point[2] + 0.45 * point[1]
+
+
+def _frame(axes: "Axes", name: str, axes_of: dict[str, tuple[float, float, float]]) -> None:
+    corners = [_on_map((x, y, 0.0)) for x, y in ((-1.2, -1.2), (1.2, -1.2), (1.2, 1.2), (-1.2, 1.2))]
+    axes.fill(*np.transpose(corners), color=PALE, linewidth=0)
+    for word, x, y in (("N", 0.0, 1.5), ("E", 1.45, 0.0), ("S", 0.0, -1.4), ("W", -1.45, 0.0)):
+        axes.text(*_on_map((x, y, 0.0)), word, color=GREY, fontsize=11, ha="center", va="center")
+    for axis, (x, y, z) in axes_of.items():
+        axes.annotate(
+            "", _on_map((0.95 * x, 0.95 * y, 0.95 * z)), (0.0, 0.0),
+            arrowprops={"arrowstyle": "-|>", "color": AXES[axis], "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
+        place = _on_map((1.12 * x, 1.12 * y, 1.12 * z))
+        axes.text(*place, axis, color=AXES[axis], fontsize=13, weight="bold", ha="center", va="center")
+    axes.plot(0.0, 0.0, "o", color=INK, markersize=5)
+    force = 9.8 * axes_of["z"][2]
+    axes.set_title(name, fontsize=13, color=INK, weight="bold", pad=2)
+    axes.text(0.0, -1.5, f"at rest: 0, 0, {force:+.1f} m/s²", fontsize=10, color=INK, ha="center")
+    axes.set_xlim(-1.95, 1.95)
+    axes.set_ylim(-1.55, 1.3)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
 
 
 def _box(axes: "Axes", up: str) -> None:
@@ -116,5 +157,6 @@ if __name__ == "__main__":
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     ladder().plot().savefig(folder / "ladder.png", dpi=110)
     sides().savefig(folder / "sides.png", dpi=90)
+    frames().savefig(folder / "frames.png", dpi=90)
     calibration().savefig(folder / "calibration.png", dpi=90)
     tilt(folder)

@@ -1,5 +1,7 @@
 """Filters over logs and live rows: attitude for every row and its error against a reference."""
 
+from imufit.replay.frames import convert_frame
+from imufit.replay.gains import PAPER_C_GAINS
 from imufit.replay.replay import DEFAULT_FILTERS, FILTERS, SETTINGS, Replay, estimate_mag_reference, replay
 from imufit.replay.replay_many import replay_many
 from imufit.replay.steady_state import SteadyState, kalman_steady_state
@@ -9,10 +11,12 @@ from imufit.replay.tilt_angles import tilt_angles
 __all__ = [
     "DEFAULT_FILTERS",
     "FILTERS",
+    "PAPER_C_GAINS",
     "SETTINGS",
     "Replay",
     "SteadyState",
     "Stream",
+    "convert_frame",
     "estimate_mag_reference",
     "kalman_steady_state",
     "replay",

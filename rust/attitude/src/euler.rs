@@ -10,73 +10,72 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SimdBool, Vector3};
 
-use crate::Quaternion;
+use crate::{Quaternion, Real};
 
 /// Below this length the half angle that gimbal lock leaves open is taken as undetermined.
 const GIMBAL: f64 = 1e-12;
 
 /// Roll, pitch and yaw, rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Euler {
+pub struct Euler<T = f64> {
     /// About the body's x axis.
-    pub roll: f64,
+    pub roll: T,
     /// About the y axis.
-    pub pitch: f64,
+    pub pitch: T,
     /// About the reference frame's z axis.
-    pub yaw: f64,
+    pub yaw: T,
 }
 
 /// An angle brought into (-pi, pi].
-pub fn wrap(angle: f64) -> f64 {
-    let turned = angle - 2.0 * PI * (angle / (2.0 * PI)).round();
-    if turned <= -PI { turned + 2.0 * PI } else { turned }
+pub fn wrap<T: Real>(angle: T) -> T {
+    let turn = T::splat(2.0 * PI);
+    let turned = angle - turn * (angle / turn).simd_round();
+    (turned + turn).select(turned.simd_le(T::splat(-PI)), turned)
 }
 
-impl Euler {
+impl<T: Real> Euler<T> {
     /// The angles of an attitude, with roll = 0 at gimbal lock.
-    pub fn from_quaternion(q: Quaternion) -> Self {
+    pub fn from_quaternion(q: Quaternion<T>) -> Self {
         let [w, x, y, z] = q.to_array();
+        let (zero, two, gimbal) = (T::splat(0.0), T::splat(2.0), T::splat(GIMBAL));
         // cos(theta/2) - sin(theta/2) and cos(theta/2) + sin(theta/2): one of them vanishes at gimbal lock.
-        let (minus, plus) = ((x + z).hypot(w - y), (x - z).hypot(w + y));
-        let pitch = 2.0 * (plus - minus).atan2(plus + minus);
-        let (half_sum, half_difference) = ((x + z).atan2(w - y), (x - z).atan2(w + y));
-        let (roll, yaw) = if minus < GIMBAL {
-            (0.0, -2.0 * half_difference)
-        } else if plus < GIMBAL {
-            (0.0, 2.0 * half_sum)
-        } else {
-            (half_sum + half_difference, half_sum - half_difference)
-        };
+        let (minus, plus) = ((x + z).simd_hypot(w - y), (x - z).simd_hypot(w + y));
+        let pitch = two * (plus - minus).simd_atan2(plus + minus);
+        let (half_sum, half_difference) = ((x + z).simd_atan2(w - y), (x - z).simd_atan2(w + y));
+        let (up, down) = (minus.simd_lt(gimbal), plus.simd_lt(gimbal));
+        let yaw = (two * half_sum).select(down, half_sum - half_difference);
         Self {
-            roll: wrap(roll),
+            roll: wrap(zero.select(up | down, half_sum + half_difference)),
             pitch,
-            yaw: wrap(yaw),
+            yaw: wrap((-two * half_difference).select(up, yaw)),
         }
     }
 
     /// The attitude of these angles.
-    pub fn to_quaternion(self) -> Quaternion {
-        Quaternion::exp(&(Vector3::z() * self.yaw))
-            * Quaternion::exp(&(Vector3::y() * self.pitch))
-            * Quaternion::exp(&(Vector3::x() * self.roll))
+    pub fn to_quaternion(self) -> Quaternion<T> {
+        let zero = T::splat(0.0);
+        Quaternion::exp(&Vector3::new(zero, zero, self.yaw))
+            * Quaternion::exp(&Vector3::new(zero, self.pitch, zero))
+            * Quaternion::exp(&Vector3::new(self.roll, zero, zero))
     }
 
-    /// The matrix of `d[roll, pitch, yaw]/dt = T omega` with the body's angular rate; `None` at gimbal lock.
-    pub fn rate_matrix(self) -> Option<Matrix3<f64>> {
-        let ((sp, cp), (st, ct)) = (self.roll.sin_cos(), self.pitch.sin_cos());
-        if ct.abs() < GIMBAL {
+    /// The matrix of `d[roll, pitch, yaw]/dt = T omega` with the body's angular rate; `None` at gimbal lock (of any lane).
+    pub fn rate_matrix(self) -> Option<Matrix3<T>> {
+        let ((sp, cp), (st, ct)) = (self.roll.simd_sin_cos(), self.pitch.simd_sin_cos());
+        if ct.simd_abs().simd_lt(T::splat(GIMBAL)).any() {
             return None;
         }
+        let (zero, one) = (T::splat(0.0), T::splat(1.0));
         Some(Matrix3::new(
-            1.0,
+            one,
             sp * st / ct,
             cp * st / ct,
-            0.0,
+            zero,
             cp,
             -sp,
-            0.0,
+            zero,
             sp / ct,
             cp / ct,
         ))
@@ -95,7 +94,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn angles_to_quaternion_and_back(roll in -3.1..3.1, pitch in -1.57..1.5, yaw in -3.1..3.1) {
+        fn angles_to_quaternion_and_back(roll in -3.1_f64..3.1, pitch in -1.57..1.5, yaw in -3.1..3.1) {
             let back = Euler::from_quaternion(Euler { roll, pitch, yaw }.to_quaternion());
             let loss = 1e-14 / f64::cos(pitch);
             prop_assert!((back.roll - roll).abs() < loss);
@@ -104,7 +103,7 @@ mod tests {
         }
 
         #[test]
-        fn the_order_is_yaw_then_pitch_then_roll(roll in -3.0..3.0, pitch in -1.5..1.5, yaw in -3.0..3.0) {
+        fn the_order_is_yaw_then_pitch_then_roll(roll in -3.0_f64..3.0, pitch in -1.5..1.5, yaw in -3.0..3.0) {
             let ours = matrix_from_quaternion(Euler { roll, pitch, yaw }.to_quaternion());
             let product = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw)
                 * Rotation3::from_axis_angle(&Vector3::y_axis(), pitch)
@@ -116,7 +115,7 @@ mod tests {
 
         #[test]
         fn near_and_at_gimbal_lock_the_angles_still_compose_to_the_attitude(
-            roll in -3.0..3.0, below in 0.0..1e-6, sign in prop::sample::select(vec![-1.0, 1.0]), yaw in -3.0..3.0
+            roll in -3.0_f64..3.0, below in 0.0..1e-6, sign in prop::sample::select(vec![-1.0, 1.0]), yaw in -3.0..3.0
         ) {
             let q = Euler { roll, pitch: sign * (FRAC_PI_2 - below), yaw }.to_quaternion();
             let back = Euler::from_quaternion(q).to_quaternion();
@@ -125,9 +124,9 @@ mod tests {
 
         #[test]
         fn rate_matrix_is_the_derivative_of_the_angles(
-            roll in -3.0..3.0, pitch in -1.2..1.2, yaw in -3.0..3.0, x in -2.0..2.0, y in -2.0..2.0, z in -2.0..2.0
+            roll in -3.0_f64..3.0, pitch in -1.2..1.2, yaw in -3.0..3.0, x in -2.0..2.0, y in -2.0..2.0, z in -2.0..2.0
         ) {
-            let (h, omega) = (1e-6, Vector3::new(x, y, z));
+            let (h, omega) = (1e-6_f64, Vector3::<f64>::new(x, y, z));
             let angles = Euler { roll, pitch, yaw };
             let q = angles.to_quaternion();
             let (a, b) = (Euler::from_quaternion(q.turned(&omega, h)), Euler::from_quaternion(q.turned(&omega, -h)));

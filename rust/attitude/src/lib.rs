@@ -4,17 +4,20 @@
 //! `x_n = r_nb x_b`, and rotations compose like matrices: `q_nc = q_nb * q_bc`. Angles are in radians.
 //! The symbols follow the paper on TRIAD with the nonlinear complementary filter (paper C of the documentation).
 #![cfg_attr(test, allow(clippy::float_cmp))]
+#![allow(clippy::inline_always)] // a row of a replay is a hundred operations: a call between them is felt
 
 pub mod attitude_error;
 pub mod euler;
 pub mod frame;
 pub mod matrix;
 pub mod quaternion;
+pub mod real;
 
 pub use attitude_error::{AttitudeError, Rmse};
 pub use euler::Euler;
 pub use frame::Frame;
 pub use quaternion::Quaternion;
+pub use real::{Lanes, Real};
 
 /// What cannot be turned into an attitude or a frame.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -2,21 +2,23 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::Quaternion;
+use crate::{Quaternion, Real};
 
 /// The matrix of an attitude: its columns are the body's axes in the reference frame.
-pub fn matrix_from_quaternion(q: Quaternion) -> Matrix3<f64> {
+#[inline(always)]
+pub fn matrix_from_quaternion<T: Real>(q: Quaternion<T>) -> Matrix3<T> {
     let [w, x, y, z] = q.to_array();
+    let (one, two) = (T::splat(1.0), T::splat(2.0));
     Matrix3::new(
-        1.0 - 2.0 * (y * y + z * z),
-        2.0 * (x * y - w * z),
-        2.0 * (x * z + w * y),
-        2.0 * (x * y + w * z),
-        1.0 - 2.0 * (x * x + z * z),
-        2.0 * (y * z - w * x),
-        2.0 * (x * z - w * y),
-        2.0 * (y * z + w * x),
-        1.0 - 2.0 * (x * x + y * y),
+        one - two * (y * y + z * z),
+        two * (x * y - w * z),
+        two * (x * z + w * y),
+        two * (x * y + w * z),
+        one - two * (x * x + z * z),
+        two * (y * z - w * x),
+        two * (x * z - w * y),
+        two * (y * z + w * x),
+        one - two * (x * x + y * y),
     )
 }
 
@@ -24,19 +26,29 @@ pub fn matrix_from_quaternion(q: Quaternion) -> Matrix3<f64> {
 ///
 /// `None` where an entry is not finite. A matrix that is no rotation must go through [`nearest_rotation`] first.
 pub fn quaternion_from_matrix(r: &Matrix3<f64>) -> Option<Quaternion> {
+    r.iter().all(|x| x.is_finite()).then(|| quaternion_of_rotation(r))
+}
+
+/// [`quaternion_from_matrix`] for a matrix that is known to be a rotation.
+pub fn quaternion_of_rotation<T: Real>(r: &Matrix3<T>) -> Quaternion<T> {
     let (a, b, c) = (r[(0, 0)], r[(1, 1)], r[(2, 2)]);
-    let trace = a + b + c;
+    let (trace, one, two) = (a + b + c, T::splat(1.0), T::splat(2.0));
     let plus = Vector3::new(r[(2, 1)] + r[(1, 2)], r[(0, 2)] + r[(2, 0)], r[(1, 0)] + r[(0, 1)]);
     let minus = Vector3::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]);
-    if trace >= a && trace >= b && trace >= c {
-        Quaternion::new(1.0 + trace, minus.x, minus.y, minus.z)
-    } else if a >= b && a >= c {
-        Quaternion::new(minus.x, 1.0 + 2.0 * a - trace, plus.z, plus.y)
-    } else if b >= c {
-        Quaternion::new(minus.y, plus.z, 1.0 + 2.0 * b - trace, plus.x)
-    } else {
-        Quaternion::new(minus.z, plus.y, plus.x, 1.0 + 2.0 * c - trace)
-    }
+    let by_x = (minus.x, Vector3::new(one + two * a - trace, plus.z, plus.y));
+    let by_y = (minus.y, Vector3::new(plus.z, one + two * b - trace, plus.x));
+    let by_z = (minus.z, Vector3::new(plus.y, plus.x, one + two * c - trace));
+    let choose = |which: T::SimdBool, (w, v): (T, Vector3<T>), (other_w, other_v): (T, Vector3<T>)| {
+        (
+            w.select(which, other_w),
+            v.zip_map(&other_v, |x, other| x.select(which, other)),
+        )
+    };
+    let imaginary = choose(b.simd_ge(c), by_y, by_z);
+    let imaginary = choose(a.simd_ge(b) & a.simd_ge(c), by_x, imaginary);
+    let real = trace.simd_ge(a) & trace.simd_ge(b) & trace.simd_ge(c);
+    let (w, v) = choose(real, (one + trace, minus), imaginary);
+    Quaternion::from_components(w, v)
 }
 
 /// The rotation nearest to `m` in the sense of the Frobenius norm, by singular value decomposition

@@ -53,6 +53,7 @@ impl<'a> Columns<'a> {
     }
 
     /// The row of that number; NaN beyond the end.
+    #[inline(always)]
     pub(crate) fn row(&self, k: usize) -> Row {
         let reading = |column: Option<&[f64]>| {
             let xyz = column?.get(3 * k..3 * k + 3)?;

@@ -15,7 +15,8 @@
 use imufit_attitude::Quaternion;
 
 use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::{Environment, Sample};
+use crate::intake::{Intake, all_rows};
+use crate::{Columns, Environment, Sample, Skipped};
 
 /// Weight and the step it belongs to, or a time constant.
 pub const PARAMETERS: &[Parameter] = &[
@@ -108,12 +109,16 @@ impl Filter for Complementary {
         self.q = attitude;
     }
 
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [f64], skipped: &mut Skipped) {
+        all_rows(self, intake, columns, attitude, skipped);
+    }
+
     fn state(&self) -> Vec<f64> {
         self.q.to_array().to_vec()
     }
 
     fn set_state(&mut self, state: &[f64]) -> bool {
-        let found = split_state::<0>(state);
+        let found = split_state::<f64, 0>(state);
         if let Some((q, [])) = found {
             self.q = q;
         }

@@ -1,9 +1,11 @@
 //! The trait of all filters and THE list of them.
 
-use imufit_attitude::Quaternion;
+use imufit_attitude::{Quaternion, Real};
+use nalgebra::SimdBool;
 
-use crate::{Environment, FilterError, Sample, Sensor};
-use crate::{accel, complementary, gyro, kalman, mahony, triad};
+use crate::intake::Intake;
+use crate::{Columns, Environment, FilterError, Sample, Sensor, Skipped};
+use crate::{accel, complementary, gyro, hybrid, kalman, mahony, quest, triad};
 
 /// What a step could not use of the sample it was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,21 +17,33 @@ pub enum Usage {
 }
 
 /// An attitude filter: sample in, attitude out. It may rely on each reading being finite and each `dt` not negative.
-pub trait Filter: Send + Sync {
+///
+/// With [`Lanes`](imufit_attitude::Lanes) for `T` several settings of one filter go through the same samples side by side.
+pub trait Filter<T: Real = f64>: Send + Sync {
     /// Advances to the time of `sample`.
     fn step(&mut self, sample: &Sample) -> Usage;
 
     /// The attitude `q_nb` after the last step, unit within 1e-12.
-    fn attitude(&self) -> Quaternion;
+    fn attitude(&self) -> Quaternion<T>;
 
     /// Starts over at `attitude`, everything learned forgotten.
     fn reset(&mut self, attitude: Quaternion);
 
     /// All that the next step depends on.
-    fn state(&self) -> Vec<f64>;
+    fn state(&self) -> Vec<T>;
 
     /// Takes over what [`Filter::state`] gave; `false`, and nothing changed, where it does not fit.
-    fn set_state(&mut self, state: &[f64]) -> bool;
+    fn set_state(&mut self, state: &[T]) -> bool;
+
+    /// All rows of `columns` one after the other, and the attitude after each of them, `w x y z`.
+    ///
+    /// A filter that can be cloned has a loop of its own with its step inside: [`all_rows`](crate::intake::all_rows).
+    #[doc(hidden)]
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
+        for (k, out) in attitude.chunks_exact_mut(4).enumerate() {
+            intake.advance(self, &columns.row(k), out, skipped);
+        }
+    }
 }
 
 /// One setting of a filter.
@@ -62,7 +76,7 @@ pub struct Description {
 }
 
 /// The filters there are.
-pub const FILTERS: [Description; 6] = [
+pub const FILTERS: [Description; 8] = [
     Description {
         name: "accel",
         summary: "Inclination from the specific force alone, row by row; the heading stays where it started.",
@@ -104,6 +118,20 @@ pub const FILTERS: [Description; 6] = [
         needs: &[Sensor::Gyr, Sensor::Acc],
         parameters: mahony::PARAMETERS,
         make: |environment, values| Box::new(mahony::Mahony::new(environment, values)),
+    },
+    Description {
+        name: "quest",
+        summary: "Attitude from two weighted vectors, the most probable one, row by row.",
+        needs: &[Sensor::Acc, Sensor::Mag],
+        parameters: quest::PARAMETERS,
+        make: |environment, values| Box::new(quest::Quest::new(environment, values)),
+    },
+    Description {
+        name: "hybrid",
+        summary: "Mahony's filter driven (or, with driven = 0, started) by the attitude that TRIAD finds.",
+        needs: &[Sensor::Gyr, Sensor::Acc, Sensor::Mag],
+        parameters: hybrid::PARAMETERS,
+        make: hybrid::make,
     },
 ];
 
@@ -170,9 +198,10 @@ pub(crate) fn fill(
 }
 
 /// The four components of an attitude at the head of a state, and the rest.
-pub(crate) fn split_state<const REST: usize>(state: &[f64]) -> Option<(Quaternion, [f64; REST])> {
+pub(crate) fn split_state<T: Real, const REST: usize>(state: &[T]) -> Option<(Quaternion<T>, [T; REST])> {
     let (head, rest) = state.split_at_checked(4)?;
     let q = Quaternion::from_unit(head.try_into().ok()?)?;
-    let rest: [f64; REST] = rest.try_into().ok()?;
-    rest.iter().all(|value| value.is_finite()).then_some((q, rest))
+    let rest: [T; REST] = rest.try_into().ok()?;
+    let finite = |value: &T| value.simd_abs().simd_le(T::splat(f64::MAX)).all();
+    rest.iter().all(finite).then_some((q, rest))
 }

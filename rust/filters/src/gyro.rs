@@ -5,8 +5,9 @@
 
 use imufit_attitude::Quaternion;
 
-use crate::Sample;
 use crate::filter::{Filter, Parameter, Usage, split_state};
+use crate::intake::{Intake, all_rows};
+use crate::{Columns, Sample, Skipped};
 
 /// None.
 pub const PARAMETERS: &[Parameter] = &[];
@@ -33,12 +34,16 @@ impl Filter for Gyro {
         self.q = attitude;
     }
 
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [f64], skipped: &mut Skipped) {
+        all_rows(self, intake, columns, attitude, skipped);
+    }
+
     fn state(&self) -> Vec<f64> {
         self.q.to_array().to_vec()
     }
 
     fn set_state(&mut self, state: &[f64]) -> bool {
-        let found = split_state::<0>(state);
+        let found = split_state::<f64, 0>(state);
         if let Some((q, [])) = found {
             self.q = q;
         }

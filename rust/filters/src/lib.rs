@@ -8,21 +8,28 @@
 //! | [`kalman`] | attitude and gyro bias | paper B, the filter it cites |
 //! | [`triad`] | two vectors | paper C, Black 1964 |
 //! | [`mahony`] | nonlinear complementary filter | paper C, eqs. (5) to (7) |
+//! | [`quest`] | two weighted vectors | paper C names it; Shuster and Oh 1981 |
+//! | [`hybrid`] | TRIAD with Mahony's filter | paper C, figures 1 and 2 |
 //!
 //! A filter sees one [`Sample`] at a time and never a time stamp or a value that is not finite: gaps, NaN, free fall and
-//! slow sensors are the business of [`replay`] alone.
+//! slow sensors are the business of [`intake`] alone.
 #![cfg_attr(test, allow(clippy::float_cmp))]
+#![allow(clippy::inline_always)] // a row of a replay is a hundred operations: a call between them is felt
 
 pub mod accel;
 pub mod columns;
 pub mod complementary;
 pub mod filter;
 pub mod gyro;
+pub mod hybrid;
+pub mod intake;
 pub mod kalman;
 pub mod mahony;
 mod memory;
+pub mod quest;
 pub mod replay;
 pub mod rules;
+pub mod run_lanes;
 pub mod sample;
 pub mod skipped;
 pub mod start;
@@ -34,6 +41,7 @@ pub use columns::{Columns, Row};
 pub use filter::{Description, FILTERS, Filter, Parameter};
 pub use replay::Replay;
 pub use rules::Rules;
+pub use run_lanes::run_lanes;
 pub use sample::{AngularRate, Environment, FluxDensity, Reading, Sample, Sensor, SpecificForce};
 pub use skipped::Skipped;
 pub use start::Start;

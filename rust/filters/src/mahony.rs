@@ -23,16 +23,20 @@
 //! In one step a correction never exceeds the measured error (`k_P (k_1 dt_1 + k_2 dt_2) / 2` is limited to 1), which
 //! keeps the filter stable for any gain and any step.
 //!
+//! **Recovery.** One reading with NaN or infinity, free fall and a field along the vertical leave no error behind but that of
+//! the gyro. An error of up to 90 degrees, left by a saturated gyro or by a gap, is below a tenth of itself
+//! `8 / (k_p min(k_1, k_2))` s after good readings return.
+//!
 //! The paper's gains `[k_1 k_2 k_I k_P]`, [`AS_IN_FIGURE_3`] (the text prints `[1 - 0.2 20]`) and [`AS_IN_FIGURE_4`], suit
 //! a slow robot arm. The defaults are softer: found on hand-moved recordings with optical reference (BROAD), where they
 //! give 1.5 to 4 degrees on rotations and slow translations.
 
-use imufit_attitude::Quaternion;
-use nalgebra::Vector3;
+use imufit_attitude::{Quaternion, Real};
+use nalgebra::{SimdBool, Vector3};
 
 use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::sample::horizontal;
-use crate::{Environment, Sample};
+use crate::intake::{Intake, all_rows};
+use crate::{Columns, Environment, Sample, Skipped};
 
 /// The gains, named as printed, and the limit of the field.
 pub const PARAMETERS: &[Parameter] = &[
@@ -75,91 +79,155 @@ pub const AS_IN_FIGURE_4: [f64; 4] = [5.0, 0.1, 0.2, 10.0];
 
 /// The filter.
 #[derive(Debug, Clone)]
-pub struct Mahony {
-    environment: Environment,
-    k_1: f64,
-    k_2: f64,
-    k_i: f64,
-    k_p: f64,
-    min_angle: f64,
-    q: Quaternion,
-    bias: Vector3<f64>,
+pub struct Mahony<T = f64> {
+    /// +1 where z points up, -1 where it points down: up is along z in every frame.
+    up_z: T,
+    /// x and y of north x up, so that `v x north = up (v . across)` for a horizontal v.
+    across: [T; 2],
+    /// k_1 / 2 and k_2 / 2.
+    half_weights: [T; 2],
+    half_k_i: T,
+    k_p: T,
+    /// Square of the sine of the least angle between field and vertical.
+    least_square: T,
+    q: Quaternion<T>,
+    bias: Vector3<T>,
 }
 
-impl Mahony {
+/// What the vectors of one sample say of a filter's attitude.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Innovation<T> {
+    /// Eq. (5) times the time that each vector stands for: body frame, s.
+    pub w_mes: Vector3<T>,
+    /// k_i / 2 times that time, summed, s.
+    pub weight: T,
+    /// Whether the field was of use.
+    pub usage: Usage,
+}
+
+impl<T: Real> Mahony<T> {
     /// With the values of [`PARAMETERS`] in their order.
-    pub fn new(environment: &Environment, values: &[f64]) -> Self {
-        let value = |at: usize| values.get(at).copied().unwrap_or(PARAMETERS[at].default);
+    pub fn new(environment: &Environment, values: &[T]) -> Self {
+        let value = |at: usize| values.get(at).copied().unwrap_or(T::splat(PARAMETERS[at].default));
+        let up = environment.up();
+        let across = environment.field_north().cross(&up);
+        let half = T::splat(0.5);
         Self {
-            environment: *environment,
-            k_1: value(0),
-            k_2: value(1),
-            k_i: value(2),
+            up_z: T::splat(up.z),
+            across: [T::splat(across.x), T::splat(across.y)],
+            half_weights: [value(0) * half, value(1) * half],
+            half_k_i: value(2) * half,
             k_p: value(3),
-            min_angle: value(4),
-            q: Quaternion::IDENTITY,
-            bias: Vector3::zeros(),
+            least_square: square_of_sine(value(4)),
+            q: Quaternion::default(),
+            bias: Vector3::repeat(T::splat(0.0)),
         }
     }
 
     /// The estimated gyro bias b^, rad/s.
-    pub fn bias(&self) -> Vector3<f64> {
+    pub fn bias(&self) -> Vector3<T> {
         self.bias
     }
 
-    /// Eq. (5) times the time each vector stands for: body frame, s.
-    fn innovation(&self, sample: &Sample) -> (Vector3<f64>, f64, Usage) {
-        let (mut w_mes, mut weight, mut usage) = (Vector3::zeros(), 0.0, Usage::Full);
-        let up = self.environment.up();
-        if let Some(f) = sample.f
-            && let Some(v) = f.value.0.try_normalize(0.0)
-        {
-            let gain = 0.5 * self.k_1 * f.dt;
-            w_mes += v.cross(&self.q.rotate_back(&up)) * gain;
-            weight += gain;
-        }
-        if let Some(m) = sample.m {
-            if let Some(v) = horizontal(&self.q.rotate(&m.value.0), &up, self.min_angle.min(1.5).sin()) {
-                let gain = 0.5 * self.k_2 * m.dt;
-                w_mes += self.q.rotate_back(&v.cross(&self.environment.field_north())) * gain;
-                weight += gain;
-            } else {
-                usage = Usage::NoHeading;
+    /// Puts the attitude elsewhere; the bias stays.
+    pub(crate) fn put(&mut self, attitude: Quaternion<T>) {
+        self.q = attitude;
+    }
+
+    /// The attitude turned by the rate of the sample less the bias; still to be brought back onto the unit sphere.
+    #[inline(always)]
+    pub(crate) fn predicted(&self, sample: &Sample) -> Quaternion<T> {
+        let Some(omega) = sample.omega else {
+            return self.q;
+        };
+        let rate = omega.value.0.map(T::splat) - self.bias;
+        self.q
+            .times(Quaternion::exp_of_half(&(rate * T::splat(0.5 * omega.dt))))
+    }
+
+    /// Turns attitude and bias by an innovation, by no more than the error it shows.
+    #[inline(always)]
+    pub(crate) fn correct(&mut self, predicted: Quaternion<T>, w_mes: &Vector3<T>, weight: T) {
+        let one = T::splat(1.0);
+        let limit = one.simd_min(one / (self.k_p * weight));
+        // The renormalisation does not wait for the innovation.
+        let half = w_mes * (limit * self.k_p * T::splat(0.5));
+        self.q = predicted.kept().times(Quaternion::exp_of_half(&half));
+        let bias = self.bias - w_mes * (limit * self.half_k_i);
+        let finite = bias.dot(&bias).simd_le(T::splat(f64::MAX));
+        self.bias = if finite.all() {
+            bias
+        } else {
+            bias.zip_map(&self.bias, |new, old| new.select(finite, old))
+        };
+    }
+
+    /// Eq. (5).
+    #[inline(always)]
+    fn innovation(&self, q: Quaternion<T>, sample: &Sample) -> Innovation<T> {
+        let zero = T::splat(0.0);
+        let up = q.vertical() * self.up_z;
+        let (mut w_mes, mut weight, mut usage) = (Vector3::repeat(zero), zero, Usage::Full);
+        if let Some(f) = sample.f {
+            let length = f.value.0.norm();
+            if length > 0.0 {
+                let gain = self.half_weights[0] * T::splat(f.dt);
+                w_mes = f.value.0.map(T::splat).cross(&up) * (gain / T::splat(length));
+                weight = gain;
             }
         }
-        (w_mes, weight, usage)
+        if let Some(m) = sample.m {
+            let m_n = q.rotate(&m.value.0.map(T::splat));
+            let (x, y) = (m_n.x, m_n.y);
+            let square = x * x + y * y;
+            let whole = T::splat(m.value.0.norm_squared());
+            let shows = square.simd_ge(self.least_square * whole) & square.simd_gt(zero);
+            if !shows.all() {
+                usage = Usage::NoHeading;
+            }
+            let gain = (self.half_weights[1] * T::splat(m.dt)).select(shows, zero);
+            let heading = ((self.across[0] * x + self.across[1] * y) * gain) / square.simd_sqrt();
+            w_mes += up * heading.select(shows, zero);
+            weight += gain;
+        }
+        Innovation { w_mes, weight, usage }
     }
 }
 
-impl Filter for Mahony {
+/// Of the least angle between field and vertical, at most 1.5 rad.
+pub(crate) fn square_of_sine<T: Real>(angle: T) -> T {
+    let sine = angle.simd_min(T::splat(1.5)).simd_sin();
+    sine * sine
+}
+
+impl<T: Real> Filter<T> for Mahony<T> {
+    #[inline(always)]
     fn step(&mut self, sample: &Sample) -> Usage {
-        if let Some(omega) = sample.omega {
-            self.q = self.q.turned(&(omega.value.0 - self.bias), omega.dt);
-        }
-        let (w_mes, weight, usage) = self.innovation(sample);
-        let limit = 1.0_f64.min(1.0 / (self.k_p * weight));
-        self.q = self.q.turned(&(w_mes * limit), self.k_p);
-        let bias = self.bias - w_mes * (0.5 * self.k_i * limit);
-        if bias.norm_squared().is_finite() {
-            self.bias = bias;
-        }
+        let predicted = self.predicted(sample);
+        let Innovation { w_mes, weight, usage } = self.innovation(predicted, sample);
+        self.correct(predicted, &w_mes, weight);
         usage
     }
 
-    fn attitude(&self) -> Quaternion {
+    #[inline(always)]
+    fn attitude(&self) -> Quaternion<T> {
         self.q
     }
 
     fn reset(&mut self, attitude: Quaternion) {
-        (self.q, self.bias) = (attitude, Vector3::zeros());
+        (self.q, self.bias) = (attitude.splat(), Vector3::repeat(T::splat(0.0)));
     }
 
-    fn state(&self) -> Vec<f64> {
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
+        all_rows(self, intake, columns, attitude, skipped);
+    }
+
+    fn state(&self) -> Vec<T> {
         let [w, x, y, z] = self.q.to_array();
         vec![w, x, y, z, self.bias.x, self.bias.y, self.bias.z]
     }
 
-    fn set_state(&mut self, state: &[f64]) -> bool {
+    fn set_state(&mut self, state: &[T]) -> bool {
         let found = split_state(state);
         if let Some((q, bias)) = found {
             (self.q, self.bias) = (q, Vector3::from(bias));
@@ -213,7 +281,7 @@ mod tests {
         let frame = Frame::Enu;
         let environment = Environment::new(frame, 9.81, None).unwrap();
         let q = Quaternion::exp(&Vector3::new(0.4, -0.7, 1.9));
-        let mut filter = Mahony::new(&environment, &[]);
+        let mut filter = Mahony::<f64>::new(&environment, &[]);
         filter.reset(q);
         let mut sample = standing(q, frame, Vector3::zeros(), 0.01);
         let disturbed = frame.default_field() + Vector3::new(30.0, 10.0, 25.0);

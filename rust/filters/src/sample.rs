@@ -77,11 +77,13 @@ pub struct Environment {
     frame: Frame,
     gravity: f64,
     field_north: Vector3<f64>,
+    field: Option<Vector3<f64>>,
 }
 
 impl Environment {
     /// A frame, the magnitude of gravity (m/s^2) and, where it is known, the magnetic flux density in the reference
-    /// frame (uT). Of the field only the horizontal direction is used; without one the field points north.
+    /// frame (uT). Most filters use only its horizontal direction, and `quest` its dip as well; without one the field
+    /// points north.
     pub fn new(frame: Frame, gravity: f64, field: Option<Vector3<f64>>) -> Result<Self, FilterError> {
         if !(gravity.is_finite() && gravity > 0.0) {
             return Err(FilterError::Environment(format!(
@@ -101,6 +103,7 @@ impl Environment {
             frame,
             gravity,
             field_north,
+            field: field.and_then(|m| m.try_normalize(0.0)),
         })
     }
 
@@ -122,6 +125,11 @@ impl Environment {
     /// Direction of the field's horizontal part, in the reference frame (north where no field is given).
     pub fn field_north(&self) -> Vector3<f64> {
         self.field_north
+    }
+
+    /// Direction of the whole field, in the reference frame, where one is given.
+    pub fn field(&self) -> Option<Vector3<f64>> {
+        self.field
     }
 }
 

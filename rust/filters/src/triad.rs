@@ -5,12 +5,14 @@
 //! pair in the body and for the known pair in the reference frame, and `R = [t1 t2 t3]_n [t1 t2 t3]_b^T`. The first
 //! vector is met exactly, of the second only the direction across the first is used; the dip of the field plays no part.
 
-use imufit_attitude::matrix::quaternion_from_matrix;
-use imufit_attitude::{Frame, Quaternion};
-use nalgebra::{Matrix3, Vector3};
+use imufit_attitude::matrix::quaternion_of_rotation;
+use imufit_attitude::{Frame, Quaternion, Real};
+use nalgebra::{Matrix3, SimdBool, Vector3};
 
 use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::{Environment, FluxDensity, Sample, SpecificForce};
+use crate::intake::{Intake, all_rows};
+use crate::mahony::square_of_sine;
+use crate::{Columns, Environment, FluxDensity, Sample, Skipped, SpecificForce};
 
 /// How close to parallel is too close.
 pub const PARAMETERS: &[Parameter] = &[Parameter {
@@ -20,16 +22,27 @@ pub const PARAMETERS: &[Parameter] = &[Parameter {
     meaning: "where field and specific force are closer to parallel than this, the heading is held: smaller accepts noisier headings",
 }];
 
-/// The matrix with the columns t1, t2, t3; `None` where the sine of the angle between a and m is below `sine`.
-fn triad(a: &Vector3<f64>, m: &Vector3<f64>, sine: f64) -> Option<Matrix3<f64>> {
-    let (a, m) = (a.try_normalize(0.0)?, m.try_normalize(0.0)?);
+/// The matrix with the columns t1, t2, t3, and whether the sine of the angle between a and m has at least the given square.
+pub(crate) fn triad<T: Real>(a: &Vector3<T>, m: &Vector3<T>, least_square: T) -> (Matrix3<T>, T::SimdBool) {
+    let (a, m) = (a / a.norm(), m / m.norm());
     let across = a.cross(&m);
-    let length = across.norm();
-    if !(length.is_finite() && length > 0.0 && length >= sine) {
-        return None;
-    }
-    let t2 = across / length;
-    Some(Matrix3::from_columns(&[a, t2, a.cross(&t2)]))
+    let square = across.dot(&across);
+    // A vector of length zero makes NaN, which fails every comparison.
+    let apart = square.simd_gt(T::splat(0.0)) & square.simd_ge(least_square);
+    let t2 = across / square.simd_sqrt();
+    (Matrix3::from_columns(&[a, t2, a.cross(&t2)]), apart)
+}
+
+/// The attitude that takes the directions (a, m) of the body into those of the reference frame, a exactly; and whether
+/// there is one.
+pub(crate) fn attitude_from_pairs<T: Real>(
+    body: (&Vector3<T>, &Vector3<T>),
+    reference: (&Vector3<T>, &Vector3<T>),
+    least_square: T,
+) -> (Quaternion<T>, T::SimdBool) {
+    let (seen, apart) = triad(body.0, body.1, least_square);
+    let (known, known_apart) = triad(reference.0, reference.1, T::splat(0.0));
+    (quaternion_of_rotation(&(known * seen.transpose())), apart & known_apart)
 }
 
 /// The attitude for which `f` points up and the field's horizontal part north (or along the field given in the
@@ -40,70 +53,102 @@ pub fn attitude_from_vectors(
     environment: &Environment,
     min_angle: f64,
 ) -> Option<Quaternion> {
-    let body = triad(&f.0, &m.0, min_angle.min(1.5).sin())?;
-    let reference = triad(&environment.up(), &environment.field_north(), 0.0)?;
-    quaternion_from_matrix(&(reference * body.transpose()))
+    let reference = (&environment.up(), &environment.field_north());
+    let (q, apart) = attitude_from_pairs((&f.0, &m.0), reference, square_of_sine(min_angle));
+    apart.then_some(q)
 }
 
 /// The attitude nearest to `q` for which `f` points up.
-pub fn levelled(q: Quaternion, f: &SpecificForce, frame: Frame) -> Quaternion {
-    Quaternion::between(&q.rotate(&f.0), &frame.up()) * q
+pub fn levelled<T: Real>(q: Quaternion<T>, f: &SpecificForce, frame: Frame) -> Quaternion<T> {
+    Quaternion::between(&q.rotate(&f.0.map(T::splat)), &frame.up().map(T::splat)) * q
+}
+
+/// What TRIAD says of a sample: the attitude, and in which lanes the field had a part in it.
+///
+/// On rows without a usable field (a slow magnetometer, a field along the specific force) the attitude `held` is turned
+/// by the least rotation that makes the specific force point up, so that roll and pitch stay fresh and the heading is
+/// held. `None` without a usable specific force.
+pub(crate) fn measured<T: Real>(
+    sample: &Sample,
+    held: Quaternion<T>,
+    environment: &Environment,
+    least_square: T,
+) -> Option<(Quaternion<T>, T::SimdBool)> {
+    let f = sample.f?.value;
+    let (q, apart) = match sample.m {
+        Some(m) => attitude_from_pairs(
+            (&f.0.map(T::splat), &m.value.0.map(T::splat)),
+            (
+                &environment.up().map(T::splat),
+                &environment.field_north().map(T::splat),
+            ),
+            least_square,
+        ),
+        None => (held, T::splat(0.0).simd_gt(T::splat(0.0))),
+    };
+    if apart.all() {
+        return Some((q, apart));
+    }
+    Some((q.select(apart, levelled(held, &f, environment.frame())), apart))
 }
 
 /// The filter: no memory but the attitude it holds.
 ///
-/// On rows without a usable field (a slow magnetometer, a field along the specific force) the last attitude is turned
-/// by the least rotation that makes the specific force point up, so that roll and pitch stay fresh and the heading is
-/// held; on rows without a usable specific force the attitude is held.
+/// Rows without a usable field keep roll and pitch fresh and hold the heading; on rows without a usable specific force
+/// (free fall, NaN, clipped) the attitude is held. With the first good pair of readings, also after a gap, the attitude is
+/// the measured one again: recovered in one row.
 #[derive(Debug, Clone)]
-pub struct Triad {
+pub struct Triad<T = f64> {
     environment: Environment,
-    min_angle: f64,
-    q: Quaternion,
+    least_square: T,
+    q: Quaternion<T>,
 }
 
-impl Triad {
+impl<T: Real> Triad<T> {
     /// With the values of [`PARAMETERS`] in their order.
-    pub fn new(environment: &Environment, values: &[f64]) -> Self {
-        let min_angle = values.first().copied().unwrap_or(PARAMETERS[0].default);
+    pub fn new(environment: &Environment, values: &[T]) -> Self {
+        let min_angle = values.first().copied().unwrap_or(T::splat(PARAMETERS[0].default));
         Self {
             environment: *environment,
-            min_angle,
-            q: Quaternion::IDENTITY,
+            least_square: square_of_sine(min_angle),
+            q: Quaternion::default(),
         }
     }
 }
 
-impl Filter for Triad {
+impl<T: Real> Filter<T> for Triad<T> {
+    #[inline]
     fn step(&mut self, sample: &Sample) -> Usage {
-        let Some(f) = sample.f else {
+        let Some((q, apart)) = measured(sample, self.q, &self.environment, self.least_square) else {
             return Usage::Full;
         };
-        let measured = sample
-            .m
-            .and_then(|m| attitude_from_vectors(&f.value, &m.value, &self.environment, self.min_angle));
-        self.q = measured.unwrap_or_else(|| levelled(self.q, &f.value, self.environment.frame()));
-        if sample.m.is_some() && measured.is_none() {
+        self.q = q;
+        if sample.m.is_some() && !apart.all() {
             Usage::NoHeading
         } else {
             Usage::Full
         }
     }
 
-    fn attitude(&self) -> Quaternion {
+    #[inline]
+    fn attitude(&self) -> Quaternion<T> {
         self.q
     }
 
     fn reset(&mut self, attitude: Quaternion) {
-        self.q = attitude;
+        self.q = attitude.splat();
     }
 
-    fn state(&self) -> Vec<f64> {
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
+        all_rows(self, intake, columns, attitude, skipped);
+    }
+
+    fn state(&self) -> Vec<T> {
         self.q.to_array().to_vec()
     }
 
-    fn set_state(&mut self, state: &[f64]) -> bool {
-        let found = split_state::<0>(state);
+    fn set_state(&mut self, state: &[T]) -> bool {
+        let found = split_state::<T, 0>(state);
         if let Some((q, [])) = found {
             self.q = q;
         }
