@@ -8,6 +8,7 @@ Names are loaded when they are first used, so that ``import imufit`` costs next 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from imufit import allan as allan
     from imufit import calibrate as calibrate
     from imufit import device as device
     from imufit import diagnose as diagnose
@@ -34,6 +35,7 @@ else:
     from importlib import import_module
 
     _MODULES = (
+        "allan",
         "calibrate",
         "device",
         "diagnose",

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import click
 
 from imufit.cli.add import add
+from imufit.cli.allan import allan
 from imufit.cli.apply import apply
 from imufit.cli.calibrate import calibrate
 from imufit.cli.compare import compare
@@ -83,6 +84,7 @@ for _command in (
     reveal,
     grade,
     replay,
+    allan,
     convert,
     demo,
 ):

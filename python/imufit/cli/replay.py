@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs, log_argument, plot_option
+from imufit.cli.arguments import EXISTING, LOG_ENDINGS, OutputFile, json_option, keep_inputs, log_argument, plot_option
 from imufit.cli.names import FILTERS, KnownList, unknown
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
@@ -37,6 +37,13 @@ if TYPE_CHECKING:
     help="Setting of a filter, in SI units, or of the rules as replay.NAME, e.g. kalman.acc_noise=0.01. Repeatable.",
 )
 @click.option(
+    "--settings",
+    "settings_file",
+    type=EXISTING,
+    metavar="FILE.toml",
+    help="Settings as `imufit tune -o` and `imufit allan --settings` write them; --set goes before them.",
+)
+@click.option(
     "--band",
     type=click.FloatRange(min=0.0, min_open=True),
     default=0.1,
@@ -55,6 +62,7 @@ def replay(
     mapping: tuple[str, ...],
     filters: tuple[tuple[str, ...], ...],
     assignments: tuple[str, ...],
+    settings_file: Path | None,
     band: float,
     output: Path | None,
     json_file: Path | None,
@@ -66,9 +74,11 @@ def replay(
     of the inclination: RMSE, offset, standard deviation, drift, noise density, settling time, gain on vibration, and
     how the methods rank.
     """
-    keep_inputs([log], [output, json_file, plot_file])
+    keep_inputs([log, settings_file], [output, json_file, plot_file])
     names = tuple(dict.fromkeys(name for group in filters for name in group))
-    settings = _settings(assignments)
+    settings = {} if settings_file is None else engine.read_settings(settings_file)
+    for group, values in _settings(assignments).items():
+        settings[group] = {**settings.get(group, {}), **values}
     out = Output(json_file)
     with ProgressBar() as progress:
         result = engine.replay(engine.read_log(log, mapping), names, progress, settings)

@@ -2,6 +2,7 @@
 
 from imufit.replay.replay import DEFAULT_FILTERS, FILTERS, SETTINGS, Replay, estimate_mag_reference, replay
 from imufit.replay.replay_many import replay_many
+from imufit.replay.settings_file import read_settings, write_settings
 from imufit.replay.steady_state import SteadyState, kalman_steady_state
 from imufit.replay.stream import Stream
 from imufit.replay.tilt_angles import tilt_angles
@@ -15,7 +16,9 @@ __all__ = [
     "Stream",
     "estimate_mag_reference",
     "kalman_steady_state",
+    "read_settings",
     "replay",
     "replay_many",
     "tilt_angles",
+    "write_settings",
 ]
