@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from imufit.allan.terms import TERMS, Term, basis
+from imufit.allan.terms import TERMS, Term, basis, dominant
 from imufit.figures import quantity
 from imufit.log import Log
 from imufit.results import Table
@@ -96,8 +96,11 @@ class Channel:
 
     @property
     def still_falling(self) -> bool:
-        """Whether the deviation is least at the end of the curve: a longer log would show less."""
-        return int(np.nanargmin(self.deviation)) >= len(self.tau) - 2
+        """Whether white noise is most of the deviation at the longest averaging time: a longer log would show less."""
+        if self.squares is None:
+            return int(np.nanargmin(self.deviation)) >= len(self.tau) - 2
+        visible = [self.terms[kind].value or 0.0 for kind in self.squares]
+        return dominant(np.square(visible), self.tau[-1:]) == ["white"]
 
     def fitted(self, tau: Array) -> Array | None:
         """Return the deviation that the fitted terms give, (k,); None without a fit.
@@ -195,9 +198,7 @@ class Allan:
     @property
     def remarks(self) -> tuple[str, ...]:
         """Notes, and what this log cannot show."""
-        hidden = [
-            name for name, channel in self.channels.items() if channel.terms["flicker"].value is None
-        ]
+        hidden = [name for name, channel in self.channels.items() if channel.terms["flicker"].value is None]
         remarks = list(self.notes)
         if hidden:
             remarks.append(
@@ -222,7 +223,10 @@ class Allan:
         rows = tuple(
             (
                 name,
-                *(_cell(channel.terms[kind], channel.unit, kind) for kind in ("white", "flicker", "walk", "quantisation")),
+                *(
+                    _cell(channel.terms[kind], channel.unit, kind)
+                    for kind in ("white", "flicker", "walk", "quantisation")
+                ),
             )
             for name, channel in self.channels.items()
         )
@@ -255,14 +259,16 @@ class Allan:
     def to_dataframe(self) -> pd.DataFrame:
         """Table with one row for each channel and averaging time: channel, tau, deviation, low, high, freedom."""
         frames = [
-            pd.DataFrame({
-                "channel": name,
-                "tau": channel.tau,
-                "deviation": channel.deviation,
-                "low": channel.low,
-                "high": channel.high,
-                "freedom": channel.freedom,
-            })
+            pd.DataFrame(
+                {
+                    "channel": name,
+                    "tau": channel.tau,
+                    "deviation": channel.deviation,
+                    "low": channel.low,
+                    "high": channel.high,
+                    "freedom": channel.freedom,
+                }
+            )
             for name, channel in self.channels.items()
         ]
         return pd.concat(frames, ignore_index=True)

@@ -6,7 +6,7 @@ r"""The usual terms of an Allan variance, fitted together to the whole curve.
 the bias. The squares are found by weighted least squares that cannot go negative (Lawson and Hanson). The weights
 come from the equivalent degrees of freedom under the kind of noise that dominates each averaging time, as the fit itself
 tells it; both are repeated until they agree. Only averaging times an octave apart are fitted: those in between repeat what
-these say.
+these say, and the correlation of those an octave apart is taken into account.
 """
 
 from __future__ import annotations
@@ -36,11 +36,14 @@ _SURE = 3.0
 """A term whose square is not this many standard errors above 0 is not visible."""
 _BOUND = 1.645
 """One-sided 95 % of a normal distribution."""
-_ACCEPTED = 1e-3
+_ACCEPTED = 1e-6
 """A fit whose misfit is less probable than this is no fit: a shorter filter or noise of another colour shapes the curve."""
 _LEAST = 4
 """Octaves that a fit needs."""
+_FOOT = 1
+"""Octaves by which the fit starts later where a filter bends the curve."""
 _ROUNDS = 8
+_GRID = 600
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,8 @@ class Fitted:
         By kind of noise, as in `TERMS`.
     squares : dict of float
         Fitted coefficients squared, those that are not visible included.
+    white_error : float
+        Standard error of the square of N.
     tau_start : float
         Shortest averaging time that was fitted, s: below it the sensor's own filter shapes the curve.
     probability : float
@@ -88,6 +93,7 @@ class Fitted:
 
     terms: dict[str, Term]
     squares: dict[str, float]
+    white_error: float
     tau_start: float
     probability: float
 
@@ -101,6 +107,22 @@ def dominant(squares: Array, tau: Array) -> list[str]:
     """Return the kind of noise that adds most at each averaging time (s), for squares (4,) in the order of `TERMS`."""
     names = list(TERMS)
     return [names[k] for k in np.argmax(basis(tau) * squares, axis=1)]
+
+
+def correlation(tau: Array, squares: Array) -> Array:
+    r"""Return how the estimates at different averaging times hang together, (k, k), for squares (4,) as in `TERMS`.
+
+    The estimator is the power behind a filter with :math:`|H|^2 = 2 \sin^4(\pi f \tau) / (\pi f \tau)^2`, and the
+    covariance of two such powers of a Gaussian noise of density S goes as :math:`\int |H_1|^2 |H_2|^2 S^2 df`.
+    """
+    frequency = np.geomspace(0.02 / tau[-1], 0.5 / tau[0], _GRID)
+    omega = 2.0 * np.pi * frequency
+    density = squares @ np.stack([omega**2, np.ones_like(omega), 1.0 / omega, 1.0 / omega**2])
+    phase = np.pi * frequency * tau[:, None]
+    powers = np.sin(phase) ** 4 / phase**2 * density * np.sqrt(frequency)
+    joint = powers @ powers.T
+    size = np.sqrt(np.diag(joint))
+    return np.asarray(joint / np.outer(size, size) + 1e-9 * np.eye(tau.size))
 
 
 def fit(tau: Array, variance: Array, freedom: Callable[[str, int], float]) -> Fitted | None:
@@ -118,14 +140,19 @@ def fit(tau: Array, variance: Array, freedom: Callable[[str, int], float]) -> Fi
     usable = np.isfinite(variance) & (variance > 0.0)
     if np.count_nonzero(usable) < _LEAST:
         return None
-    tries = []
     rows = np.flatnonzero(usable)
-    for first in range(len(rows) - _LEAST + 1):
-        found = _fit(tau, variance, rows[first:], freedom)
-        tries.append(found)
-        if found.probability >= _ACCEPTED:
-            break
-    return tries[-1] if tries[-1].probability >= _ACCEPTED else max(tries, key=lambda found: found.probability)
+    found = best = _fit(tau, variance, rows, freedom)
+    if found.probability >= _ACCEPTED:
+        return found
+    last = len(rows) - _LEAST
+    for first in range(1, last + 1):
+        before, found = found, _fit(tau, variance, rows[first:], freedom)
+        best = max(best, found, key=lambda each: each.probability)
+        # Where the sensor's filter bends the curve, its foot still pulls at the first fits that pass.
+        level = found.squares["white"] <= before.squares["white"] + before.white_error
+        if before.probability >= _ACCEPTED and level:
+            return _fit(tau, variance, rows[min(first + _FOOT, last) :], freedom)
+    return best
 
 
 def _fit(tau: Array, variance: Array, rows: NDArray[np.intp], freedom: Callable[[str, int], float]) -> Fitted:
@@ -133,22 +160,28 @@ def _fit(tau: Array, variance: Array, rows: NDArray[np.intp], freedom: Callable[
     design, measured = basis(tau[rows]), variance[rows]
     model = measured.copy()
     kinds = ["white"] * len(rows)
-    squares = np.zeros(len(TERMS))
-    spread = np.ones_like(measured)
+    squares = np.array([0.0, 1.0, 0.0, 0.0])
+    whitening, freedoms = np.eye(len(rows)), np.ones(len(rows))
     for _ in range(_ROUNDS):
         # The scatter is that of the model: a point that came out low by chance is not surer for it.
-        spread = model * np.sqrt(2.0 / np.array([freedom(kind, int(row)) for kind, row in zip(kinds, rows, strict=True)]))
-        squares = nnls(design / spread[:, None], measured / spread)[0]
+        freedoms = np.array([freedom(kind, int(row)) for kind, row in zip(kinds, rows, strict=True)])
+        spread = model * np.sqrt(2.0 / freedoms)
+        whitening = np.linalg.inv(np.linalg.cholesky(correlation(tau[rows], squares))) / spread
+        squares = nnls(whitening @ design, whitening @ measured)[0]
         model = np.maximum(design @ squares, 1e-3 * measured)
         kinds = dominant(squares, tau[rows])
-    misfit = float(np.sum(((design @ squares - measured) / spread) ** 2))
+    # The likelihood ratio of variances, which few degrees of freedom leave far from normal.
+    over = measured / (design @ squares)
+    misfit = float(np.sum(freedoms * (over - 1.0 - np.log(over))))
     left = max(1, len(rows) - int(np.count_nonzero(squares)))
     probability = float(chi2.sf(misfit, left))
     # Where the terms do not describe the curve its misfit says how sure they are.
     inflation = np.sqrt(max(1.0, misfit / left))
-    errors = inflation * _errors(design / spread[:, None], squares)
+    errors = inflation * _errors(whitening @ design, squares)
     terms = {name: _term(squares[k], errors[k]) for k, name in enumerate(TERMS)}
-    fitted = Fitted(terms, dict(zip(TERMS, squares.tolist(), strict=True)), float(tau[rows[0]]), probability)
+    fitted = Fitted(
+        terms, dict(zip(TERMS, squares.tolist(), strict=True)), float(errors[1]), float(tau[rows[0]]), probability
+    )
     return _at_the_ends(fitted, tau[rows])
 
 

@@ -50,7 +50,9 @@ def read_settings(path: str | Path) -> dict[str, dict[str, float]]:
     for group, values in groups.items():
         _known("filter", group, SETTINGS, path)
         if not isinstance(values, dict):
-            raise InputError(f"{group} is no table of settings", file=path, remedy=f"Write [{group}] above its settings.")
+            raise InputError(
+                f"{group} is no table of settings", file=path, remedy=f"Write [{group}] above its settings."
+            )
         for name, value in values.items():
             _known(f"setting of {group}", name, SETTINGS[group], path)
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
