@@ -158,6 +158,9 @@ def fit(tau: Array, variance: Array, freedom: Callable[[str, int], float]) -> Fi
 def _fit(tau: Array, variance: Array, rows: NDArray[np.intp], freedom: Callable[[str, int], float]) -> Fitted:
     """Fit the terms to some of the points."""
     design, measured = basis(tau[rows]), variance[rows]
+    if rows[0] > 0:
+        # Behind a filter quantisation cannot be seen, and would only take up what is left of the filter's bend.
+        design[:, 0] = 0.0
     model = measured.copy()
     kinds = ["white"] * len(rows)
     squares = np.array([0.0, 1.0, 0.0, 0.0])
