@@ -1,4 +1,4 @@
-"""Allan deviation: the estimator against allantools, what is read off against what was put in, and what cannot be seen."""
+"""Allan deviation: the estimator against allantools, what is read off, and what cannot be seen."""
 
 import json
 from dataclasses import replace
@@ -25,15 +25,15 @@ def still(seconds: float = 600.0, seed: int = 1, *, white=(0.02, 1e-3, 0.3), wal
     noise = Noise(acc=acc, gyr=gyr, mag=mag)
     return Log.from_arrays(
         t,
-        acc=[0.0, 0.0, 9.80665] + noise.acc.draw(rng, t),
+        acc=noise.acc.draw(rng, t) + [0.0, 0.0, 9.80665],
         gyr=noise.gyr.draw(rng, t) + 0.01,
-        mag=[20.0, 0.0, 40.0] + noise.mag.draw(rng, t),
+        mag=noise.mag.draw(rng, t) + [20.0, 0.0, 40.0],
         frame="NWU",
     )
 
 
 def flicker(n: int, size: float, rng: np.random.Generator) -> np.ndarray:
-    """Noise whose one-sided density is size^2 / (2 pi f): the bias instability `size` of IEEE Std 952, twice two-sided."""
+    """Noise of the bias instability `size` of IEEE Std 952: its two-sided density is size^2 / (2 pi f)."""
     frequency = np.fft.rfftfreq(n, STEP)
     density = np.zeros_like(frequency)
     density[1:] = 2.0 * size**2 / (2.0 * np.pi * frequency[1:])

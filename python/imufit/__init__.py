@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from imufit import replay, simulate
     from imufit import report as report
     from imufit import results as results
+    from imufit import tune as tune
     from imufit._imufit import __version__
     from imufit.diagnose.ladder import ladder
     from imufit.errors import InputError
@@ -50,6 +51,7 @@ else:
         "report",
         "results",
         "simulate",
+        "tune",
     )
     _HOMES = {
         "_imufit": ("__version__",),

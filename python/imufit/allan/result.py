@@ -212,8 +212,8 @@ class Allan:
         ]
         if late:
             remarks.append(
-                f"The shortest averaging times of {', '.join(late)} are left out of the fit: there a filter of the sensor, "
-                "or noise of another colour, shapes the curve."
+                f"The shortest averaging times of {', '.join(late)} are left out of the fit: there a filter of the "
+                "sensor, or noise of another colour, shapes the curve."
             )
         return tuple(remarks)
 

@@ -39,7 +39,10 @@ def allan(
     json_file: Path | None,
     plot_file: Path | None,
 ) -> None:
-    """Take the Allan deviation of LOG at rest and read the noise off it; a log that moves is cut to its longest rest."""
+    """Take the Allan deviation of LOG at rest and read the noise off it.
+
+    Of a log that moves only the longest rest is used.
+    """
     keep_inputs([log], [output, settings_file, json_file, plot_file])
     out = Output(json_file)
     with ProgressBar() as progress:

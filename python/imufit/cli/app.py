@@ -27,6 +27,7 @@ from imufit.cli.names import unknown
 from imufit.cli.replay import replay
 from imufit.cli.reveal import reveal
 from imufit.cli.simulate import simulate
+from imufit.cli.tune import tune
 
 SUCCESS, INTERNAL, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 DEBUG = "IMUFIT_DEBUG"
@@ -84,6 +85,7 @@ for _command in (
     reveal,
     grade,
     replay,
+    tune,
     allan,
     convert,
     demo,

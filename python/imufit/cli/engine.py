@@ -131,6 +131,25 @@ def filter_noise(found: Any) -> dict[str, dict[str, float]]:
     return filter_noise(found)
 
 
+def tune(log: Log, filter_name: str, progress: Progress, **options: Any) -> Any:
+    """Tune the gains of a filter on a log.
+
+    Raises
+    ------
+    InputError
+        The log lacks what this takes, or a setting cannot be.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.tune import tune  # noqa: PLC0415
+
+    try:
+        return tune(log, filter_name, progress=progress, **options)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(str(error), file=log.path) from error
+
+
 def write_settings(settings: Mapping[str, Mapping[str, float]], path: Path) -> None:
     """Write settings of filters as TOML, one table a filter."""
     from imufit.replay import write_settings  # noqa: PLC0415
