@@ -25,9 +25,9 @@ def still(seconds: float = 600.0, seed: int = 1, *, white=(0.02, 1e-3, 0.3), wal
     noise = Noise(acc=acc, gyr=gyr, mag=mag)
     return Log.from_arrays(
         t,
-        acc=noise.acc.draw(rng, t) + [0.0, 0.0, 9.80665],
+        acc=noise.acc.draw(rng, t) + np.array([0.0, 0.0, 9.80665]),
         gyr=noise.gyr.draw(rng, t) + 0.01,
-        mag=noise.mag.draw(rng, t) + [20.0, 0.0, 40.0],
+        mag=noise.mag.draw(rng, t) + np.array([20.0, 0.0, 40.0]),
         frame="NWU",
     )
 

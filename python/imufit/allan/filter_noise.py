@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from imufit import _imufit
 from imufit.allan.result import Allan
-from imufit.allan.terms import TERMS
 
 _SETTINGS = {"acc_noise": ("acc", "white"), "gyr_noise": ("gyr", "white"), "mag_noise": ("mag", "white")}
 _WALKS = {"bias_walk": ("gyr", "walk")}
@@ -36,8 +35,8 @@ def filter_noise(found: Allan) -> dict[str, dict[str, float]]:
     for name, description in _imufit.filter_descriptions().items():
         for setting, entry in description["settings"].items():
             sensor, kind = {**_SETTINGS, **_WALKS}.get(setting, ("", ""))
-            value = None if not sensor else found.mean(sensor, lambda channel, kind=kind: channel.terms[kind].value)
-            if value is None or kind not in TERMS:
+            value = found.term(sensor, kind) if sensor else None
+            if value is None:
                 continue
             length = lengths.get(sensor)
             if sensor in lengths and entry["unit"].startswith("rad"):

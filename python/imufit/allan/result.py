@@ -174,6 +174,18 @@ class Allan:
         known = [value for value in values if value is not None and np.isfinite(value)]
         return float(np.sqrt(np.mean(np.square(known)))) if known and len(known) == len(values) else None
 
+    def term(self, sensor: str, kind: str) -> float | None:
+        """Root mean square over a sensor's axes of a term's coefficient; None where an axis does not show it.
+
+        Parameters
+        ----------
+        sensor : str
+            "acc", "gyr" or "mag".
+        kind : str
+            Kind of noise, as in `TERMS`.
+        """
+        return self.mean(sensor, lambda channel: channel.terms[kind].value)
+
     @property
     def sample_noise(self) -> dict[str, float]:
         """Standard deviation of one reading per sensor: the metadata `noise`, the noise floor of the loop."""

@@ -195,7 +195,8 @@ def _errors(weighted: Array, squares: Array) -> Array:
     for k in range(squares.size):
         chosen = np.flatnonzero(active | (np.arange(squares.size) == k))
         normal = weighted[:, chosen].T @ weighted[:, chosen]
-        errors[k] = np.sqrt(np.linalg.pinv(normal, hermitian=True)[list(chosen).index(k)][list(chosen).index(k)])
+        at = int(np.flatnonzero(chosen == k)[0])
+        errors[k] = np.sqrt(np.linalg.pinv(normal, hermitian=True)[at, at])
     return errors
 
 

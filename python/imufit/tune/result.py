@@ -225,15 +225,17 @@ class Tuning:
             return f"{name} alone does better: {quantity.number(error)} deg."
         limits = []
         for gain in self.gains:
-            if gain.wins is None:
+            if gain.wins is None or (gain.wins[0] == 0.0 and np.isinf(gain.wins[1])):
                 continue
             low, high = gain.wins
             sides = [
                 f"{quantity.number(1.0 / low, 2)} times too small" if low > 0.0 else "",
                 f"{quantity.number(high, 2)} times too large" if np.isfinite(high) else "",
             ]
-            limits.append(f"{gain.name} " + (" or ".join(side for side in sides if side) or "never"))
-        return f"It loses to {name} ({quantity.number(error)} deg) with {'; '.join(limits)}."
+            limits.append(f"{gain.name} " + " or ".join(side for side in sides if side))
+        if not limits:
+            return f"It beats {name} ({quantity.number(error)} deg) whichever gain is wrong by up to 10 000 times."
+        return f"It loses to {name} ({quantity.number(error)} deg) only with {'; '.join(limits)}."
 
     def tables(self) -> list[Table]:
         """Gains, values, and the map as tables."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from imufit.allan import allan, filter_noise
 from imufit.errors import InputError
 from imufit.log import Log
 from imufit.progress import Progress, silent
+from imufit.replay import SETTINGS
 from imufit.tune.gains import RANGE, starts
 from imufit.tune.result import Gain, GainMap, Innovation, Tuning
 from imufit.tune.search import coarse, refine
@@ -25,9 +27,12 @@ _FLAT = 1.05
 """Gains within this factor of the least value are as good."""
 _PER_DECADE = 8
 _DECADES = 4
+_BETWEEN = 15
 _MAP = 17
 _MAP_DECADES = 1.5
 _ONE_ROW = 1e-9
+_REST = 20.0
+"""Shortest rest, s, whose Allan deviation is used."""
 _NOISES = ("gyr_noise", "bias_walk")
 """Noises that an Allan deviation tells; the accelerometer's and the magnetometer's include motion and surroundings."""
 
@@ -129,16 +134,8 @@ def tune(
         progress(1 + k, 6, f"fine search, {what}")
         column = np.where(np.isfinite(values[:, k]), values[:, k], np.inf)
         at = int(np.argmin(column))
-        optima.append(
-            refine(
-                lambda each, k=k: ready.values(scores(each))[:, k],
-                points[at],
-                float(column[at]),
-                low,
-                high,
-                spacing / 2.0,
-            )[0]
-        )
+        judge = partial(_column, ready, scores, k)
+        optima.append(refine(judge, points[at], float(column[at]), low, high, spacing / 2.0)[0])
     progress(4, 6, "tolerance of the gains")
     best = optima[PARTS]
     rival = _rival(ready)
@@ -164,11 +161,18 @@ def tune(
     )
 
 
+def _column(ready: Trials, scores: Callable[[Array], Array], k: int, points: Array) -> Array:
+    """Return the criterion of each point over half or whole k."""
+    return ready.values(scores(points))[:, k]
+
+
 def _known_noise(log: Log, name: str) -> tuple[dict[str, float], str]:
     """Return the noises that the log's longest rest tells of this filter, and what is to be said about it."""
     try:
         found = allan(log, sensors=("gyr",))
     except InputError:
+        return {}, ""
+    if found.duration < _REST:
         return {}, ""
     known = {key: value for key, value in filter_noise(found).get(name, {}).items() if key in _NOISES}
     if not known:
@@ -213,9 +217,18 @@ def _gains(
     values = ready.values(ready.scores(tried))[:, PARTS].reshape(len(names), factors.size)
     units = _units(ready.filter_name)
     middle = factors.size // 2
+
+    def change(k: int, tested: Array) -> Array:
+        """Return the values with gain k times each of the factors."""
+        name = names[k]
+        return ready.values(ready.scores([{**tuned, name: tuned[name] * factor} for factor in tested.tolist()]))[
+            :, PARTS
+        ]
+
     found = []
     for k, name in enumerate(names):
         edge = "lower" if best[k] - box[0][k] < 0.1 else "upper" if box[1][k] - best[k] < 0.1 else None
+        judge = partial(change, k)
         found.append(
             Gain(
                 name=name,
@@ -223,8 +236,8 @@ def _gains(
                 default=defaults[k],
                 tuned=tuned[name],
                 edge=edge,
-                flat=_within(factors, values[k], middle, _FLAT * values[k, middle]),
-                wins=None if rival is None else _within(factors, values[k], middle, rival),
+                flat=_within(factors, values[k], middle, _FLAT * values[k, middle], judge),
+                wins=None if rival is None else _within(factors, values[k], middle, rival, judge),
                 factors=factors,
                 values=values[k],
             )
@@ -233,27 +246,29 @@ def _gains(
 
 
 def _units(name: str) -> dict[str, str]:
-    from imufit.replay import SETTINGS  # noqa: PLC0415
-
     return {setting: entry["unit"] for setting, entry in SETTINGS[name].items()}
 
 
-def _within(factors: Array, values: Array, middle: int, limit: float) -> tuple[float, float] | None:
-    """Return the factors around 1 between which the values stay below a limit; 0 and infinity where none is met."""
+def _within(
+    factors: Array, values: Array, middle: int, limit: float, judge: Callable[[Array], Array]
+) -> tuple[float, float] | None:
+    """Return the outermost factors around 1 up to which the values stay below a limit, to 2 %.
+
+    0 and infinity where the limit is not met within the factors; None where it is exceeded at once.
+    """
     if not values[middle] <= limit:
         return None
-
-    def crossing(step: int) -> float:
-        k = middle
-        while 0 <= k + step < values.size:
-            ahead = values[k + step]
-            if not ahead <= limit:
-                part = (limit - values[k]) / (ahead - values[k]) if np.isfinite(ahead) else 0.0
-                return float(factors[k] * (factors[k + step] / factors[k]) ** part)
-            k += step
-        return float("inf") if step > 0 else 0.0
-
-    return crossing(-1), crossing(1)
+    ends = []
+    for step in (-1, 1):
+        bad = np.flatnonzero(~(values[middle::step] <= limit))
+        if not bad.size:
+            ends.append(float("inf") if step > 0 else 0.0)
+            continue
+        last = middle + step * (int(bad[0]) - 1)
+        between = np.geomspace(factors[last], factors[last + step], _BETWEEN + 2)[1:-1]
+        good = np.append(judge(between) <= limit, False)
+        ends.append(float(np.concatenate([[factors[last]], between])[int(np.argmin(good))]))
+    return ends[0], ends[1]
 
 
 def _map(ready: Trials, names: list[str], best: Array, map_of: tuple[str, str] | None) -> GainMap | None:
@@ -269,7 +284,7 @@ def _map(ready: Trials, names: list[str], best: Array, map_of: tuple[str, str] |
     return GainMap((a, b), x, y, values)
 
 
-def _worth(ready: Trials, scores: Array, criterion: str) -> dict[str, float]:
+def _worth(ready: Trials, scores: Array, criterion: Criterion) -> dict[str, float]:
     """Return the value, deg, of the defaults and the tuned gains, and of the latter on the half they were not tuned on.
 
     The rows of `scores` are the defaults, those tuned on the first half, on the second, and on the whole.

@@ -8,7 +8,7 @@
 //! settings, and what is left is the error of the attitude and of the bias. A copy that runs for a single row gives the
 //! innovations: what the filter is surprised by at each row.
 
-use imufit_attitude::{AttitudeError, Quaternion};
+use imufit_attitude::Quaternion;
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
@@ -19,6 +19,17 @@ use crate::{Environment, FilterError, Replay, Rules, Start};
 
 /// Rows that every filter takes before the next ones are fetched.
 const WINDOW: usize = 4096;
+
+/// What all trials share.
+#[derive(Debug, Clone, Copy)]
+pub struct Conditions {
+    /// The surroundings.
+    pub environment: Environment,
+    /// The rules around the filter.
+    pub rules: Rules,
+    /// Where the attitude starts.
+    pub start: Start,
+}
 
 /// What a trial is judged by.
 #[derive(Debug, Clone, Copy)]
@@ -31,6 +42,17 @@ pub struct Judgement<'a> {
     pub parts: usize,
     /// Time that a prediction runs, s; not positive: nothing is predicted.
     pub horizon: f64,
+}
+
+/// Total, heading and inclination error, rad: those of [`imufit_attitude::AttitudeError`] without its other parts.
+fn errors(found: Quaternion, reference: Quaternion) -> [f64; 3] {
+    let [w, x, y, z] = (found * reference.inverse()).canonical().to_array();
+    let across = x.hypot(y);
+    [
+        2.0 * across.hypot(z).atan2(w),
+        2.0 * z.atan2(w),
+        2.0 * across.atan2(w.hypot(z)),
+    ]
 }
 
 /// Sums over the surprises of one sensor, rad.
@@ -91,13 +113,8 @@ impl Trial {
             && let Ok(reference) = <[f64; 4]>::try_from(reference)
             && let Some(reference) = Quaternion::from_row(&reference)
         {
-            let error = AttitudeError::between(found, reference);
             score.rows += 1;
-            for (sum, value) in score
-                .squares
-                .iter_mut()
-                .zip([error.total, error.heading, error.inclination])
-            {
+            for (sum, value) in score.squares.iter_mut().zip(errors(found, reference)) {
                 *sum += value * value;
             }
         }
@@ -180,13 +197,16 @@ impl Known {
 pub fn run<E: From<FilterError>>(
     description: &'static Description,
     settings: &[Vec<(String, f64)>],
-    environment: Environment,
-    rules: Rules,
-    start: Start,
+    conditions: Conditions,
     columns: &Columns<'_>,
     judgement: &Judgement<'_>,
     mut look: impl FnMut() -> Result<(), E>,
 ) -> Result<Vec<Vec<Score>>, E> {
+    let Conditions {
+        environment,
+        rules,
+        start,
+    } = conditions;
     columns.check()?;
     let n = columns.t.len();
     let lengths = [
@@ -269,9 +289,11 @@ mod tests {
         run::<FilterError>(
             find("mahony").unwrap(),
             &settings,
-            environment,
-            Rules::default(),
-            Start::Vectors,
+            Conditions {
+                environment,
+                rules: Rules::default(),
+                start: Start::Vectors,
+            },
             &columns,
             &judgement,
             || Ok(()),

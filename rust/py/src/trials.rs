@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use imufit_attitude::Frame;
-use imufit_filters::trials::{self, Judgement, Score};
+use imufit_filters::trials::{self, Conditions, Judgement, Score};
 use imufit_filters::{Columns, Environment, Rules, Start, filter};
 use nalgebra::Vector3;
 use numpy::{PyArray3, PyReadonlyArray1};
@@ -99,20 +99,16 @@ fn filter_trials<'py>(
     };
     let environment = Environment::new(frame, gravity, field).map_err(from_filters)?;
     let rules = Rules::from_settings(&sorted(rules)).map_err(from_filters)?;
+    let conditions = Conditions {
+        environment,
+        rules,
+        start,
+    };
     let description = filter::find(name).map_err(from_filters)?;
     let settings: Vec<_> = settings.into_iter().map(|each| sorted(Some(each))).collect();
     let run = || {
         let look = || Python::attach(|py| py.check_signals()).map_err(Stop::Signal);
-        trials::run(
-            description,
-            &settings,
-            environment,
-            rules,
-            start,
-            &columns,
-            &judgement,
-            look,
-        )
+        trials::run(description, &settings, conditions, &columns, &judgement, look)
     };
     let scores = py.detach(run).map_err(PyErr::from)?;
     let nested: Vec<Vec<Vec<f64>>> = scores
