@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from imufit import _imufit
 from imufit.allan.rest import longest_rest
@@ -75,6 +75,11 @@ def allan(log: Log, sensors: tuple[str, ...] = ("acc", "gyr", "mag"), progress: 
     return Allan(channels, rest.duration, rest.n, log.metadata.gravity, _field(rest), (note,) if note else ())
 
 
+def _quantile(part: float, freedom: Array) -> Array:
+    """Quantile of chi-squared with these degrees of freedom."""
+    return np.asarray(2.0 * gammaincinv(0.5 * freedom, part))
+
+
 def _field(log: Log) -> float | None:
     """Return the length of the measured field, uT."""
     if log.mag is None or not np.isfinite(log.mag).all(axis=1).any():
@@ -114,8 +119,8 @@ def _channel(name: str, unit: str, pieces: list[Array], samples: Samples) -> Cha
         scatter=_imufit.block_scatter(pieces, block),
         tau=tau,
         deviation=deviation,
-        low=deviation * np.sqrt(edf / chi2.ppf(1.0 - tail, edf)),
-        high=deviation * np.sqrt(edf / chi2.ppf(tail, edf)),
+        low=deviation * np.sqrt(edf / _quantile(1.0 - tail, edf)),
+        high=deviation * np.sqrt(edf / _quantile(tail, edf)),
         freedom=edf,
         terms=hidden if fitted is None else fitted.terms,
         squares=None if fitted is None else fitted.squares,

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.stats import chi2
+from scipy.special import gammaincc
 
 from imufit.results.json_value import json_value
 
@@ -177,11 +177,13 @@ def _fit(tau: Array, variance: Array, rows: NDArray[np.intp], freedom: Callable[
     over = measured / (design @ squares)
     misfit = float(np.sum(freedoms * (over - 1.0 - np.log(over))))
     left = max(1, len(rows) - int(np.count_nonzero(squares)))
-    probability = float(chi2.sf(misfit, left))
+    probability = float(gammaincc(0.5 * left, 0.5 * misfit))
     # Where the terms do not describe the curve its misfit says how sure they are.
     inflation = np.sqrt(max(1.0, misfit / left))
     errors = inflation * _errors(whitening @ design, squares)
     terms = {name: _term(squares[k], errors[k]) for k, name in enumerate(TERMS)}
+    if rows[0] > 0:
+        terms["quantisation"] = Term(None, None, float("nan"))
     fitted = Fitted(
         terms, dict(zip(TERMS, squares.tolist(), strict=True)), float(errors[1]), float(tau[rows[0]]), probability
     )

@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 Array = NDArray[np.float64]
 
@@ -25,6 +24,8 @@ def coarse(low: Array, high: Array) -> Array:
         axis = np.linspace(0.0, 1.0, _COARSE[d])
         unit = np.array(list(product(axis, repeat=d)))
     else:
+        from scipy.stats import qmc  # noqa: PLC0415  takes a second to load, and few filters need it
+
         unit = qmc.Sobol(d, seed=1).random(_SCATTERED)
     return np.asarray(low + unit * (high - low))
 

@@ -252,8 +252,8 @@ mod tests {
     const N: usize = 6000;
 
     /// Swinging about x with noise that is none: a sine of the row's square.
-    fn log() -> (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>) {
-        let (mut t, mut acc, mut gyr, mut mag, mut reference) = (vec![], vec![], vec![], vec![], vec![]);
+    fn log() -> [Vec<f64>; 5] {
+        let [mut t, mut acc, mut gyr, mut mag, mut reference] = [const { Vec::new() }; 5];
         for k in 0..N {
             let time = 0.01 * k as f64;
             let q = Quaternion::exp(&(Vector3::x() * (0.5 * time).sin()));
@@ -266,11 +266,11 @@ mod tests {
             gyr.extend([0.5 * (0.5 * time).cos() + 0.001, 0.0, 0.0]);
             reference.extend(q.to_array());
         }
-        (t, acc, gyr, mag, reference)
+        [t, acc, gyr, mag, reference]
     }
 
     fn scores(horizon: f64, gains: &[f64]) -> Vec<Vec<Score>> {
-        let (t, acc, gyr, mag, reference) = log();
+        let [t, acc, gyr, mag, reference] = log();
         let columns = Columns {
             t: &t,
             acc: Some(&acc),
@@ -303,7 +303,7 @@ mod tests {
 
     #[test]
     fn the_errors_are_those_of_a_replay() {
-        let (t, acc, gyr, mag, reference) = log();
+        let [t, acc, gyr, mag, reference] = log();
         let columns = Columns {
             t: &t,
             acc: Some(&acc),

@@ -107,6 +107,7 @@ fn filter_trials<'py>(
     let description = filter::find(name).map_err(from_filters)?;
     let settings: Vec<_> = settings.into_iter().map(|each| sorted(Some(each))).collect();
     let run = || {
+        #[allow(clippy::redundant_closure_for_method_calls)] // the path is not general enough over the lifetime
         let look = || Python::attach(|py| py.check_signals()).map_err(Stop::Signal);
         trials::run(description, &settings, conditions, &columns, &judgement, look)
     };
