@@ -9,7 +9,20 @@ from collections.abc import Iterator
 import pytest
 from imufit import _imufit
 
-PARTS = ("log", "device.mpu6050", "simulate", "replay", "model", "fit", "diagnose", "results", "report", "export")
+PARTS = (
+    "log",
+    "device.mpu6050",
+    "simulate",
+    "replay",
+    "model",
+    "fit",
+    "diagnose",
+    "results",
+    "report",
+    "export",
+    "allan",
+    "tune",
+)
 WITHOUT_ENTRY = {"self", "cls"}
 
 

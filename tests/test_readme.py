@@ -11,7 +11,15 @@ sys.path.insert(0, str(ROOT / "docs"))
 
 import blocks  # noqa: E402  lies beside the documents
 
-PAGES = ("README.md", "docs/logs.md", "docs/own_effect.md", "docs/calibration.md", "docs/replay.md", "docs/tilt.md")
+PAGES = (
+    "README.md",
+    "docs/logs.md",
+    "docs/own_effect.md",
+    "docs/calibration.md",
+    "docs/replay.md",
+    "docs/tuning.md",
+    "docs/tilt.md",
+)
 
 
 @pytest.mark.parametrize("name", PAGES)

@@ -8,6 +8,7 @@ Names are loaded when they are first used, so that ``import imufit`` costs next 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from imufit import allan as allan
     from imufit import calibrate as calibrate
     from imufit import device as device
     from imufit import diagnose as diagnose
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from imufit import replay, simulate
     from imufit import report as report
     from imufit import results as results
+    from imufit import tune as tune
     from imufit._imufit import __version__
     from imufit.diagnose.ladder import ladder
     from imufit.errors import InputError
@@ -34,6 +36,7 @@ else:
     from importlib import import_module
 
     _MODULES = (
+        "allan",
         "calibrate",
         "device",
         "diagnose",
@@ -48,6 +51,7 @@ else:
         "report",
         "results",
         "simulate",
+        "tune",
     )
     _HOMES = {
         "_imufit": ("__version__",),

@@ -21,8 +21,11 @@ __all__ = [
     "Profile",
     "Survey",
     "__version__",
+    "allan_deviation",
+    "allan_freedom",
     "attitude_errors",
     "attitude_rmse",
+    "block_scatter",
     "built_in_effects",
     "concerns_reference",
     "convert_frame",
@@ -30,6 +33,7 @@ __all__ = [
     "euler_from_quaternion",
     "evaluate",
     "filter_descriptions",
+    "filter_trials",
     "find_effect",
     "find_rests",
     "frame_vectors",
@@ -88,6 +92,12 @@ def frame_vectors(frame: str) -> _FrameVectors: ...
 def attitude_errors(estimate: _Array, reference: _Array) -> _Array: ...
 def attitude_rmse(estimate: _Array, reference: _Array, mask: NDArray[np.bool_] | None = None) -> _Rmse | None: ...
 
+# --- allan: pieces of evenly spaced samples, NaN where one is lost
+
+def allan_deviation(pieces: list[_Array], factors: Sequence[int]) -> tuple[_Array, list[int]]: ...
+def allan_freedom(kind: str, samples: int, factor: int) -> float: ...
+def block_scatter(pieces: list[_Array], rows: int) -> float: ...
+
 # --- device: bytes (uint8) to acc (n, 3) m/s^2, gyr (n, 3) rad/s, temp (n,) degC, and what is clipped
 
 class _Mpu6050(TypedDict):
@@ -142,6 +152,25 @@ class Filter:
     def skipped(self) -> dict[str, int]: ...
     def reset(self) -> None: ...
 
+def filter_trials(
+    name: str,
+    settings: Sequence[Mapping[str, float]],
+    t: _Array,
+    acc: _Array | None = None,
+    gyr: _Array | None = None,
+    mag: _Array | None = None,
+    *,
+    part: NDArray[np.uint8],
+    parts: int,
+    reference: _Array | None = None,
+    horizon: float = 0.0,
+    frame: str = "NED",
+    gravity: float = 9.80665,
+    mag_reference: Sequence[float] | None = None,
+    rules: Mapping[str, float] | None = None,
+    initial: Sequence[float] | None = None,
+    start_time: float | None = None,
+) -> _Array: ...
 def filter_descriptions() -> dict[str, _Description]: ...
 def replay_rules() -> dict[str, _Setting]: ...
 def tilt_angles(acc: _Array) -> _Array: ...

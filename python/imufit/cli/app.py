@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import click
 
 from imufit.cli.add import add
+from imufit.cli.allan import allan
 from imufit.cli.apply import apply
 from imufit.cli.calibrate import calibrate
 from imufit.cli.compare import compare
@@ -26,6 +27,7 @@ from imufit.cli.names import unknown
 from imufit.cli.replay import replay
 from imufit.cli.reveal import reveal
 from imufit.cli.simulate import simulate
+from imufit.cli.tune import tune
 
 SUCCESS, INTERNAL, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 DEBUG = "IMUFIT_DEBUG"
@@ -83,6 +85,8 @@ for _command in (
     reveal,
     grade,
     replay,
+    tune,
+    allan,
     convert,
     demo,
 ):

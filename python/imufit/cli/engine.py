@@ -117,6 +117,59 @@ def replay(
         raise InputError(str(error), file=log.path) from error
 
 
+def allan(log: Log, progress: Progress) -> Any:
+    """Take the Allan deviation of each sensor over the longest rest of a log."""
+    from imufit.allan import allan  # noqa: PLC0415
+
+    return allan(log, progress=progress)
+
+
+def filter_noise(found: Any) -> dict[str, dict[str, float]]:
+    """Return the noise settings of the filters that follow from an Allan deviation."""
+    from imufit.allan import filter_noise  # noqa: PLC0415
+
+    return filter_noise(found)
+
+
+def tune(log: Log, filter_name: str, progress: Progress, **options: Any) -> Any:
+    """Tune the gains of a filter on a log.
+
+    Raises
+    ------
+    InputError
+        The log lacks what this takes, or a setting cannot be.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.tune import tune  # noqa: PLC0415
+
+    try:
+        return tune(log, filter_name, progress=progress, **options)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(str(error), file=log.path) from error
+
+
+def write_settings(settings: Mapping[str, Mapping[str, float]], path: Path) -> None:
+    """Write settings of filters as TOML, one table a filter."""
+    from imufit.replay import write_settings  # noqa: PLC0415
+
+    write_settings(settings, path)
+
+
+def read_settings(path: Path) -> dict[str, dict[str, float]]:
+    """Read settings of filters from TOML.
+
+    Raises
+    ------
+    InputError
+        No TOML, or no table of numbers; the place is named.
+    """
+    from imufit.replay import read_settings  # noqa: PLC0415
+
+    return read_settings(path)
+
+
 def write_log(log: Any, path: Path) -> None:
     """Write a log as Parquet, CSV or NPZ, by the path's ending."""
     log.write(path)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs, log_argument, plot_option
-from imufit.cli.names import FILTERS, KnownList, unknown
+from imufit.cli.arguments import EXISTING, LOG_ENDINGS, OutputFile, json_option, keep_inputs, log_argument, plot_option
+from imufit.cli.names import FILTERS, KnownList
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.settings import set_option, settings_from
 
 if TYPE_CHECKING:
     from imufit.results import Table
@@ -29,12 +28,13 @@ if TYPE_CHECKING:
     metavar="NAME[,NAME...]",
     help=f"Out of {', '.join(FILTERS)}. Repeatable; without it all that the log allows.",
 )
+@set_option
 @click.option(
-    "--set",
-    "assignments",
-    multiple=True,
-    metavar="FILTER.NAME=VALUE",
-    help="Setting of a filter, in SI units, or of the rules as replay.NAME, e.g. kalman.acc_noise=0.01. Repeatable.",
+    "--settings",
+    "settings_file",
+    type=EXISTING,
+    metavar="FILE.toml",
+    help="Settings as `imufit tune -o` and `imufit allan --settings` write them; --set goes before them.",
 )
 @click.option(
     "--band",
@@ -55,6 +55,7 @@ def replay(
     mapping: tuple[str, ...],
     filters: tuple[tuple[str, ...], ...],
     assignments: tuple[str, ...],
+    settings_file: Path | None,
     band: float,
     output: Path | None,
     json_file: Path | None,
@@ -66,9 +67,11 @@ def replay(
     of the inclination: RMSE, offset, standard deviation, drift, noise density, settling time, gain on vibration, and
     how the methods rank.
     """
-    keep_inputs([log], [output, json_file, plot_file])
+    keep_inputs([log, settings_file], [output, json_file, plot_file])
     names = tuple(dict.fromkeys(name for group in filters for name in group))
-    settings = _settings(assignments)
+    settings = {} if settings_file is None else engine.read_settings(settings_file)
+    for group, values in settings_from(assignments).items():
+        settings[group] = {**settings.get(group, {}), **values}
     out = Output(json_file)
     with ProgressBar() as progress:
         result = engine.replay(engine.read_log(log, mapping), names, progress, settings)
@@ -100,36 +103,3 @@ def _attitude_table(value: dict[str, Any]) -> Table:
         for name, errors in value["filters"].items()
     )
     return Table("Attitude error against the reference, RMSE in deg", ("filter", *(f">{c}" for c in columns)), rows)
-
-
-def _settings(assignments: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Read ``FILTER.NAME=VALUE``.
-
-    Raises
-    ------
-    click.UsageError
-        Not of that form, an unknown name (the known ones are told), or no finite number.
-    """
-    settings: dict[str, dict[str, float]] = {}
-    for text in assignments:
-        place, equals, number = text.partition("=")
-        group, dot, name = (part.strip() for part in place.partition("."))
-        if not (equals and dot and group and name):
-            raise click.UsageError(f"--set {text!r}: write FILTER.NAME=VALUE, such as kalman.acc_noise=0.01")
-        known = engine.filter_settings()
-        if group not in known:
-            raise click.UsageError(f"--set: {unknown('filter', group, known)}")
-        if name not in known[group]:
-            raise click.UsageError(
-                f"--set: {unknown(f'setting of {group}', name, known[group])}"
-                if known[group]
-                else f"--set: {group} has no settings"
-            )
-        try:
-            value = float(number)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise click.UsageError(f"--set {text!r}: {number.strip()!r} is no number")
-        settings.setdefault(group, {})[name] = value
-    return settings

@@ -4,6 +4,7 @@ from imufit.replay.frames import convert_frame
 from imufit.replay.gains import PAPER_C_GAINS
 from imufit.replay.replay import DEFAULT_FILTERS, FILTERS, SETTINGS, Replay, estimate_mag_reference, replay
 from imufit.replay.replay_many import replay_many
+from imufit.replay.settings_file import read_settings, write_settings
 from imufit.replay.steady_state import SteadyState, kalman_steady_state
 from imufit.replay.stream import Stream
 from imufit.replay.tilt_angles import tilt_angles
@@ -19,7 +20,9 @@ __all__ = [
     "convert_frame",
     "estimate_mag_reference",
     "kalman_steady_state",
+    "read_settings",
     "replay",
     "replay_many",
     "tilt_angles",
+    "write_settings",
 ]

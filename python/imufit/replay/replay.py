@@ -190,7 +190,7 @@ class Replay:
         ValueError
             The band is not positive.
         """
-        return compare_tilt(self.log, self.attitude, _NEEDS, _counted_rows(self.log), band_deg)
+        return compare_tilt(self.log, self.attitude, _NEEDS, counted_rows(self.log), band_deg)
 
     def plot(self) -> Figure:
         """Tilt of all filters over time with the reference, and its error: paper B's Figures 3 to 5.
@@ -284,34 +284,70 @@ def replay(
     `estimate_mag_reference`; without a reference it is north. Errors are taken over the rows with a reference and,
     where the log has the covariate `movement`, ``movement == 1``.
     """
-    sensors = {name: _present(getattr(log, name)) for name in ("acc", "gyr", "mag")}
-    names = _choose(filters, sensors)
     given = _checked(settings)
-    rules = {"max_gap": max(1.0, 10.0 * _usual_step(log.t)), **ranges(log), **given.get("replay", {})}
-    field = _mag_reference(log)
-    q0, t0 = _start(log, sensors, initial)
-    counted = _counted_rows(log)
+    around = surroundings(log, given.get("replay", {}), initial)
+    sensors = around.sensors
+    names = _choose(filters, sensors)
+    counted = counted_rows(log)
 
     attitude: dict[str, Array] = {}
     errors: dict[str, Errors | None] = {}
     skipped: dict[str, int] = {}
     for done, name in enumerate(names):
         progress(done, len(names), f"filter {name}")
-        running = _imufit.Filter(
-            name,
-            frame=log.metadata.frame,
-            gravity=log.metadata.gravity,
-            mag_reference=None if field is None else field.tolist(),
-            settings=dict(given.get(name, {})),
-            rules=rules,
-            initial=q0,
-            start_time=t0,
-        )
+        running = _imufit.Filter(name, settings=dict(given.get(name, {})), **around.arguments)
         attitude[name], reasons = running.run(log.t, **sensors)
         errors[name] = _errors(attitude[name], log.ref_q, counted)
         skipped = {reason: max(skipped.get(reason, 0), reasons.get(reason, 0)) for reason in (*skipped, *reasons)}
     progress(len(names), len(names), "replayed")
-    return Replay(log, attitude, errors, skipped, field)
+    return Replay(log, attitude, errors, skipped, around.field)
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What every filter over one log is given.
+
+    Attributes
+    ----------
+    sensors : dict
+        Readings of "acc", "gyr" and "mag", (n, 3); None for a sensor without any.
+    field : (3,) array or None
+        Field in the reference frame whose horizontal direction counts as known, uT.
+    arguments : dict
+        Keyword arguments of the compiled filters: frame, gravity, field, rules and start.
+    """
+
+    sensors: dict[str, Array | None]
+    field: Array | None
+    arguments: dict[str, Any]
+
+
+def surroundings(
+    log: Log, rules: Mapping[str, float] | None = None, initial: ArrayLike | Rotation | str | None = None
+) -> Surroundings:
+    """Return what every filter over this log is given; rules and initial attitude as in `replay`.
+
+    Parameters
+    ----------
+    log : Log
+        n rows.
+    rules : mapping, optional
+        Settings of the rules.
+    initial : optional
+        As in `replay`.
+    """
+    sensors = {name: _present(getattr(log, name)) for name in ("acc", "gyr", "mag")}
+    field = _mag_reference(log)
+    q0, t0 = _start(log, sensors, initial)
+    arguments = {
+        "frame": log.metadata.frame,
+        "gravity": log.metadata.gravity,
+        "mag_reference": None if field is None else field.tolist(),
+        "rules": {"max_gap": max(1.0, 10.0 * _usual_step(log.t)), **ranges(log), **(rules or {})},
+        "initial": q0,
+        "start_time": t0,
+    }
+    return Surroundings(sensors, field, arguments)
 
 
 def estimate_mag_reference(log: Log) -> Array | None:
@@ -388,7 +424,14 @@ def _start(
     return None, None
 
 
-def _counted_rows(log: Log) -> NDArray[np.bool_] | None:
+def counted_rows(log: Log) -> NDArray[np.bool_] | None:
+    """Return the rows (n,) that count for errors, ``movement == 1``; None where all do.
+
+    Parameters
+    ----------
+    log : Log
+        With or without the covariate `movement`.
+    """
     movement = log.covariates.get("movement")
     return None if movement is None else movement == 1.0
 

@@ -35,6 +35,7 @@ pub mod skipped;
 pub mod start;
 pub mod steady_state;
 pub mod triad;
+pub mod trials;
 pub mod vibration;
 
 pub use columns::{Columns, Row};

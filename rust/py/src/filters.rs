@@ -203,7 +203,7 @@ fn run_in_windows(
 }
 
 /// Settings in the order of their names, so that the first wrong one is always the same.
-fn sorted(settings: Option<HashMap<String, f64>>) -> Vec<(String, f64)> {
+pub fn sorted(settings: Option<HashMap<String, f64>>) -> Vec<(String, f64)> {
     let mut settings: Vec<_> = settings.unwrap_or_default().into_iter().collect();
     settings.sort_by(|a, b| a.0.cmp(&b.0));
     settings

@@ -1,6 +1,7 @@
 //! The module `imufit._imufit`: registration, nothing else.
 #![allow(clippy::needless_pass_by_value)] // arguments that pyo3 extracts are owned, and so are errors in `map_err`
 
+mod allan;
 mod arrays;
 mod attitude;
 mod calibration;
@@ -12,6 +13,7 @@ mod fit;
 mod inference;
 mod model;
 mod python_effect;
+mod trials;
 mod window;
 
 use pyo3::prelude::*;
@@ -19,10 +21,12 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    allan::register(m)?;
     attitude::register(m)?;
     calibration::register(m)?;
     device::register(m)?;
     filters::register(m)?;
+    trials::register(m)?;
     model::register(m)?;
     correction::register(m)?;
     fit::register(m)?;

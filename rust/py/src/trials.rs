@@ -1,0 +1,146 @@
+//! `rust/filters/src/trials.rs`: many settings of a filter over one log.
+
+use std::collections::HashMap;
+
+use imufit_attitude::Frame;
+use imufit_filters::trials::{self, Conditions, Judgement, Score};
+use imufit_filters::{Columns, Environment, Rules, Start, filter};
+use nalgebra::Vector3;
+use numpy::{PyArray3, PyReadonlyArray1};
+use pyo3::prelude::*;
+
+use crate::arrays::{self, Column, Rows};
+use crate::errors::{from_attitude, from_filters, value_error};
+use crate::filters::sorted;
+
+/// The numbers of a [`Score`].
+const NUMBERS: usize = 12;
+
+fn numbers(score: &Score) -> [f64; NUMBERS] {
+    let (f, m) = (&score.inclination, &score.heading);
+    let [total, heading, inclination] = score.squares;
+    [
+        score.rows as f64,
+        total,
+        heading,
+        inclination,
+        f.n as f64,
+        f.length,
+        f.square,
+        f.product,
+        m.n as f64,
+        m.length,
+        m.square,
+        m.product,
+    ]
+}
+
+/// Scores (settings, parts, 12) of a filter with each of `settings` over one log, in one pass: rows with reference; sums of
+/// the squared total, heading and inclination error, rad^2; then of the surprises of the specific force and of the field
+/// each their number, the sums of their lengths (rad), of their squares and of the products of neighbours (rad^2).
+///
+/// `part` (n,) uint8 says what a row counts for, below `parts`; `horizon` s is the time of a prediction, 0 for none.
+#[pyfunction]
+#[pyo3(signature = (
+    name, settings, t, acc=None, gyr=None, mag=None, *, part, parts, reference=None, horizon=0.0, frame="NED",
+    gravity=9.80665, mag_reference=None, rules=None, initial=None, start_time=None
+))]
+#[allow(clippy::too_many_arguments)] // keyword arguments of one Python call
+fn filter_trials<'py>(
+    py: Python<'py>,
+    name: &str,
+    settings: Vec<HashMap<String, f64>>,
+    t: &Bound<'py, PyAny>,
+    acc: Option<&Bound<'py, PyAny>>,
+    gyr: Option<&Bound<'py, PyAny>>,
+    mag: Option<&Bound<'py, PyAny>>,
+    part: PyReadonlyArray1<'py, u8>,
+    parts: usize,
+    reference: Option<&Bound<'py, PyAny>>,
+    horizon: f64,
+    frame: &str,
+    gravity: f64,
+    mag_reference: Option<&Bound<'py, PyAny>>,
+    rules: Option<HashMap<String, f64>>,
+    initial: Option<&Bound<'py, PyAny>>,
+    start_time: Option<f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let t = Column::new("t", t)?;
+    let n = t.len();
+    let acc = Rows::<3>::optional_with_rows("acc", acc, "t", n)?;
+    let gyr = Rows::<3>::optional_with_rows("gyr", gyr, "t", n)?;
+    let mag = Rows::<3>::optional_with_rows("mag", mag, "t", n)?;
+    let reference = Rows::<4>::optional_with_rows("reference", reference, "t", n)?;
+    let columns = Columns {
+        t: t.values()?,
+        acc: acc.as_ref().map(Rows::values).transpose()?,
+        gyr: gyr.as_ref().map(Rows::values).transpose()?,
+        mag: mag.as_ref().map(Rows::values).transpose()?,
+    };
+    let judgement = Judgement {
+        reference: reference.as_ref().map(Rows::values).transpose()?,
+        part: part
+            .as_slice()
+            .map_err(|_| value_error("part is not contiguous: pass np.ascontiguousarray(part)"))?,
+        parts,
+        horizon,
+    };
+    let frame: Frame = frame.parse().map_err(from_attitude)?;
+    let field = mag_reference
+        .map(|m| arrays::vector("mag_reference", m))
+        .transpose()?
+        .map(Vector3::from);
+    let start = match initial {
+        None => Start::Vectors,
+        Some(q) => Start::Given {
+            time: start_time.unwrap_or(f64::NEG_INFINITY),
+            attitude: arrays::quaternion("initial", q)?,
+        },
+    };
+    let environment = Environment::new(frame, gravity, field).map_err(from_filters)?;
+    let rules = Rules::from_settings(&sorted(rules)).map_err(from_filters)?;
+    let conditions = Conditions {
+        environment,
+        rules,
+        start,
+    };
+    let description = filter::find(name).map_err(from_filters)?;
+    let settings: Vec<_> = settings.into_iter().map(|each| sorted(Some(each))).collect();
+    let run = || {
+        #[allow(clippy::redundant_closure_for_method_calls)] // the path is not general enough over the lifetime
+        let look = || Python::attach(|py| py.check_signals()).map_err(Stop::Signal);
+        trials::run(description, &settings, conditions, &columns, &judgement, look)
+    };
+    let scores = py.detach(run).map_err(PyErr::from)?;
+    let nested: Vec<Vec<Vec<f64>>> = scores
+        .iter()
+        .map(|parts| parts.iter().map(|score| numbers(score).to_vec()).collect())
+        .collect();
+    Ok(PyArray3::from_vec3(py, &nested)?)
+}
+
+/// What ends a pass early.
+enum Stop {
+    Filter(imufit_filters::FilterError),
+    Signal(PyErr),
+}
+
+impl From<imufit_filters::FilterError> for Stop {
+    fn from(error: imufit_filters::FilterError) -> Self {
+        Self::Filter(error)
+    }
+}
+
+impl From<Stop> for PyErr {
+    fn from(stop: Stop) -> Self {
+        match stop {
+            Stop::Filter(error) => from_filters(error),
+            Stop::Signal(error) => error,
+        }
+    }
+}
+
+/// Adds this file's function to the module.
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(filter_trials, m)?)
+}
