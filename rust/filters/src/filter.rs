@@ -1,9 +1,10 @@
 //! The trait of all filters and THE list of them.
 
 use imufit_attitude::Quaternion;
+use nalgebra::Matrix3;
 
 use crate::{Environment, FilterError, Sample, Sensor};
-use crate::{accel, complementary, gyro, kalman, mahony, triad};
+use crate::{accel, complementary, gyro, kalman, mahony, mekf, triad};
 
 /// What a step could not use of the sample it was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,6 +22,11 @@ pub trait Filter: Send + Sync {
 
     /// The attitude `q_nb` after the last step, unit within 1e-12.
     fn attitude(&self) -> Quaternion;
+
+    /// Covariance of the error of the attitude, reference frame, rad^2; `None` for a filter that keeps none.
+    fn attitude_covariance(&self) -> Option<Matrix3<f64>> {
+        None
+    }
 
     /// Starts over at `attitude`, everything learned forgotten.
     fn reset(&mut self, attitude: Quaternion);
@@ -62,7 +68,7 @@ pub struct Description {
 }
 
 /// The filters there are.
-pub const FILTERS: [Description; 6] = [
+pub const FILTERS: [Description; 7] = [
     Description {
         name: "accel",
         summary: "Inclination from the specific force alone, row by row; the heading stays where it started.",
@@ -104,6 +110,13 @@ pub const FILTERS: [Description; 6] = [
         needs: &[Sensor::Gyr, Sensor::Acc],
         parameters: mahony::PARAMETERS,
         make: |environment, values| Box::new(mahony::Mahony::new(environment, values)),
+    },
+    Description {
+        name: "mekf",
+        summary: "A multiplicative extended Kalman filter that knows disturbances, with or without a magnetometer.",
+        needs: &[Sensor::Gyr, Sensor::Acc],
+        parameters: mekf::PARAMETERS,
+        make: |environment, values| Box::new(mekf::Mekf::new(environment, values)),
     },
 ];
 

@@ -8,6 +8,7 @@
 //! | [`kalman`] | attitude and gyro bias | paper B, the filter it cites |
 //! | [`triad`] | two vectors | paper C, Black 1964 |
 //! | [`mahony`] | nonlinear complementary filter | paper C, eqs. (5) to (7) |
+//! | [`mekf`] | multiplicative extended Kalman filter | Markley 2003; disturbances: its own page |
 //!
 //! A filter sees one [`Sample`] at a time and never a time stamp or a value that is not finite: gaps, NaN, free fall and
 //! slow sensors are the business of [`replay`] alone.
@@ -16,15 +17,19 @@
 pub mod accel;
 pub mod columns;
 pub mod complementary;
+mod field;
 pub mod filter;
 pub mod gyro;
 pub mod kalman;
 pub mod mahony;
+pub mod mekf;
 mod memory;
 pub mod replay;
+mod rest;
 pub mod rules;
 pub mod sample;
 pub mod skipped;
+pub mod smoother;
 pub mod start;
 pub mod steady_state;
 pub mod triad;
@@ -36,6 +41,7 @@ pub use replay::Replay;
 pub use rules::Rules;
 pub use sample::{AngularRate, Environment, FluxDensity, Reading, Sample, Sensor, SpecificForce};
 pub use skipped::Skipped;
+pub use smoother::Smoother;
 pub use start::Start;
 pub use steady_state::{SteadyState, steady_state_gain};
 
