@@ -49,3 +49,31 @@ impl Field {
         departure
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The variance after each second of a field that jumps after twenty seconds.
+    fn variances(memory: f64) -> Vec<f64> {
+        let mut field = Field::UNKNOWN;
+        let mut found = Vec::new();
+        for k in 0..20_000 {
+            let h = if k < 2000 { 18.0 } else { 24.0 };
+            let variance = field.update(h, -44.0, 0.01, memory, 0.1);
+            if k % 100 == 99 {
+                found.push(variance);
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn a_departure_is_seen_at_once_and_a_field_that_stays_is_accepted() {
+        let found = variances(5.0);
+        assert!(found[19] < 1e-12);
+        assert!((found[20] - (6.0_f64 / 18.0).powi(2)).abs() < 0.02);
+        assert!(found[199] < 1e-3);
+        assert!(variances(50.0)[60] > variances(5.0)[60]);
+    }
+}

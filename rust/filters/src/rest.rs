@@ -62,3 +62,36 @@ pub(crate) fn matrix(q: Quaternion) -> nalgebra::Matrix3<f64> {
         q.rotate(&Vector3::z()),
     ])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits = Limits {
+        gyr: 0.035,
+        acc: 0.5,
+        bias: 0.06,
+    };
+
+    fn rests(rate: impl Fn(f64) -> f64) -> bool {
+        let mut rest = Rest::UNKNOWN;
+        let force = Vector3::z() * 9.81;
+        (0..400).fold(false, |_, k| {
+            rest.update(&(Vector3::x() * rate(0.01 * f64::from(k))), &force, 0.01, &LIMITS)
+        })
+    }
+
+    #[test]
+    fn a_biased_gyro_rests_and_a_turn_does_not() {
+        assert!(rests(|_| 0.02));
+        assert!(!rests(|_| 0.2));
+        assert!(!rests(|t| 0.3 * (6.0 * t).sin()));
+    }
+
+    #[test]
+    fn after_a_jerk_it_rests_again_in_three_seconds() {
+        let jerk = |t: f64| if (1.0..1.1).contains(&t) { 0.5 } else { 0.0 };
+        assert!(rests(jerk));
+        assert!(!rests(|t| jerk(t - 2.0)));
+    }
+}
