@@ -274,7 +274,8 @@ def replay(
         n rows with the sensors that the filters need.
     filters : sequence of str, optional
         Names out of `FILTERS` and `SMOOTHERS`; a named filter without its sensor is refused. Without it: those of
-        gyro, triad and mahony for which the log has the sensors. None or an empty sequence: every filter for which it has them.
+        gyro, triad and mahony for which the log has the sensors. None or an empty sequence: every filter of
+        `FILTERS` for which it has them.
     settings : mapping of mappings, optional
         ``{"mahony": {"k_p": 1.0}, "replay": {"max_gap": 0.5}}``: filter (or "replay"), name and value as in
         `SETTINGS`. Without `max_gap` a gap is a step longer than 1 s and than ten usual steps of the log. Without
