@@ -52,6 +52,7 @@ __all__ = [
     "rotate_back",
     "rotation_vector_from_quaternion",
     "saturate",
+    "smooth",
     "sphere",
     "table_attitudes",
     "tilt_angles",
@@ -171,6 +172,20 @@ def filter_trials(
     initial: Sequence[float] | None = None,
     start_time: float | None = None,
 ) -> _Array: ...
+def smooth(
+    t: _Array,
+    acc: _Array | None = None,
+    gyr: _Array | None = None,
+    mag: _Array | None = None,
+    *,
+    frame: str = "NED",
+    gravity: float = 9.80665,
+    mag_reference: Sequence[float] | None = None,
+    settings: Mapping[str, float] | None = None,
+    rules: Mapping[str, float] | None = None,
+    initial: Sequence[float] | None = None,
+    start_time: float | None = None,
+) -> tuple[_Array, dict[str, int]]: ...
 def filter_descriptions() -> dict[str, _Description]: ...
 def replay_rules() -> dict[str, _Setting]: ...
 def tilt_angles(acc: _Array) -> _Array: ...

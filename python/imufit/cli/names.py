@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-FILTERS = ("accel", "gyro", "complementary", "kalman", "triad", "quest", "mahony", "hybrid", "mekf")
+FILTERS = ("accel", "gyro", "complementary", "kalman", "triad", "quest", "mahony", "hybrid", "mekf", "smoother")
 FORMS = {
     "c-header": "C99 header, SI units",
     "arduino": "sketch with a function to call after reading the sensor, SI units",

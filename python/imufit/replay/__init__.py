@@ -2,7 +2,15 @@
 
 from imufit.replay.frames import convert_frame
 from imufit.replay.gains import PAPER_C_GAINS
-from imufit.replay.replay import DEFAULT_FILTERS, FILTERS, SETTINGS, Replay, estimate_mag_reference, replay
+from imufit.replay.replay import (
+    DEFAULT_FILTERS,
+    FILTERS,
+    SETTINGS,
+    SMOOTHERS,
+    Replay,
+    estimate_mag_reference,
+    replay,
+)
 from imufit.replay.replay_many import replay_many
 from imufit.replay.settings_file import read_settings, write_settings
 from imufit.replay.steady_state import SteadyState, kalman_steady_state
@@ -14,6 +22,7 @@ __all__ = [
     "FILTERS",
     "PAPER_C_GAINS",
     "SETTINGS",
+    "SMOOTHERS",
     "Replay",
     "SteadyState",
     "Stream",

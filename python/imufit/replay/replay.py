@@ -44,13 +44,21 @@ _DESCRIPTIONS: Final = _imufit.filter_descriptions()
 FILTERS: Final[dict[str, str]] = {name: entry["summary"] for name, entry in _DESCRIPTIONS.items()}
 """The filters there are: name and one sentence."""
 
+SMOOTHERS: Final[dict[str, str]] = {
+    "smoother": "The filter mekf forwards and backwards over the whole log: each row from those before and after it.",
+}
+"""What needs the whole log, and so is no filter for live rows: name and one sentence."""
+
 SETTINGS: Final[dict[str, dict[str, _imufit._Setting]]] = {
     **{name: entry["settings"] for name, entry in _DESCRIPTIONS.items()},
+    "smoother": _DESCRIPTIONS["mekf"]["settings"],
     "replay": _imufit.replay_rules(),
 }
-"""The settings of each filter, and of the rules for gaps and free fall: default, unit, meaning."""
+"""The settings of each filter and smoother, and of the rules for gaps and free fall: default, unit, meaning."""
 
-_NEEDS: Final = {name: entry["needs"] for name, entry in _DESCRIPTIONS.items()}
+_NEEDS: Final = {name: entry["needs"] for name, entry in _DESCRIPTIONS.items()} | {
+    "smoother": _DESCRIPTIONS["mekf"]["needs"],
+}
 
 DEFAULT_FILTERS: Final[tuple[str, ...]] = ("gyro", "triad", "mahony")
 
@@ -105,7 +113,12 @@ class Replay:
         name : str
             The filter.
         """
-        return Rotation.from_quat(self._of(name)[:, [1, 2, 3, 0]])
+        q = self._of(name)[:, [1, 2, 3, 0]]
+        without = np.isnan(q[:, 0])
+        rotation = Rotation.from_quat(np.where(without[:, None], (0.0, 0.0, 0.0, 1.0), q))
+        if without.any():
+            rotation[without] = Rotation.from_rotvec(np.full((int(without.sum()), 3), np.nan))
+        return rotation
 
     def euler(self, name: str) -> Array:
         """Roll, pitch, yaw of one filter, (n, 3), rad: ``R = Rz(yaw) Ry(pitch) Rx(roll)``, roll 0 at gimbal lock.
@@ -255,8 +268,9 @@ def replay(
     log : Log
         n rows with the sensors that the filters need.
     filters : sequence of str, optional
-        Names out of `FILTERS`; a named filter without its sensor is refused. Without it: those of gyro, triad and
-        mahony for which the log has the sensors. None or an empty sequence: every filter for which it has them.
+        Names out of `FILTERS` and `SMOOTHERS`; a named filter without its sensor is refused. Without it: those of
+        gyro, triad and mahony for which the log has the sensors. None or an empty sequence: every filter of
+        `FILTERS` for which it has them.
     settings : mapping of mappings, optional
         ``{"mahony": {"k_p": 1.0}, "replay": {"max_gap": 0.5}}``: filter (or "replay"), name and value as in
         `SETTINGS`. Without `max_gap` a gap is a step longer than 1 s and than ten usual steps of the log. Without
@@ -295,8 +309,11 @@ def replay(
     skipped: dict[str, int] = {}
     for done, name in enumerate(names):
         progress(done, len(names), f"filter {name}")
-        running = _imufit.Filter(name, settings=dict(given.get(name, {})), **around.arguments)
-        attitude[name], reasons = running.run(log.t, **sensors)
+        options = {**around.arguments, "settings": dict(given.get(name, {}))}
+        if name in SMOOTHERS:
+            attitude[name], reasons = _imufit.smooth(log.t, **sensors, **options)
+        else:
+            attitude[name], reasons = _imufit.Filter(name, **options).run(log.t, **sensors)
         errors[name] = _errors(attitude[name], log.ref_q, counted)
         skipped = {reason: max(skipped.get(reason, 0), reasons.get(reason, 0)) for reason in (*skipped, *reasons)}
     progress(len(names), len(names), "replayed")

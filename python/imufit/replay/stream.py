@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
-from imufit.replay.replay import SETTINGS, Settings
+from imufit.replay.replay import SETTINGS, SMOOTHERS, Settings
 
 if TYPE_CHECKING:
     from imufit.log.metadata import Frame
@@ -48,7 +48,7 @@ class Stream:
     Raises
     ------
     ValueError
-        An unknown filter, setting or sensor.
+        An unknown filter, setting or sensor, or a smoother, which is no filter for live rows.
 
     Examples
     --------
@@ -71,6 +71,12 @@ class Stream:
         for sensor in sensors:
             if sensor not in ("acc", "gyr", "mag"):
                 raise ValueError(f"{sensor!r} is no sensor: use acc, gyr, mag")
+        for name in filters:
+            if name in SMOOTHERS:
+                raise ValueError(
+                    f"{name} needs the rows to come, which a stream does not know: use mekf here, "
+                    f"and {name} on the recorded log with imufit.replay.replay"
+                )
         for name in settings or {}:
             if name not in SETTINGS:
                 raise ValueError(f"settings for {name!r}: there is no such filter. Use one of {', '.join(SETTINGS)}")

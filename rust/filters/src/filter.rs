@@ -1,11 +1,11 @@
 //! The trait of all filters and THE list of them.
 
 use imufit_attitude::{Quaternion, Real};
-use nalgebra::SimdBool;
+use nalgebra::{Matrix3, SimdBool};
 
 use crate::intake::Intake;
 use crate::{Columns, Environment, FilterError, Sample, Sensor, Skipped};
-use crate::{accel, complementary, gyro, hybrid, kalman, mahony, quest, triad};
+use crate::{accel, complementary, gyro, hybrid, kalman, mahony, mekf, quest, triad};
 
 /// What a step could not use of the sample it was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,6 +25,11 @@ pub trait Filter<T: Real = f64>: Send + Sync {
 
     /// The attitude `q_nb` after the last step, unit within 1e-12.
     fn attitude(&self) -> Quaternion<T>;
+
+    /// Covariance of the error of the attitude, reference frame, rad^2; `None` for a filter that keeps none.
+    fn attitude_covariance(&self) -> Option<Matrix3<f64>> {
+        None
+    }
 
     /// Starts over at `attitude`, everything learned forgotten.
     fn reset(&mut self, attitude: Quaternion);
@@ -76,7 +81,7 @@ pub struct Description {
 }
 
 /// The filters there are.
-pub const FILTERS: [Description; 8] = [
+pub const FILTERS: [Description; 9] = [
     Description {
         name: "accel",
         summary: "Inclination from the specific force alone, row by row; the heading stays where it started.",
@@ -132,6 +137,13 @@ pub const FILTERS: [Description; 8] = [
         needs: &[Sensor::Gyr, Sensor::Acc, Sensor::Mag],
         parameters: hybrid::PARAMETERS,
         make: hybrid::make,
+    },
+    Description {
+        name: "mekf",
+        summary: "A multiplicative extended Kalman filter that knows disturbances, with or without a magnetometer.",
+        needs: &[Sensor::Gyr, Sensor::Acc],
+        parameters: mekf::PARAMETERS,
+        make: |environment, values| Box::new(mekf::Mekf::new(environment, values)),
     },
 ];
 

@@ -10,6 +10,7 @@
 //! | [`mahony`] | nonlinear complementary filter | paper C, eqs. (5) to (7) |
 //! | [`quest`] | two weighted vectors | paper C names it; Shuster and Oh 1981 |
 //! | [`hybrid`] | TRIAD with Mahony's filter | paper C, figures 1 and 2 |
+//! | [`mekf`] | multiplicative extended Kalman filter | Markley 2003; disturbances: its own page |
 //!
 //! A filter sees one [`Sample`] at a time and never a time stamp or a value that is not finite: gaps, NaN, free fall and
 //! slow sensors are the business of [`intake`] alone.
@@ -19,19 +20,23 @@
 pub mod accel;
 pub mod columns;
 pub mod complementary;
+mod field;
 pub mod filter;
 pub mod gyro;
 pub mod hybrid;
 pub mod intake;
 pub mod kalman;
 pub mod mahony;
+pub mod mekf;
 mod memory;
 pub mod quest;
 pub mod replay;
+mod rest;
 pub mod rules;
 pub mod run_lanes;
 pub mod sample;
 pub mod skipped;
+pub mod smoother;
 pub mod start;
 pub mod steady_state;
 pub mod triad;
@@ -45,6 +50,7 @@ pub use rules::Rules;
 pub use run_lanes::run_lanes;
 pub use sample::{AngularRate, Environment, FluxDensity, Reading, Sample, Sensor, SpecificForce};
 pub use skipped::Skipped;
+pub use smoother::Smoother;
 pub use start::Start;
 pub use steady_state::{SteadyState, steady_state_gain};
 

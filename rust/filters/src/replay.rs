@@ -4,6 +4,7 @@
 //! is the same bit by bit.
 
 use imufit_attitude::Quaternion;
+use nalgebra::Matrix3;
 
 use crate::columns::{Columns, Row};
 use crate::filter::{Description, Filter};
@@ -47,6 +48,33 @@ impl Replay {
     pub fn reset(&mut self) {
         self.filter.reset(Quaternion::IDENTITY);
         self.intake.memory = Memory::EMPTY;
+    }
+
+    /// Goes on at the next row, whatever its time, with a filter in that state.
+    pub(crate) fn resume(&mut self, filter: &[f64]) -> bool {
+        let taken = self.filter.set_state(filter);
+        if taken {
+            self.intake.memory = Memory {
+                started: true,
+                ..Memory::EMPTY
+            };
+        }
+        taken
+    }
+
+    /// The state of the filter alone.
+    pub(crate) fn filter_state(&self) -> Vec<f64> {
+        self.filter.state()
+    }
+
+    /// The filter's attitude after the last row.
+    pub(crate) fn attitude(&self) -> Quaternion {
+        self.filter.attitude()
+    }
+
+    /// Covariance of its error, where the filter keeps one.
+    pub(crate) fn attitude_covariance(&self) -> Option<Matrix3<f64>> {
+        self.filter.attitude_covariance()
     }
 
     /// All that the next row's attitude depends on, to be handed to another replay with the same settings.

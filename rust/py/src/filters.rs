@@ -5,7 +5,9 @@ use std::collections::HashMap;
 use imufit_attitude::Frame;
 use imufit_filters::accel::tilt_rows;
 use imufit_filters::filter::{self, FILTERS, Parameter};
-use imufit_filters::{Columns, Environment, FilterError, Replay, Row, Rules, Skipped, Start, steady_state_gain};
+use imufit_filters::{
+    Columns, Environment, FilterError, Replay, Row, Rules, Skipped, Smoother, Start, steady_state_gain,
+};
 use nalgebra::Vector3;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -45,20 +47,9 @@ impl PyFilter {
         initial: Option<&Bound<'_, PyAny>>,
         start_time: Option<f64>,
     ) -> PyResult<Self> {
-        let frame: Frame = frame.parse().map_err(from_attitude)?;
-        let field = mag_reference
-            .map(|m| arrays::vector("mag_reference", m))
-            .transpose()?
-            .map(Vector3::from);
-        let start = match initial {
-            None => Start::Vectors,
-            Some(q) => Start::Given {
-                time: start_time.unwrap_or(f64::NEG_INFINITY),
-                attitude: arrays::quaternion("initial", q)?,
-            },
-        };
+        let environment = surroundings(frame, gravity, mag_reference)?;
+        let start = start_of(initial, start_time)?;
         let build = || {
-            let environment = Environment::new(frame, gravity, field)?;
             let rules = Rules::from_settings(&sorted(rules))?;
             Replay::new(filter::find(name)?, &sorted(settings), environment, rules, start)
         };
@@ -167,6 +158,25 @@ impl PyFilter {
     }
 }
 
+fn surroundings(frame: &str, gravity: f64, mag_reference: Option<&Bound<'_, PyAny>>) -> PyResult<Environment> {
+    let frame: Frame = frame.parse().map_err(from_attitude)?;
+    let field = mag_reference
+        .map(|m| arrays::vector("mag_reference", m))
+        .transpose()?
+        .map(Vector3::from);
+    Environment::new(frame, gravity, field).map_err(from_filters)
+}
+
+fn start_of(initial: Option<&Bound<'_, PyAny>>, start_time: Option<f64>) -> PyResult<Start> {
+    Ok(match initial {
+        None => Start::Vectors,
+        Some(q) => Start::Given {
+            time: start_time.unwrap_or(f64::NEG_INFINITY),
+            attitude: arrays::quaternion("initial", q)?,
+        },
+    })
+}
+
 /// The reasons that there were, with their rows.
 fn reasons<'py>(py: Python<'py>, skipped: &Skipped) -> PyResult<Bound<'py, PyDict>> {
     let reasons = PyDict::new(py);
@@ -200,6 +210,66 @@ fn run_in_windows(
         look().map_err(Stop::Signal)?;
     }
     Ok(skipped)
+}
+
+impl From<FilterError> for Stop {
+    fn from(error: FilterError) -> Self {
+        Self::Filter(error)
+    }
+}
+
+/// Attitudes (n, 4), scalar first, of the filter `mekf` forwards and backwards over a whole log, and the rows of which
+/// something was not used, by reason. Settings are those of `mekf`, everything else as in `Filter`.
+#[pyfunction]
+#[pyo3(signature = (
+    t, acc=None, gyr=None, mag=None, *, frame="NED", gravity=9.80665, mag_reference=None, settings=None, rules=None,
+    initial=None, start_time=None
+))]
+#[allow(clippy::too_many_arguments)] // keyword arguments of one Python call
+fn smooth<'py>(
+    py: Python<'py>,
+    t: &Bound<'py, PyAny>,
+    acc: Option<&Bound<'py, PyAny>>,
+    gyr: Option<&Bound<'py, PyAny>>,
+    mag: Option<&Bound<'py, PyAny>>,
+    frame: &str,
+    gravity: f64,
+    mag_reference: Option<&Bound<'py, PyAny>>,
+    settings: Option<HashMap<String, f64>>,
+    rules: Option<HashMap<String, f64>>,
+    initial: Option<&Bound<'py, PyAny>>,
+    start_time: Option<f64>,
+) -> PyResult<Run<'py>> {
+    let environment = surroundings(frame, gravity, mag_reference)?;
+    let start = start_of(initial, start_time)?;
+    let build = || {
+        let rules = Rules::from_settings(&sorted(rules))?;
+        Smoother::new(&sorted(settings), environment, rules, start)
+    };
+    let smoother = build().map_err(from_filters)?;
+    let t = Column::new("t", t)?;
+    let n = t.len();
+    let acc = Rows::<3>::optional_with_rows("acc", acc, "t", n)?;
+    let gyr = Rows::<3>::optional_with_rows("gyr", gyr, "t", n)?;
+    let mag = Rows::<3>::optional_with_rows("mag", mag, "t", n)?;
+    let columns = Columns {
+        t: t.values()?,
+        acc: acc.as_ref().map(Rows::values).transpose()?,
+        gyr: gyr.as_ref().map(Rows::values).transpose()?,
+        mag: mag.as_ref().map(Rows::values).transpose()?,
+    };
+    #[allow(clippy::redundant_closure_for_method_calls)] // the path is not general enough over the lifetime
+    let look = || Python::attach(|py| py.check_signals()).map_err(Stop::Signal);
+    let (attitude, skipped) = filled_rows::<4, _, _>(
+        py,
+        n,
+        |out| smoother.run(&columns, out, look),
+        |stop| match stop {
+            Stop::Filter(error) => from_filters(error),
+            Stop::Signal(error) => error,
+        },
+    )?;
+    Ok((attitude, reasons(py, &skipped)?))
 }
 
 /// Settings in the order of their names, so that the first wrong one is always the same.
@@ -272,5 +342,6 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(filter_descriptions, m)?)?;
     m.add_function(wrap_pyfunction!(tilt_angles, m)?)?;
     m.add_function(wrap_pyfunction!(kalman_steady_state, m)?)?;
+    m.add_function(wrap_pyfunction!(smooth, m)?)?;
     m.add_function(wrap_pyfunction!(replay_rules, m)?)
 }
