@@ -115,6 +115,17 @@ def test_the_initial_attitude_can_be_given() -> None:
     np.testing.assert_allclose(by_reference, log.ref_q[0], atol=1e-15)
 
 
+def test_rows_before_the_start_are_no_rotation() -> None:
+    log = made_log()
+    assert log.acc is not None
+    late = log.acc.copy()
+    late[:7] = np.nan
+    result = replay(with_fields(log, acc=late), ["mahony"], initial="vectors")
+    angles = result.rotation("mahony").as_rotvec()
+    assert np.isnan(angles[:7]).all()
+    np.testing.assert_allclose(angles[7:], Rotation.from_quat(result.attitude["mahony"][7:, [1, 2, 3, 0]]).as_rotvec())
+
+
 def test_settings_reach_their_filter() -> None:
     log = made_log()
     a, b = (replay(log, ["mahony"], {"mahony": {"k_p": k_p}}) for k_p in (0.5, 20.0))

@@ -114,11 +114,9 @@ class Replay:
             The filter.
         """
         q = self._of(name)[:, [1, 2, 3, 0]]
-        without = np.isnan(q[:, 0])
-        rotation = Rotation.from_quat(np.where(without[:, None], (0.0, 0.0, 0.0, 1.0), q))
-        if without.any():
-            rotation[without] = Rotation.from_rotvec(np.full((int(without.sum()), 3), np.nan))
-        return rotation
+        start = int(np.isnan(q[:, 0]).sum())  # scipy's rotations take NaN, but not as a quaternion
+        before = Rotation.from_rotvec(np.full((start, 3), np.nan))
+        return Rotation.concatenate([before, Rotation.from_quat(q[start:])]) if start else Rotation.from_quat(q)
 
     def euler(self, name: str) -> Array:
         """Roll, pitch, yaw of one filter, (n, 3), rad: ``R = Rz(yaw) Ry(pitch) Rx(roll)``, roll 0 at gimbal lock.
@@ -309,9 +307,9 @@ def replay(
     skipped: dict[str, int] = {}
     for done, name in enumerate(names):
         progress(done, len(names), f"filter {name}")
-        options = {**around.arguments, "settings": dict(given.get(name, {}))}
+        options: dict[str, Any] = {**around.arguments, "settings": dict(given.get(name, {}))}
         if name in SMOOTHERS:
-            attitude[name], reasons = _imufit.smooth(log.t, **sensors, **options)
+            attitude[name], reasons = _imufit.smooth(log.t, *sensors.values(), **options)
         else:
             attitude[name], reasons = _imufit.Filter(name, **options).run(log.t, **sensors)
         errors[name] = _errors(attitude[name], log.ref_q, counted)

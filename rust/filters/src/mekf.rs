@@ -282,7 +282,7 @@ impl Mekf {
         }
     }
 
-    /// P <- (I + A) P (I + A)^T, A being nonzero in N rows from `first` only.
+    /// P <- (I + A) P (I + A)^T, A being nonzero in N rows from `first` only. P stays symmetric to the bit.
     fn carry<const N: usize>(&mut self, first: usize, a: &SMatrix<f64, N, STATES>) {
         let ap = a * self.covariance;
         let apa = ap * a.transpose();
@@ -290,15 +290,15 @@ impl Mekf {
             return;
         }
         let p = &mut self.covariance;
+        let within = |j: usize| (first..first + N).contains(&j);
         for i in 0..N {
-            for j in 0..STATES {
+            for j in (0..STATES).filter(|j| !within(*j)) {
                 p[(first + i, j)] += ap[(i, j)];
-                p[(j, first + i)] += ap[(i, j)];
+                p[(j, first + i)] = p[(first + i, j)];
             }
-        }
-        for i in 0..N {
-            for j in 0..N {
-                p[(first + i, first + j)] += apa[(i, j)];
+            for j in 0..=i {
+                p[(first + i, first + j)] += ap[(i, first + j)] + ap[(j, first + i)] + apa[(i, j)];
+                p[(first + j, first + i)] = p[(first + i, first + j)];
             }
         }
     }
@@ -354,8 +354,9 @@ impl Mekf {
         }
         for j in 0..STATES {
             let (g, c) = (gain[j], ph[j] - gain[j] * s);
-            for i in 0..STATES {
+            for i in 0..=j {
                 self.covariance[(i, j)] -= ph[i] * g + gain[i] * c;
+                self.covariance[(j, i)] = self.covariance[(i, j)];
             }
         }
         *x += gain * innovation;
