@@ -269,7 +269,7 @@ class TestRules:
             assert np.concatenate(pieces).tobytes() == whole.tobytes()
             started = np.isfinite(whole[:, 0])
             assert np.abs(np.linalg.norm(whole[started], axis=1) - 1.0).max(initial=0.0) < 1e-12
-            assert np.isfinite(state[10:]).all()
+            assert np.isfinite(state[12:]).all()
 
     @pytest.mark.parametrize("name", NAMES)
     def test_row_by_row_is_the_same_filter_as_one_batch(self, name: str) -> None:

@@ -220,7 +220,7 @@ class TestFaults:
             assert skipped["gyr_clipped"] >= 100
         else:
             assert skipped == counted
-        assert np.isfinite(made.state[10:]).all()
+        assert np.isfinite(made.state[12:]).all()
         np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1.0, atol=1e-12)
         error = angles(motion.truth, rotation_of(q))
         left = error[rows.start : rows.stop + 1].max() if fault != "gap" else error[rows.start]

@@ -14,6 +14,8 @@ use crate::Real;
 
 /// Square of the half angle, rad^2, up to which the exponential map takes its series.
 const SERIES: f64 = 0.01;
+/// The same for the first three terms of the series.
+const SHORT_SERIES: f64 = 5e-6;
 
 /// An attitude as a unit quaternion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -210,12 +212,27 @@ impl<T: Real> Quaternion<T> {
     #[inline(always)]
     pub fn exp_of_half(h: &Vector3<T>) -> Self {
         let square = h.dot(h);
-        let series = Self::series(h, square);
+        let tiny = square.simd_le(T::splat(SHORT_SERIES));
+        let short = Self::short_series(h, square);
+        if tiny.all() {
+            return short;
+        }
+        // Lane by lane, so that each has the bits that it would have alone.
+        let series = short.select(tiny, Self::series(h, square));
         let small = square.simd_le(T::splat(SERIES));
         if small.all() {
             return series;
         }
         series.select(small, Self::circle(&(h + h)))
+    }
+
+    /// [`Quaternion::exp_of_half`] for a half angle whose square is very small.
+    #[inline(always)]
+    fn short_series(h: &Vector3<T>, square: T) -> Self {
+        let c = T::splat;
+        let cosine = (c(1.0) - square * c(0.5)) + square * square * c(1.0 / 24.0);
+        let sinc = (c(1.0) - square * c(1.0 / 6.0)) + square * square * c(1.0 / 120.0);
+        Self { w: cosine, v: h * sinc }
     }
 
     /// [`Quaternion::exp_of_half`] for a half angle whose square is small.

@@ -142,7 +142,7 @@ impl Intake {
         }
     }
 
-    /// Rows to which no rule applies, from row `from` on: all three sensors, after a row of the same kind. What
+    /// Rows to which no rule applies, from row `from` on: all three sensors, after a row of the same kind, no lever arm. What
     /// [`Intake::advance`] would do with them, in fewer steps and with the filter in the registers. How many there were.
     #[inline(always)]
     fn full_rows<T: Real, F: Filter<T> + Clone>(
@@ -160,38 +160,28 @@ impl Intake {
             t_gyr,
             t_mag,
             mut omega,
-            mut alpha,
             ..
         } = self.memory;
         let (Some(acc), Some(gyr), Some(mag)) = (columns.acc, columns.gyr, columns.mag) else {
             return 0;
         };
         // A sensor that has read at the last row; NaN, none yet, fails every comparison.
-        if !(started && t_acc >= last && t_gyr >= last && t_mag >= last) {
+        if !(started && t_acc >= last && t_gyr >= last && t_mag >= last) || self.lever.is_some() {
             return 0;
         }
-        let (rules, least_square, lever) = (self.rules, self.least_square, self.lever);
-        let has_lever = lever.is_some();
+        let (rules, least_square) = (self.rules, self.least_square);
         let mut running = filter.clone();
         let (mut rows, mut no_heading) = (0, 0);
         let readings = threes(acc, from).iter().zip(threes(gyr, from)).zip(threes(mag, from));
         let (outs, _) = attitude.get_mut(4 * from..).unwrap_or_default().as_chunks_mut::<4>();
         for ((t, ((acc, gyr), mag)), out) in columns.t.iter().skip(from).zip(readings).zip(outs) {
             let [acc, gyr, mag] = [acc, gyr, mag].map(|xyz| Vector3::from(*xyz));
-            let dt = t - last;
-            let (mut f, mut turned) = (acc, alpha);
-            if has_lever {
-                lever.turn(&mut turned, &omega, &gyr, dt);
-                f = lever.at_joint(&acc, &gyr, &turned);
-            }
-            let square = f.norm_squared();
-            // NaN fails every comparison.
+            let (dt, square) = (t - last, acc.norm_squared());
+            // NaN fails every comparison; a sum that overflows is looked at again by the rules.
             let usable = dt > 0.0
                 && dt <= rules.max_gap
                 && square > least_square
-                && square <= f64::MAX
-                && gyr.norm_squared() <= f64::MAX
-                && mag.norm_squared() <= f64::MAX;
+                && square + (gyr.norm_squared() + mag.norm_squared()) <= f64::MAX;
             if !usable || clipped(&acc, rules.acc_range) || clipped(&gyr, rules.gyr_range) {
                 break;
             }
@@ -201,7 +191,7 @@ impl Intake {
                     dt,
                 }),
                 f: Some(Reading {
-                    value: SpecificForce(f),
+                    value: SpecificForce(acc),
                     dt,
                 }),
                 m: Some(Reading {
@@ -211,7 +201,7 @@ impl Intake {
             };
             no_heading += usize::from(running.step(&sample) == Usage::NoHeading);
             *out = running.attitude().to_array();
-            (last, omega, alpha) = (*t, gyr, turned);
+            (last, omega) = (*t, gyr);
             rows += 1;
         }
         if rows > 0 {
@@ -219,7 +209,7 @@ impl Intake {
             skipped.no_heading += no_heading;
             let memory = &mut self.memory;
             (memory.last, memory.t_acc, memory.t_gyr, memory.t_mag) = (last, last, last, last);
-            (memory.omega, memory.alpha) = (omega, alpha);
+            memory.omega = omega;
         }
         rows
     }

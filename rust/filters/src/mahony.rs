@@ -77,6 +77,9 @@ pub const AS_IN_FIGURE_3: [f64; 4] = [1.0, 1.0, 0.2, 20.0];
 /// `k_1, k_2, k_i, k_p` of figure 4.
 pub const AS_IN_FIGURE_4: [f64; 4] = [5.0, 0.1, 0.2, 10.0];
 
+/// Square of the least horizontal field, uT^2, whose reciprocal is a number of the machine.
+const LEAST: f64 = 1e-290;
+
 /// The filter.
 #[derive(Debug, Clone)]
 pub struct Mahony<T = f64> {
@@ -88,6 +91,7 @@ pub struct Mahony<T = f64> {
     half_weights: [T; 2],
     half_k_i: T,
     k_p: T,
+    per_k_p: T,
     /// Square of the sine of the least angle between field and vertical.
     least_square: T,
     q: Quaternion<T>,
@@ -118,6 +122,7 @@ impl<T: Real> Mahony<T> {
             half_weights: [value(0) * half, value(1) * half],
             half_k_i: value(2) * half,
             k_p: value(3),
+            per_k_p: T::splat(1.0) / value(3),
             least_square: square_of_sine(value(4)),
             q: Quaternion::default(),
             bias: Vector3::repeat(T::splat(0.0)),
@@ -148,13 +153,14 @@ impl<T: Real> Mahony<T> {
     /// Turns attitude and bias by an innovation, by no more than the error it shows.
     #[inline(always)]
     pub(crate) fn correct(&mut self, predicted: Quaternion<T>, w_mes: &Vector3<T>, weight: T) {
-        let one = T::splat(1.0);
-        let limit = one.simd_min(one / (self.k_p * weight));
+        let (one, half) = (T::splat(1.0), T::splat(0.5));
+        let longest = one / weight;
         // The renormalisation does not wait for the innovation.
-        let half = w_mes * (limit * self.k_p * T::splat(0.5));
+        let half = w_mes * (self.k_p.simd_min(longest) * half);
+        let limit = one.simd_min(longest * self.per_k_p);
         self.q = predicted.kept().times(Quaternion::exp_of_half(&half));
         let bias = self.bias - w_mes * (limit * self.half_k_i);
-        let finite = bias.dot(&bias).simd_le(T::splat(f64::MAX));
+        let finite = (bias.x + bias.y + bias.z).simd_abs().simd_le(T::splat(f64::MAX));
         self.bias = if finite.all() {
             bias
         } else {
@@ -166,13 +172,14 @@ impl<T: Real> Mahony<T> {
     #[inline(always)]
     fn innovation(&self, q: Quaternion<T>, sample: &Sample) -> Innovation<T> {
         let zero = T::splat(0.0);
-        let up = q.vertical() * self.up_z;
+        let vertical = q.vertical();
         let (mut w_mes, mut weight, mut usage) = (Vector3::repeat(zero), zero, Usage::Full);
         if let Some(f) = sample.f {
             let length = f.value.0.norm();
             if length > 0.0 {
                 let gain = self.half_weights[0] * T::splat(f.dt);
-                w_mes = f.value.0.map(T::splat).cross(&up) * (gain / T::splat(length));
+                let scale = self.up_z * (gain / T::splat(length));
+                w_mes = f.value.0.map(T::splat).cross(&vertical) * scale;
                 weight = gain;
             }
         }
@@ -181,13 +188,16 @@ impl<T: Real> Mahony<T> {
             let (x, y) = (m_n.x, m_n.y);
             let square = x * x + y * y;
             let whole = T::splat(m.value.0.norm_squared());
-            let shows = square.simd_ge(self.least_square * whole) & square.simd_gt(zero);
+            let shows = square.simd_ge(self.least_square * whole) & square.simd_ge(T::splat(LEAST));
             if !shows.all() {
                 usage = Usage::NoHeading;
             }
             let gain = (self.half_weights[1] * T::splat(m.dt)).select(shows, zero);
-            let heading = ((self.across[0] * x + self.across[1] * y) * gain) / square.simd_sqrt();
-            w_mes += up * heading.select(shows, zero);
+            let signed = self.up_z * gain;
+            // Root and reciprocal do not wait for each other.
+            let per_length = square.simd_sqrt() * (T::splat(1.0) / square);
+            let heading = ((self.across[0] * x + self.across[1] * y) * signed) * per_length;
+            w_mes += vertical * heading.select(shows, zero);
             weight += gain;
         }
         Innovation { w_mes, weight, usage }

@@ -9,6 +9,7 @@ use numpy::{
     PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::intern;
 use pyo3::prelude::*;
 
 /// A borrowed table of `n` rows with `C` numbers each, row by row; `C = 1` is a column of shape (n,).
@@ -120,7 +121,11 @@ where
     T: Send,
     E: Send,
 {
-    let array = PyArray2::zeros(py, [n, C], false);
+    // numpy's empty: `fill` writes every number, and zeros first are felt beside a filter.
+    let array = py
+        .import(intern!(py, "numpy"))?
+        .call_method1(intern!(py, "empty"), ((n, C),))?;
+    let array = array.cast_into::<PyArray2<f64>>()?;
     let result = fill_array(
         py,
         array
