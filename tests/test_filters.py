@@ -450,6 +450,6 @@ class TestRefusals:
 
     def test_foreign_states(self) -> None:
         made = _imufit.Filter("mahony")
-        for state in (_imufit.Filter("gyro").state, np.zeros(17), np.full(17, np.nan), np.empty(0)):
+        for state in (_imufit.Filter("gyro").state, np.zeros(19), np.full(19, np.nan), np.empty(0)):
             with pytest.raises(ValueError, match="state does not belong to mahony"):
                 made.state = state
