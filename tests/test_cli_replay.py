@@ -5,6 +5,7 @@ import pytest
 from cli_stand_in import run, strict_json
 from imufit.cli.names import FILTERS
 from imufit.log import Log
+from imufit.model import SensorModel
 from imufit.replay import replay
 
 METHODS = ("accel", "gyro", "complementary", "kalman")
@@ -161,6 +162,18 @@ def test_both_level_axes_turn_the_same_way():
         assert comparison is not None
         assert comparison.methods["accel"] is not None
         assert comparison.methods["accel"].rmse_deg < 1.0
+
+
+def test_a_model_is_taken_out_first(capsys, tmp_path, log):
+    SensorModel(["acc.bias"], {"acc.bias": {"x": 0.0, "y": 0.04, "z": 0.0}}).save(tmp_path / "m.toml")
+    options = ("replay", log, "--filter", "accel", "--json", "-")
+    offsets = []
+    for more in ((), ("--model", tmp_path / "m.toml")):
+        code, out, err = run(capsys, *options, *more)
+        assert (code, err) == (0, [])
+        offsets.append(strict_json(out)["filters"]["accel"]["tilt"]["offset_deg"])
+    assert offsets[0] == pytest.approx(np.degrees(0.04 / 9.80665), abs=0.02)
+    assert offsets[1] == pytest.approx(0.0, abs=0.02)
 
 
 def test_what_cannot_be_replayed_is_one_line(capsys, tmp_path, log):

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import EXISTING, LOG_ENDINGS, OutputFile, json_option, keep_inputs, log_argument, plot_option
+from imufit.cli.arguments import (
+    EXISTING,
+    LOG_ENDINGS,
+    OutputFile,
+    effects_from_option,
+    json_option,
+    keep_inputs,
+    log_argument,
+    plot_option,
+)
 from imufit.cli.names import FILTERS, KnownList
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
@@ -28,6 +37,10 @@ if TYPE_CHECKING:
     metavar="NAME[,NAME...]",
     help=f"Out of {', '.join(FILTERS)}. Repeatable; without it all that the log allows.",
 )
+@click.option(
+    "--model", "model_file", type=EXISTING, metavar="MODEL", help="Take its effects out of the readings first."
+)
+@effects_from_option
 @set_option
 @click.option(
     "--settings",
@@ -54,6 +67,7 @@ def replay(
     *,
     mapping: tuple[str, ...],
     filters: tuple[tuple[str, ...], ...],
+    model_file: Path | None,
     assignments: tuple[str, ...],
     settings_file: Path | None,
     band: float,
@@ -67,14 +81,19 @@ def replay(
     of the inclination: RMSE, offset, standard deviation, drift, noise density, settling time, gain on vibration, and
     how the methods rank.
     """
-    keep_inputs([log, settings_file], [output, json_file, plot_file])
+    keep_inputs([log, model_file, settings_file], [output, json_file, plot_file])
     names = tuple(dict.fromkeys(name for group in filters for name in group))
     settings = {} if settings_file is None else engine.read_settings(settings_file)
     for group, values in settings_from(assignments).items():
         settings[group] = {**settings.get(group, {}), **values}
     out = Output(json_file)
+    rows = engine.read_log(log, mapping)
+    if model_file is not None:
+        model = engine.sensor_model(path=model_file)
+        rows = model.apply(rows)
+        out.say(f"{' + '.join(model.effects) or 'No effect'} taken out.", *(f"Note: {note}." for note in rows.notes))
     with ProgressBar() as progress:
-        result = engine.replay(engine.read_log(log, mapping), names, progress, settings)
+        result = engine.replay(rows, names, progress, settings)
     compared = result.comparison(band)
     value = result.to_dict(compared)
     out.say(f"{value['n']} rows replayed.", bold=True)

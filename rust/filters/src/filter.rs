@@ -64,6 +64,13 @@ pub struct Parameter {
     pub meaning: &'static str,
 }
 
+impl Parameter {
+    /// Whether it is a coordinate of a place, which may be negative.
+    pub fn is_coordinate(&self) -> bool {
+        self.unit == "m"
+    }
+}
+
 type Make = fn(&Environment, &[f64]) -> Box<dyn Filter>;
 
 /// A filter by name.
@@ -195,8 +202,13 @@ pub(crate) fn fill(
                 known,
             });
         };
-        if !(0.0..=LARGEST).contains(value) {
-            let (name, range) = (parameters[at].name, "a number from 0 to 1e50");
+        let (name, signed) = (parameters[at].name, parameters[at].is_coordinate());
+        let (size, range) = if signed {
+            (value.abs(), "a number from -1e50 to 1e50")
+        } else {
+            (*value, "a number from 0 to 1e50")
+        };
+        if !(0.0..=LARGEST).contains(&size) {
             return Err(FilterError::Setting {
                 filter,
                 name,

@@ -10,13 +10,17 @@
 //! 5. **Clipped readings.** A specific force with a component at the end of the accelerometer's range (`acc_range`) points
 //!    somewhere else than the true one and is not used. A rate at the end of the gyro's range (`gyr_range`) is too small
 //!    but closer than any guess: it is used and counted.
-//! 6. **Start.** See [`Start`]. Rows before it have no attitude: NaN.
+//! 6. **Lever arm.** Where the accelerometer sits at a known place of a rigid arm (`lever_x`, `lever_y`, `lever_z`), what
+//!    filters and free fall see is the specific force at the joint: the rate and its change since the row before tell what the
+//!    turn adds. A row without a rate takes the last ones.
+//! 7. **Start.** See [`Start`]. Rows before it have no attitude: NaN.
 
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::Vector3;
 
 use crate::columns::{Columns, Row};
 use crate::filter::{Filter, Usage};
+use crate::lever_arm::LeverArm;
 use crate::memory::Memory;
 use crate::rules::clipped;
 use crate::triad::attitude_from_vectors;
@@ -45,6 +49,7 @@ pub struct Intake {
     start: Start,
     /// Square of the least specific force that shows the vertical, (m/s^2)^2.
     least_square: f64,
+    lever: LeverArm,
     pub(crate) memory: Memory,
 }
 
@@ -111,6 +116,10 @@ impl Intake {
             rules,
             start,
             least_square: (rules.free_fall * environment.gravity()).powi(2),
+            lever: LeverArm {
+                arm: rules.lever,
+                time: rules.lever_time,
+            },
             memory: Memory::EMPTY,
         }
     }
@@ -151,6 +160,7 @@ impl Intake {
             t_gyr,
             t_mag,
             mut omega,
+            mut alpha,
             ..
         } = self.memory;
         let (Some(acc), Some(gyr), Some(mag)) = (columns.acc, columns.gyr, columns.mag) else {
@@ -160,14 +170,21 @@ impl Intake {
         if !(started && t_acc >= last && t_gyr >= last && t_mag >= last) {
             return 0;
         }
-        let (rules, least_square) = (self.rules, self.least_square);
+        let (rules, least_square, lever) = (self.rules, self.least_square, self.lever);
+        let has_lever = lever.is_some();
         let mut running = filter.clone();
         let (mut rows, mut no_heading) = (0, 0);
         let readings = threes(acc, from).iter().zip(threes(gyr, from)).zip(threes(mag, from));
         let (outs, _) = attitude.get_mut(4 * from..).unwrap_or_default().as_chunks_mut::<4>();
         for ((t, ((acc, gyr), mag)), out) in columns.t.iter().skip(from).zip(readings).zip(outs) {
             let [acc, gyr, mag] = [acc, gyr, mag].map(|xyz| Vector3::from(*xyz));
-            let (dt, square) = (t - last, acc.norm_squared());
+            let dt = t - last;
+            let (mut f, mut turned) = (acc, alpha);
+            if has_lever {
+                lever.turn(&mut turned, &omega, &gyr, dt);
+                f = lever.at_joint(&acc, &gyr, &turned);
+            }
+            let square = f.norm_squared();
             // NaN fails every comparison.
             let usable = dt > 0.0
                 && dt <= rules.max_gap
@@ -184,7 +201,7 @@ impl Intake {
                     dt,
                 }),
                 f: Some(Reading {
-                    value: SpecificForce(acc),
+                    value: SpecificForce(f),
                     dt,
                 }),
                 m: Some(Reading {
@@ -194,7 +211,7 @@ impl Intake {
             };
             no_heading += usize::from(running.step(&sample) == Usage::NoHeading);
             *out = running.attitude().to_array();
-            (last, omega) = (*t, gyr);
+            (last, omega, alpha) = (*t, gyr, turned);
             rows += 1;
         }
         if rows > 0 {
@@ -202,7 +219,7 @@ impl Intake {
             skipped.no_heading += no_heading;
             let memory = &mut self.memory;
             (memory.last, memory.t_acc, memory.t_gyr, memory.t_mag) = (last, last, last, last);
-            memory.omega = omega;
+            (memory.omega, memory.alpha) = (omega, alpha);
         }
         rows
     }
@@ -257,6 +274,10 @@ impl Intake {
         let memory = &mut self.memory;
         let mut sample = Sample::default();
         if let Some(omega) = gyr {
+            if self.lever.is_some() && t - memory.t_gyr > 0.0 && t - memory.t_gyr <= max_gap {
+                self.lever
+                    .turn(&mut memory.alpha, &memory.omega, &omega, t - memory.t_gyr);
+            }
             skipped.gyr_clipped += usize::from(clipped(&omega, self.rules.gyr_range));
             if t - memory.t_gyr <= max_gap {
                 let value = AngularRate((memory.omega + omega) * 0.5);
@@ -269,9 +290,16 @@ impl Intake {
             }
             (memory.t_gyr, memory.omega) = (t, omega);
         }
-        if let Some(f) = acc {
-            if clipped(&f, self.rules.acc_range) {
+        if let Some(reading) = acc {
+            let f = if self.lever.is_some() {
+                self.lever.at_joint(&reading, &memory.omega, &memory.alpha)
+            } else {
+                reading
+            };
+            if clipped(&reading, self.rules.acc_range) {
                 skipped.acc_clipped += 1;
+            } else if !f.norm_squared().is_finite() {
+                skipped.acc_not_finite += 1;
             } else if f.norm_squared() > self.least_square {
                 sample.f = Some(Reading {
                     value: SpecificForce(f),

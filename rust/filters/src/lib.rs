@@ -26,6 +26,7 @@ pub mod gyro;
 pub mod hybrid;
 pub mod intake;
 pub mod kalman;
+mod lever_arm;
 pub mod mahony;
 pub mod mekf;
 mod memory;

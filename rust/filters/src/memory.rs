@@ -15,11 +15,13 @@ pub(crate) struct Memory {
     pub t_mag: f64,
     /// The rate at `t_gyr`.
     pub omega: Vector3<f64>,
+    /// Angular acceleration there, where a lever arm asks for it.
+    pub alpha: Vector3<f64>,
 }
 
 impl Memory {
     /// Numbers of a memory that is written down.
-    pub const LENGTH: usize = 10;
+    pub const LENGTH: usize = 12;
 
     pub const EMPTY: Self = Self {
         started: false,
@@ -29,6 +31,7 @@ impl Memory {
         t_gyr: f64::NAN,
         t_mag: f64::NAN,
         omega: Vector3::new(0.0, 0.0, 0.0),
+        alpha: Vector3::new(0.0, 0.0, 0.0),
     };
 
     /// After a gap: nothing is bridged.
@@ -50,19 +53,20 @@ impl Memory {
             t_gyr,
             t_mag,
             omega,
+            alpha,
         } = self;
         let started = if started { 1.0 } else { 0.0 };
         [
-            started, first, last, t_acc, t_gyr, t_mag, omega.x, omega.y, omega.z, 0.0,
+            started, first, last, t_acc, t_gyr, t_mag, omega.x, omega.y, omega.z, alpha.x, alpha.y, alpha.z,
         ]
     }
 
     /// `None` where the numbers are no memory.
     pub fn from_slice(numbers: &[f64]) -> Option<Self> {
-        let &[started, first, last, t_acc, t_gyr, t_mag, x, y, z, _] = numbers else {
+        let &[started, first, last, t_acc, t_gyr, t_mag, x, y, z, a, b, c] = numbers else {
             return None;
         };
-        (x + y + z).is_finite().then(|| Self {
+        (x + y + z + a + b + c).is_finite().then(|| Self {
             started: started > 0.5,
             first,
             last,
@@ -70,6 +74,7 @@ impl Memory {
             t_gyr,
             t_mag,
             omega: Vector3::new(x, y, z),
+            alpha: Vector3::new(a, b, c),
         })
     }
 }

@@ -31,6 +31,30 @@ pub const PARAMETERS: &[Parameter] = &[
         unit: "rad/s",
         meaning: "end of the gyro's range: a rate with a component there is clipped; it is used, being the best there is, and counted. 0: not known",
     },
+    Parameter {
+        name: "lever_x",
+        default: 0.0,
+        unit: "m",
+        meaning: "where the accelerometer is, body axis x, seen from a joint that stands still: its acceleration about the joint is taken out. All three 0: not done",
+    },
+    Parameter {
+        name: "lever_y",
+        default: 0.0,
+        unit: "m",
+        meaning: "the same, body axis y",
+    },
+    Parameter {
+        name: "lever_z",
+        default: 0.0,
+        unit: "m",
+        meaning: "the same, body axis z",
+    },
+    Parameter {
+        name: "lever_time",
+        default: 0.005,
+        unit: "s",
+        meaning: "time constant of the angular acceleration that the lever arm needs: larger takes noise out of it and comes later",
+    },
 ];
 
 /// A reading this close to the end of the range is at it: the last step of a 12 bit converter, so that a range counts
@@ -48,6 +72,10 @@ pub struct Rules {
     pub acc_range: f64,
     /// End of the gyro's range, rad/s; 0 where it is not known.
     pub gyr_range: f64,
+    /// The accelerometer seen from a joint that stands still, body frame, m; 0 where there is none.
+    pub lever: Vector3<f64>,
+    /// Time constant of the angular acceleration, s.
+    pub lever_time: f64,
 }
 
 impl Default for Rules {
@@ -57,6 +85,8 @@ impl Default for Rules {
             free_fall: PARAMETERS[1].default,
             acc_range: PARAMETERS[2].default,
             gyr_range: PARAMETERS[3].default,
+            lever: Vector3::new(PARAMETERS[4].default, PARAMETERS[5].default, PARAMETERS[6].default),
+            lever_time: PARAMETERS[7].default,
         }
     }
 }
@@ -71,6 +101,8 @@ impl Rules {
             free_fall: value(1),
             acc_range: value(2),
             gyr_range: value(3),
+            lever: Vector3::new(value(4), value(5), value(6)),
+            lever_time: value(7),
         })
     }
 }

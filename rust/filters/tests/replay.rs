@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 
 /// Values that a replay puts before the state of its filter; times among them are NaN before the first row.
-const OWN_STATE: usize = 10;
+const OWN_STATE: usize = 12;
 
 fn replay_of(name: &str, start: Start) -> Replay {
     replay_with(name, &[], Rules::default(), start)
