@@ -1,9 +1,9 @@
 """Paper C's filters on sensors that an industrial robot carried: does the paper's claim hold on real data?
 
 Every recording of a folder but those of path 1, by the methods of `examples/paper_c_hybrid.py` with both published
-sets of gains: with the readings as they are, and with the effects taken out that the ladder finds on path 1
-of the same sensor. All filters start at TRIAD's attitude. The first two seconds are left out: there the radio's
-buffer empties and three hundred rows a second carry the time of their arrival.
+sets of gains and with gains tuned on path 1 of the same sensor: with the readings as they are, and with the effects
+taken out that the ladder finds on that path. All filters start at TRIAD's attitude. The first two seconds are left out:
+there the radio's buffer empties, and three hundred rows a second carry the time of their arrival.
 Run: ``python benches/robot_arm.py [FOLDER]``.
 """
 
@@ -19,6 +19,7 @@ from imufit import Log
 from imufit.diagnose.attitude import corrected
 from imufit.replay import estimate_mag_reference
 from imufit.replay import replay as run_filters
+from imufit.tune import tune
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -60,8 +61,8 @@ def with_field_north(log: Log) -> Log:
     return replace(log, ref_q=turned, metadata=replace(log.metadata, frame="NED", mag_reference=known))
 
 
-def judged(log: Log) -> dict[str, Array]:
-    """Return for every method total, heading and inclination error (deg), then `MEASURES`."""
+def judged(log: Log, tuned: dict[str, float] | None = None) -> dict[str, Array]:
+    """Return for every method heading and inclination error (deg), then `MEASURES`; `tuned` adds a hybrid."""
     log = with_field_north(with_reference(log))
     start = run_filters(log, ["triad"]).attitude["triad"][0]
     reading = PAPER["Reading"](whole_field=True)
@@ -69,12 +70,13 @@ def judged(log: Log) -> dict[str, Array]:
         f"{PAPER['WHOLE']}, {name}": PAPER["by_the_equations"](log, gains, reading, start)
         for name, gains in PAPER["SETS"].items()
     }
-    for name, (chosen, settings) in PAPER["FILTERS"].items():
+    methods = {**PAPER["FILTERS"], **({"hybrid, tuned": ("hybrid", tuned)} if tuned else {})}
+    for name, (chosen, settings) in methods.items():
         found[name] = run_filters(log, [chosen], {chosen: settings}).attitude[chosen]
     measures = list(MEASURES.values())
     return {
         name: np.array([*parts(log, q), *PAPER["figures"](log, q)[measures]])
-        for name, q in sorted(found.items(), key=lambda item: ("figure" in item[0], item[0][-1]))
+        for name, q in sorted(found.items(), key=lambda item: item[0][-1] if "figure" in item[0] else "")
     }
 
 
@@ -116,11 +118,14 @@ def main(folder: Path) -> None:
         raise SystemExit(f"{folder}: no recordings SENSOR_pathN_SPEED.parquet")
     everything: tuple[list[dict[str, Array]], list[dict[str, Array]]] = ([], [])
     for sensor in sensors:
-        ladder = imufit.ladder(read(folder / f"{sensor}_{FITTED}.parquet"))
-        print(f"{sensor}: model of {FITTED}: {', '.join(ladder.model)}")
+        fitted = read(folder / f"{sensor}_{FITTED}.parquet")
+        ladder = imufit.ladder(fitted)
+        tuned = tune(corrected(ladder.fit.model, fitted), "hybrid").settings["hybrid"]
+        gains = ", ".join(f"{name} = {value:.2g}" for name, value in tuned.items())
+        print(f"{sensor}: model of {FITTED}: {', '.join(ladder.model)}; gains tuned there: {gains}")
         logs = [read(path) for path in sorted(folder.glob(f"{sensor}_path*.parquet")) if "_path1_" not in path.name]
-        before = [judged(log) for log in logs]
-        after = [judged(corrected(ladder.fit.model, log)) for log in logs]
+        before = [judged(log, tuned) for log in logs]
+        after = [judged(corrected(ladder.fit.model, log), tuned) for log in logs]
         print_table(sensor, before, after)
         for whole, part in zip(everything, (before, after), strict=True):
             whole.extend(part)

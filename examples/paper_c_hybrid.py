@@ -22,7 +22,7 @@ import numpy as np
 from imufit.figures.style import BLUE, GREY, INK, ORANGE, VERMILION, new_figure, tidy, title
 from imufit.replay import PAPER_C_GAINS
 from imufit.replay import replay as run_filters
-from imufit.simulate import simulate
+from imufit.simulate import Noise, simulate
 from imufit.simulate.robot_arm import ARM, STANDING
 from scipy.spatial.transform import Rotation
 
@@ -45,10 +45,11 @@ TUNED_ON = 101
 
 
 @cache
-def swung(seed: int, *, at_joint: bool = False) -> imufit.Log:
-    """Simulate the arm; with the sensor at its end or, by the same motion, in the joint."""
+def swung(seed: int, *, at_joint: bool = False, mag_rate: float = 75.0) -> imufit.Log:
+    """Simulate the arm; with the sensor at its end or, by the same motion, in the joint; magnetometer's rate in Hz."""
     place = {"acc.lever_arm": {"x": -ARM[0]}} if at_joint else {}
-    return simulate("arm_swing", {**LOW_PASS, **GYRO_BIAS, **place}, seed, DURATION, RATE).to_log()
+    noise = replace(Noise.gy86(), mag_rate=mag_rate)
+    return simulate("arm_swing", {**LOW_PASS, **GYRO_BIAS, **place}, seed, DURATION, RATE, noise=noise).to_log()
 
 
 @dataclass(frozen=True)
@@ -377,6 +378,20 @@ def print_readings(seed: int) -> None:
         print(f"{name:38}" + "".join(f"{value:10.2f}" for value in (*mahony, *hybrid)) + f"   {verdict}")
 
 
+def print_slow(seed: int) -> None:
+    """Print what a magnetometer at its usual 15 Hz does to those who take the heading of it row by row."""
+    print(f"\n{'Magnetometer':40}{'75 Hz: yaw, deg':>16}{'lag, ms':>9}{'15 Hz: yaw, deg':>18}{'lag, ms':>9}")
+    for name in ("TRIAD", "QUEST", "Mahony, figure 3", "hybrid driven, figure 3", "hybrid driven, figure 4", "mekf"):
+        shown = [by_rate(seed, name, rate)[[2, 4]] for rate in (75.0, 15.0)]
+        print(f"{name:40}" + "".join(f"{yaw:16.2f}{lag:9.1f}  " for yaw, lag in shown).rstrip())
+
+
+def by_rate(seed: int, name: str, mag_rate: float) -> np.ndarray:
+    """Return the measures of a method with a magnetometer of this rate, Hz."""
+    (chosen, settings), log = FILTERS[name], swung(seed, mag_rate=mag_rate)
+    return figures(log, run_filters(log, [chosen], {chosen: settings}).attitude[chosen])
+
+
 def print_start(seed: int) -> None:
     """Print how long a filter takes that starts at [1 0 0 0] while the arm stands elsewhere."""
     away = np.degrees(rotations(first_attitude(swung(seed))[None]).magnitude()[0])
@@ -421,6 +436,7 @@ def main(folder: str | None = None, count: str = "1") -> None:
     print_verdict(found)
     print_readings(seeds[0])
     print_start(seeds[0])
+    print_slow(seeds[0])
     print_dynamics(seeds)
     if folder is None:
         return

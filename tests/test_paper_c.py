@@ -90,6 +90,12 @@ def test_a_wrong_start_is_slow_with_the_second_gains_and_does_not_touch_the_seed
     assert paper.found_after(SEED, "Mahony, figure 4") > 4.0
 
 
+def test_with_a_slow_magnetometer_triad_lags_and_the_hybrid_does_not(paper):
+    triad, hybrid = (paper.by_rate(SEED, name, 15.0)[LAG] for name in ("TRIAD", "hybrid driven, figure 3"))
+    assert triad > 15.0
+    assert hybrid < 5.0
+
+
 def test_the_error_is_the_arms_acceleration_and_a_known_arm_takes_it_away(paper, on_the_arm, in_the_joint):
     known = {name: values[0] for name, values in paper.measured((SEED,), arm_known=True).items()}
     for name in ("TRIAD", "QUEST", "Mahony, figure 3", "hybrid driven, figure 3", "hybrid driven, figure 4"):
