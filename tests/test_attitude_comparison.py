@@ -36,7 +36,7 @@ def test_a_disturbed_field_is_the_environment():
     mag = log.mag.copy()
     there = log.t % 40.0 > 28.0
     mag[there] += Rotation.from_quat(log.ref_q[there][:, [1, 2, 3, 0]]).inv().apply([5.0, 25.0, 0.0])
-    found = attitude_comparison(SensorModel(), replace(log, mag=mag))
+    found = attitude_comparison(SensorModel(), replace(log, mag=mag), "mahony")
     assert "field_disturbance" in quantities(found, "heading")
     assert found.limit == "environment"
     assert "the environment limits it" in found.sentence
@@ -73,5 +73,5 @@ def test_nothing_is_said_without_reference_or_sensor(what):
 
 def test_json_has_numbers_for_both():
     value = attitude_comparison(SensorModel(["mag.hard_iron"], IRON), iron()).to_dict()
-    assert value["filter"] == "mahony"
+    assert value["filter"] == "mekf"
     assert value["before_deg"] > value["after_deg"] > 0.0

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FILTER = "mahony"
+FILTER = "mekf"
 BLOCKS = 24
 BINS = 10
 MIN_ROWS = 240
