@@ -288,7 +288,7 @@ def redrawn(seed: int, name: str):
     mahony = by_the_equations(log, gains, Reading(whole_field=True), np.array(IDENTITY))
     lines = {
         "TRIAD": (ORANGE, 2.4, run_filters(log, ["triad"]).attitude["triad"]),
-        "Mahony as printed (whole field, from [1 0 0 0])": (VERMILION, 1.3, mahony),
+        f"{WHOLE}, from [1 0 0 0]": (VERMILION, 1.3, mahony),
         "hybrid, driven": (BLUE, 1.6, driven(log, gains, Reading())),
         "true": (INK, 0.9, log.ref_q),
     }
