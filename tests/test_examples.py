@@ -15,7 +15,7 @@ SHOWS = {
     "paper_a_calibration.py": ("published as 0.995", "of the twelve parameters within 2 standard errors"),
     "own_effect.py": ("gyr.fan is missing", "+ acc.bias"),
 }
-ON_A_PAGE = {"paper_b_tilt.py": "docs/tilt.md"}
+ON_A_PAGE = {"paper_b_tilt.py": "docs/tilt.md", "paper_c_hybrid.py": "docs/hybrid.md"}
 """Examples whose whole output stands on a page, where `test_readme.py` runs them."""
 
 

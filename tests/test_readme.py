@@ -19,6 +19,7 @@ PAGES = (
     "docs/replay.md",
     "docs/tuning.md",
     "docs/tilt.md",
+    "docs/hybrid.md",
 )
 
 

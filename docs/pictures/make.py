@@ -1,4 +1,4 @@
-"""Draw the pictures of the documents: an error falling, six sides, three frames, a calibration, a machine tool.
+"""Draw the pictures of the documents: an error falling, six sides, three frames, a calibration, two experiments.
 
 python docs/pictures/make.py [FOLDER]
 """
@@ -82,6 +82,12 @@ def tilt(folder: Path) -> None:
     runpy.run_path(str(example))["main"](str(folder), "5")
 
 
+def hybrid(folder: Path) -> None:
+    """Draw the pictures of docs/hybrid.md: the example does."""
+    example = Path(__file__).resolve().parents[2] / "examples" / "paper_c_hybrid.py"
+    runpy.run_path(str(example))["main"](str(folder))
+
+
 def _seen(point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Project a point of the room on the paper: what is further away lies further up and to the right."""
     return np.array([point[0] + 0.40 * point[1], point[2] + 0.30 * point[1]])
@@ -160,3 +166,4 @@ if __name__ == "__main__":
     frames().savefig(folder / "frames.png", dpi=90)
     calibration().savefig(folder / "calibration.png", dpi=90)
     tilt(folder)
+    hybrid(folder)

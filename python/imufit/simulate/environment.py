@@ -44,10 +44,10 @@ def gravity_vector(frame: str) -> Array:
     return GRAVITY * north_and_down(frame)[1]
 
 
-def field_vector(frame: str) -> Array:
-    """Return the magnetic flux density (3,) in the reference frame, uT."""
+def field_vector(frame: str, parts: tuple[float, float] = (FIELD_NORTH, FIELD_DOWN)) -> Array:
+    """Return the magnetic flux density (3,) in the reference frame, uT, from its northward and downward part."""
     north, down = north_and_down(frame)
-    return FIELD_NORTH * north + FIELD_DOWN * down
+    return parts[0] * north + parts[1] * down
 
 
 @dataclass(frozen=True)

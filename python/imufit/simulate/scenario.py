@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imufit.simulate.environment import FIELD_DOWN, FIELD_NORTH
 from imufit.simulate.noise import Noise
 from imufit.simulate.truth import Trajectory
 
@@ -34,6 +35,7 @@ class Scenario:
     rig : whether the motion is that of a one-axis rig with a commanded angle.
     sensors : which of "acc", "gyr", "mag", "temp" the log has unless told otherwise.
     noise : makes the random errors that the log has unless told otherwise.
+    field : horizontal (northward) and downward flux density, uT.
     """
 
     description: str
@@ -43,3 +45,4 @@ class Scenario:
     rig: bool = False
     sensors: tuple[str, ...] = ("acc", "gyr", "mag", "temp")
     noise: Callable[[], Noise] = Noise
+    field: tuple[float, float] = (FIELD_NORTH, FIELD_DOWN)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from imufit.simulate.environment import north_and_down
 from imufit.simulate.machine_tool import MACHINE_TOOL
 from imufit.simulate.motion import Array, Cruise, Product, Signal, Sinusoids, Steps, Sum
+from imufit.simulate.robot_arm import ROBOT_ARM
 from imufit.simulate.scenario import Plan, Scenario
 from imufit.simulate.truth import Fixed, Joint, Legs, Trajectory, rotation_from_vector
 
@@ -197,6 +198,7 @@ SCENARIOS: Mapping[str, Scenario] = {
         position=True,
     ),
     **MACHINE_TOOL,
+    **ROBOT_ARM,
 }
 
 

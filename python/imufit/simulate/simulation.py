@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from imufit.log import Log
-from imufit.simulate.environment import GRAVITY, Environment, field_vector, stream
+from imufit.simulate.environment import GRAVITY, Environment, stream
 from imufit.simulate.injections import injection, order
 from imufit.simulate.motion import Array
 from imufit.simulate.noise import Noise, noisy_attitude
@@ -180,7 +180,7 @@ def _metadata(study: Study, scenario: str, rig_axis: str | None, noise_in_metada
     frame, names = study.run.frame, study.names
     data: dict[str, Any] = {"frame": frame, "gravity": GRAVITY, "sensor": f"simulated, scenario {scenario}"}
     if "mag" in names:
-        data["mag_reference"] = field_vector(frame).tolist()
+        data["mag_reference"] = study.environment.field.tolist()
     if rig_axis is not None:
         data["rig_axis"] = rig_axis
     if noise_in_metadata:

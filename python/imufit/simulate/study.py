@@ -59,7 +59,9 @@ class Study:
         kind = SCENARIOS[scenario]
         self.names = kind.sensors if sensors is None else _known_sensors(sensors)
         self.noise = noise or (Noise.realistic() if realistic else kind.noise())
-        self.environment = _environment(effects, seed, duration, rate, frame=frame, covariates=covariates)
+        self.environment = _environment(
+            effects, seed, duration, rate, frame=frame, covariates=covariates, field=kind.field
+        )
         t = sampling_times(self.noise, seed, duration, rate)
         self.rows, self.run = Rows(t), Run(frame, float(t[0]), float(t[-1]))
         every = np.ones(t.size, dtype=np.bool_)
@@ -122,14 +124,21 @@ def _known_sensors(sensors: Sequence[str]) -> tuple[str, ...]:
 
 
 def _environment(
-    effects: Sequence[str], seed: int, duration: float, rate: float, *, frame: str, covariates: Sequence[str]
+    effects: Sequence[str],
+    seed: int,
+    duration: float,
+    rate: float,
+    *,
+    frame: str,
+    covariates: Sequence[str],
+    field: tuple[float, float],
 ) -> Environment:
     needed = [injection(name) for name in effects]
     columns = [*covariates, *(entry.column for entry in needed if entry.column is not None)]
     vibrating = any(entry.vibration for entry in needed)
     return Environment(
         gravity=gravity_vector(frame),
-        field=field_vector(frame),
+        field=field_vector(frame, field),
         temperature=Temperature.random(stream(seed, "temperature"), duration),
         covariates={name: covariate(name, seed, duration) for name in dict.fromkeys(columns)},
         vibration=Vibration.random(stream(seed, "vibration"), duration, rate) if vibrating else None,
