@@ -7,7 +7,7 @@ from imufit.simulate.robot_arm import ARM, REACH, STANDING
 from scipy.spatial.transform import Rotation
 
 RATE = 200.0
-QUIET = Noise(acc=SensorNoise(1e-12), gyr=SensorNoise(1e-12), mag=SensorNoise(1e-12))
+QUIET = Noise(acc=SensorNoise(0.0), gyr=SensorNoise(0.0), mag=SensorNoise(0.0))
 
 
 @pytest.fixture(scope="module")

@@ -51,10 +51,14 @@ class Scale:
         return max(self.ratios(effect, parameters).values(), default=0.0)
 
     def ratios(self, effect: str, parameters: Parameters) -> dict[str, float]:
-        """Return the ratio to the white noise for each sensor in the log that the effect touches."""
-        change = self.change(effect, parameters)
+        """Return the ratio to the white noise of each sensor that the effect touches; infinite without noise."""
+        sizes = {
+            name: float(np.sqrt(np.mean(x[self.sampled[name]] ** 2)))
+            for name, x in self.change(effect, parameters).items()
+        }
         return {
-            name: float(np.sqrt(np.mean(x[self.sampled[name]] ** 2))) / self.white[name] for name, x in change.items()
+            name: size / self.white[name] if self.white[name] > 0.0 else (np.inf if size > 0.0 else 0.0)
+            for name, size in sizes.items()
         }
 
     def change(self, effect: str, parameters: Parameters) -> dict[str, Array]:
