@@ -2,158 +2,237 @@
 
 Errors are those of docs/conventions.md: e = q_est q_ref^-1 in the reference frame, root mean squares over the rows with
 `movement` = 1, averaged over the trials. North is the field's direction for every filter; no filter sees the reference.
-One fixed setting per filter for all trials. Ours are judged a second time with settings tuned on the other trials:
-for each trial the one of `CANDIDATES` with the least mean error on all trials but that one. The others run
-with their own defaults (imufusion: with its rejections at 10 degrees; ahrs: its EKF).
-Run: ``python benches/broad.py [FOLDER] [--no-tuning]``.
+One fixed setting per filter for all trials: ours and the others run with their defaults. Then
+
+- *settings of the others*: ours with, for each trial, the one of `CANDIDATES` that has the least mean error on all
+  trials but that one;
+- *model of the others*: readings corrected for each trial with a sensor model that all trials but that one gave. It
+  holds the effects that the ladder found on more than half of them, fitted to each of them, and of every parameter the
+  median. The fits take the field for north, too: with a field of its own each would find an iron of its own. Where the
+  model says that the reference is late, the trial is judged against the reference of that much later.
+
+Run: ``python benches/broad.py [FOLDER] [--no-tuning] [--no-models] [--json]``. The table goes to standard output,
+progress to standard error.
 """
 
+import argparse
+import json
+import math
+import os
+import statistics
 import sys
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import lru_cache, partial
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
-import ahrs
 import imufit
-import imufusion
 import numpy as np
-import qmt
-from imufit import Log, _imufit
-from imufit.replay import SETTINGS
+from imufit import InputError, Log, SensorModel, _imufit
+from imufit.diagnose.attitude import corrected
+from imufit.replay import SETTINGS, convert_frame
 from imufit.replay import replay as run_filters
 from numpy.typing import NDArray
-from vqf import VQF, offlineVQF
+from peers import MISSING, PEERS
 
 Array = NDArray[np.float64]
+Parameters = dict[str, dict[str, float]]
 FOLDER = Path(__file__).resolve().parents[1] / ".." / "shared" / "data" / "broad"
 NORTH = (0.0, 20.0, -44.0)  # ENU: the horizontal part to the north, as all filters take it
-OURS = ("mekf", "smoother")
+OURS = ("mekf", "smoother", "mahony")
+TUNED = ("mekf", "smoother")
+WITH_MODEL = ("mekf", "smoother", "vqf, online", "vqf, offline")
+LEFT_OUT = ("ahrs, Mahony",)  # slower than its Madgwick and no better
 PARTS = ("total", "heading", "inclination")
+OF_ONE_RECORDING = ("drift", "warmup", "column:", "field_reference")
+"""Effects that say nothing of the same sensor in another recording."""
 
 _DEFAULTS = {name: setting["default"] for name, setting in SETTINGS["mekf"].items()}
-TUNED = ("gyr_noise", "bias_walk", "speed", "mag_noise", "mag_departure", "scale_start")
 CANDIDATES: tuple[dict[str, float], ...] = (
     {},
-    *({name: _DEFAULTS[name] * factor} for name in TUNED for factor in (0.5, 2.0)),
+    *(
+        {name: _DEFAULTS[name] * factor}
+        for name in ("gyr_noise", "bias_walk", "speed", "mag_noise", "mag_departure", "scale_start")
+        for factor in (0.5, 2.0)
+    ),
 )
 """The defaults, and each of the settings that matter halved and doubled."""
 
 
+@lru_cache(maxsize=4)
 def read(path: Path) -> Log:
     log = imufit.read(path)
-    if log.acc is None or log.gyr is None or log.mag is None or log.ref_q is None:
-        raise SystemExit(f"{path}: a recording of BROAD has acc, gyr, mag and a reference")
-    return replace(log, metadata=replace(log.metadata, mag_reference=NORTH))
+    if any(column is None for column in (log.acc, log.gyr, log.mag, log.ref_q)) or "movement" not in log.covariates:
+        raise InputError("a recording of BROAD has acc, gyr, mag, a reference and the column movement", file=path)
+    return log
 
 
-def step_of(log: Log) -> float:
-    return float(np.median(np.diff(log.t)))
-
-
-def vqf_online(log: Log) -> Array:
-    return VQF(step_of(log)).updateBatch(log.gyr, log.acc, log.mag)["quat9D"]
-
-
-def vqf_offline(log: Log) -> Array:
-    return offlineVQF(log.gyr, log.acc, log.mag, step_of(log))["quat9D"]
-
-
-def qmt_vqf(log: Log) -> Array:
-    return qmt.oriEstVQF(log.gyr, log.acc, log.mag, params={"Ts": step_of(log)})
-
-
-def qmt_mahony(log: Log) -> Array:
-    return qmt.oriEstMahony(log.gyr, log.acc, log.mag, params={"Ts": step_of(log)})
-
-
-def ahrs_ekf(log: Log) -> Array:
-    dip = float(np.degrees(np.arctan2(-NORTH[2], NORTH[1])))
-    return ahrs.filters.EKF(gyr=log.gyr, acc=log.acc, mag=log.mag, Dt=step_of(log), frame="ENU", magnetic_ref=dip).Q
-
-
-def fusion(log: Log) -> Array:
-    running = imufusion.Ahrs()
-    rate = 1.0 / step_of(log)
-    settings = imufusion.AhrsSettings()
-    settings.convention = imufusion.CONVENTION_ENU
-    settings.sample_rate, settings.gyroscope_range = rate, 2000.0
-    settings.acceleration_rejection, settings.magnetic_rejection, settings.rejection_timeout = 10.0, 10.0, 5.0
-    running.settings = settings
-    out = np.empty((log.n, 4))
-    gyr, acc, mag, step = np.degrees(log.gyr), log.acc / 9.80665, log.mag, step_of(log)
-    for k in range(log.n):
-        running.update(gyr[k], acc[k], mag[k], step)
-        q = running.quaternion
-        out[k] = getattr(q, "wxyz", None) if hasattr(q, "wxyz") else (q.w, q.x, q.y, q.z)
-    return out
-
-
-PEERS: dict[str, Callable[[Log], Array]] = {
-    "vqf online": vqf_online,
-    "vqf offline": vqf_offline,
-    "qmt vqf": qmt_vqf,
-    "qmt mahony": qmt_mahony,
-    "ahrs ekf": ahrs_ekf,
-    "imufusion": fusion,
-}
-
-
-def errors(log: Log, q: Array) -> Array:
+def errors(log: Log, q: Array) -> list[float]:
     """Total, heading and inclination, deg."""
     found = _imufit.attitude_rmse(q, log.ref_q, log.covariates["movement"] == 1.0)
     if found is None:
-        raise SystemExit("a trial without a row to be judged")
-    return np.degrees([found[part] for part in PARTS])
+        raise InputError("no row with a reference and movement = 1", file=log.path)
+    return [float(np.degrees(found[part])) for part in PARTS]
 
 
-def ours(log: Log, name: str, settings: dict[str, float]) -> Array:
-    return errors(log, run_filters(log, [name], {name: settings}).attitude[name])
+def judge(path: Path, settings: dict[str, float], parameters: Parameters, name: str) -> list[float]:
+    """Errors of a filter of ours or of another package over a trial, corrected with a sensor model."""
+    log = corrected(SensorModel(list(parameters), parameters), read(path))
+    log = replace(log, metadata=replace(log.metadata, mag_reference=NORTH))
+    if name not in PEERS:
+        return errors(log, run_filters(log, [name], {name: settings}).attitude[name])
+    peer, columns = PEERS[name], (np.ascontiguousarray(x, dtype=np.float64) for x in (log.gyr, log.acc, log.mag))
+    q = peer.run(float(np.median(np.diff(log.t))), *columns)
+    return errors(log, convert_frame(np.ascontiguousarray(q, dtype=np.float64), peer.frame, "ENU"))
 
 
-def line(name: str, found: Array) -> str:
-    return f"{name:24s}" + "".join(f"{x:12.2f}" for x in found)
+def with_field(log: Log) -> Log:
+    """Return the log with a reference field: as long as its mean, horizontally and vertically, and to the north."""
+    judged = (log.covariates["movement"] == 1.0) & np.isfinite(np.hstack([log.ref_q, log.mag])).all(axis=1)
+    q, mag = (np.ascontiguousarray(x[judged], dtype=np.float64) for x in (log.ref_q, log.mag))
+    east, north, up = _imufit.rotate(q, mag).mean(axis=0).tolist()
+    return replace(log, metadata=replace(log.metadata, mag_reference=(0.0, math.hypot(east, north), up)))
 
 
-def left_out(found: Array) -> Array:
-    """Errors (trials, 3) with the candidate that is best on the other trials; `found` (candidates, trials, 3)."""
-    total = found[:, :, 0]
-    best = np.argmin(total.sum(axis=1, keepdims=True) - total, axis=0)
-    return found[best, np.arange(total.shape[1])]
+def climb(path: Path) -> list[str]:
+    """Return the effects of the sensor that the ladder finds on a trial."""
+    return [
+        effect
+        for effect in imufit.ladder(with_field(read(path))).model
+        if not any(x in effect for x in OF_ONE_RECORDING)
+    ]
+
+
+def fit(path: Path, effects: Sequence[str]) -> Parameters | None:
+    """Return the parameters of a stack of effects on a trial; None where it cannot be fitted there."""
+    try:
+        return SensorModel(effects).fit(with_field(read(path))).model.parameters
+    except InputError:
+        return None
+
+
+class Trials:
+    """The trials of a folder, worked on side by side."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.paths = list(paths)
+        self._pool = ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn"))
+
+    def each(self, what: str, task: Callable[..., Any], *columns: Sequence[Any]) -> list[Any]:
+        """Results of a task over paths (all, or the first of the columns) and what goes with each."""
+        before = time.perf_counter()
+        found = list(self._pool.map(task, *(columns or (self.paths,))))
+        print(f"{what}: {len(found)} in {time.perf_counter() - before:.1f} s", file=sys.stderr, flush=True)
+        return found
+
+    def judged(self, name: str) -> Array:
+        """Errors (trials, 3) of a filter with its defaults."""
+        return np.array(self.each(name, partial(judge, settings={}, parameters={}, name=name)))
+
+    def tuned(self, name: str) -> Array:
+        """Errors (trials, 3) with the candidate that is best on the other trials."""
+        n = len(self.paths)
+        settings = [each for each in CANDIDATES for _ in range(n)]
+        task = partial(judge, parameters={}, name=name)
+        found = self.each(f"{name}, settings", task, self.paths * len(CANDIDATES), settings)
+        every = np.array(found).reshape(len(CANDIDATES), n, len(PARTS))
+        total = every[:, :, 0]
+        best = np.argmin(total.sum(axis=1, keepdims=True) - total, axis=0)
+        return every[best, np.arange(n)]
+
+    def models(self) -> list[Parameters]:
+        """For each trial the model that the others give."""
+        found = self.each("ladder", climb)
+        stacks = [_majority([*found[:k], *found[k + 1 :]]) for k in range(len(found))]
+        fitted = {
+            stack: self.each(f"fit of {' '.join(stack)}", partial(fit, effects=stack))
+            for stack in dict.fromkeys(stacks)
+        }
+        return [_median(fitted[stack][:k] + fitted[stack][k + 1 :]) for k, stack in enumerate(stacks)]
+
+    def with_models(self, name: str, models: Sequence[Parameters]) -> Array:
+        """Errors (trials, 3) of a filter with its defaults over corrected readings."""
+        settings: list[dict[str, float]] = [{}] * len(self.paths)
+        return np.array(self.each(f"{name}, model", partial(judge, name=name), self.paths, settings, models))
+
+
+def _majority(found: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    count = Counter(effect for effects in found for effect in effects)
+    return tuple(sorted(effect for effect, n in count.items() if 2 * n > len(found)))
+
+
+def _median(fitted: Sequence[Parameters | None]) -> Parameters:
+    known = [each for each in fitted if each is not None]
+    return {
+        effect: {name: statistics.median(each[effect][name] for each in known) for name in known[0][effect]}
+        for effect in (known[0] if known else ())
+    }
+
+
+def written(paths: Sequence[Path], found: dict[str, Array], models: Sequence[Parameters]) -> dict[str, Any]:
+    """Return everything for `--json`."""
+    names = [path.stem for path in paths]
+    keys = [f"{part}_deg" for part in PARTS]
+    return {
+        "trials": names,
+        "filters": {
+            name: {
+                "mean": dict(zip(keys, each.mean(axis=0).tolist(), strict=True)),
+                **{key: each[:, k].tolist() for k, key in enumerate(keys)},
+            }
+            for name, each in found.items()
+        },
+        "models_of_the_others": dict(zip(names, models, strict=False)),
+        "missing": MISSING,
+    }
+
+
+def printed(paths: Sequence[Path], found: dict[str, Array]) -> None:
+    print(f"mean over {len(paths)} trials, deg".ljust(36) + "".join(f"{part:>14s}" for part in PARTS))
+    for name, each in found.items():
+        print(f"{name:36s}" + "".join(f"{x:14.2f}" for x in each.mean(axis=0)))
+    print("\ntotal error of each trial, deg")
+    for k, name in enumerate(found):
+        print(f"{k:4d}  {name}")
+    print(" " * 44 + "".join(f"{k:7d}" for k in range(len(found))))
+    for k, path in enumerate(paths):
+        print(f"{path.stem:44s}" + "".join(f"{each[k, 0]:7.2f}" for each in found.values()))
 
 
 def main() -> None:
-    arguments = [each for each in sys.argv[1:] if not each.startswith("--")]
-    folder = Path(arguments[0]) if arguments else FOLDER
-    paths = sorted(path for path in folder.glob("*.parquet") if "norefgaps" not in path.name)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, default=FOLDER)
+    parser.add_argument("--no-tuning", action="store_true", help="leave out the settings of the others")
+    parser.add_argument("--no-models", action="store_true", help="leave out the models of the others")
+    parser.add_argument("--json", action="store_true", help="print JSON in place of the table")
+    given = parser.parse_args()
+    paths = sorted(path for path in given.folder.glob("*.parquet") if "norefgaps" not in path.name)
     if not paths:
-        raise SystemExit(f"no recordings (*.parquet) in {folder}")
-    logs = [read(path) for path in paths]
-    with ThreadPoolExecutor() as pool:
-        fixed = {name: np.array(list(pool.map(lambda log, n=name: ours(log, n, {}), logs))) for name in OURS}
-        fixed["mahony"] = np.array(list(pool.map(lambda log: ours(log, "mahony", {}), logs)))
-        for name, peer in PEERS.items():
-            try:
-                fixed[name] = np.array([errors(log, np.ascontiguousarray(peer(log), dtype=np.float64)) for log in logs])
-            except ImportError as error:
-                print(
-                    f"{name} does not run beside numpy {np.__version__}: {str(error).splitlines()[0]}", file=sys.stderr
-                )
-        tuned = {}
-        if "--no-tuning" not in sys.argv:
-            for name in OURS:
-                tried = [list(pool.map(lambda log, n=name, s=s: ours(log, n, s), logs)) for s in CANDIDATES]
-                tuned[name] = left_out(np.array(tried))
-    print(f"{len(logs)} trials, total error in deg")
-    print(f"{'':44s}" + "".join(f"{name:>14s}" for name in fixed))
-    for k, path in enumerate(paths):
-        print(f"{path.stem:44s}" + "".join(f"{found[k, 0]:14.2f}" for found in fixed.values()))
-    print(f"\n{'mean over trials, deg':24s}" + "".join(f"{part:>12s}" for part in PARTS))
-    for name, found in fixed.items():
-        print(line(name, found.mean(axis=0)))
-    for name, found in tuned.items():
-        print(line(f"{name}, leave one out", found.mean(axis=0)))
+        raise SystemExit(f"no recordings (*.parquet) in {given.folder}")
+    for line in MISSING:
+        print(line, file=sys.stderr)
+    trials, models = Trials(paths), list[Parameters]()
+    peers = [name for name, peer in PEERS.items() if peer.frame is not None and name not in LEFT_OUT]
+    found = {name: trials.judged(name) for name in (*OURS, *peers)}
+    if not given.no_tuning and len(paths) > 1:
+        found |= {f"{name}, settings of the others": trials.tuned(name) for name in TUNED}
+    if not given.no_models and len(paths) > 1:
+        models = trials.models()
+        names = [name for name in WITH_MODEL if name in found]
+        found |= {f"{name}, model of the others": trials.with_models(name, models) for name in names}
+    if given.json:
+        print(json.dumps(written(paths, found, models), indent=1))
+    else:
+        printed(paths, found)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except InputError as error:
+        raise SystemExit(str(error)) from None

@@ -16,7 +16,7 @@ import numpy as np
 from filterpy.kalman import KalmanFilter
 from imufit import Log, _imufit
 from imufit.replay import Stream, replay_many
-from peers import PEERS, CLoop
+from peers import MISSING, PEERS, CLoop
 from scipy.signal import lfilter
 
 G = 9.80665
@@ -227,15 +227,17 @@ def beside_others(t: np.ndarray, acc: np.ndarray, gyr: np.ndarray, mag: np.ndarr
     }
     for label, one in made.items():
         runs[f"imufit {label}"] = (lambda one=one: (one.reset(), one.run(t, acc, gyr, mag)), rows)
-    for label, (peer, most) in PEERS.items():
-        n = min(rows, most)
-        runs[label] = (lambda peer=peer, n=n: peer(dt, gyr[:n], acc[:n], mag[:n]), n)
+    for label, peer in PEERS.items():
+        n = min(rows, peer.rows)
+        runs[label] = (lambda run=peer.run, n=n: run(dt, gyr[:n], acc[:n], mag[:n]), n)
     best = dict.fromkeys(runs, np.inf)
     for _ in range(5):
         for label, (run, n) in runs.items():
             before = time.process_time()
             run()
             best[label] = min(best[label], (time.process_time() - before) / n)
+    for line in MISSING:
+        print(line, file=sys.stderr)
     limit = best["C, first_order"]
     print(f"\nnine axes, {rows} rows, one core\n{'filter':<28}{'million rows/s':>16}{'of the C loop':>16}")
     for label, each in sorted(best.items(), key=lambda item: item[1]):

@@ -1,9 +1,11 @@
 """The multiplicative extended Kalman filter and the smoother on top of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from imufit import Log
-from imufit.replay import SETTINGS, SMOOTHERS, Stream, replay
+from imufit import Log, _imufit
+from imufit.replay import SETTINGS, SMOOTHERS, Replay, Stream, replay
 from scipy.spatial.transform import Rotation
 
 G = 9.80665
@@ -37,6 +39,15 @@ def moving(seconds: float, still: float = 0.0, seed: int = 0, bias: np.ndarray =
 def total(log: Log, name: str = "mekf", rows: slice = slice(None), **settings: float) -> np.ndarray:
     """Angle of the error, deg."""
     return np.degrees(replay(log, [name], {name: settings}).row_errors(name)[rows, 0])
+
+
+def both(log: Log, ranges: dict[str, float] | None = None) -> Replay:
+    """Filter and smoother over a log; every attitude is finite and of unit norm."""
+    result = replay(log, ["mekf", "smoother"], {"replay": ranges or {}})
+    for q in result.attitude.values():
+        assert np.isfinite(q).all()
+        assert np.abs(np.linalg.norm(q, axis=1) - 1.0).max() < 1e-12
+    return result
 
 
 def stream() -> Stream:
@@ -139,13 +150,9 @@ def test_a_disturbance_is_counted_and_gone_after_ten_seconds(name: str):
         gyr[2000] = 1.0
     else:
         gyr[2000, 2] = acc[2100, 1] = np.nan
-    spoiled = Log.from_arrays(
-        log.t, acc=acc, gyr=gyr, mag=log.mag, reference=log.ref_q, frame="ENU", mag_reference=FIELD.tolist()
-    )
-    result = replay(spoiled, ["mekf", "smoother"], {"replay": ranges})
+    result = both(replace(log, acc=acc, gyr=gyr), ranges)
     assert result.skipped[{"free fall": "free_fall", "saturated": "gyr_clipped"}.get(name, "gyr_not_finite")] > 0
     for each in ("mekf", "smoother"):
-        assert np.isfinite(result.attitude[each]).all()
         assert np.degrees(result.row_errors(each)[3050:, 0]).max() < 2.0
 
 
@@ -160,25 +167,40 @@ def test_one_infinite_sample_of_a_running_device_does_no_harm():
     assert np.degrees(error.magnitude()[500:]).max() < 2.0
 
 
+def test_one_infinite_sample_of_a_log_does_no_harm_to_the_smoother():
+    log, _ = moving(20.0, still=5.0)
+    gyr, acc = log.gyr.copy(), log.acc.copy()
+    gyr[1000, 1], acc[1100] = np.inf, -np.inf
+    q, skipped = _imufit.smooth(log.t, acc, gyr, log.mag, frame="ENU", mag_reference=FIELD.tolist())
+    assert skipped == {"gyr_not_finite": 1, "acc_not_finite": 1}
+    assert np.degrees(_imufit.attitude_errors(q, log.ref_q)[:, 0]).max() < 2.0
+
+
 def test_after_a_gap_of_ten_seconds_the_attitude_is_found_again():
     """The times of the filter's documentation: tilt within 10 s in motion, heading within 30 s."""
     log, _ = moving(60.0, still=5.0)
     keep = np.r_[0:1000, 2000:6000]
-    cut = Log.from_arrays(
-        log.t[keep],
-        acc=log.acc[keep],
-        gyr=log.gyr[keep],
-        mag=log.mag[keep],
-        reference=log.ref_q[keep],
-        frame="ENU",
-        mag_reference=FIELD.tolist(),
-    )
-    result = replay(cut, ["mekf"])
+    columns = {name: getattr(log, name)[keep] for name in ("t", "acc", "gyr", "mag", "ref_q")}
+    result = both(replace(log, **columns))
     assert result.skipped["gap"] >= 1
     errors = np.degrees(result.row_errors("mekf"))
     assert errors[1000, 0] > 20.0
     assert errors[2000:, 2].max() < 2.0
     assert errors[4000:, 0].max() < 2.0
+    # The rows on both sides of the gap serve the smoother.
+    errors = np.degrees(result.row_errors("smoother"))
+    assert errors[2000:, 2].max() < 2.0
+    assert errors[4000:, 0].max() < 2.0
+    assert errors[1010:, 0].max() < 3.0
+
+
+def test_a_start_in_motion_is_over_within_the_times_of_a_gap():
+    log, _ = moving(50.0)
+    result = both(log)
+    for each in ("mekf", "smoother"):
+        errors = np.degrees(result.row_errors(each))
+        assert errors[1000:, 2].max() < 2.0
+        assert errors[3000:, 0].max() < 2.0
 
 
 def test_a_vertical_field_shows_no_heading_and_does_no_harm():
@@ -186,21 +208,29 @@ def test_a_vertical_field_shows_no_heading_and_does_no_harm():
     q = Rotation.from_quat(np.asarray(log.ref_q)[:, [1, 2, 3, 0]])
     mag = log.mag.copy()
     mag[1000:1500] = q.inv().apply([0.0, 0.0, -50.0])[1000:1500]
-    spoiled = Log.from_arrays(
-        log.t, acc=log.acc, gyr=log.gyr, mag=mag, reference=log.ref_q, frame="ENU", mag_reference=FIELD.tolist()
-    )
-    result = replay(spoiled, ["mekf"])
+    result = both(replace(log, mag=mag))
     assert result.skipped["no_heading"] > 400
-    assert np.degrees(result.row_errors("mekf")[500:, 0]).max() < 2.0
+    for each in ("mekf", "smoother"):
+        assert np.degrees(result.row_errors(each)[500:, 0]).max() < 2.0
+
+
+def test_a_slow_magnetometer_stands_for_the_time_between_its_readings():
+    log, _ = moving(40.0, still=5.0)
+    mag = np.full_like(log.mag, np.nan)
+    mag[::20] = log.mag[::20]
+    slow, fast = both(replace(log, mag=mag)), both(log)
+    for each in ("mekf", "smoother"):
+        heading = np.abs(np.degrees(slow.row_errors(each)[1000:, 1]))
+        assert heading.max() < 2.0
+        # 5 of 100 readings a second, yet no slower to follow them.
+        assert np.abs(slow.row_errors(each) - fast.row_errors(each))[1000:, 1].max() < np.radians(1.0)
 
 
 def test_a_disturbed_field_hardly_turns_the_heading():
     log, _ = moving(40.0, still=5.0)
     mag = log.mag.copy()
     mag[2000:2500] += [30.0, -10.0, 20.0]
-    spoiled = Log.from_arrays(
-        log.t, acc=log.acc, gyr=log.gyr, mag=mag, reference=log.ref_q, frame="ENU", mag_reference=FIELD.tolist()
-    )
+    spoiled = replace(log, mag=mag)
     assert total(spoiled, rows=slice(2000, 2500)).max() < 4.0
     assert total(spoiled, "mahony", slice(2000, 2500)).max() > 10.0
 
@@ -215,8 +245,9 @@ def test_the_smoother_is_better_than_the_filter_and_needs_no_start():
 def test_without_a_magnetometer_the_heading_keeps_to_its_start():
     log, _ = moving(40.0, still=5.0)
     no_field = Log.from_arrays(log.t, acc=log.acc, gyr=log.gyr, reference=log.ref_q, frame="ENU")
+    result = both(no_field)
     for name in ("mekf", "smoother"):
-        errors = np.degrees(replay(no_field, [name]).row_errors(name))
+        errors = np.degrees(result.row_errors(name))
         assert errors[1000:, 2].max() < 1.0
         assert np.abs(errors[:, 1]).max() < 3.0
 

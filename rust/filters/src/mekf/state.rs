@@ -1,0 +1,85 @@
+//! The state as numbers: attitude, bias, velocity, scale column by column, the covariance's triangle, rest, field.
+
+use imufit_attitude::Quaternion;
+use nalgebra::{Matrix3, Vector3};
+
+use super::Mekf;
+use super::covariance::{BIAS, SCALE, SPEED, TRIANGLE, places};
+use crate::field::Field;
+use crate::filter::split_state;
+use crate::rest::Rest;
+
+/// Numbers before the triangle: attitude, bias, velocity, scale.
+const ESTIMATES: usize = 4 + 3 + 2 + 9;
+/// Numbers of a state beyond the attitude.
+const REST_OF_STATE: usize = ESTIMATES - 4 + TRIANGLE + 7 + 4 + 1;
+
+/// The state with which a pass the other way round begins at `attitude`: bias and scale are kept with their certainty,
+/// the bias, like every rate, with its sign changed; attitude and velocity are to be found anew.
+pub(crate) fn turned_back(state: &[f64], attitude: Quaternion) -> Vec<f64> {
+    let mut state = state.to_vec();
+    let at = ESTIMATES.min(state.len());
+    let (head, triangle) = state.split_at_mut(at);
+    for (value, own) in head.iter_mut().zip(attitude.to_array()) {
+        *value = own;
+    }
+    for value in head.iter_mut().skip(4).take(3) {
+        *value = -*value;
+    }
+    for value in head.iter_mut().skip(7).take(2) {
+        *value = 0.0;
+    }
+    let is_bias = |i: usize| (BIAS..SPEED).contains(&i);
+    let is_lost = |i: usize| i < BIAS || (SPEED..SCALE).contains(&i);
+    for (value, (i, j)) in triangle.iter_mut().zip(places()) {
+        if i != j && (is_lost(i) || is_lost(j)) {
+            *value = 0.0;
+        } else if is_bias(i) != is_bias(j) {
+            *value = -*value;
+        }
+    }
+    state
+}
+
+impl Mekf {
+    pub(super) fn numbers(&self) -> Vec<f64> {
+        let mut state = self.q.to_array().to_vec();
+        state.extend(self.bias.iter().chain(&self.velocity).chain(self.scale.iter()));
+        state.extend(self.covariance.triangle());
+        let (Rest { rate, force, calm }, field) = (self.rest, self.field);
+        state.extend(rate.iter().chain(force.iter()));
+        state.extend([
+            calm,
+            field.horizontal,
+            field.vertical,
+            field.time,
+            field.departure,
+            self.since_force,
+        ]);
+        state
+    }
+
+    pub(super) fn set_numbers(&mut self, state: &[f64]) -> bool {
+        let Some((q, rest)) = split_state::<f64, REST_OF_STATE>(state) else {
+            return false;
+        };
+        let vector = |at: usize| Vector3::new(rest[at], rest[at + 1], rest[at + 2]);
+        (self.q, self.bias, self.velocity) = (q, vector(0), [rest[3], rest[4]]);
+        self.scale = Matrix3::from_column_slice(&rest[5..14]);
+        self.covariance.set_triangle(&rest[14..14 + TRIANGLE]);
+        let at = 14 + TRIANGLE;
+        self.rest = Rest {
+            rate: vector(at),
+            force: vector(at + 3),
+            calm: rest[at + 6],
+        };
+        self.field = Field {
+            horizontal: rest[at + 7],
+            vertical: rest[at + 8],
+            time: rest[at + 9],
+            departure: rest[at + 10],
+        };
+        self.since_force = rest[at + 11];
+        true
+    }
+}
