@@ -18,6 +18,13 @@ pub struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
+    /// Whether there is a column of that sensor.
+    pub(crate) fn has(&self, wanted: Sensor) -> bool {
+        let mut sensors = self.sensors().into_iter();
+        sensors.any(|(sensor, column)| sensor == wanted && column.is_some())
+    }
+
+    /// The columns by sensor.
     pub(crate) fn sensors(&self) -> [(Sensor, Option<&'a [f64]>); 3] {
         [
             (Sensor::Acc, self.acc),

@@ -4,48 +4,63 @@
 //! depends on the heading. A disturbance of unknown direction that changes them by some uT turns the horizontal part by
 //! about as many uT over its length; that angle is the standard deviation of the heading which the field shows.
 
+use imufit_attitude::Real;
+
 /// Time constant of the departure, s.
 const DEPARTURE_TIME: f64 = 0.5;
 
 /// Mean of the undisturbed field and the departure from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Field {
+pub(crate) struct Field<T> {
     /// Horizontal part, uT.
-    pub horizontal: f64,
+    pub horizontal: T,
     /// Part along up, uT.
-    pub vertical: f64,
+    pub vertical: T,
     /// Time that the mean stands for, s; 0 before the first reading.
-    pub time: f64,
+    pub time: T,
     /// Mean square of the departure over the horizontal part, rad^2.
-    pub departure: f64,
+    pub departure: T,
 }
 
-impl Field {
-    pub const UNKNOWN: Self = Self {
-        horizontal: 0.0,
-        vertical: 0.0,
-        time: 0.0,
-        departure: 0.0,
-    };
+impl<T: Real> Field<T> {
+    pub fn unknown() -> Self {
+        let zero = T::splat(0.0);
+        Self {
+            horizontal: zero,
+            vertical: zero,
+            time: zero,
+            departure: zero,
+        }
+    }
+
+    /// Lane by lane `self` where the condition holds, else `other`.
+    pub fn select(self, condition: T::SimdBool, other: Self) -> Self {
+        Self {
+            horizontal: self.horizontal.select(condition, other.horizontal),
+            vertical: self.vertical.select(condition, other.vertical),
+            time: self.time.select(condition, other.time),
+            departure: self.departure.select(condition, other.departure),
+        }
+    }
 
     /// Takes the two parts of a reading that stands for `dt` and returns the variance, rad^2, of the heading it shows as
     /// far as its departure from the mean tells. `memory`: time constant of the mean, s; `usual`: departure, rad, at
     /// which a reading is learned half as fast.
-    pub fn update(&mut self, horizontal: f64, vertical: f64, dt: f64, memory: f64, usual: f64) -> f64 {
-        if self.time <= 0.0 {
-            (self.horizontal, self.vertical) = (horizontal, vertical);
-        }
+    pub fn update(&mut self, horizontal: T, vertical: T, dt: f64, memory: T, usual: T) -> T {
+        let (zero, one, least) = (T::splat(0.0), T::splat(1.0), T::splat(f64::MIN_POSITIVE));
+        let first = self.time.simd_le(zero);
+        self.horizontal = horizontal.select(first, self.horizontal);
+        self.vertical = vertical.select(first, self.vertical);
         let (h, v) = (horizontal - self.horizontal, vertical - self.vertical);
-        let square = (h * h + v * v) / (self.horizontal * self.horizontal).max(f64::MIN_POSITIVE);
-        self.departure += (square - self.departure) * -(-dt / DEPARTURE_TIME).exp_m1();
-        let departure = self.departure.max(square);
-        self.time = (self.time + dt).min(memory);
-        if self.time > 0.0 {
-            let trust = 1.0 / (1.0 + departure / (usual * usual).max(f64::MIN_POSITIVE));
-            let weight = (dt / self.time).min(1.0) * if self.time < memory { 1.0 } else { trust };
-            self.horizontal += h * weight;
-            self.vertical += v * weight;
-        }
+        let square = (h * h + v * v) / (self.horizontal * self.horizontal).simd_max(least);
+        self.departure += (square - self.departure) * T::splat(-(-dt / DEPARTURE_TIME).exp_m1());
+        let departure = self.departure.simd_max(square);
+        self.time = (self.time + T::splat(dt)).simd_min(memory);
+        let trust = one / (one + departure / (usual * usual).simd_max(least));
+        let share = (T::splat(dt) / self.time).simd_min(one) * one.select(self.time.simd_lt(memory), trust);
+        let weight = share.select(self.time.simd_gt(zero), zero);
+        self.horizontal += h * weight;
+        self.vertical += v * weight;
         departure
     }
 }
@@ -56,7 +71,7 @@ mod tests {
 
     /// The variance after each second of a field that jumps after twenty seconds.
     fn variances(memory: f64) -> Vec<f64> {
-        let mut field = Field::UNKNOWN;
+        let mut field = Field::unknown();
         let mut found = Vec::new();
         for k in 0..20_000 {
             let h = if k < 2000 { 18.0 } else { 24.0 };

@@ -27,7 +27,7 @@ pub trait Filter<T: Real = f64>: Send + Sync {
     fn attitude(&self) -> Quaternion<T>;
 
     /// Covariance of the error of the attitude, reference frame, rad^2; `None` for a filter that keeps none.
-    fn attitude_covariance(&self) -> Option<Matrix3<f64>> {
+    fn attitude_covariance(&self) -> Option<Matrix3<T>> {
         None
     }
 
@@ -175,6 +175,17 @@ impl Description {
     ) -> Result<Box<dyn Filter>, FilterError> {
         let values = fill(self.name, self.parameters, settings)?;
         Ok((self.make)(environment, &values))
+    }
+
+    /// The first sensor that is needed and not there is an error.
+    pub(crate) fn check_sensors(&self, present: impl Fn(Sensor) -> bool) -> Result<(), FilterError> {
+        match self.needs.iter().find(|sensor| !present(**sensor)) {
+            None => Ok(()),
+            Some(sensor) => Err(FilterError::MissingSensor {
+                filter: self.name,
+                sensor: sensor.name(),
+            }),
+        }
     }
 }
 

@@ -4,18 +4,16 @@
 //! is the same bit by bit.
 
 use imufit_attitude::Quaternion;
-use nalgebra::Matrix3;
 
 use crate::columns::{Columns, Row};
 use crate::filter::{Description, Filter};
 use crate::intake::Intake;
 use crate::memory::Memory;
-use crate::{Environment, FilterError, Rules, Sensor, Skipped, Start};
+use crate::{Environment, FilterError, Rules, Skipped, Start};
 
 /// A filter with the rules around it: the same object serves a whole log, pieces of one, and a running device.
 pub struct Replay {
-    name: &'static str,
-    needs: &'static [Sensor],
+    description: &'static Description,
     filter: Box<dyn Filter>,
     intake: Intake,
 }
@@ -29,52 +27,22 @@ impl Replay {
         rules: Rules,
         start: Start,
     ) -> Result<Self, FilterError> {
-        let filter = description.build(&environment, settings)?;
-        let Description { name, needs, .. } = *description;
         Ok(Self {
-            name,
-            needs,
-            filter,
+            description,
+            filter: description.build(&environment, settings)?,
             intake: Intake::new(environment, rules, start),
         })
     }
 
     /// The filter's name.
     pub fn name(&self) -> &'static str {
-        self.name
+        self.description.name
     }
 
     /// Back to before the first row.
     pub fn reset(&mut self) {
         self.filter.reset(Quaternion::IDENTITY);
         self.intake.memory = Memory::EMPTY;
-    }
-
-    /// Goes on at the next row, whatever its time, with a filter in that state.
-    pub(crate) fn resume(&mut self, filter: &[f64]) -> bool {
-        let taken = self.filter.set_state(filter);
-        if taken {
-            self.intake.memory = Memory {
-                started: true,
-                ..Memory::EMPTY
-            };
-        }
-        taken
-    }
-
-    /// The state of the filter alone.
-    pub(crate) fn filter_state(&self) -> Vec<f64> {
-        self.filter.state()
-    }
-
-    /// The filter's attitude after the last row.
-    pub(crate) fn attitude(&self) -> Quaternion {
-        self.filter.attitude()
-    }
-
-    /// Covariance of its error, where the filter keeps one.
-    pub(crate) fn attitude_covariance(&self) -> Option<Matrix3<f64>> {
-        self.filter.attitude_covariance()
     }
 
     /// All that the next row's attitude depends on, to be handed to another replay with the same settings.
@@ -88,7 +56,7 @@ impl Replay {
     pub fn set_state(&mut self, state: &[f64]) -> Result<(), FilterError> {
         let expected = Memory::LENGTH + self.filter.state().len();
         let error = FilterError::State {
-            filter: self.name,
+            filter: self.description.name,
             came: state.len(),
             expected,
         };
@@ -108,13 +76,7 @@ impl Replay {
     /// Fills `attitude`, four values `w x y z` for each row of `columns`; NaN before the start.
     pub fn run(&mut self, columns: &Columns<'_>, attitude: &mut [f64]) -> Result<Skipped, FilterError> {
         columns.check()?;
-        let present = |wanted: Sensor| {
-            columns
-                .sensors()
-                .iter()
-                .any(|(s, column)| *s == wanted && column.is_some())
-        };
-        self.check_sensors(present)?;
+        self.description.check_sensors(|sensor| columns.has(sensor))?;
         let (came, expected) = (attitude.len() / 4, columns.t.len());
         if attitude.len() != 4 * expected {
             return Err(FilterError::Length {
@@ -130,20 +92,10 @@ impl Replay {
 
     /// The attitude `w x y z` after one more row, NaN before the start: what [`Replay::run`] does row by row.
     pub fn step(&mut self, row: &Row) -> Result<([f64; 4], Skipped), FilterError> {
-        self.check_sensors(|sensor| row.has(sensor))?;
+        self.description.check_sensors(|sensor| row.has(sensor))?;
         let (mut attitude, mut skipped) = ([f64::NAN; 4], Skipped::default());
         self.intake
             .advance(self.filter.as_mut(), row, &mut attitude, &mut skipped);
         Ok((attitude, skipped))
-    }
-
-    fn check_sensors(&self, present: impl Fn(Sensor) -> bool) -> Result<(), FilterError> {
-        match self.needs.iter().find(|sensor| !present(**sensor)) {
-            None => Ok(()),
-            Some(sensor) => Err(FilterError::MissingSensor {
-                filter: self.name,
-                sensor: sensor.name(),
-            }),
-        }
     }
 }

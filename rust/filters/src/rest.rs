@@ -3,8 +3,8 @@
 //! Only differences from the mean of the last half second count, so that neither a gyro bias nor a tilt is motion. A rate
 //! that is constant but larger than any bias is a turn.
 
-use imufit_attitude::Quaternion;
-use nalgebra::Vector3;
+use imufit_attitude::Real;
+use nalgebra::{SimdBool, Vector3};
 
 /// Time constant of the means, s.
 const MEAN_TIME: f64 = 0.5;
@@ -13,68 +13,64 @@ const CALM_TIME: f64 = 1.5;
 
 /// What differs from rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Limits {
+pub(crate) struct Limits<T> {
     /// Departure of the rate from its mean, rad/s.
-    pub gyr: f64,
+    pub gyr: T,
     /// Departure of the specific force from its mean, m/s^2.
-    pub acc: f64,
+    pub acc: T,
     /// Largest mean rate that may be a bias, rad/s.
-    pub bias: f64,
+    pub bias: T,
 }
 
 /// Means of both sensors and the time since something moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Rest {
+pub(crate) struct Rest<T> {
     pub rate: Vector3<f64>,
     pub force: Vector3<f64>,
     /// Time since a reading last departed from its mean, s; negative before the first reading.
-    pub calm: f64,
+    pub calm: T,
 }
 
-impl Rest {
-    pub const UNKNOWN: Self = Self {
-        rate: Vector3::new(0.0, 0.0, 0.0),
-        force: Vector3::new(0.0, 0.0, 0.0),
-        calm: -1.0,
-    };
+impl<T: Real> Rest<T> {
+    pub fn unknown() -> Self {
+        Self {
+            rate: Vector3::zeros(),
+            force: Vector3::zeros(),
+            calm: T::splat(-1.0),
+        }
+    }
 
     /// Takes a rate and a specific force that stand for `dt`, and tells whether the body rests.
-    pub fn update(&mut self, rate: &Vector3<f64>, force: &Vector3<f64>, dt: f64, limits: &Limits) -> bool {
-        if self.calm < 0.0 {
-            (self.rate, self.force, self.calm) = (*rate, *force, 0.0);
-            return false;
+    pub fn update(&mut self, rate: &Vector3<f64>, force: &Vector3<f64>, dt: f64, limits: &Limits<T>) -> T::SimdBool {
+        let (zero, enough) = (T::splat(0.0), T::splat(CALM_TIME));
+        let first = self.calm.simd_lt(zero);
+        if first.all() {
+            (self.rate, self.force, self.calm) = (*rate, *force, zero);
+            return !first;
         }
         let (from_rate, from_force) = (rate - self.rate, force - self.force);
         let weight = -(-dt / MEAN_TIME).exp_m1();
         self.rate += from_rate * weight;
         self.force += from_force * weight;
-        let moved = from_rate.amax() > limits.gyr || from_force.amax() > limits.acc || self.rate.amax() > limits.bias;
-        self.calm = if moved { 0.0 } else { (self.calm + dt).min(CALM_TIME) };
-        self.calm >= CALM_TIME
+        let beyond = |departure: &Vector3<f64>, limit: T| T::splat(departure.amax()).simd_gt(limit);
+        let moved = beyond(&from_rate, limits.gyr) | beyond(&from_force, limits.acc) | beyond(&self.rate, limits.bias);
+        self.calm = zero.select(moved, (self.calm + T::splat(dt)).simd_min(enough));
+        self.calm.simd_ge(enough)
     }
-}
-
-/// The matrix of an attitude, body to reference frame.
-pub(crate) fn matrix(q: Quaternion) -> nalgebra::Matrix3<f64> {
-    nalgebra::Matrix3::from_columns(&[
-        q.rotate(&Vector3::x()),
-        q.rotate(&Vector3::y()),
-        q.rotate(&Vector3::z()),
-    ])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const LIMITS: Limits = Limits {
+    const LIMITS: Limits<f64> = Limits {
         gyr: 0.035,
         acc: 0.5,
         bias: 0.06,
     };
 
     fn rests(rate: impl Fn(f64) -> f64) -> bool {
-        let mut rest = Rest::UNKNOWN;
+        let mut rest = Rest::unknown();
         let force = Vector3::z() * 9.81;
         (0..400).fold(false, |_, k| {
             rest.update(&(Vector3::x() * rate(0.01 * f64::from(k))), &force, 0.01, &LIMITS)

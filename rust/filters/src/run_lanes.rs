@@ -11,9 +11,10 @@ use crate::filter::{Filter, fill, find};
 use crate::hybrid::{Driven, Seeded};
 use crate::intake::Intake;
 use crate::mahony::Mahony;
+use crate::mekf::Mekf;
 use crate::quest::Quest;
 use crate::triad::Triad;
-use crate::{Environment, FilterError, Rules, Sensor, Skipped, Start};
+use crate::{Environment, FilterError, Rules, Skipped, Start};
 
 /// Values of one setting by name.
 pub type Settings = Vec<(String, f64)>;
@@ -26,6 +27,7 @@ fn in_lanes(name: &str, environment: &Environment, values: &[Lanes]) -> Option<B
     match (name, driven) {
         ("mahony", _) => Some(Box::new(Mahony::new(environment, values))),
         ("triad", _) => Some(Box::new(Triad::new(environment, values))),
+        ("mekf", _) => Some(Box::new(Mekf::new(environment, values))),
         ("quest", _) => Some(Box::new(Quest::new(environment, values))),
         ("hybrid", 0) => Some(Box::new(Seeded::new(environment, values))),
         ("hybrid", 4) => Some(Box::new(Driven::new(environment, values))),
@@ -83,13 +85,7 @@ pub fn run_lanes(
             .collect();
         let mut attitudes = vec![vec![0.0; 4 * columns.t.len()]; four.len()];
         // Where a sensor is missing a replay of its own says so.
-        let there = |wanted: &Sensor| {
-            columns
-                .sensors()
-                .iter()
-                .any(|(sensor, column)| sensor == wanted && column.is_some())
-        };
-        let complete = description.needs.iter().all(there);
+        let complete = description.needs.iter().all(|sensor| columns.has(*sensor));
         match in_lanes(description.name, &environment, &lanes).filter(|_| complete) {
             Some(filter) => {
                 columns.check()?;

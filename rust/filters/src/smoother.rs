@@ -13,12 +13,14 @@
 //! Without a magnetometer nothing shows the heading but its start, which pass 3 alone knows: it keeps that of q_f.
 //! A row that no attitude reaches forwards has none here either. Memory: 18 numbers a row.
 
-use imufit_attitude::Quaternion;
+use imufit_attitude::{Quaternion, Real};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::filter::{Description, find};
-use crate::mekf;
-use crate::{Columns, Environment, FilterError, Replay, Rules, Skipped, Start};
+use crate::filter::{Description, Filter, fill, find};
+use crate::intake::Intake;
+use crate::mekf::{Mekf, turned_back};
+use crate::memory::Memory;
+use crate::{Columns, Environment, FilterError, Rules, Skipped, Start};
 
 /// The filter that runs both ways.
 const FILTER: &str = "mekf";
@@ -56,19 +58,18 @@ impl Reversed {
 
 /// What one pass says of a row.
 #[derive(Clone, Copy)]
-struct Passed {
-    q: Quaternion,
-    covariance: Matrix3<f64>,
+struct Passed<T> {
+    q: Quaternion<T>,
+    covariance: Matrix3<T>,
 }
 
 /// Settings and surroundings of a smoothed log; see [`Smoother::run`].
 #[derive(Debug, Clone)]
-pub struct Smoother {
+pub struct Smoother<T = f64> {
     description: &'static Description,
-    settings: Vec<(String, f64)>,
-    environment: Environment,
-    rules: Rules,
-    start: Start,
+    filter: Mekf<T>,
+    intake: Intake,
+    up: Vector3<f64>,
 }
 
 impl Smoother {
@@ -80,14 +81,25 @@ impl Smoother {
         start: Start,
     ) -> Result<Self, FilterError> {
         let description = find(FILTER)?;
-        description.build(&environment, settings)?;
-        Ok(Self {
+        let values = fill(description.name, description.parameters, settings)?;
+        Ok(Self::with_values(description, &values, environment, rules, start))
+    }
+}
+
+impl<T: Real> Smoother<T> {
+    fn with_values(
+        description: &'static Description,
+        values: &[T],
+        environment: Environment,
+        rules: Rules,
+        start: Start,
+    ) -> Self {
+        Self {
             description,
-            settings: settings.to_vec(),
-            environment,
-            rules,
-            start,
-        })
+            filter: Mekf::new(&environment, values),
+            intake: Intake::new(environment, rules, start),
+            up: environment.up(),
+        }
     }
 
     /// Fills `attitude`, four values `w x y z` for each row of `columns`; NaN before the start. The rows of which
@@ -95,73 +107,146 @@ impl Smoother {
     pub fn run<E: From<FilterError>>(
         &self,
         columns: &Columns<'_>,
-        attitude: &mut [f64],
+        attitude: &mut [T],
         mut look: impl FnMut() -> Result<(), E>,
     ) -> Result<Skipped, E> {
-        let mut first = self.replay()?;
-        let skipped = first.run(columns, attitude)?;
+        columns.check()?;
+        self.description.check_sensors(|sensor| columns.has(sensor))?;
+        let (mut first, mut intake, mut skipped) = (self.filter.clone(), self.intake.clone(), Skipped::default());
+        first.rows(&mut intake, columns, attitude, &mut skipped);
         look()?;
         let Some((start, q)) = first_attitude(attitude) else {
             return Ok(skipped);
         };
-        let mut backwards = self.replay()?;
-        backwards.resume(&mekf::turned_back(&first.filter_state(), first.attitude()));
         let reversed = Reversed::new(columns);
-        let mut after = pass(&mut backwards, &reversed.columns(), 0)?;
+        let (mut after, backwards) = self.pass(&turned_back(&first.state(), first.attitude()), &reversed.columns(), 0);
         after.reverse();
         look()?;
-        let mut forwards = self.replay()?;
-        forwards.resume(&mekf::turned_back(&backwards.filter_state(), q));
-        let before = pass(&mut forwards, columns, start)?;
+        let (before, _) = self.pass(&turned_back(&backwards.state(), q), columns, start);
         let turned = columns.mag.is_some_and(|m| m.iter().any(|x| x.is_finite()));
+        let up = self.up.map(T::splat);
         let rows = attitude.chunks_exact_mut(4).zip(&after).skip(start).zip(&before);
         for ((out, after), before) in rows {
-            let q = between(before, after, &self.environment.up(), turned);
-            out.copy_from_slice(&q.to_array());
+            out.copy_from_slice(&between(before, after, &up, turned).to_array());
         }
         Ok(skipped)
     }
 
-    fn replay(&self) -> Result<Replay, FilterError> {
-        Replay::new(
-            self.description,
-            &self.settings,
-            self.environment,
-            self.rules,
-            self.start,
-        )
+    /// What the rows from `start` on say to a filter that begins in that state, and the filter after them.
+    fn pass(&self, state: &[T], columns: &Columns<'_>, start: usize) -> (Vec<Passed<T>>, Mekf<T>) {
+        let (mut filter, mut intake) = (self.filter.clone(), self.intake.clone());
+        if filter.set_state(state) {
+            intake.memory = Memory {
+                started: true,
+                ..Memory::EMPTY
+            };
+        }
+        let (mut out, mut skipped) = ([T::splat(0.0); 4], Skipped::default());
+        let found = (start..columns.t.len()).map(|k| {
+            intake.advance(&mut filter, &columns.row(k), &mut out, &mut skipped);
+            Passed {
+                q: filter.attitude(),
+                covariance: filter.attitude_covariance().unwrap_or_else(Matrix3::identity),
+            }
+        });
+        let found = found.collect();
+        (found, filter)
     }
 }
 
 /// The first row with an attitude, and that.
-fn first_attitude(attitude: &[f64]) -> Option<(usize, Quaternion)> {
-    let rows = attitude.chunks_exact(4).enumerate();
-    rows.into_iter()
-        .find_map(|(k, row)| Quaternion::from_row(row).map(|q| (k, q)))
-}
-
-fn pass(replay: &mut Replay, columns: &Columns<'_>, start: usize) -> Result<Vec<Passed>, FilterError> {
-    (start..columns.t.len())
-        .map(|k| {
-            replay.step(&columns.row(k))?;
-            Ok(Passed {
-                q: replay.attitude(),
-                covariance: replay.attitude_covariance().unwrap_or_else(Matrix3::identity),
-            })
-        })
-        .collect()
+fn first_attitude<T: Real>(attitude: &[T]) -> Option<(usize, Quaternion<T>)> {
+    let mut rows = attitude.as_chunks().0.iter().enumerate();
+    rows.find_map(|(k, row)| Quaternion::from_unit(*row).map(|q| (k, q)))
 }
 
 /// The attitude between two with covariances; with `heading` = false the heading of the first.
-fn between(first: &Passed, second: &Passed, up: &Vector3<f64>, heading: bool) -> Quaternion {
+fn between<T: Real>(first: &Passed<T>, second: &Passed<T>, up: &Vector3<T>, heading: bool) -> Quaternion<T> {
     let difference = (second.q * first.q.inverse()).log();
-    let share = (first.covariance + second.covariance)
-        .try_inverse()
-        .map_or_else(Vector3::zeros, |inverse| first.covariance * (inverse * difference));
+    let share = first.covariance * solved(&(first.covariance + second.covariance), &difference);
     let share = if heading { share } else { share - up * share.dot(up) };
-    if share.norm_squared().is_finite() {
-        Quaternion::exp(&share) * first.q
-    } else {
-        first.q
+    let found = share.norm_squared().simd_le(T::splat(f64::MAX));
+    (Quaternion::exp(&share) * first.q).select(found, first.q)
+}
+
+/// `m^-1 x` by the vector products of the columns; not finite where there is no inverse.
+fn solved<T: Real>(m: &Matrix3<T>, x: &Vector3<T>) -> Vector3<T> {
+    let [a, b, c] = [0, 1, 2].map(|k| m.column(k).into_owned());
+    let across = [b.cross(&c), c.cross(&a), a.cross(&b)];
+    Vector3::from(across.map(|row| row.dot(x))) / a.dot(&across[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use imufit_attitude::{Frame, Lanes};
+    use nalgebra::SimdValue;
+
+    use super::*;
+
+    /// A sensor that turns about two axes, moved to and fro, with a disturbed field in the middle.
+    fn columns() -> (Vec<f64>, [Vec<f64>; 3]) {
+        let (mut q, mut times, mut readings) = (Quaternion::IDENTITY, Vec::new(), [const { Vec::new() }; 3]);
+        for k in 0..1500_i32 {
+            let t = f64::from(k) * 0.01;
+            let omega = Vector3::new(t.sin(), (1.3 * t).cos(), 0.4);
+            q = q.turned(&omega, 0.01);
+            let moved = Vector3::new((9.0 * t).sin(), (7.0 * t).cos(), 0.0);
+            let magnet = if (600..800).contains(&k) { 15.0 } else { 0.0 };
+            let acc = q.rotate_back(&(Frame::Ned.up() * 9.81 + moved));
+            let mag = q.rotate_back(&(Frame::Ned.default_field() + Vector3::y() * magnet));
+            times.push(if k > 1200 { t + 3.0 } else { t });
+            for (column, reading) in readings.iter_mut().zip([acc, omega + Vector3::repeat(0.01), mag]) {
+                column.extend(reading.iter());
+            }
+        }
+        (times, readings)
+    }
+
+    #[test]
+    fn several_settings_side_by_side_have_the_bits_of_each_alone() {
+        let (t, [acc, gyr, mag]) = columns();
+        let columns = Columns {
+            t: &t,
+            acc: Some(&acc),
+            gyr: Some(&gyr),
+            mag: Some(&mag),
+        };
+        let environment = Environment::new(Frame::Ned, 9.81, None).unwrap();
+        let description = find(FILTER).unwrap();
+        let alone: Vec<Vec<f64>> = (0..4_i32)
+            .map(|k| {
+                let factor = 0.5 + 0.5 * f64::from(k);
+                description.parameters.iter().map(|p| p.default * factor).collect()
+            })
+            .collect();
+        let lanes: Vec<Lanes> = (0..description.parameters.len())
+            .map(|at| Lanes::from([0, 1, 2, 3].map(|lane| alone[lane][at])))
+            .collect();
+        let (rules, start, n) = (Rules::default(), Start::Vectors, 4 * t.len());
+        let go_on = || Ok::<_, FilterError>(());
+        let mut together = vec![Lanes::splat(0.0); n];
+        Smoother::with_values(description, &lanes, environment, rules, start)
+            .run(&columns, &mut together, go_on)
+            .unwrap();
+        for (lane, values) in alone.iter().enumerate() {
+            let mut found = vec![0.0; n];
+            Smoother::with_values(description, values, environment, rules, start)
+                .run(&columns, &mut found, go_on)
+                .unwrap();
+            assert!(
+                found
+                    .iter()
+                    .zip(&together)
+                    .all(|(a, b)| a.to_bits() == b.extract(lane).to_bits())
+            );
+        }
+    }
+
+    #[test]
+    fn the_result_of_one_row_agrees_with_matrices() {
+        let p = Matrix3::new(2.0, 0.3, -0.2, 0.3, 1.0, 0.1, -0.2, 0.1, 3.0) * 1e-4;
+        let x = Vector3::new(0.3, -0.2, 0.5);
+        assert!((solved(&p, &x) - p.try_inverse().unwrap() * x).norm() < 1e-9);
+        assert!(!solved(&Matrix3::<f64>::zeros(), &x).norm().is_finite());
     }
 }

@@ -3,7 +3,8 @@
 //! Every element is written together with its mirror image, so that the matrix is symmetric to the bit and its triangle
 //! is all there is of it. Predictions touch only the rows that they change, and use how few errors those depend on.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use imufit_attitude::Real;
+use nalgebra::{Matrix3, SMatrix, SVector, SimdBool, Vector3};
 
 /// Errors: attitude 3 (reference frame), gyro bias 3, horizontal velocity 2, gyro scale and misalignment 9.
 pub(super) const STATES: usize = 17;
@@ -20,7 +21,7 @@ pub(super) const TRIANGLE: usize = STATES * (STATES + 1) / 2;
 const NOT_HEADING: [usize; 4] = [0, 1, SPEED, SPEED + 1];
 
 /// One number for each error.
-pub(super) type Errors = SVector<f64, STATES>;
+pub(super) type Errors<T = f64> = SVector<T, STATES>;
 
 /// What a measurement may move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,43 +34,43 @@ pub(super) enum Moves {
 
 /// The matrix.
 #[derive(Debug, Clone)]
-pub(super) struct Covariance(SMatrix<f64, STATES, STATES>);
+pub(super) struct Covariance<T = f64>(SMatrix<T, STATES, STATES>);
 
-impl Covariance {
+impl<T: Real> Covariance<T> {
     /// Independent errors with these standard deviations.
-    pub fn independent(sd: &Errors) -> Self {
+    pub fn independent(sd: &Errors<T>) -> Self {
         Self(SMatrix::from_diagonal(&sd.component_mul(sd)))
     }
 
-    pub fn variance(&self, at: usize) -> f64 {
+    pub fn variance(&self, at: usize) -> T {
         self.0[(at, at)]
     }
 
     /// Adds to the variance of an error.
-    pub fn add(&mut self, at: usize, variance: f64) {
+    pub fn add(&mut self, at: usize, variance: T) {
         self.0[(at, at)] += variance;
     }
 
     /// Makes an error independent of the others.
-    pub fn forget(&mut self, at: usize, variance: f64) {
-        self.0.fill_row(at, 0.0);
-        self.0.fill_column(at, 0.0);
+    pub fn forget(&mut self, at: usize, variance: T) {
+        self.0.fill_row(at, T::splat(0.0));
+        self.0.fill_column(at, T::splat(0.0));
         self.0[(at, at)] = variance;
     }
 
     /// That of the attitude.
-    pub fn attitude(&self) -> Matrix3<f64> {
+    pub fn attitude(&self) -> Matrix3<T> {
         self.0.fixed_view::<3, 3>(0, 0).into_owned()
     }
 
     /// `a' = a - R (b + K w) dt`: attitude and what the rate `w` is wrong by.
-    pub fn turn(&mut self, r: &Matrix3<f64>, w: &Vector3<f64>, dt: f64) {
+    pub fn turn(&mut self, r: &Matrix3<T>, w: &Vector3<T>, dt: T) {
         let p = &self.0;
-        let of_rate: [Errors; 3] = std::array::from_fn(|j| {
+        let of_rate: [Errors<T>; 3] = std::array::from_fn(|j| {
             let at = SCALE + 3 * j;
             p.column(BIAS + j) + p.column(at) * w.x + p.column(at + 1) * w.y + p.column(at + 2) * w.z
         });
-        let change: [Errors; 3] = std::array::from_fn(|i| {
+        let change: [Errors<T>; 3] = std::array::from_fn(|i| {
             let g = r.row(i) * -dt;
             of_rate[0] * g[0] + of_rate[1] * g[1] + of_rate[2] * g[2]
         });
@@ -84,7 +85,7 @@ impl Covariance {
     }
 
     /// `v' = v + (a x f) dt`, the horizontal part; `f` is the specific force in the reference frame.
-    pub fn accelerate(&mut self, f: &Vector3<f64>, dt: f64) {
+    pub fn accelerate(&mut self, f: &Vector3<T>, dt: T) {
         let (x, y, z) = (f.x * dt, f.y * dt, f.z * dt);
         let p = &self.0;
         let change = [p.column(1) * z - p.column(2) * y, p.column(2) * x - p.column(0) * z];
@@ -100,13 +101,13 @@ impl Covariance {
     }
 
     /// P <- (I + A) P (I + A)^T with A nonzero in N rows from `first`: those of A P, and the elements of A P A^T.
-    fn carry<const N: usize>(&mut self, first: usize, change: &[Errors; N], square: impl Fn(usize, usize) -> f64) {
-        let squares: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| square(i, j)));
-        let size: f64 = change.iter().map(Errors::norm_squared).sum();
-        if !(size + squares.iter().flatten().map(|x| x * x).sum::<f64>()).is_finite() {
-            return;
-        }
-        let within: [[f64; N]; N] =
+    fn carry<const N: usize>(&mut self, first: usize, change: &[Errors<T>; N], square: impl Fn(usize, usize) -> T) {
+        let squares: [[T; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| square(i, j)));
+        let sizes = change.iter().map(Errors::norm_squared);
+        let size = sizes.chain(squares.iter().flatten().map(|x| *x * *x));
+        let sound = finite(size.fold(T::splat(0.0), |sum, x| sum + x));
+        let before = (!sound.all()).then_some(self.0);
+        let within: [[T; N]; N] =
             std::array::from_fn(|i| std::array::from_fn(|j| self.0[(first + i, first + j)] + change[i][first + j]));
         for (i, change) in change.iter().enumerate() {
             let mut column = self.0.column_mut(first + i);
@@ -121,23 +122,35 @@ impl Covariance {
                 self.0[(first + j, first + i)] = value;
             }
         }
+        self.keep(before, sound);
     }
 
-    /// The error `at` was measured as `value`, variance `r`; adds to the errors `x` found so far in this step.
+    /// Takes back what was done to lanes that are not `sound`.
+    fn keep(&mut self, before: Option<SMatrix<T, STATES, STATES>>, sound: T::SimdBool) {
+        if let Some(before) = before {
+            self.0.zip_apply(&before, |new, old| *new = new.select(sound, old));
+        }
+    }
+
+    /// The error `at` was measured as `value`, variance `r`; adds to the errors `x` found so far in this step. Nothing is
+    /// done where `shown` does not hold.
     ///
     /// Rows of the gain that are zero leave the block of their errors as it was, and change the rest of the matrix no
     /// less (Schmidt's consider filter, the Joseph form written out).
-    pub fn measure(&mut self, x: &mut Errors, at: usize, value: f64, r: f64, moves: Moves) {
-        let column: Errors = self.0.column(at).into_owned();
+    pub fn measure(&mut self, x: &mut Errors<T>, at: usize, value: T, r: T, moves: Moves, shown: T::SimdBool) {
+        let zero = T::splat(0.0);
+        let column: Errors<T> = self.0.column(at).into_owned();
         let (s, innovation) = (column[at] + r, value - x[at]);
         // u_i u_j is the same number both ways round.
-        let (u, mut step) = (column / s.sqrt(), column * (innovation / s));
-        if !(s > 0.0 && s.is_finite() && (u.norm_squared() + step.norm_squared()).is_finite()) {
+        let (u, mut step) = (column / s.simd_sqrt(), column * (innovation / s));
+        let sound = shown & s.simd_gt(zero) & finite(s) & finite(u.norm_squared() + step.norm_squared());
+        if sound.none() {
             return;
         }
+        let before = (!sound.all()).then_some(self.0);
         let kept = NOT_HEADING.map(|i| NOT_HEADING.map(|j| self.0[(i, j)]));
         for j in 0..STATES {
-            self.0.column_mut(j).axpy(-u[j], &u, 1.0);
+            self.0.column_mut(j).axpy(-u[j], &u, T::splat(1.0));
         }
         // What was measured itself, without the cancellation of a large variance and a small one.
         let left = column * (r / s);
@@ -145,27 +158,33 @@ impl Covariance {
         self.0.row_mut(at).tr_copy_from(&left);
         if moves == Moves::Heading {
             for (i, kept) in NOT_HEADING.into_iter().zip(kept) {
-                step[i] = 0.0;
+                step[i] = zero;
                 for (j, kept) in NOT_HEADING.into_iter().zip(kept) {
                     self.0[(i, j)] = kept;
                 }
             }
         }
-        *x += step;
+        self.keep(before, sound);
+        x.zip_apply(&step, |x, step| *x = (*x + step).select(sound, *x));
     }
 
     /// The upper triangle, column by column.
-    pub fn triangle(&self) -> impl Iterator<Item = f64> + '_ {
+    pub fn triangle(&self) -> impl Iterator<Item = T> + '_ {
         places().map(|(i, j)| self.0[(i, j)])
     }
 
     /// Takes over what [`Covariance::triangle`] gave.
-    pub fn set_triangle(&mut self, triangle: &[f64]) {
+    pub fn set_triangle(&mut self, triangle: &[T]) {
         for (&value, (i, j)) in triangle.iter().zip(places()) {
             self.0[(i, j)] = value;
             self.0[(j, i)] = value;
         }
     }
+}
+
+/// Where a number is one that the machine can hold.
+fn finite<T: Real>(x: T) -> T::SimdBool {
+    x.simd_abs().simd_le(T::splat(f64::MAX))
 }
 
 /// Row and column of each number of a triangle.
@@ -183,7 +202,7 @@ mod tests {
     fn some() -> Covariance {
         let a = Full::from_fn(|i, j| ((i * 7 + j * 13) % 11) as f64 / 11.0 - 0.4);
         let square = a * a.transpose() + Full::identity() * 0.1;
-        let mut covariance = Covariance::independent(&Errors::zeros());
+        let mut covariance = Covariance::<f64>::independent(&Errors::zeros());
         let triangle: Vec<f64> = places().map(|(i, j)| square[(i, j)]).collect();
         covariance.set_triangle(&triangle);
         covariance
@@ -242,10 +261,10 @@ mod tests {
             for i in 0..STATES {
                 left[(i, at)] -= gain[i];
             }
-            let mut x = Errors::repeat(0.1);
+            let mut x: Errors = Errors::repeat(0.1);
             let expected_x = x + gain * (value - x[at]);
             let mut found = some();
-            found.measure(&mut x, at, value, r, moves);
+            found.measure(&mut x, at, value, r, moves, true);
             close(&found, &(left * p * left.transpose() + gain * gain.transpose() * r));
             assert!((x - expected_x).amax() < 1e-14);
         }
@@ -256,8 +275,8 @@ mod tests {
         let mut found = some();
         found.turn(&Matrix3::identity(), &Vector3::repeat(1e200), 1.0);
         found.accelerate(&Vector3::repeat(1e200), 1.0);
-        found.measure(&mut Errors::zeros(), 0, f64::NAN, 0.1, Moves::All);
-        found.measure(&mut Errors::zeros(), 0, 1.0, f64::INFINITY, Moves::All);
+        found.measure(&mut Errors::zeros(), 0, f64::NAN, 0.1, Moves::All, true);
+        found.measure(&mut Errors::zeros(), 0, 1.0, f64::INFINITY, Moves::All, true);
         assert_eq!(found.0, some().0);
     }
 }

@@ -1,14 +1,15 @@
 //! State and step: predictions and measurements in the order in which a row brings them.
 
-use imufit_attitude::Quaternion;
-use nalgebra::{Matrix3, Vector3};
+use imufit_attitude::matrix::matrix_from_quaternion;
+use imufit_attitude::{Quaternion, Real};
+use nalgebra::{Matrix3, SimdBool, Vector3};
 
 use super::covariance::{BIAS, Covariance, Errors, Moves, SCALE, SPEED};
 use super::settings::Values;
 use crate::field::Field;
 use crate::filter::{Filter, Usage};
 use crate::intake::{Intake, all_rows};
-use crate::rest::{Limits, Rest, matrix};
+use crate::rest::{Limits, Rest};
 use crate::{Columns, Environment, Sample, Skipped};
 
 /// Velocity noise density at rest, m/s*sqrt(s).
@@ -20,34 +21,40 @@ const GAP: f64 = 1.0;
 
 /// The filter.
 #[derive(Debug, Clone)]
-pub struct Mekf {
+pub struct Mekf<T = f64> {
     environment: Environment,
-    values: Values,
-    pub(super) q: Quaternion,
-    pub(super) bias: Vector3<f64>,
+    values: Values<T>,
+    pub(super) q: Quaternion<T>,
+    pub(super) bias: Vector3<T>,
     /// Horizontal, reference frame, m/s.
-    pub(super) velocity: [f64; 2],
-    pub(super) scale: Matrix3<f64>,
-    pub(super) covariance: Covariance,
-    pub(super) rest: Rest,
-    pub(super) field: Field,
+    pub(super) velocity: [T; 2],
+    pub(super) scale: Matrix3<T>,
+    pub(super) covariance: Covariance<T>,
+    pub(super) rest: Rest<T>,
+    pub(super) field: Field<T>,
     /// Time turned since the last specific force, s; -1 where the next one shows the vertical.
     pub(super) since_force: f64,
 }
 
-impl Mekf {
+/// Where there is nothing to tell apart.
+fn always<T: Real>() -> T::SimdBool {
+    T::splat(0.0).simd_le(T::splat(0.0))
+}
+
+impl<T: Real> Mekf<T> {
     /// With the values of [`super::PARAMETERS`] in their order.
-    pub fn new(environment: &Environment, values: &[f64]) -> Self {
+    pub fn new(environment: &Environment, values: &[T]) -> Self {
+        let zero = T::splat(0.0);
         let mut filter = Self {
             environment: *environment,
             values: Values::new(values),
-            q: Quaternion::IDENTITY,
-            bias: Vector3::zeros(),
-            velocity: [0.0; 2],
-            scale: Matrix3::zeros(),
-            covariance: Covariance::independent(&Errors::zeros()),
-            rest: Rest::UNKNOWN,
-            field: Field::UNKNOWN,
+            q: Quaternion::default(),
+            bias: Vector3::repeat(zero),
+            velocity: [zero; 2],
+            scale: Matrix3::repeat(zero),
+            covariance: Covariance::independent(&Errors::repeat(zero)),
+            rest: Rest::unknown(),
+            field: Field::unknown(),
             since_force: 0.0,
         };
         filter.reset(Quaternion::IDENTITY);
@@ -56,9 +63,10 @@ impl Mekf {
 
     /// Turns by a reading and lets the uncertainty grow.
     fn turn(&mut self, reading: &Vector3<f64>, dt: f64) {
-        let v = self.values;
-        self.covariance.turn(&matrix(self.q), reading, dt);
-        self.q = self.q.turned(&(reading - self.bias - self.scale * reading), dt);
+        let (v, dt, reading) = (self.values, T::splat(dt), reading.map(T::splat));
+        self.covariance.turn(&matrix_from_quaternion(self.q), &reading, dt);
+        let rate = reading - self.bias - self.scale * reading;
+        self.q = self.q.turned(&rate, dt);
         for i in 0..3 {
             self.covariance.add(i, v.gyr_noise * v.gyr_noise * dt);
             self.covariance.add(BIAS + i, v.bias_walk * v.bias_walk * dt);
@@ -70,98 +78,101 @@ impl Mekf {
         let v = self.values;
         let (lost, blind) = (self.since_force < 0.0, self.since_force - dt);
         self.since_force = 0.0;
+        let f = f.map(T::splat);
         if lost {
-            self.level(f);
+            self.level(&f);
         }
-        let force = self.q.rotate(f);
-        self.velocity[0] += force.x * dt;
-        self.velocity[1] += force.y * dt;
-        self.covariance.accelerate(&force, dt);
+        let (time, force) = (T::splat(dt), self.q.rotate(&f));
+        self.velocity[0] += force.x * time;
+        self.velocity[1] += force.y * time;
+        self.covariance.accelerate(&force, time);
         for at in [SPEED, SPEED + 1] {
-            self.covariance.add(at, v.acc_noise * v.acc_noise * dt);
+            self.covariance.add(at, v.acc_noise * v.acc_noise * time);
             if blind > 0.01 * dt {
-                let sd = self.covariance.variance(at).max(0.0).sqrt();
-                self.covariance
-                    .add(at, (sd + self.environment.gravity() * blind).powi(2) - sd * sd);
+                let sd = self.covariance.variance(at).simd_max(T::splat(0.0)).simd_sqrt();
+                let more = sd + T::splat(self.environment.gravity() * blind);
+                self.covariance.add(at, more * more - sd * sd);
             }
         }
-        let mut x = Errors::zeros();
+        let r = T::splat(2.0) * v.speed * v.speed * v.speed_time / time;
+        self.stop(Errors::repeat(T::splat(0.0)), r, always::<T>());
+    }
+
+    /// The velocity is zero, variance `r`; `x`: errors found before.
+    fn stop(&mut self, mut x: Errors<T>, r: T, shown: T::SimdBool) {
         for i in 0..2 {
-            let r = 2.0 * v.speed * v.speed * v.speed_time / dt;
-            self.covariance
-                .measure(&mut x, SPEED + i, -self.velocity[i], r, Moves::All);
+            let value = -self.velocity[i];
+            self.covariance.measure(&mut x, SPEED + i, value, r, Moves::All, shown);
         }
-        self.correct(&x);
+        self.correct(&x, shown);
     }
 
     /// Moves the errors found into the estimates.
-    fn correct(&mut self, x: &Errors) {
-        self.q = Quaternion::exp(&Vector3::new(x[0], x[1], x[2])) * self.q;
-        self.bias += Vector3::new(x[3], x[4], x[5]);
-        self.velocity[0] += x[SPEED];
-        self.velocity[1] += x[SPEED + 1];
+    fn correct(&mut self, x: &Errors<T>, shown: T::SimdBool) {
+        let turned = Quaternion::exp(&Vector3::new(x[0], x[1], x[2])) * self.q;
+        self.q = turned.select(shown, self.q);
+        let moved = |old: T, step: T| (old + step).select(shown, old);
         for i in 0..3 {
+            self.bias[i] = moved(self.bias[i], x[BIAS + i]);
             for j in 0..3 {
-                self.scale[(i, j)] += x[SCALE + 3 * i + j];
+                self.scale[(i, j)] = moved(self.scale[(i, j)], x[SCALE + 3 * i + j]);
             }
+        }
+        for i in 0..2 {
+            self.velocity[i] = moved(self.velocity[i], x[SPEED + i]);
         }
     }
 
     /// At rest the rate is the bias and the velocity zero.
-    fn stand(&mut self, reading: &Vector3<f64>, dt: f64) {
-        let v = self.values;
-        let mut x = Errors::zeros();
+    fn stand(&mut self, reading: &Vector3<f64>, dt: f64, rests: T::SimdBool) {
+        let (v, dt) = (self.values, T::splat(dt));
+        let mut x = Errors::repeat(T::splat(0.0));
         for i in 0..3 {
-            let value = reading[i] - self.bias[i];
-            self.covariance
-                .measure(&mut x, BIAS + i, value, v.rest_noise * v.rest_noise / dt, Moves::All);
+            let value = T::splat(reading[i]) - self.bias[i];
+            let r = v.rest_noise * v.rest_noise / dt;
+            self.covariance.measure(&mut x, BIAS + i, value, r, Moves::All, rests);
         }
-        for i in 0..2 {
-            self.covariance.measure(
-                &mut x,
-                SPEED + i,
-                -self.velocity[i],
-                STANDING * STANDING / dt,
-                Moves::All,
-            );
-        }
-        self.correct(&x);
+        self.stop(x, T::splat(STANDING * STANDING) / dt, rests);
     }
 
     /// The tilt from one specific force.
-    fn level(&mut self, f: &Vector3<f64>) {
-        let innovation = Quaternion::between(&self.q.rotate(f), &self.environment.up()).log();
-        let mut x = Errors::zeros();
+    fn level(&mut self, f: &Vector3<T>) {
+        let up = self.environment.up().map(T::splat);
+        let innovation = Quaternion::between(&self.q.rotate(f), &up).log();
+        let (mut x, r) = (Errors::repeat(T::splat(0.0)), T::splat(FIRST_TILT));
         for i in 0..2 {
             self.covariance
-                .measure(&mut x, i, innovation[i], FIRST_TILT, Moves::All);
+                .measure(&mut x, i, innovation[i], r, Moves::All, always::<T>());
         }
-        self.correct(&x);
+        self.correct(&x, always::<T>());
     }
 
     /// The heading from the field.
     fn head(&mut self, m: &Vector3<f64>, dt: f64) -> Usage {
-        let v = self.values;
-        let up = self.environment.up();
-        let seen = self.q.rotate(m);
-        let Some(direction) = crate::sample::horizontal(&seen, &up, v.min_angle.min(1.5).sin()) else {
-            return Usage::NoHeading;
-        };
-        if dt <= 0.0 {
-            return Usage::Full;
-        }
+        let (v, zero) = (self.values, T::splat(0.0));
+        let up = self.environment.up().map(T::splat);
+        let seen = self.q.rotate(&m.map(T::splat));
         let vertical = seen.dot(&up);
-        let departure = self
-            .field
-            .update(seen.dot(&direction), vertical, dt, v.mag_memory, v.mag_noise);
-        let north = self.environment.field_north();
-        let innovation = up.dot(&direction.cross(&north)).atan2(direction.dot(&north));
+        let across = seen - up * vertical;
+        let length = across.norm();
+        let sine = v.min_angle.simd_min(T::splat(1.5)).simd_sin();
+        let shown = length.simd_gt(zero) & length.simd_ge(sine * T::splat(m.norm()));
+        let usage = if shown.all() { Usage::Full } else { Usage::NoHeading };
+        if dt <= 0.0 || shown.none() {
+            return usage;
+        }
+        let mut field = self.field;
+        let departure = field.update(length, vertical, dt, v.mag_memory, v.mag_noise);
+        self.field = field.select(shown, self.field);
+        let north = self.environment.field_north().map(T::splat);
+        let innovation = up.dot(&across.cross(&north)).simd_atan2(across.dot(&north));
         let variance = v.mag_noise * v.mag_noise + v.mag_departure * v.mag_departure * departure;
-        let mut x = Errors::zeros();
-        let r = variance * (2.0 * v.mag_time / dt).max(1.0);
-        self.covariance.measure(&mut x, 2, up.z * innovation, r, Moves::Heading);
-        self.correct(&x);
-        Usage::Full
+        let r = variance * (T::splat(2.0) * v.mag_time / T::splat(dt)).simd_max(T::splat(1.0));
+        let mut x = Errors::repeat(zero);
+        self.covariance
+            .measure(&mut x, 2, up.z * innovation, r, Moves::Heading, shown);
+        self.correct(&x, shown);
+        usage
     }
 
     /// Nothing is known of a turn during a gap: the next specific force shows the vertical.
@@ -169,19 +180,19 @@ impl Mekf {
         let v = self.values;
         if self.since_force >= 0.0 {
             for i in 0..3 {
-                self.covariance.add(i, GAP);
+                self.covariance.add(i, T::splat(GAP));
             }
             self.since_force = -1.0;
         }
-        self.velocity = [0.0; 2];
+        self.velocity = [T::splat(0.0); 2];
         for at in [SPEED, SPEED + 1] {
             self.covariance.forget(at, v.speed * v.speed);
         }
-        self.rest = Rest::UNKNOWN;
+        self.rest = Rest::unknown();
     }
 }
 
-impl Filter for Mekf {
+impl<T: Real> Filter<T> for Mekf<T> {
     fn step(&mut self, sample: &Sample) -> Usage {
         if let Some(omega) = sample.omega {
             self.turn(&omega.value.0, omega.dt);
@@ -195,15 +206,16 @@ impl Filter for Mekf {
             } else {
                 self.after_gap();
             }
-            if let Some(omega) = sample.omega {
+            if let Some(omega) = sample.omega.filter(|omega| omega.dt > 0.0) {
                 let v = self.values;
                 let limits = Limits {
                     gyr: v.rest_gyr,
                     acc: v.rest_acc,
-                    bias: 3.0 * v.bias_start,
+                    bias: T::splat(3.0) * v.bias_start,
                 };
-                if omega.dt > 0.0 && self.rest.update(&omega.value.0, &f.value.0, omega.dt, &limits) {
-                    self.stand(&omega.value.0, omega.dt);
+                let rests = self.rest.update(&omega.value.0, &f.value.0, omega.dt, &limits);
+                if rests.any() {
+                    self.stand(&omega.value.0, omega.dt, rests);
                 }
             }
         }
@@ -213,18 +225,19 @@ impl Filter for Mekf {
         }
     }
 
-    fn attitude(&self) -> Quaternion {
+    fn attitude(&self) -> Quaternion<T> {
         self.q
     }
 
-    fn attitude_covariance(&self) -> Option<Matrix3<f64>> {
+    fn attitude_covariance(&self) -> Option<Matrix3<T>> {
         Some(self.covariance.attitude())
     }
 
     fn reset(&mut self, attitude: Quaternion) {
-        let v = self.values;
-        (self.q, self.bias, self.velocity, self.scale) = (attitude, Vector3::zeros(), [0.0; 2], Matrix3::zeros());
-        (self.rest, self.field, self.since_force) = (Rest::UNKNOWN, Field::UNKNOWN, -1.0);
+        let (v, zero) = (self.values, T::splat(0.0));
+        (self.q, self.bias) = (attitude.splat(), Vector3::repeat(zero));
+        (self.velocity, self.scale) = ([zero; 2], Matrix3::repeat(zero));
+        (self.rest, self.field, self.since_force) = (Rest::unknown(), Field::unknown(), -1.0);
         self.covariance = Covariance::independent(&Errors::from_fn(|i, _| match i {
             0..BIAS => v.angle_start,
             BIAS..SPEED => v.bias_start,
@@ -233,15 +246,15 @@ impl Filter for Mekf {
         }));
     }
 
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [f64], skipped: &mut Skipped) {
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
         all_rows(self, intake, columns, attitude, skipped);
     }
 
-    fn state(&self) -> Vec<f64> {
+    fn state(&self) -> Vec<T> {
         self.numbers()
     }
 
-    fn set_state(&mut self, state: &[f64]) -> bool {
+    fn set_state(&mut self, state: &[T]) -> bool {
         self.set_numbers(state)
     }
 }

@@ -1,5 +1,7 @@
 //! Settings of the filter.
 
+use imufit_attitude::Real;
+
 use crate::filter::Parameter;
 
 /// Noise densities, speeds and the field's errors, so that the filter does not depend on the rate of the log.
@@ -103,29 +105,29 @@ pub const PARAMETERS: &[Parameter] = &[
 ];
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Values {
-    pub gyr_noise: f64,
-    pub bias_walk: f64,
-    pub acc_noise: f64,
-    pub speed: f64,
-    pub speed_time: f64,
-    pub mag_noise: f64,
-    pub mag_time: f64,
-    pub mag_departure: f64,
-    pub mag_memory: f64,
-    pub angle_start: f64,
-    pub bias_start: f64,
-    pub scale_start: f64,
-    pub rest_gyr: f64,
-    pub rest_acc: f64,
-    pub rest_noise: f64,
-    pub min_angle: f64,
+pub(super) struct Values<T> {
+    pub gyr_noise: T,
+    pub bias_walk: T,
+    pub acc_noise: T,
+    pub speed: T,
+    pub speed_time: T,
+    pub mag_noise: T,
+    pub mag_time: T,
+    pub mag_departure: T,
+    pub mag_memory: T,
+    pub angle_start: T,
+    pub bias_start: T,
+    pub scale_start: T,
+    pub rest_gyr: T,
+    pub rest_acc: T,
+    pub rest_noise: T,
+    pub min_angle: T,
 }
 
-impl Values {
+impl<T: Real> Values<T> {
     /// In the order of [`PARAMETERS`]; what is missing has its default.
-    pub fn new(values: &[f64]) -> Self {
-        let value = |at: usize| values.get(at).copied().unwrap_or(PARAMETERS[at].default);
+    pub fn new(values: &[T]) -> Self {
+        let value = |at: usize| values.get(at).copied().unwrap_or(T::splat(PARAMETERS[at].default));
         Self {
             gyr_noise: value(0),
             bias_walk: value(1),
