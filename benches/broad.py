@@ -58,10 +58,10 @@ CANDIDATES: tuple[dict[str, float], ...] = (
     *(
         {name: _DEFAULTS[name] * factor}
         for name in ("gyr_noise", "bias_walk", "speed", "mag_noise", "mag_departure", "scale_start")
-        for factor in (0.5, 2.0)
+        for factor in (2.0 / 3.0, 1.5)
     ),
 )
-"""The defaults, and each of the settings that matter halved and doubled."""
+"""The defaults, and each of the settings that matter by a half larger and smaller."""
 
 
 @lru_cache(maxsize=4)

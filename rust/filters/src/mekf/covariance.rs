@@ -149,8 +149,11 @@ impl<T: Real> Covariance<T> {
         }
         let before = (!sound.all()).then_some(self.0);
         let kept = NOT_HEADING.map(|i| NOT_HEADING.map(|j| self.0[(i, j)]));
-        for j in 0..STATES {
-            self.0.column_mut(j).axpy(-u[j], &u, T::splat(1.0));
+        let u = u.data.0[0];
+        for (of_j, u_j) in self.0.data.0.iter_mut().zip(u) {
+            for (x, u_i) in of_j.iter_mut().zip(u) {
+                *x -= u_i * u_j;
+            }
         }
         // What was measured itself, without the cancellation of a large variance and a small one.
         let left = column * (r / s);

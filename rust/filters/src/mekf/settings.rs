@@ -8,7 +8,7 @@ use crate::filter::Parameter;
 pub const PARAMETERS: &[Parameter] = &[
     Parameter {
         name: "gyr_noise",
-        default: 3e-3,
+        default: 2e-3,
         unit: "rad/s/sqrt(Hz)",
         meaning: "noise density of the angular rate, its errors in fast turns included: larger follows accelerometer and field faster",
     },
@@ -74,7 +74,7 @@ pub const PARAMETERS: &[Parameter] = &[
     },
     Parameter {
         name: "scale_start",
-        default: 0.005,
+        default: 0.003,
         unit: "1",
         meaning: "uncertainty of the gyro's scale factors and misalignments; 0 takes the gyro for calibrated",
     },
