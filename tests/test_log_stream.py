@@ -31,9 +31,9 @@ def long_log(n: int) -> Log:
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".npz", ".csv"])
-def test_ten_times_longer_log_needs_no_more_memory(tmp_path: Path, suffix: str) -> None:
+def test_a_six_times_longer_log_needs_no_more_memory(tmp_path: Path, suffix: str) -> None:
     peaks = []
-    for n in (250_000, 2_500_000 if suffix != ".csv" else 1_500_000):
+    for n in (250_000, 1_500_000):
         path = tmp_path / f"log{n}{suffix}"
         long_log(n).write(path)
         out = subprocess.run(
@@ -42,7 +42,7 @@ def test_ten_times_longer_log_needs_no_more_memory(tmp_path: Path, suffix: str) 
         assert int(out[0]) == n
         peaks.append(int(out[1]) / 1024)
         path.unlink()
-    # the longer log alone is 84 to 140 MB of numbers
+    # the longer log alone is 84 MB of numbers
     assert peaks[1] < peaks[0] + 30.0, peaks
 
 

@@ -13,7 +13,6 @@ from imufit.replay import replay
 from recording import recording
 
 BROAD = (
-    "broad/02_undisturbed_slow_rotation_B.parquet",
     "broad/07_undisturbed_fast_rotation_B.parquet",
     "broad/21_undisturbed_fast_combined.parquet",
 )
