@@ -15,6 +15,9 @@ CASES: tuple[tuple[str, str, dict[str, float]], ...] = (
     ("mahony", "mahony", {}),
     ("hybrid, driven", "hybrid", {"driven": 1.0}),
     ("hybrid, seeded", "hybrid", {"driven": 0.0}),
+    ("complementary", "complementary", {}),
+    ("kalman", "kalman", {}),
+    ("mekf", "mekf", {}),
 )
 
 
