@@ -2,19 +2,17 @@
 
 use std::collections::HashMap;
 
-use imufit_attitude::Frame;
 use imufit_filters::accel::tilt_rows;
 use imufit_filters::filter::{self, FILTERS, Parameter};
-use imufit_filters::{
-    Columns, Environment, FilterError, Replay, Row, Rules, Skipped, Smoother, Start, steady_state_gain,
-};
+use imufit_filters::{Columns, FilterError, Replay, Row, Rules, Skipped, Smoother, steady_state_gain};
 use nalgebra::Vector3;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{self, Column, Rows, filled_rows};
-use crate::errors::{from_attitude, from_filters};
+use crate::errors::from_filters;
+use crate::replay_arguments::{Readings, Stop, look, sorted, start_of, surroundings};
 
 /// Rows between two looks for Ctrl-C.
 const WINDOW: usize = 1 << 18;
@@ -77,29 +75,11 @@ impl PyFilter {
         gyr: Option<&Bound<'py, PyAny>>,
         mag: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Run<'py>> {
-        let t = Column::new("t", t)?;
-        let n = t.len();
-        let acc = Rows::<3>::optional_with_rows("acc", acc, "t", n)?;
-        let gyr = Rows::<3>::optional_with_rows("gyr", gyr, "t", n)?;
-        let mag = Rows::<3>::optional_with_rows("mag", mag, "t", n)?;
-        let columns = Columns {
-            t: t.values()?,
-            acc: acc.as_ref().map(Rows::values).transpose()?,
-            gyr: gyr.as_ref().map(Rows::values).transpose()?,
-            mag: mag.as_ref().map(Rows::values).transpose()?,
-        };
+        let readings = Readings::new(t, acc, gyr, mag)?;
+        let columns = readings.columns()?;
         let replay = &mut self.replay;
-        #[allow(clippy::redundant_closure_for_method_calls)] // the path is not general enough over the lifetime
-        let mut look = || Python::attach(|py| py.check_signals());
-        let (attitude, skipped) = filled_rows::<4, _, _>(
-            py,
-            n,
-            |out| run_in_windows(replay, &columns, out, &mut look),
-            |stop| match stop {
-                Stop::Filter(error) => from_filters(error),
-                Stop::Signal(error) => error,
-            },
-        )?;
+        let fill = |out: &mut [f64]| run_in_windows(replay, &columns, out);
+        let (attitude, skipped) = filled_rows::<4, _, _>(py, readings.n(), fill, PyErr::from)?;
         self.skipped += skipped;
         Ok((attitude, reasons(py, &skipped)?))
     }
@@ -158,25 +138,6 @@ impl PyFilter {
     }
 }
 
-fn surroundings(frame: &str, gravity: f64, mag_reference: Option<&Bound<'_, PyAny>>) -> PyResult<Environment> {
-    let frame: Frame = frame.parse().map_err(from_attitude)?;
-    let field = mag_reference
-        .map(|m| arrays::vector("mag_reference", m))
-        .transpose()?
-        .map(Vector3::from);
-    Environment::new(frame, gravity, field).map_err(from_filters)
-}
-
-fn start_of(initial: Option<&Bound<'_, PyAny>>, start_time: Option<f64>) -> PyResult<Start> {
-    Ok(match initial {
-        None => Start::Vectors,
-        Some(q) => Start::Given {
-            time: start_time.unwrap_or(f64::NEG_INFINITY),
-            attitude: arrays::quaternion("initial", q)?,
-        },
-    })
-}
-
 /// The reasons that there were, with their rows.
 fn reasons<'py>(py: Python<'py>, skipped: &Skipped) -> PyResult<Bound<'py, PyDict>> {
     let reasons = PyDict::new(py);
@@ -188,34 +149,17 @@ fn reasons<'py>(py: Python<'py>, skipped: &Skipped) -> PyResult<Bound<'py, PyDic
     Ok(reasons)
 }
 
-/// What ends a run early.
-enum Stop {
-    Filter(FilterError),
-    Signal(PyErr),
-}
-
 /// The whole log, with a look for Ctrl-C between windows.
-fn run_in_windows(
-    replay: &mut Replay,
-    columns: &Columns<'_>,
-    out: &mut [f64],
-    look: &mut impl FnMut() -> PyResult<()>,
-) -> Result<Skipped, Stop> {
+fn run_in_windows(replay: &mut Replay, columns: &Columns<'_>, out: &mut [f64]) -> Result<Skipped, Stop> {
     if columns.t.len() <= WINDOW {
-        return replay.run(columns, out).map_err(Stop::Filter);
+        return Ok(replay.run(columns, out)?);
     }
     let mut skipped = Skipped::default();
     for (window, out) in columns.windows(WINDOW).zip(out.chunks_mut(4 * WINDOW)) {
-        skipped += replay.run(&window, out).map_err(Stop::Filter)?;
-        look().map_err(Stop::Signal)?;
+        skipped += replay.run(&window, out)?;
+        look()?;
     }
     Ok(skipped)
-}
-
-impl From<FilterError> for Stop {
-    fn from(error: FilterError) -> Self {
-        Self::Filter(error)
-    }
 }
 
 /// Attitudes (n, 4), scalar first, of the filter `mekf` forwards and backwards over a whole log, and the rows of which
@@ -247,36 +191,11 @@ fn smooth<'py>(
         Smoother::new(&sorted(settings), environment, rules, start)
     };
     let smoother = build().map_err(from_filters)?;
-    let t = Column::new("t", t)?;
-    let n = t.len();
-    let acc = Rows::<3>::optional_with_rows("acc", acc, "t", n)?;
-    let gyr = Rows::<3>::optional_with_rows("gyr", gyr, "t", n)?;
-    let mag = Rows::<3>::optional_with_rows("mag", mag, "t", n)?;
-    let columns = Columns {
-        t: t.values()?,
-        acc: acc.as_ref().map(Rows::values).transpose()?,
-        gyr: gyr.as_ref().map(Rows::values).transpose()?,
-        mag: mag.as_ref().map(Rows::values).transpose()?,
-    };
-    #[allow(clippy::redundant_closure_for_method_calls)] // the path is not general enough over the lifetime
-    let look = || Python::attach(|py| py.check_signals()).map_err(Stop::Signal);
-    let (attitude, skipped) = filled_rows::<4, _, _>(
-        py,
-        n,
-        |out| smoother.run(&columns, out, look),
-        |stop| match stop {
-            Stop::Filter(error) => from_filters(error),
-            Stop::Signal(error) => error,
-        },
-    )?;
+    let readings = Readings::new(t, acc, gyr, mag)?;
+    let columns = readings.columns()?;
+    let fill = |out: &mut [f64]| smoother.run(&columns, out, look);
+    let (attitude, skipped) = filled_rows::<4, _, _>(py, readings.n(), fill, PyErr::from)?;
     Ok((attitude, reasons(py, &skipped)?))
-}
-
-/// Settings in the order of their names, so that the first wrong one is always the same.
-pub fn sorted(settings: Option<HashMap<String, f64>>) -> Vec<(String, f64)> {
-    let mut settings: Vec<_> = settings.unwrap_or_default().into_iter().collect();
-    settings.sort_by(|a, b| a.0.cmp(&b.0));
-    settings
 }
 
 fn describe<'py>(py: Python<'py>, parameters: &[Parameter]) -> PyResult<Bound<'py, PyDict>> {

@@ -13,6 +13,7 @@ mod fit;
 mod inference;
 mod model;
 mod python_effect;
+mod replay_arguments;
 mod trials;
 mod window;
 

@@ -2,16 +2,14 @@
 
 use std::collections::HashMap;
 
-use imufit_attitude::Frame;
 use imufit_filters::trials::{self, Conditions, Judgement, Score};
-use imufit_filters::{Columns, Environment, Rules, Start, filter};
-use nalgebra::Vector3;
+use imufit_filters::{Rules, filter};
 use numpy::{PyArray3, PyReadonlyArray1};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, Column, Rows};
-use crate::errors::{from_attitude, from_filters, value_error};
-use crate::filters::sorted;
+use crate::arrays::Rows;
+use crate::errors::{from_filters, value_error};
+use crate::replay_arguments::{Readings, look, sorted, start_of, surroundings};
 
 /// The numbers of a [`Score`].
 const NUMBERS: usize = 12;
@@ -65,18 +63,9 @@ fn filter_trials<'py>(
     initial: Option<&Bound<'py, PyAny>>,
     start_time: Option<f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let t = Column::new("t", t)?;
-    let n = t.len();
-    let acc = Rows::<3>::optional_with_rows("acc", acc, "t", n)?;
-    let gyr = Rows::<3>::optional_with_rows("gyr", gyr, "t", n)?;
-    let mag = Rows::<3>::optional_with_rows("mag", mag, "t", n)?;
-    let reference = Rows::<4>::optional_with_rows("reference", reference, "t", n)?;
-    let columns = Columns {
-        t: t.values()?,
-        acc: acc.as_ref().map(Rows::values).transpose()?,
-        gyr: gyr.as_ref().map(Rows::values).transpose()?,
-        mag: mag.as_ref().map(Rows::values).transpose()?,
-    };
+    let readings = Readings::new(t, acc, gyr, mag)?;
+    let columns = readings.columns()?;
+    let reference = Rows::<4>::optional_with_rows("reference", reference, "t", readings.n())?;
     let judgement = Judgement {
         reference: reference.as_ref().map(Rows::values).transpose()?,
         part: part
@@ -85,59 +74,20 @@ fn filter_trials<'py>(
         parts,
         horizon,
     };
-    let frame: Frame = frame.parse().map_err(from_attitude)?;
-    let field = mag_reference
-        .map(|m| arrays::vector("mag_reference", m))
-        .transpose()?
-        .map(Vector3::from);
-    let start = match initial {
-        None => Start::Vectors,
-        Some(q) => Start::Given {
-            time: start_time.unwrap_or(f64::NEG_INFINITY),
-            attitude: arrays::quaternion("initial", q)?,
-        },
-    };
-    let environment = Environment::new(frame, gravity, field).map_err(from_filters)?;
     let rules = Rules::from_settings(&sorted(rules)).map_err(from_filters)?;
     let conditions = Conditions {
-        environment,
+        environment: surroundings(frame, gravity, mag_reference)?,
         rules,
-        start,
+        start: start_of(initial, start_time)?,
     };
     let description = filter::find(name).map_err(from_filters)?;
     let settings: Vec<_> = settings.into_iter().map(|each| sorted(Some(each))).collect();
-    let run = || {
-        #[allow(clippy::redundant_closure_for_method_calls)] // the path is not general enough over the lifetime
-        let look = || Python::attach(|py| py.check_signals()).map_err(Stop::Signal);
-        trials::run(description, &settings, conditions, &columns, &judgement, look)
-    };
-    let scores = py.detach(run).map_err(PyErr::from)?;
+    let scores = py.detach(|| trials::run(description, &settings, conditions, &columns, &judgement, look))?;
     let nested: Vec<Vec<Vec<f64>>> = scores
         .iter()
         .map(|parts| parts.iter().map(|score| numbers(score).to_vec()).collect())
         .collect();
     Ok(PyArray3::from_vec3(py, &nested)?)
-}
-
-/// What ends a pass early.
-enum Stop {
-    Filter(imufit_filters::FilterError),
-    Signal(PyErr),
-}
-
-impl From<imufit_filters::FilterError> for Stop {
-    fn from(error: imufit_filters::FilterError) -> Self {
-        Self::Filter(error)
-    }
-}
-
-impl From<Stop> for PyErr {
-    fn from(stop: Stop) -> Self {
-        match stop {
-            Stop::Filter(error) => from_filters(error),
-            Stop::Signal(error) => error,
-        }
-    }
 }
 
 /// Adds this file's function to the module.
