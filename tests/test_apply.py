@@ -54,6 +54,18 @@ STACKS = [
     {"mag.soft_iron": NINE},
     {"acc.bias_temperature": XYZ, "gyr.bias_temperature": {"x": 0.003, "z": -0.002}, "mag.bias_temperature": XYZ},
     {f"{sensor}.scale_temperature": {"x": 0.002, "y": -0.003, "z": 0.001} for sensor in SENSORS},
+    {
+        "acc.bias_drift": {"x": 1e-3, "y": -2e-3, "z": 5e-4},
+        "acc.quadratic": {"x": 1e-3, "y": -5e-4, "z": 2e-3},
+        "acc.cubic": {"x": -1e-4, "y": 5e-5, "z": 2e-5},
+        "mag.current": XYZ,
+    },
+    {
+        "gyr.bias_drift": {"x": 1e-4, "y": -2e-4, "z": 5e-5},
+        "gyr.quadratic": {"x": 2e-3, "y": -5e-3, "z": 1e-3},
+        "gyr.cubic": {"x": -2e-3, "y": 1e-3, "z": 5e-4},
+        "gyr.scale_asymmetry": {"x": 0.01, "y": -0.02, "z": 0.005},
+    },
     {"mag.column:vbat": {"x": 1.0, "y": -2.0, "z": 0.5}},
     {
         "acc.bias": {"x": 0.3, "y": -0.2, "z": 0.1},

@@ -200,6 +200,8 @@ class Effect:
     @property
     def sensors(self) -> list[str]: ...
     @property
+    def column(self) -> str | None: ...
+    @property
     def parameters(self) -> list[tuple[str, str, float | None]]: ...
     @property
     def strongly_curved(self) -> bool: ...
@@ -266,6 +268,7 @@ def python_effect(
 def correct_readings(
     chunk: _Chunk,
     effects: Sequence[tuple[Effect, Sequence[float]]],
+    frame: str,
     covariates: Sequence[str],
     covariate_means: Sequence[float | None],
     temperature_mean: float | None = None,

@@ -92,7 +92,7 @@ class Analysis:
             facts = facts.with_means(model.constants.get("temperature_mean"), model.constants.get("covariate_means"))
         candidates, refused = _candidates(model, facts, coverage)
         for effect, _ in model.stack():
-            reason = effect.not_testable(facts) or _not_covered(effect.id, coverage)
+            reason = effect.not_testable(facts) or _not_covered(effect, coverage)
             if reason is not None:
                 raise InputError(f"effect {effect.id} cannot be fitted: {reason}", file=log.path)
         check_users_effects(passes, facts, [*model.effects, *candidates])
@@ -294,12 +294,18 @@ def _candidates(
 ) -> tuple[dict[str, _imufit.Effect], dict[str, str]]:
     """Effects that can be asked about on this log, and why the others cannot."""
     own = [name for name in coverage if name != "temp"]
-    offered: dict[str, Any] = {**effects(), **column_effects(own, facts.sensors)}
+    named = {(sensor, effect.column) for effect in effects().values() for sensor in effect.sensors}
+    columns = {
+        key: effect
+        for key, effect in column_effects(own, facts.sensors).items()
+        if (effect.sensors[0], effect.column) not in named
+    }
+    offered: dict[str, Any] = {**effects(), **columns}
     candidates, refused = {}, {}
     for key, effect in offered.items():
         if key in model.effects or (key == FIELD_REFERENCE and facts.field_estimated):
             continue
-        reason = effect.not_testable(facts) or _not_covered(key, coverage)
+        reason = effect.not_testable(facts) or _not_covered(effect, coverage)
         if reason is None:
             candidates[key] = effect
         else:
@@ -307,8 +313,8 @@ def _candidates(
     return candidates, refused
 
 
-def _not_covered(effect_id: str, coverage: Mapping[str, float]) -> str | None:
-    column = effect_id.split(COLUMN, 1)[1] if COLUMN in effect_id else "temp" if "temperature" in effect_id else None
+def _not_covered(effect: _imufit.Effect, coverage: Mapping[str, float]) -> str | None:
+    column = effect.column
     if column is None or coverage.get(column, 0.0) >= MIN_COVERAGE:
         return None
     return f"column {column} is known in only {100 * coverage.get(column, 0.0):.0f} % of the rows"

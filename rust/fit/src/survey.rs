@@ -1,7 +1,7 @@
 //! First pass over a log: what has to be known of the whole before evidence is taken.
 
 use imufit_model::bandwidth::Bandwidth;
-use imufit_model::facts::LogFacts;
+use imufit_model::facts::{Frame, LogFacts};
 use imufit_model::rig::Rig;
 use imufit_model::sensor::Sensor;
 use imufit_model::smoothing::Smoothing;
@@ -22,6 +22,8 @@ const BANDWIDTH_SAMPLES: usize = 4096;
 pub struct Given {
     /// Number of rows of the log.
     pub n: usize,
+    /// The reference frame.
+    pub frame: Frame,
     /// Gravity in the reference frame, m/s^2.
     pub gravity: Vector3<f64>,
     /// Reference field, uT, if known.
@@ -227,6 +229,7 @@ impl Survey {
             t_start: self.t_first,
             t_end: self.t_last,
             dt,
+            frame: self.given.frame,
             gravity: self.given.gravity,
             field,
             field_estimated: estimated,

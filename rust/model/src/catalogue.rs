@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use crate::effect::Effect;
 use crate::effects::{
-    bias, covariate, field, g_sensitivity, iron, lever_arm, misalignment, reference, rig, scale, temperature,
+    bias, covariate, current, drift, earth_rate, field, g_sensitivity, iron, lever_arm, misalignment, nonlinearity,
+    reference, rig, scale, temperature,
 };
 use crate::sensor::Sensor;
 
@@ -17,16 +18,25 @@ pub fn built_in() -> Vec<Arc<dyn Effect>> {
         Arc::new(lever_arm::lever_arm()),
         Arc::new(temperature::bias_temperature(Sensor::Acc)),
         Arc::new(temperature::scale_temperature(Sensor::Acc)),
+        Arc::new(drift::bias_drift(Sensor::Acc)),
+        Arc::new(nonlinearity::quadratic(Sensor::Acc)),
+        Arc::new(nonlinearity::cubic(Sensor::Acc)),
         Arc::new(bias::bias(Sensor::Gyr)),
         Arc::new(scale::scale(Sensor::Gyr)),
         Arc::new(misalignment::misalignment(Sensor::Gyr)),
         Arc::new(g_sensitivity::g_sensitivity()),
         Arc::new(temperature::bias_temperature(Sensor::Gyr)),
         Arc::new(temperature::scale_temperature(Sensor::Gyr)),
+        Arc::new(drift::bias_drift(Sensor::Gyr)),
+        Arc::new(nonlinearity::quadratic(Sensor::Gyr)),
+        Arc::new(nonlinearity::cubic(Sensor::Gyr)),
+        Arc::new(nonlinearity::scale_asymmetry()),
+        Arc::new(earth_rate::earth_rate()),
         Arc::new(iron::hard_iron()),
         Arc::new(iron::soft_iron()),
         Arc::new(temperature::bias_temperature(Sensor::Mag)),
         Arc::new(temperature::scale_temperature(Sensor::Mag)),
+        Arc::new(current::current()),
         Arc::new(field::field_reference()),
         Arc::new(reference::alignment()),
         Arc::new(reference::tilt()),

@@ -139,6 +139,11 @@ pub trait Effect: Send + Sync {
     /// Why it cannot be offered for this log; `None` if it can.
     fn not_testable(&self, facts: &LogFacts) -> Option<String>;
 
+    /// The column of the log that it reads besides sensors and reference: `temp` or the name of a covariate.
+    fn column(&self) -> Option<&str> {
+        None
+    }
+
     /// Columns d reading / d parameter of `sensor`, at the given parameter values.
     fn columns(&self, rows: &Rows, sensor: Sensor, parameters: &[f64], out: &mut Columns) -> Result<(), EffectError>;
 

@@ -1,6 +1,7 @@
 //! Every built-in effect keeps the contract that fitting relies on.
 #![allow(missing_docs)]
 
+use imufit_attitude::Frame;
 use imufit_model::catalogue;
 use imufit_model::contract::check;
 use imufit_model::facts::LogFacts;
@@ -72,6 +73,7 @@ fn every_built_in_effect_keeps_the_contract() {
         t_start: t[0],
         t_end: t[n - 1],
         dt: 0.01,
+        frame: Frame::Ned,
         gravity: Vector3::new(0.0, 0.0, 9.80665),
         field: Vector3::new(20.0, 0.0, 44.0),
         field_estimated: false,

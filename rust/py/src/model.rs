@@ -34,6 +34,12 @@ impl PyEffect {
         self.0.sensors().iter().map(|s| s.prefix()).collect()
     }
 
+    /// The column of a log that it reads besides sensors and reference: `temp`, a covariate, or None.
+    #[getter]
+    fn column(&self) -> Option<String> {
+        self.0.column().map(str::to_string)
+    }
+
     /// Its parameters: (name, unit, typical size or None).
     #[getter]
     fn parameters(&self) -> Vec<(String, String, Option<f64>)> {

@@ -64,6 +64,10 @@ impl Effect for Covariate {
             .then(|| format!("the log has no column {}", self.column))
     }
 
+    fn column(&self) -> Option<&str> {
+        Some(&self.column)
+    }
+
     fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
         let k = rows
             .facts
