@@ -176,10 +176,10 @@ impl Question {
         }
     }
 
-    /// Sum over blocks, the wandering of zeros taken into account; `None` if no zero wanders.
-    pub fn total_without_drift(&self) -> Option<NormalEquations> {
-        let mut total = self.total();
-        drift::take_out(&self.sums, &mut total).then_some(total)
+    /// Sum over blocks, the wandering of zeros taken into account, for several strengths of it, each with its weight; empty if no
+    /// zero wanders.
+    pub fn totals_without_drift(&self) -> Vec<(f64, NormalEquations)> {
+        drift::without(&self.sums, &self.total())
     }
 
     /// Sum over blocks.

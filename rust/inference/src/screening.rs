@@ -63,11 +63,18 @@ fn p_value_beside(question: &Question, shorter: f64) -> f64 {
     }
 }
 
-/// Wald test of the candidate's parameters with wandering zeros; 0 where no zero wanders, since the block tests then say it all.
+/// Wald test of the candidate's parameters with wandering zeros, the mean over how strongly they may wander; 0 where no zero
+/// wanders, since the block tests then say it all.
 pub fn p_value_with_drift(question: &Question) -> f64 {
-    let Some(total) = question.total_without_drift() else {
-        return 0.0;
-    };
+    question
+        .totals_without_drift()
+        .iter()
+        .map(|(weight, total)| weight * wald(question, total))
+        .sum()
+}
+
+/// p-value of the candidate's parameters from equations of unit variance.
+fn wald(question: &Question, total: &NormalEquations) -> f64 {
     let Some(solved) = total.solve(&question.precision) else {
         return 1.0;
     };
