@@ -101,6 +101,15 @@ def test_a_lever_arm_is_undone_with_the_rates_of_the_log():
     assert corrected.gyr is recorded.gyr
 
 
+def test_late_and_sluggish_readings_are_set_right_in_time():
+    late = {"acc.delay": {"tau": 0.013}, "gyr.lowpass": {"tau": 0.02}, "mag.delay": {"tau": 0.007}, "acc.scale": XYZ}
+    recorded, truth = simulated(late, rate=200.0), simulated({}, rate=200.0)
+    before, after = off(recorded, truth, edge=20), off(model_of(recorded, late).apply(recorded), truth, edge=20)
+    for name, least in zip(SENSORS, (0.5, 0.1, 0.5), strict=True):
+        assert before[name] > least, name
+        assert after[name] < 2e-3 * before[name], name
+
+
 def test_sensors_that_read_each_other_come_to_rest():
     wrong = {
         "acc.lever_arm": {"x": 0.05, "y": -0.1, "z": 0.03},

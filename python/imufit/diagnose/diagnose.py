@@ -25,6 +25,8 @@ MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
 CLEARLY_WORSE = 0.1
 """Share of the drop in held-out error by which a fit must stay behind the best one to be out."""
+CLOSE = 0.3
+"""Share of the best candidate's gain that another one's column must reach for a fit of it to be worth the time."""
 POWER = 0.84
 """Standard errors beyond the threshold at which an effect is seen with 80 % power."""
 
@@ -90,7 +92,8 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     """Where columns taken at one point mislead, let fits decide between the best candidate and others of that kind.
 
     A drive with play and a late reference look alike while a rig goes back and forth at one speed, and their columns
-    say little of how well they do at their full size.
+    say little of how well they do at their full size. A late sensor and a sluggish one have the same column. One of
+    them is out if its fit stays clearly behind, or leaves something that the best one explains.
     """
     analysis = fit.analysis
     ids = analysis.slots
@@ -99,7 +102,11 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
         return result
     items = {item["slot"]: dict(item) for item in result["screened"]}
     close = [
-        slot for slot, item in items.items() if item["testable"] and analysis.candidates[ids[slot]].strongly_curved
+        slot
+        for slot, item in items.items()
+        if item["testable"]
+        and analysis.candidates[ids[slot]].strongly_curved
+        and (ids[slot] in analysis.found or item["gain"] >= CLOSE * items[best]["gain"])
     ]
     if len(close) < 2:
         return result
@@ -107,7 +114,12 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
         items[slot]["held_out_after"] = fit.ratio_with(analysis.model.with_effect(ids[slot]))
     after = {slot: items[slot]["held_out_after"] for slot in close}
     won = min(close, key=after.__getitem__)
-    lost = [slot for slot in close if after[slot] > after[won] + CLEARLY_WORSE * (fit.ratio - after[won])]
+    lost = [
+        slot
+        for slot in close
+        if slot != won
+        and (after[slot] > after[won] + CLEARLY_WORSE * (fit.ratio - after[won]) or _leaves(fit, ids[slot], ids[won]))
+    ]
     if best not in lost:
         won = best
     # Explaining more than a candidate that passed, by fits, is as significant.
@@ -118,13 +130,19 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**result, "best": won, "rivals": rivals, "screened": [items[won], *rest], "verdict": word}
 
 
+def _leaves(fit: Fit, effect: str, other: str) -> bool:
+    """Return whether a fit of one candidate leaves something that another one explains."""
+    analysis, _ = fit.analysis.solved_for(fit.model.with_effect(effect), fit.unnamed, only=(other,))
+    return analysis.problem.diagnose(analysis.fitted_slots, analysis.candidate_slots)["best"] is not None
+
+
 def _candidate(
     item: Mapping[str, Any], effect: _imufit.Effect, rivals: list[Rival], tested: int, found: Found | None
 ) -> Candidate:
     searched = {} if found is None else dict(zip((name for name, _, _ in effect.parameters), found.trial, strict=True))
-    whole = {name: searched[name] for name in effect.whole if name in searched}
+    grid = {name: searched[name] for name in effect.searched if name in searched}
     parameters = tuple(
-        Parameter(effect.id, name, whole.get(name, value), 0.0 if name in whole else error, unit, typical)
+        Parameter(effect.id, name, grid.get(name, value), 0.0 if name in grid else error, unit, typical)
         for (name, unit, typical), (value, error) in zip(effect.parameters, item["parameters"], strict=True)
     )
     threshold = float(student.isf(ALPHA / tested / 2, BLOCKS - 1)) + POWER

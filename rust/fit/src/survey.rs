@@ -249,6 +249,7 @@ impl Survey {
             attitude_columns: self.attitude_width.for_columns(attitude_smoothing),
             position_columns: position_smoothing.map(|s| self.position_width.for_columns(s)),
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),
+            ranges: [None; 3],
             rig: self.travel.take().map(|t| t.finish(self.attitude_width.noise())),
             covariates: self.given.covariates.clone(),
         };

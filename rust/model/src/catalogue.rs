@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::effect::Effect;
 use crate::effects::{
     bias, covariate, current, drift, earth_rate, field, g_sensitivity, iron, lever_arm, misalignment, nonlinearity,
-    reference, rig, scale, temperature,
+    reference, rig, saturation, scale, temperature, timing, vibration, warmup,
 };
 use crate::sensor::Sensor;
 
@@ -21,6 +21,10 @@ pub fn built_in() -> Vec<Arc<dyn Effect>> {
         Arc::new(drift::bias_drift(Sensor::Acc)),
         Arc::new(nonlinearity::quadratic(Sensor::Acc)),
         Arc::new(nonlinearity::cubic(Sensor::Acc)),
+        Arc::new(vibration::rectification()),
+        Arc::new(timing::delay(Sensor::Acc)),
+        Arc::new(timing::lowpass(Sensor::Acc)),
+        Arc::new(saturation::saturation(Sensor::Acc)),
         Arc::new(bias::bias(Sensor::Gyr)),
         Arc::new(scale::scale(Sensor::Gyr)),
         Arc::new(misalignment::misalignment(Sensor::Gyr)),
@@ -32,11 +36,16 @@ pub fn built_in() -> Vec<Arc<dyn Effect>> {
         Arc::new(nonlinearity::cubic(Sensor::Gyr)),
         Arc::new(nonlinearity::scale_asymmetry()),
         Arc::new(earth_rate::earth_rate()),
+        Arc::new(warmup::warmup()),
+        Arc::new(timing::delay(Sensor::Gyr)),
+        Arc::new(timing::lowpass(Sensor::Gyr)),
+        Arc::new(saturation::saturation(Sensor::Gyr)),
         Arc::new(iron::hard_iron()),
         Arc::new(iron::soft_iron()),
         Arc::new(temperature::bias_temperature(Sensor::Mag)),
         Arc::new(temperature::scale_temperature(Sensor::Mag)),
         Arc::new(current::current()),
+        Arc::new(timing::delay(Sensor::Mag)),
         Arc::new(field::field_reference()),
         Arc::new(reference::alignment()),
         Arc::new(reference::tilt()),

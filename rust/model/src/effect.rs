@@ -21,6 +21,8 @@ pub struct Rows<'a> {
     pub x: &'a Triple,
     /// Sensor temperature less its mean over the log, K (n); NaN where not known.
     pub temperature: Option<&'a [f64]>,
+    /// Local power of the accelerometer's vibration, (m/s^2)^2 (n); `None` without accelerometer.
+    pub vibration: Option<&'a [f64]>,
     /// Covariates in the order of `facts.covariates` (n each); NaN where not known.
     pub covariates: &'a [Vec<f64>],
 }
@@ -158,6 +160,11 @@ pub trait Effect: Send + Sync {
         out: &mut Columns,
     ) -> Result<(), EffectError> {
         self.columns(rows, sensor, trial, out)
+    }
+
+    /// What it adds to the reading where that is not the sum of its parameters times their columns; `None` where it is.
+    fn added(&self, _rows: &Rows, _sensor: Sensor, _parameters: &[f64]) -> Option<Triple> {
+        None
     }
 
     /// True if its columns around one value say little of larger ones, so that only a fit tells how much it explains.

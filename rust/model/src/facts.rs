@@ -54,6 +54,8 @@ pub struct LogFacts {
     pub silent_axes: [[bool; 3]; 3],
     /// Median time between reference samples, s.
     pub reference_dt: f64,
+    /// Where the range of each sensor ends, if readings are cut off there; m/s^2, rad/s, uT.
+    pub ranges: [Option<f64>; 3],
     /// The one-axis rig that moves the sensor; `None` where the log names no rig axis.
     pub rig: Option<Rig>,
 }
@@ -108,6 +110,7 @@ impl LogFacts {
             position_columns: None,
             silent_axes: [[false; 3]; 3],
             reference_dt: dt,
+            ranges: [None; 3],
             rig: None,
         }
     }

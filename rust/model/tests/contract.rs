@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 use imufit_attitude::Frame;
+use imufit_model::card::Found;
 use imufit_model::catalogue;
 use imufit_model::contract::check;
 use imufit_model::facts::LogFacts;
@@ -89,6 +90,7 @@ fn every_built_in_effect_keeps_the_contract() {
         position_columns: Some(NARROWEST),
         silent_axes: [[false; 3]; 3],
         reference_dt: 0.01,
+        ranges: [None; 3],
         rig: Some(rig(&t, &attitude)),
     };
     let mut effects = catalogue::built_in();
@@ -104,7 +106,7 @@ fn every_built_in_effect_keeps_the_contract() {
             .enumerate()
             .map(|(k, p)| {
                 let size = p.typical.unwrap_or(0.3) * (1.0 - 0.3 * k as f64);
-                if p.whole { 7.0 } else { size }
+                if p.found == Found::Search { 7.0 } else { size }
             })
             .collect();
         for at in [zero, typical] {

@@ -97,6 +97,7 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
         position_columns: None,
         silent_axes: [[false; 3]; 3],
         reference_dt: 0.01,
+        ranges: [None; 3],
         rig: None,
     };
     let of = |effects| -> Vec<f64> {
@@ -178,4 +179,50 @@ fn no_current_makes_no_field() {
     let c = [1.0, -0.5, 0.2];
     let expected = Vector3::from(c) * (2.0 + time(ROW).sin());
     near(&added(&swing(Frame::Ned), "mag.current", &c), 2, expected, 1e-12);
+}
+
+#[test]
+fn a_late_sensor_shows_what_was() {
+    let (swing, t, tau) = (swing(Frame::Nwu), time(ROW), 0.023);
+    let field = |t: f64| {
+        swing
+            .attitude(t)
+            .inverse_transform_vector(&Vector3::new(20.0, 3.0, 44.0))
+    };
+    near(
+        &added(&swing, "acc.delay", &[tau]),
+        0,
+        swing.force(t - tau) - swing.force(t),
+        1e-6,
+    );
+    near(
+        &added(&swing, "gyr.delay", &[tau]),
+        1,
+        swing.omega(t - tau) - swing.omega(t),
+        1e-6,
+    );
+    near(&added(&swing, "mag.delay", &[tau]), 2, field(t - tau) - field(t), 1e-6);
+}
+
+#[test]
+fn a_sluggish_gyroscope_follows_its_differential_equation() {
+    let (swing, t, tau) = (swing(Frame::Ned), time(ROW), 0.05_f64);
+    // tau dy/dt = x - y with x = 1.6 cos(2 t), long after the start.
+    let y = 1.6 / (1.0 + (2.0 * tau).powi(2)) * ((2.0 * t).cos() + 2.0 * tau * (2.0 * t).sin());
+    let expected = swing.axis * y - swing.omega(t);
+    assert!(expected.norm() > 0.05);
+    near(&added(&swing, "gyr.lowpass", &[tau]), 1, expected, 1e-6);
+}
+
+#[test]
+fn a_warm_up_fades_and_a_range_ends() {
+    let swing = swing(Frame::Ned);
+    let c = Vector3::new(0.01, -0.02, 0.005);
+    let left = (-(time(ROW) - time(0)) / 1.5).exp();
+    near(&added(&swing, "gyr.warmup", &[c.x, c.y, c.z, 1.5]), 1, c * left, 1e-12);
+    let f = swing.force(time(ROW));
+    let range = 0.7 * f.amax();
+    let cut = f.map(|x| x.clamp(-range, range) - x);
+    assert!(cut.norm() > 1.0);
+    near(&added(&swing, "acc.saturation", &[range]), 0, cut, 1e-7);
 }

@@ -1,7 +1,7 @@
 //! Any other column of the log acts on a sensor.
 
 use super::Words;
-use crate::card::{Card, Parameter, Stage, VECTOR};
+use crate::card::{Card, Found, Parameter, Stage, VECTOR};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
@@ -35,7 +35,7 @@ pub fn column(sensor: Sensor, name: &str) -> Covariate {
             name: (*v).to_string(),
             unit: format!("{}/{name}", sensor.unit()),
             typical: None,
-            whole: false,
+            found: Found::Steps,
         })
         .collect();
     Covariate {

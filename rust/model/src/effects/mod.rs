@@ -13,8 +13,12 @@ pub mod misalignment;
 pub mod nonlinearity;
 pub mod reference;
 pub mod rig;
+pub mod saturation;
 pub mod scale;
 pub mod temperature;
+pub mod timing;
+pub mod vibration;
+pub mod warmup;
 
 use crate::card::{Card, Parameter, Stage};
 use crate::effect::{Columns, Effect, EffectError, Rows};
