@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from imufit import _imufit
 from imufit.diagnose import sentences
 from imufit.diagnose.compare import notes
-from imufit.fit.analysis import BLOCKS, Analysis
+from imufit.fit.analysis import BLOCKS, Analysis, Estimate
 from imufit.fit.profile import Found
 from imufit.model.catalogue import card_of
 from imufit.results import Candidate, Diagnosis, Parameter, Rival, Unexplained
@@ -25,8 +25,6 @@ MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
 CLEARLY_WORSE = 0.1
 """Share of the drop in held-out error by which a fit must stay behind the best one to be out."""
-CLOSE = 0.3
-"""Share of the best candidate's gain that another one's column must reach for a fit of it to be worth the time."""
 POWER = 0.84
 """Standard errors beyond the threshold at which an effect is seen with 80 % power."""
 
@@ -93,7 +91,8 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
 
     A drive with play and a late reference look alike while a rig goes back and forth at one speed, and their columns
     say little of how well they do at their full size. A late sensor and a sluggish one have the same column. One of
-    them is out if its fit stays clearly behind, or leaves something that the best one explains.
+    them is out if its fit stays clearly behind, or leaves something that the best one explains. What the columns tell
+    apart already needs no fit, unless they depend on a search.
     """
     analysis = fit.analysis
     ids = analysis.slots
@@ -106,19 +105,20 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
         for slot, item in items.items()
         if item["testable"]
         and analysis.candidates[ids[slot]].strongly_curved
-        and (ids[slot] in analysis.found or item["gain"] >= CLOSE * items[best]["gain"])
+        and (slot == best or slot in result["rivals"] or ids[slot] in analysis.found)
     ]
     if len(close) < 2:
         return result
+    fits = {slot: _with(fit, ids[slot], [ids[other] for other in close if other != slot]) for slot in close}
     for slot in close:
-        items[slot]["held_out_after"] = fit.ratio_with(analysis.model.with_effect(ids[slot]))
+        items[slot]["held_out_after"] = fits[slot][1].held_out
     after = {slot: items[slot]["held_out_after"] for slot in close}
     won = min(close, key=after.__getitem__)
     lost = [
         slot
         for slot in close
         if slot != won
-        and (after[slot] > after[won] + CLEARLY_WORSE * (fit.ratio - after[won]) or _leaves(fit, ids[slot], ids[won]))
+        and (after[slot] > after[won] + CLEARLY_WORSE * (fit.ratio - after[won]) or _leaves(fits[slot][0], ids[won]))
     ]
     if best not in lost:
         won = best
@@ -130,10 +130,14 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**result, "best": won, "rivals": rivals, "screened": [items[won], *rest], "verdict": word}
 
 
-def _leaves(fit: Fit, effect: str, other: str) -> bool:
+def _with(fit: Fit, effect: str, others: Sequence[str]) -> tuple[Analysis, Estimate]:
+    """Fit one candidate, with the columns of some others around it."""
+    return fit.analysis.solved_for(fit.model.with_effect(effect), fit.unnamed, only=others)
+
+
+def _leaves(analysis: Analysis, other: str) -> bool:
     """Return whether a fit of one candidate leaves something that another one explains."""
-    analysis, _ = fit.analysis.solved_for(fit.model.with_effect(effect), fit.unnamed, only=(other,))
-    return analysis.problem.diagnose(analysis.fitted_slots, analysis.candidate_slots)["best"] is not None
+    return analysis.problem.diagnose(analysis.fitted_slots, [analysis.slots.index(other)])["best"] is not None
 
 
 def _candidate(
