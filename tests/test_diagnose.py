@@ -11,7 +11,6 @@ from imufit.simulate import OBSERVABLE, Noise, SensorNoise
 from scipy.spatial.transform import Rotation
 from test_fit import FIRST_EFFECTS
 
-
 LATE_OR_SLUGGISH = {f"{sensor}.{name}" for sensor in ("acc", "gyr") for name in ("delay", "lowpass")}
 """As late as they are at a third of the noise, they differ by less than a hundredth of it."""
 
