@@ -54,6 +54,18 @@ STACKS = [
     {"mag.soft_iron": NINE},
     {"acc.bias_temperature": XYZ, "gyr.bias_temperature": {"x": 0.003, "z": -0.002}, "mag.bias_temperature": XYZ},
     {f"{sensor}.scale_temperature": {"x": 0.002, "y": -0.003, "z": 0.001} for sensor in SENSORS},
+    {
+        "acc.bias_drift": {"x": 1e-3, "y": -2e-3, "z": 5e-4},
+        "acc.quadratic": {"x": 1e-3, "y": -5e-4, "z": 2e-3},
+        "acc.cubic": {"x": -1e-4, "y": 5e-5, "z": 2e-5},
+        "mag.current": XYZ,
+    },
+    {
+        "gyr.bias_drift": {"x": 1e-4, "y": -2e-4, "z": 5e-5},
+        "gyr.quadratic": {"x": 2e-3, "y": -5e-3, "z": 1e-3},
+        "gyr.cubic": {"x": -2e-3, "y": 1e-3, "z": 5e-4},
+        "gyr.scale_asymmetry": {"x": 0.01, "y": -0.02, "z": 0.005},
+    },
     {"mag.column:vbat": {"x": 1.0, "y": -2.0, "z": 0.5}},
     {
         "acc.bias": {"x": 0.3, "y": -0.2, "z": 0.1},
@@ -87,6 +99,15 @@ def test_a_lever_arm_is_undone_with_the_rates_of_the_log():
     assert off(corrected, truth, edge=4)["acc"] < 1e-4
     assert off(corrected, truth)["acc"] < 0.02
     assert corrected.gyr is recorded.gyr
+
+
+def test_late_and_sluggish_readings_are_set_right_in_time():
+    late = {"acc.delay": {"tau": 0.013}, "gyr.lowpass": {"tau": 0.02}, "mag.delay": {"tau": 0.007}, "acc.scale": XYZ}
+    recorded, truth = simulated(late, rate=200.0), simulated({}, rate=200.0)
+    before, after = off(recorded, truth, edge=20), off(model_of(recorded, late).apply(recorded), truth, edge=20)
+    for name, least in zip(SENSORS, (0.5, 0.1, 0.5), strict=True):
+        assert before[name] > least, name
+        assert after[name] < 2e-3 * before[name], name
 
 
 def test_sensors_that_read_each_other_come_to_rest():

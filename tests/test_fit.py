@@ -16,7 +16,9 @@ FIRST_EFFECTS = [
     "acc.scale_temperature", "gyr.bias", "gyr.scale", "gyr.misalignment", "gyr.g_sensitivity", "gyr.bias_temperature",
     "gyr.scale_temperature", "mag.hard_iron", "mag.soft_iron", "mag.bias_temperature", "mag.scale_temperature",
     "mag.field_reference", "ref.alignment", "ref.delay", "acc.column:vbat", "gyr.column:motor_current",
-    "mag.column:vbat",
+    "mag.column:vbat", "acc.bias_drift", "gyr.bias_drift", "acc.quadratic", "acc.cubic", "gyr.quadratic", "gyr.cubic",
+    "gyr.scale_asymmetry", "gyr.earth_rate", "mag.current", "acc.delay", "gyr.delay", "mag.delay", "acc.lowpass",
+    "gyr.lowpass", "gyr.warmup",
 ]  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from imufit import _imufit
 from imufit.diagnose import sentences
 from imufit.diagnose.compare import notes
-from imufit.fit.analysis import BLOCKS, Analysis
+from imufit.fit.analysis import BLOCKS, Analysis, Estimate
 from imufit.fit.profile import Found
 from imufit.model.catalogue import card_of
 from imufit.results import Candidate, Diagnosis, Parameter, Rival, Unexplained
@@ -90,7 +90,9 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     """Where columns taken at one point mislead, let fits decide between the best candidate and others of that kind.
 
     A drive with play and a late reference look alike while a rig goes back and forth at one speed, and their columns
-    say little of how well they do at their full size.
+    say little of how well they do at their full size. A late sensor and a sluggish one have the same column. One of
+    them is out if its fit stays clearly behind, or leaves something that the best one explains. What the columns tell
+    apart already needs no fit, unless they depend on a search.
     """
     analysis = fit.analysis
     ids = analysis.slots
@@ -99,15 +101,25 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
         return result
     items = {item["slot"]: dict(item) for item in result["screened"]}
     close = [
-        slot for slot, item in items.items() if item["testable"] and analysis.candidates[ids[slot]].strongly_curved
+        slot
+        for slot, item in items.items()
+        if item["testable"]
+        and analysis.candidates[ids[slot]].strongly_curved
+        and (slot == best or slot in result["rivals"] or ids[slot] in analysis.found)
     ]
     if len(close) < 2:
         return result
+    fits = {slot: _with(fit, ids[slot], [ids[other] for other in close if other != slot]) for slot in close}
     for slot in close:
-        items[slot]["held_out_after"] = fit.ratio_with(analysis.model.with_effect(ids[slot]))
+        items[slot]["held_out_after"] = fits[slot][1].held_out
     after = {slot: items[slot]["held_out_after"] for slot in close}
     won = min(close, key=after.__getitem__)
-    lost = [slot for slot in close if after[slot] > after[won] + CLEARLY_WORSE * (fit.ratio - after[won])]
+    lost = [
+        slot
+        for slot in close
+        if slot != won
+        and (after[slot] > after[won] + CLEARLY_WORSE * (fit.ratio - after[won]) or _leaves(fits[slot][0], ids[won]))
+    ]
     if best not in lost:
         won = best
     # Explaining more than a candidate that passed, by fits, is as significant.
@@ -118,13 +130,23 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**result, "best": won, "rivals": rivals, "screened": [items[won], *rest], "verdict": word}
 
 
+def _with(fit: Fit, effect: str, others: Sequence[str]) -> tuple[Analysis, Estimate]:
+    """Fit one candidate, with the columns of some others around it."""
+    return fit.analysis.solved_for(fit.model.with_effect(effect), fit.unnamed, only=others)
+
+
+def _leaves(analysis: Analysis, other: str) -> bool:
+    """Return whether a fit of one candidate leaves something that another one explains."""
+    return analysis.problem.diagnose(analysis.fitted_slots, [analysis.slots.index(other)])["best"] is not None
+
+
 def _candidate(
     item: Mapping[str, Any], effect: _imufit.Effect, rivals: list[Rival], tested: int, found: Found | None
 ) -> Candidate:
     searched = {} if found is None else dict(zip((name for name, _, _ in effect.parameters), found.trial, strict=True))
-    whole = {name: searched[name] for name in effect.whole if name in searched}
+    grid = {name: searched[name] for name in effect.searched if name in searched}
     parameters = tuple(
-        Parameter(effect.id, name, whole.get(name, value), 0.0 if name in whole else error, unit, typical)
+        Parameter(effect.id, name, grid.get(name, value), 0.0 if name in grid else error, unit, typical)
         for (name, unit, typical), (value, error) in zip(effect.parameters, item["parameters"], strict=True)
     )
     threshold = float(student.isf(ALPHA / tested / 2, BLOCKS - 1)) + POWER

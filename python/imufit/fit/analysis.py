@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -88,11 +88,12 @@ class Analysis:
         """
         passes = Passes(log, progress)
         facts, coverage = passes.survey()
+        facts = facts.with_ranges(**passes.ranges())
         if keep_constants and model.constants:
             facts = facts.with_means(model.constants.get("temperature_mean"), model.constants.get("covariate_means"))
         candidates, refused = _candidates(model, facts, coverage)
         for effect, _ in model.stack():
-            reason = effect.not_testable(facts) or _not_covered(effect.id, coverage)
+            reason = effect.not_testable(facts) or _not_covered(effect, coverage)
             if reason is not None:
                 raise InputError(f"effect {effect.id} cannot be fitted: {reason}", file=log.path)
         check_users_effects(passes, facts, [*model.effects, *candidates])
@@ -135,15 +136,20 @@ class Analysis:
         nuisance: Mapping[str, list[float]],
         *,
         with_candidates: bool = True,
+        only: Collection[str] | None = None,
         lean: bool = False,
     ) -> Analysis:
         """Evidence of the same log around other parameter values or another stack of effects.
 
-        Without candidates it is quicker to take; lean, for the next iteration of a fit, it does not tell the residual
-        as it stands either, only whitened.
+        Without candidates, or with only some of them, it is quicker to take; lean, for the next iteration of a fit, it
+        does not tell the residual as it stands either, only whitened.
         """
         known = {**self.candidates, **dict(zip(self.model.effects, (e for e, _ in self.model.stack()), strict=True))}
-        candidates = {key: effect for key, effect in known.items() if key not in model.effects and key not in nuisance}
+        candidates = {
+            key: effect
+            for key, effect in known.items()
+            if key not in model.effects and key not in nuisance and (only is None or key in only)
+        }
         asked = candidates if with_candidates and not lean else {}
         starts = {
             key: self.found[key].start for key in model.effects if key in self.found and key not in self.model.effects
@@ -198,10 +204,21 @@ class Analysis:
         present = [*(v for _, v in self.model.stack()), *self.nuisance.values()]
         for slot in chosen:
             count = len(present[slot])
-            values[slot] = np.asarray(present[slot]) + result["step"][at : at + count]
+            values[slot] = self._within_reach(slot, np.asarray(present[slot]) + result["step"][at : at + count])
             errors[slot] = result["standard_error"][at : at + count]
             at += count
         return Estimate(values, errors, result["full_step"], result["held_out"], result["training"])
+
+    def _within_reach(self, slot: int, values: Array) -> Array:
+        """Keep what a search started (a time constant) within half and twice its present value in one step."""
+        if slot >= len(self.model.effects):
+            return values
+        effect, present = self.model.stack()[slot]
+        for k, (name, _, _) in enumerate(effect.parameters):
+            if name in effect.searched and name not in effect.only_searched:
+                low, high = sorted((0.5 * present[k], 2.0 * present[k]))
+                values[k] = min(max(values[k], low), high)
+        return values
 
     def moved_to(self, estimate: Estimate) -> tuple[SensorModel, dict[str, list[float]]]:
         """Return the model and the unnamed effects with estimated parameters."""
@@ -212,7 +229,7 @@ class Analysis:
             names = [name for name, _, _ in effect.parameters]
             parameters[ids[slot]] = dict(zip(names, map(float, estimate.values[slot]), strict=True))
             errors[ids[slot]] = dict(zip(names, map(float, estimate.errors[slot]), strict=True))
-            errors[ids[slot]] |= dict.fromkeys(effect.whole, 0.0)
+            errors[ids[slot]] |= dict.fromkeys(effect.only_searched, 0.0)
         nuisance = {
             ids[slot]: [float(v) for v in estimate.values[slot]]
             for slot in self.fitted_slots
@@ -242,7 +259,7 @@ class Analysis:
         """True if the reading is proportional to the fitted parameters, so that one solution is exact."""
         stages = {effect.stage for effect, _ in self.model.stack()}
         stages |= {find_effect(key).stage for key in self.nuisance} if "gain" in stages else set()
-        return "reference" not in stages and not {"input", "gain"} <= stages
+        return not any(effect.nonlinear for effect, _ in self.model.stack()) and not {"input", "gain"} <= stages
 
     def solved(self) -> tuple[Analysis, Estimate]:
         """Evidence around the best parameters, by Gauss and Newton's iteration where the effects are not linear."""
@@ -253,14 +270,20 @@ class Analysis:
         return best, estimate
 
     def solved_for(
-        self, model: SensorModel, nuisance: Mapping[str, list[float]], *, with_candidates: bool = True
+        self,
+        model: SensorModel,
+        nuisance: Mapping[str, list[float]],
+        *,
+        with_candidates: bool = True,
+        only: Collection[str] | None = None,
     ) -> tuple[Analysis, Estimate]:
         """Evidence around the best parameters of another stack of effects.
 
-        Without candidates it is quicker to take, and enough to know how well that stack does.
+        Without candidates, or with only some of them, it is quicker to take, and enough to know how well that stack
+        does.
         """
         best, estimate = self.around(model, nuisance, lean=True)._iterated()
-        best = best.around(*best.moved_to(estimate), with_candidates=with_candidates)
+        best = best.around(*best.moved_to(estimate), with_candidates=with_candidates, only=only)
         return best, best.estimate()
 
     def _iterated(self) -> tuple[Analysis, Estimate]:
@@ -294,12 +317,18 @@ def _candidates(
 ) -> tuple[dict[str, _imufit.Effect], dict[str, str]]:
     """Effects that can be asked about on this log, and why the others cannot."""
     own = [name for name in coverage if name != "temp"]
-    offered: dict[str, Any] = {**effects(), **column_effects(own, facts.sensors)}
+    named = {(sensor, effect.column) for effect in effects().values() for sensor in effect.sensors}
+    columns = {
+        key: effect
+        for key, effect in column_effects(own, facts.sensors).items()
+        if (effect.sensors[0], effect.column) not in named
+    }
+    offered: dict[str, Any] = {**effects(), **columns}
     candidates, refused = {}, {}
     for key, effect in offered.items():
         if key in model.effects or (key == FIELD_REFERENCE and facts.field_estimated):
             continue
-        reason = effect.not_testable(facts) or _not_covered(key, coverage)
+        reason = effect.not_testable(facts) or _not_covered(effect, coverage)
         if reason is None:
             candidates[key] = effect
         else:
@@ -307,8 +336,8 @@ def _candidates(
     return candidates, refused
 
 
-def _not_covered(effect_id: str, coverage: Mapping[str, float]) -> str | None:
-    column = effect_id.split(COLUMN, 1)[1] if COLUMN in effect_id else "temp" if "temperature" in effect_id else None
+def _not_covered(effect: _imufit.Effect, coverage: Mapping[str, float]) -> str | None:
+    column = effect.column
     if column is None or coverage.get(column, 0.0) >= MIN_COVERAGE:
         return None
     return f"column {column} is known in only {100 * coverage.get(column, 0.0):.0f} % of the rows"

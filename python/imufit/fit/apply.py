@@ -43,6 +43,7 @@ def apply(model: SensorModel, log: LogSource) -> Log:
         readings, lost = _imufit.correct_readings(
             chunk_arrays(chunk, covariates),
             kept,
+            whole.metadata.frame,
             covariates,
             [means.get(name) for name in covariates],
             model.constants.get("temperature_mean"),

@@ -71,16 +71,6 @@ class Fit:
         """
         return Fit(*self.analysis.solved_for(model, self.unnamed))
 
-    def ratio_with(self, model: SensorModel) -> float:
-        """Return the held-out error over the noise floor that another stack of effects would reach on the same log.
-
-        Parameters
-        ----------
-        model : SensorModel
-            The other stack; its parameters start from this fit's values.
-        """
-        return self.analysis.solved_for(model, self.unnamed, with_candidates=False)[1].held_out
-
     @property
     def log(self) -> LogSource:
         """The log."""

@@ -75,7 +75,7 @@ def search(
 
 def _found(effect: _imufit.Effect, trial: list[float], step: list[float]) -> Found:
     start = [
-        searched if name in effect.whole else moved
+        searched if name in effect.searched else moved
         for (name, _, _), searched, moved in zip(effect.parameters, trial, step, strict=True)
     ]
     return Found(trial, start)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from imufit.simulate.environment import stream
+from imufit.simulate.injections import injection
 from imufit.simulate.scenarios import SCENARIOS
 from imufit.simulate.sealed import Truth
 from imufit.simulate.separation import APART, distance
@@ -16,6 +17,9 @@ from imufit.simulate.study import Study
 
 COLUMNS = ("motor_current", "vbat")
 """Covariates that every log with a hidden effect has, so that their presence tells nothing."""
+
+LARGEST = 20.0
+"""Nothing is hidden with a parameter more than this many times its typical size: the Earth does not turn that fast."""
 
 NOTHING = 0.25
 """Probability that nothing is hidden, where that is allowed."""
@@ -140,6 +144,10 @@ def _distinguishable(study: Study, effect: str, size: str | float, attempt: int)
     try:
         parameters = study.draw(effect, size, attempt)
     except ValueError:
+        return None
+    entry = injection(effect)
+    sizes = {} if entry.stage == "range" else entry.typical
+    if any(abs(parameters[name]) > LARGEST * size for name, size in sizes.items()):
         return None
     coarse, share = study.coarse()
     near, _ = distance(coarse, effect, parameters, COLUMNS)

@@ -159,7 +159,7 @@ def _disturbances() -> list[Injection]:
         entry("mag.hard_iron", _three(5.0), _constant),
         entry("gyr.g_sensitivity", dict.fromkeys(NINE, 2e-4), lambda s, p: s.force @ matrix(p).T),
         entry("gyr.scale_asymmetry", _three(0.005), lambda s, p: vector(p) * np.abs(s.input)),
-        entry("mag.current", _three(1.0), lambda s, p: _times(s.covariates["motor_current"], p)),
+        entry("mag.current", _three(1.0), lambda s, p: _times(s.current, p)),
     ]
     for sensor in SENSORS:
         u, x = unit[sensor], full[sensor]

@@ -39,6 +39,7 @@ class Situation:
     since : (n,), time since the start of the log, s.
     warmth : (n,), temperature less its mean over the log, K.
     covariates : (n,) each, less their means over the log.
+    current : (n,), motor current, A; NaN where there is no motor.
     vibration_power : (n,), local mean square of the vibration, (m/s^2)^2.
     """
 
@@ -48,6 +49,7 @@ class Situation:
     since: Array
     warmth: Array
     covariates: Mapping[str, Array]
+    current: Array
     vibration_power: Array
 
 
@@ -159,6 +161,7 @@ class Setup:
             rotation=felt.rotation,
             since=rows.t - rows.t[0],
             warmth=warmth - np.mean(warmth),
+            current=columns.get("motor_current", np.full(rows.t.size, np.nan)),
             covariates={key: column - np.mean(column) for key, column in columns.items()},
             vibration_power=np.zeros(rows.t.size) if vibration is None else vibration.power(then),
         )

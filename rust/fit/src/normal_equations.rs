@@ -83,6 +83,22 @@ impl NormalEquations {
         }
     }
 
+    /// Equations of the parameters `kept` once others have been given values: what these explain is taken off the observations.
+    #[must_use]
+    pub fn given(&self, kept: &[usize], others: &[usize], values: &[f64]) -> Self {
+        let mut out = self.selected(kept);
+        for (j, value) in others.iter().zip(values) {
+            for (k, i) in kept.iter().enumerate() {
+                out.right[k] -= self.gram[(*i, *j)] * value;
+            }
+            out.square -= 2.0 * self.right[*j] * value;
+            for (i, other) in others.iter().zip(values) {
+                out.square += self.gram[(*i, *j)] * value * other;
+            }
+        }
+        out
+    }
+
     /// Equations of some of the parameters.
     #[must_use]
     pub fn selected(&self, parameters: &[usize]) -> Self {

@@ -1,7 +1,7 @@
 //! First pass over a log: what has to be known of the whole before evidence is taken.
 
 use imufit_model::bandwidth::Bandwidth;
-use imufit_model::facts::LogFacts;
+use imufit_model::facts::{Frame, LogFacts};
 use imufit_model::rig::Rig;
 use imufit_model::sensor::Sensor;
 use imufit_model::smoothing::Smoothing;
@@ -22,6 +22,8 @@ const BANDWIDTH_SAMPLES: usize = 4096;
 pub struct Given {
     /// Number of rows of the log.
     pub n: usize,
+    /// The reference frame.
+    pub frame: Frame,
     /// Gravity in the reference frame, m/s^2.
     pub gravity: Vector3<f64>,
     /// Reference field, uT, if known.
@@ -227,6 +229,7 @@ impl Survey {
             t_start: self.t_first,
             t_end: self.t_last,
             dt,
+            frame: self.given.frame,
             gravity: self.given.gravity,
             field,
             field_estimated: estimated,
@@ -246,6 +249,7 @@ impl Survey {
             attitude_columns: self.attitude_width.for_columns(attitude_smoothing),
             position_columns: position_smoothing.map(|s| self.position_width.for_columns(s)),
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),
+            ranges: [None; 3],
             rig: self.travel.take().map(|t| t.finish(self.attitude_width.noise())),
             covariates: self.given.covariates.clone(),
         };

@@ -8,11 +8,7 @@ use crate::screening;
 /// p-value of `candidate` on top of the model and a `rival`; 1 where nothing of it is left.
 pub fn p_value_given(problem: &Problem, model: &[usize], rival: &[usize], candidate: &[usize]) -> f64 {
     let both: Vec<usize> = model.iter().chain(rival).copied().collect();
-    let directions = problem.directions(&both, candidate);
-    if directions.ncols() == 0 {
-        return 1.0;
-    }
-    screening::p_value(&problem.question(&both, candidate, &directions))
+    screening::p_value_on(problem, &both, candidate)
 }
 
 /// Share of a fitted signal that another candidate reproduces, as a correlation: the square root of R^2 of `columns * beta` on the rival, the model projected out.

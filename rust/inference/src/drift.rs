@@ -2,8 +2,8 @@
 //!
 //! A gyroscope's zero wanders more slowly than any whitening filter of affordable length can see. Whatever varies as slowly (a bias,
 //! a temperature, an attitude that hardly changes) would then look significant. For each question the strength of the walk
-//! is estimated by restricted maximum likelihood from block means of the residual that the question's own parameters leave,
-//! and taken into account by generalised least squares.
+//! is judged by the restricted likelihood of block means of the residual that the question's own parameters leave, and taken
+//! into account by generalised least squares.
 
 use std::sync::Arc;
 
@@ -211,8 +211,37 @@ impl ChannelSums {
     }
 }
 
-/// The strength of the walk of each sensor's zeros that is likeliest, for the channels it applies to.
-fn likeliest(channels: &[ChannelSums]) -> Vec<(&ChannelSums, usize)> {
+/// How strongly a sensor's zeros wander: the channels concerned and how probable each strength is.
+struct Wandering<'a> {
+    channels: Vec<&'a ChannelSums>,
+    probabilities: Vec<f64>,
+}
+
+impl Wandering<'_> {
+    /// The most probable strength.
+    fn likeliest(&self) -> usize {
+        let p = &self.probabilities;
+        (0..p.len()).max_by(|a, b| p[*a].total_cmp(&p[*b])).unwrap_or(0)
+    }
+
+    /// The least strength that is exceeded with at most this probability.
+    fn exceeded(&self, probability: f64) -> usize {
+        let mut above: f64 = self.probabilities.iter().sum();
+        let position = self.probabilities.iter().position(|p| {
+            above -= p;
+            above <= probability
+        });
+        position.unwrap_or(self.probabilities.len().saturating_sub(1))
+    }
+
+    /// True if the zeros can wander at all.
+    fn any(&self, strength: usize) -> bool {
+        self.channels.first().is_some_and(|c| c.strengths[strength].kappa > 0.0)
+    }
+}
+
+/// How strongly the zeros of each sensor wander, every strength of the grid being as good before the log is seen.
+fn wandering(channels: &[ChannelSums]) -> Vec<Wandering<'_>> {
     let mut found = Vec::new();
     for sensor in 0..3 {
         let own: Vec<&ChannelSums> = channels
@@ -227,33 +256,68 @@ fn likeliest(channels: &[ChannelSums]) -> Vec<(&ChannelSums, usize)> {
                 *t += l;
             }
         }
-        let best = (0..total.len())
-            .max_by(|a, b| total[*a].total_cmp(&total[*b]))
-            .unwrap_or(0);
-        if first.strengths[best].kappa > 0.0 {
-            found.extend(own.into_iter().map(|channel| (channel, best)));
-        }
+        let most = total.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> = total.iter().map(|l| (l - most).exp()).collect();
+        let sum: f64 = weights.iter().sum();
+        found.push(Wandering {
+            channels: own,
+            probabilities: weights.iter().map(|w| w / sum).collect(),
+        });
     }
     found
 }
 
-/// Takes wandering zeros out of the equations of a question, one strength per sensor; true if a zero wanders that puts the answer in doubt.
+/// Probabilities with which a strength of the walk is exceeded, and the weight of the strengths around each.
+const LEVELS: [(f64, f64); 6] = [
+    (0.5, 0.5),
+    (0.1, 0.4),
+    (0.01, 0.09),
+    (0.001, 9e-3),
+    (1e-4, 9e-4),
+    (1e-5, 9e-5),
+];
+
+/// The equations of a question with wandering zeros taken out, for strengths from the middle of what the log leaves possible to
+/// the far end, each with its weight. Empty if no zero wanders in a way that puts the answer in doubt.
+///
+/// A log that does not tell how strong the walk is may hide a strong one; what varies as slowly as the walk must not gain from that.
 /// The offset of a magnetometer is iron, which does not wander; the field does, from place to place, and counts for less where it does.
-pub fn take_out(channels: &[ChannelSums], equations: &mut NormalEquations) -> bool {
-    let wandering = likeliest(channels);
-    for (channel, strength) in &wandering {
-        channel.take_out(*strength, equations);
+pub fn without(channels: &[ChannelSums], equations: &NormalEquations) -> Vec<(f64, NormalEquations)> {
+    let sensors = wandering(channels);
+    let inertial = |w: &Wandering| w.channels.iter().any(|c| c.channel / 3 != Sensor::Mag.index());
+    let mut out: Vec<(f64, NormalEquations)> = Vec::new();
+    let mut before: Option<Vec<usize>> = None;
+    for (probability, weight) in LEVELS {
+        let strengths: Vec<usize> = sensors.iter().map(|w| w.exceeded(probability)).collect();
+        if before.as_ref() == Some(&strengths) {
+            if let Some(last) = out.last_mut() {
+                last.0 += weight;
+            }
+            continue;
+        }
+        let mut reduced = equations.clone();
+        for (sensor, strength) in sensors.iter().zip(&strengths).filter(|(w, s)| w.any(**s)) {
+            for channel in &sensor.channels {
+                channel.take_out(*strength, &mut reduced);
+            }
+        }
+        before = Some(strengths);
+        out.push((weight, reduced));
     }
-    wandering
+    let doubtful = sensors
         .iter()
-        .any(|(channel, _)| channel.channel / 3 != Sensor::Mag.index())
+        .any(|w| inertial(w) && w.any(w.exceeded(LEVELS[LEVELS.len() - 1].0)));
+    if doubtful { out } else { Vec::new() }
 }
 
 /// What wandering zeros add to the covariance of `X^T y` of equations over the same parameters.
 pub fn spread(channels: &[ChannelSums], parameters: usize) -> DMatrix<f64> {
     let mut sum = DMatrix::zeros(parameters, parameters);
-    for (channel, strength) in likeliest(channels) {
-        sum += channel.spread(strength);
+    for sensor in wandering(channels) {
+        let strength = sensor.likeliest();
+        for channel in sensor.channels.iter().filter(|_| sensor.any(strength)) {
+            sum += channel.spread(strength);
+        }
     }
     sum
 }

@@ -2,6 +2,7 @@
 
 use imufit_fit::evidence::Evidence;
 use imufit_fit::normal_equations::NormalEquations;
+use imufit_model::card::Found;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::{DMatrix, DVector};
 
@@ -18,6 +19,8 @@ pub struct Problem {
     pub plausible: DVector<f64>,
     /// True where that comes from a typical size.
     pub typical: Vec<bool>,
+    /// Value that a parameter of a candidate has if it is there at all: one that only a search finds, and that the readings themselves tell.
+    pub known: Vec<Option<f64>>,
     /// Weight of each channel in `white`.
     pub weights: [f64; CHANNELS],
     /// Block sums of every channel, for zeros that wander.
@@ -54,8 +57,12 @@ impl Problem {
         let p = white.layout.model.parameters();
         let mut plausible = DVector::zeros(p);
         let mut typical = vec![false; p];
+        let mut known = vec![None; p];
         for slot in white.layout.model.slots() {
-            for (k, card) in slot.effect.card().parameters.iter().enumerate() {
+            let parameters = &slot.effect.card().parameters;
+            let searched = !slot.in_model && parameters.iter().all(|p| p.found == Found::Search);
+            for (k, card) in parameters.iter().enumerate() {
+                known[slot.first + k] = searched.then_some(slot.parameters[k]);
                 let j = slot.first + k;
                 let information: f64 = white_blocks.iter().map(|b| b.gram[(j, j)]).sum();
                 typical[j] = card.typical.is_some();
@@ -72,6 +79,7 @@ impl Problem {
             raw: raw_blocks,
             plausible,
             typical,
+            known,
             weights,
             sums,
         }
@@ -138,6 +146,22 @@ impl Problem {
         DMatrix::from_fn(m, kept.len(), |i, k| scale[i] * eigen.eigenvectors[(i, kept[k])])
     }
 
+    /// Values of a candidate's parameters if all of them are known beforehand.
+    pub fn known_values(&self, candidate: &[usize]) -> Option<Vec<f64>> {
+        let values: Option<Vec<f64>> = candidate.iter().map(|j| self.known[*j]).collect();
+        values.filter(|v| !v.is_empty())
+    }
+
+    /// The question of a model beside a candidate whose parameters are known, so that there is nothing of it to be fitted.
+    pub fn question_given(&self, model: &[usize], candidate: &[usize], values: &[f64]) -> Question {
+        let given = |blocks: &[NormalEquations]| blocks.iter().map(|b| b.given(model, candidate, values)).collect();
+        Question {
+            white: given(&self.white),
+            raw: given(&self.raw),
+            ..self.question(model, &[], &DMatrix::zeros(0, 0))
+        }
+    }
+
     /// The question of a candidate (in the given directions) on top of a model.
     pub fn question(&self, model: &[usize], candidate: &[usize], directions: &DMatrix<f64>) -> Question {
         let (p, m) = (model.len(), directions.ncols());
@@ -176,10 +200,10 @@ impl Question {
         }
     }
 
-    /// Sum over blocks, the wandering of zeros taken into account; `None` if no zero wanders.
-    pub fn total_without_drift(&self) -> Option<NormalEquations> {
-        let mut total = self.total();
-        drift::take_out(&self.sums, &mut total).then_some(total)
+    /// Sum over blocks, the wandering of zeros taken into account, for several strengths of it, each with its weight; empty if no
+    /// zero wanders.
+    pub fn totals_without_drift(&self) -> Vec<(f64, NormalEquations)> {
+        drift::without(&self.sums, &self.total())
     }
 
     /// Sum over blocks.

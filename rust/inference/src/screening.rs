@@ -63,11 +63,18 @@ fn p_value_beside(question: &Question, shorter: f64) -> f64 {
     }
 }
 
-/// Wald test of the candidate's parameters with wandering zeros; 0 where no zero wanders, since the block tests then say it all.
+/// Wald test of the candidate's parameters with wandering zeros, the mean over how strongly they may wander; 0 where no zero
+/// wanders, since the block tests then say it all.
 pub fn p_value_with_drift(question: &Question) -> f64 {
-    let Some(total) = question.total_without_drift() else {
-        return 0.0;
-    };
+    question
+        .totals_without_drift()
+        .iter()
+        .map(|(weight, total)| weight * wald(question, total))
+        .sum()
+}
+
+/// p-value of the candidate's parameters from equations of unit variance.
+fn wald(question: &Question, total: &NormalEquations) -> f64 {
     let Some(solved) = total.solve(&question.precision) else {
         return 1.0;
     };
@@ -130,10 +137,14 @@ fn halves_agree(question: &Question, whole: &Jackknife) -> bool {
 pub struct Weighed {
     question: Question,
     answer: Screened,
+    known: bool,
 }
 
 /// Weighs one candidate on top of the model's parameters.
 pub fn weigh(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, candidate: &[usize]) -> Weighed {
+    if let Some(values) = problem.known_values(candidate) {
+        return weigh_known(problem, model, base, slot, candidate, &values);
+    }
     let directions = problem.directions(model, candidate);
     let question = problem.question(model, candidate, &directions);
     let mut answer = Screened {
@@ -154,7 +165,67 @@ pub fn weigh(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, ca
         (answer.gain, answer.gain_error) = held_out::gain(base, &with);
         answer.held_out.1 = with.ratio;
     }
-    Weighed { question, answer }
+    Weighed {
+        question,
+        answer,
+        known: false,
+    }
+}
+
+/// Weighs a candidate whose size is known beforehand.
+fn weigh_known(
+    problem: &Problem,
+    model: &[usize],
+    base: &HeldOut,
+    slot: usize,
+    candidate: &[usize],
+    values: &[f64],
+) -> Weighed {
+    let question = problem.question_given(model, candidate, values);
+    let seen: f64 = problem
+        .white
+        .iter()
+        .flat_map(|b| candidate.iter().zip(values).map(|(j, v)| b.gram[(*j, *j)] * v * v))
+        .sum();
+    let with = held_out::held_out(&question);
+    let (gain, gain_error) = held_out::gain(base, &with);
+    let answer = Screened {
+        slot,
+        gain,
+        gain_error,
+        p_value: p_value_known(gain),
+        held_out: (base.ratio, with.ratio),
+        expected_ratio: base.ratio,
+        parameters: values.iter().map(|v| (*v, 0.0)).collect(),
+        testable: seen > 1.0,
+        stable: true,
+        plausible: true,
+        directions: DMatrix::from_iterator(values.len(), 1, values.iter().copied()),
+    };
+    Weighed {
+        question,
+        answer,
+        known: true,
+    }
+}
+
+/// Where nothing is fitted, the likelihood is `exp(gain / 2)` times that of the model alone, and chance makes a ratio of k with
+/// a probability of at most 1 / k. It may lie in a single block, which no comparison of blocks could judge.
+fn p_value_known(gain: f64) -> f64 {
+    (-0.5 * gain.max(0.0)).exp()
+}
+
+/// p-value of a candidate on top of a model; 1 where nothing of it can be seen.
+pub fn p_value_on(problem: &Problem, model: &[usize], candidate: &[usize]) -> f64 {
+    if let Some(values) = problem.known_values(candidate) {
+        let with = held_out::held_out(&problem.question_given(model, candidate, &values));
+        return p_value_known(held_out::gain(&base(problem, model), &with).0);
+    }
+    let directions = problem.directions(model, candidate);
+    if directions.ncols() == 0 {
+        return 1.0;
+    }
+    p_value(&problem.question(model, candidate, &directions))
 }
 
 impl Weighed {
@@ -168,8 +239,15 @@ impl Weighed {
         let Self {
             question,
             answer: mut out,
+            known,
         } = self;
         if !out.testable {
+            return out;
+        }
+        if known {
+            if let Some(fitted) = question.solve(&question.total()) {
+                out.expected_ratio = ratio(&question, &fitted);
+            }
             return out;
         }
         let Some(fine) = jackknife::jackknife(&question, 1) else {
@@ -191,14 +269,19 @@ impl Weighed {
             let limit = BEYOND * problem.plausible[*j];
             !problem.typical[*j] || value.abs() - 3.0 * error <= limit
         });
-        let (mut square, mut n) = (0.0, 0.0);
-        for block in &question.raw {
-            square += block.residual_square(&fine.estimate).max(0.0);
-            n += block.n;
-        }
-        out.expected_ratio = (square / (n - fine.estimate.len() as f64).max(1.0)).sqrt();
+        out.expected_ratio = ratio(&question, &fine.estimate);
         out
     }
+}
+
+/// Residual over noise floor at a solution, over all data.
+fn ratio(question: &Question, solution: &DVector<f64>) -> f64 {
+    let (mut square, mut n) = (0.0, 0.0);
+    for block in &question.raw {
+        square += block.residual_square(solution).max(0.0);
+        n += block.n;
+    }
+    (square / (n - solution.len() as f64).max(1.0)).sqrt()
 }
 
 /// Held-out error of the model alone.

@@ -9,8 +9,19 @@ pub struct Parameter {
     pub unit: String,
     /// Size that low-cost sensors typically show; `None` if nobody can tell.
     pub typical: Option<f64>,
-    /// True if it is a whole number, which only a search finds and no step moves.
-    pub whole: bool,
+    /// How its value is found.
+    pub found: Found,
+}
+
+/// How the value of a parameter is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// By steps along its column.
+    Steps,
+    /// By a search, then by steps along its column: without a search there is nothing to start from.
+    SearchThenSteps,
+    /// By a search alone: no step moves it.
+    Search,
 }
 
 /// Where in the chain from truth to reading an effect acts.
@@ -18,12 +29,16 @@ pub struct Parameter {
 pub enum Stage {
     /// The reference itself is changed before ideal readings are taken.
     Reference,
+    /// The sensor shows what was: late, or smoothed.
+    Time,
     /// Changes the quantity that reaches the sensing element.
     Input,
     /// Turns the quantity into a reading: acts on what the stages before left.
     Gain,
     /// Adds to the reading whatever the quantity is.
     Offset,
+    /// Cuts off the reading at the end of the sensor's range.
+    Range,
 }
 
 /// Description of an effect.
@@ -64,7 +79,7 @@ pub fn parameters(names: &[&str], unit: &str, typical: f64) -> Vec<Parameter> {
             name: (*name).to_string(),
             unit: unit.to_string(),
             typical: Some(typical),
-            whole: false,
+            found: Found::Steps,
         })
         .collect()
 }

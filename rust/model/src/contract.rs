@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::card::{Found, Stage};
 use crate::effect::{Effect, EffectError};
 use crate::facts::LogFacts;
 use crate::sensor_model::{Evaluation, SensorModel};
@@ -29,8 +30,12 @@ pub fn check(effect: &Arc<dyn Effect>, at: &[f64], window: &Window, facts: &LogF
     let here = evaluate(effect, at, window, facts)?;
     let model = SensorModel::new(vec![(effect.clone(), at.to_vec())], vec![], facts)?;
     let known: Vec<bool> = here.ideal.omega.axis(0).iter().map(|v| v.is_finite()).collect();
+    let late = effect.card().stage == Stage::Time;
     for (c, channel) in here.channels.iter().enumerate() {
         let Some(channel) = channel else { continue };
+        // What a late sensor shows, the reference may not know yet, or not any more.
+        let known = known.iter().zip(&channel.residual);
+        let known: Vec<bool> = known.map(|(k, r)| *k && (!late || r.is_finite())).collect();
         for (column, parameter) in channel.columns.iter().zip(&model.active()[c]) {
             if let Some(row) = (0..column.len()).find(|i| known[*i] && !column[*i].is_finite()) {
                 let name = &effect.card().parameters[*parameter].name;
@@ -46,7 +51,7 @@ pub fn check(effect: &Arc<dyn Effect>, at: &[f64], window: &Window, facts: &LogF
         .parameters
         .iter()
         .enumerate()
-        .filter(|(_, card)| !card.whole)
+        .filter(|(_, card)| card.found != Found::Search)
     {
         let h = 1e-3 * card.typical.unwrap_or(1.0);
         let (mut above, mut below) = (at.to_vec(), at.to_vec());

@@ -8,6 +8,7 @@ mod dependence;
 mod newton;
 mod stack;
 mod surroundings;
+mod timing;
 
 use std::sync::Arc;
 
@@ -15,8 +16,10 @@ use crate::card::Stage;
 use crate::effect::{Columns, Effect, EffectError};
 use crate::effects::field::FIELD_REFERENCE;
 use crate::facts::LogFacts;
+use crate::ideal::SensorTime;
 use crate::sensor::Sensor;
 use crate::triple::Triple;
+use crate::vibration;
 use crate::window::{Window, held};
 use dependence::{Dependence, dependence};
 use newton::Failure;
@@ -87,6 +90,7 @@ struct Log<'a> {
     window: &'a Window<'a>,
     facts: &'a LogFacts,
     temperature: Option<Vec<f64>>,
+    vibration: Option<Vec<f64>>,
     covariates: Vec<Vec<f64>>,
     attitude: Option<Vec<nalgebra::UnitQuaternion<f64>>>,
 }
@@ -112,6 +116,7 @@ pub fn correct(
             .temperature
             .filter(|_| facts.has_temperature)
             .map(|t| rows.clone().map(|i| held(t, i) - facts.temperature_mean).collect()),
+        vibration: window.reading(Sensor::Acc).map(|_| vibration::power(window, facts.dt)),
         covariates: window
             .covariates
             .iter()
@@ -119,6 +124,7 @@ pub fn correct(
             .collect(),
         attitude: None,
     };
+    let times = timing::of(effects);
     let mut parts: [Vec<Part>; 3] = Default::default();
     for sensor in Sensor::ALL.into_iter().filter(|s| window.reading(*s).is_some()) {
         parts[sensor.index()] = parts_of(sensor, effects, &log)?;
@@ -133,11 +139,22 @@ pub fn correct(
             }))
         })
     });
-    let mut now = raw.clone();
-    in_turn(&log, &parts, &raw, &mut now)?;
+    // A gain and a constant offset leave time as it is, so that time can be set right first.
+    let mut timely = raw.clone();
+    for (reading, time) in timely.iter_mut().zip(&times) {
+        if let (Some(y), true) = (reading.as_mut(), *time != SensorTime::default()) {
+            *y = timing::set_right(y, window.t, *time);
+        }
+    }
+    let mut now = timely.clone();
+    in_turn(&log, &parts, &timely, &mut now)?;
     for sensor in Sensor::ALL {
         let k = sensor.index();
-        if let (Some(raw), Some(now), false) = (&raw[k], now[k].take(), parts[k].is_empty()) {
+        if let (Some(raw), Some(now), false) = (
+            &raw[k],
+            now[k].take(),
+            parts[k].is_empty() && times[k] == SensorTime::default(),
+        ) {
             out.lost[k] = (0..raw.len())
                 .filter(|i| (0..3).any(|a| raw.axis(a)[*i].is_finite() && !now.axis(a)[*i].is_finite()))
                 .count();
@@ -152,7 +169,9 @@ fn parts_of(sensor: Sensor, effects: &[(Arc<dyn Effect>, Vec<f64>)], log: &Log) 
     let mut parts = Vec::new();
     for (effect, parameters) in effects {
         let acts = effect.sensors().contains(&sensor) && parameters.iter().any(|v| *v != 0.0);
-        if !acts || of_reference(effect.as_ref()) {
+        // What was cut off is lost, and time is set right by itself.
+        let elsewhere = matches!(effect.card().stage, Stage::Time | Stage::Range);
+        if !acts || elsewhere || of_reference(effect.as_ref()) {
             continue;
         }
         let lacking = |reason: String| CorrectionError::Lacking {
@@ -291,6 +310,7 @@ fn correct_sensor(
             t: &log.window.t[rows.clone()],
             ideal: seen.ideal(&rows, log.attitude.as_deref()),
             temperature: log.temperature.as_ref().map(|t| &t[rows.clone()]),
+            vibration: log.vibration.as_ref().map(|v| &v[rows.clone()]),
             covariates: log.covariates.iter().map(|c| c[rows.clone()].to_vec()).collect(),
             columns,
         };

@@ -21,6 +21,8 @@ pub struct Rows<'a> {
     pub x: &'a Triple,
     /// Sensor temperature less its mean over the log, K (n); NaN where not known.
     pub temperature: Option<&'a [f64]>,
+    /// Local power of the accelerometer's vibration, (m/s^2)^2 (n); `None` without accelerometer.
+    pub vibration: Option<&'a [f64]>,
     /// Covariates in the order of `facts.covariates` (n each); NaN where not known.
     pub covariates: &'a [Vec<f64>],
 }
@@ -139,6 +141,11 @@ pub trait Effect: Send + Sync {
     /// Why it cannot be offered for this log; `None` if it can.
     fn not_testable(&self, facts: &LogFacts) -> Option<String>;
 
+    /// The column of the log that it reads besides sensors and reference: `temp` or the name of a covariate.
+    fn column(&self) -> Option<&str> {
+        None
+    }
+
     /// Columns d reading / d parameter of `sensor`, at the given parameter values.
     fn columns(&self, rows: &Rows, sensor: Sensor, parameters: &[f64], out: &mut Columns) -> Result<(), EffectError>;
 
@@ -153,6 +160,11 @@ pub trait Effect: Send + Sync {
         out: &mut Columns,
     ) -> Result<(), EffectError> {
         self.columns(rows, sensor, trial, out)
+    }
+
+    /// What it adds to the reading where that is not the sum of its parameters times their columns; `None` where it is.
+    fn added(&self, _rows: &Rows, _sensor: Sensor, _parameters: &[f64]) -> Option<Triple> {
+        None
     }
 
     /// True if its columns around one value say little of larger ones, so that only a fit tells how much it explains.

@@ -1,5 +1,6 @@
 //! What is known of a log as a whole before its evidence is taken.
 
+pub use imufit_attitude::Frame;
 use nalgebra::Vector3;
 
 use crate::rig::Rig;
@@ -20,6 +21,8 @@ pub struct LogFacts {
     pub t_end: f64,
     /// Median time between rows, s.
     pub dt: f64,
+    /// The reference frame.
+    pub frame: Frame,
     /// Gravity in the reference frame, m/s^2 (points down).
     pub gravity: Vector3<f64>,
     /// Magnetic flux density in the reference frame, uT; zero without a magnetometer.
@@ -51,6 +54,8 @@ pub struct LogFacts {
     pub silent_axes: [[bool; 3]; 3],
     /// Median time between reference samples, s.
     pub reference_dt: f64,
+    /// Where the range of each sensor ends, if readings are cut off there; m/s^2, rad/s, uT.
+    pub ranges: [Option<f64>; 3],
     /// The one-axis rig that moves the sensor; `None` where the log names no rig axis.
     pub rig: Option<Rig>,
 }
@@ -62,10 +67,11 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 impl LogFacts {
-    /// Facts of a log of which only the readings count: nothing is known of its reference. `window` is the whole log; means that are not
-    /// given are taken from it.
+    /// Facts of a log of which only the readings count: nothing is known of its reference but the frame it would be in. `window` is the
+    /// whole log; means that are not given are taken from it.
     pub fn without_reference(
         window: &Window,
+        frame: Frame,
         covariates: Vec<String>,
         covariate_means: &[Option<f64>],
         temperature_mean: Option<f64>,
@@ -83,6 +89,7 @@ impl LogFacts {
             t_start,
             t_end,
             dt,
+            frame,
             gravity: Vector3::zeros(),
             field: Vector3::zeros(),
             field_estimated: false,
@@ -103,6 +110,7 @@ impl LogFacts {
             position_columns: None,
             silent_axes: [[false; 3]; 3],
             reference_dt: dt,
+            ranges: [None; 3],
             rig: None,
         }
     }

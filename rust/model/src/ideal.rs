@@ -7,6 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::facts::LogFacts;
 use crate::reference::{self, Kinematics, Widths};
 use crate::rig::{Play, RigError, Slack};
+use crate::sensor::Sensor;
 use crate::triple::Triple;
 use crate::window::Window;
 
@@ -21,6 +22,17 @@ pub struct ReferenceChange {
     pub tilt: UnitQuaternion<f64>,
     /// By how much a one-axis rig misses its commanded angle.
     pub rig: RigError,
+    /// How late and how sluggish each sensor is.
+    pub sensors: [SensorTime; 3],
+}
+
+/// What a sensor shows of the past: the quantity of `delay` ago, smoothed by a lag of first order.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SensorTime {
+    /// s.
+    pub delay: f64,
+    /// Time constant, s.
+    pub lag: f64,
 }
 
 impl Default for ReferenceChange {
@@ -30,6 +42,7 @@ impl Default for ReferenceChange {
             alignment: UnitQuaternion::identity(),
             tilt: UnitQuaternion::identity(),
             rig: RigError::default(),
+            sensors: Default::default(),
         }
     }
 }
@@ -43,6 +56,10 @@ impl ReferenceChange {
             alignment: self.alignment * other.alignment,
             tilt: self.tilt * other.tilt,
             rig: self.rig.and(other.rig),
+            sensors: std::array::from_fn(|s| SensorTime {
+                delay: self.sensors[s].delay + other.sensors[s].delay,
+                lag: self.sensors[s].lag + other.sensors[s].lag,
+            }),
         }
     }
 }
@@ -68,7 +85,17 @@ pub struct Ideal {
     pub command: Vec<Command>,
     /// Axis of the rig in the sensor's frame; zero without a rig.
     pub rig_axis: Vector3<f64>,
+    /// For a sluggish sensor how much further behind its reading would fall per second of its lag; empty otherwise.
+    pub settling: Triple,
 }
+
+/// Nodes and weights of Gauss and Laguerre's quadrature: a lag shows the integral of exp(-u) x(t - lag u) over u > 0.
+const PAST: [(f64, f64); 4] = [
+    (0.322_547_689_619_392_3, 0.603_154_104_341_633_6),
+    (1.745_761_101_158_346_6, 0.357_418_692_437_799_7),
+    (4.536_620_296_921_128, 0.038_887_908_515_005_384),
+    (9.395_070_912_301_133, 5.392_947_055_613_275e-4),
+];
 
 /// What a one-axis rig was told to do in a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,17 +180,68 @@ impl Ideal {
         }
     }
 
+    /// Ideal readings as one sensor shows them if it is late or sluggish; `None` if it is neither.
+    pub fn of_sensor(window: &Window, facts: &LogFacts, change: &ReferenceChange, sensor: Sensor) -> Option<Self> {
+        let time = change.sensors[sensor.index()];
+        if time == SensorTime::default() {
+            return None;
+        }
+        let before = |past: f64| {
+            let delay = change.delay - past;
+            Self::new(window, facts, &ReferenceChange { delay, ..*change })
+        };
+        let mut now = before(time.delay);
+        if time.lag == 0.0 {
+            return Some(now);
+        }
+        let n = now.len();
+        now.settling = Triple::zeros(n);
+        for triple in now.triples() {
+            *triple = Triple::zeros(n);
+        }
+        for (node, weight) in PAST {
+            let mut then = before(time.delay + time.lag * node);
+            now.settling.add(then.rate(sensor), weight * node);
+            for (sum, triple) in now.triples().into_iter().zip(then.triples()) {
+                sum.add(triple, weight);
+            }
+        }
+        Some(now)
+    }
+
+    const fn triples(&mut self) -> [&mut Triple; 6] {
+        [
+            &mut self.omega,
+            &mut self.alpha,
+            &mut self.f,
+            &mut self.f_rate,
+            &mut self.m,
+            &mut self.m_rate,
+        ]
+    }
+
+    /// Time derivative of what a sensor reads.
+    pub const fn rate(&self, sensor: Sensor) -> &Triple {
+        match sensor {
+            Sensor::Acc => &self.f_rate,
+            Sensor::Gyr => &self.alpha,
+            Sensor::Mag => &self.m_rate,
+        }
+    }
+
+    /// How much further behind a sensor's reading would fall per second of its lag.
+    pub fn settling(&self, sensor: Sensor) -> &Triple {
+        if self.settling.is_empty() {
+            self.rate(sensor)
+        } else {
+            &self.settling
+        }
+    }
+
     fn push(&mut self, k: Option<&Kinematics>, facts: &LogFacts, change: &ReferenceChange) {
         let Some(k) = k else {
             let nan = Vector3::repeat(f64::NAN);
-            for triple in [
-                &mut self.omega,
-                &mut self.alpha,
-                &mut self.f,
-                &mut self.f_rate,
-                &mut self.m,
-                &mut self.m_rate,
-            ] {
+            for triple in self.triples() {
                 triple.push(&nan);
             }
             self.attitude.push(UnitQuaternion::identity());

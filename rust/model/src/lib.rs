@@ -18,4 +18,5 @@ pub mod sensor;
 pub mod sensor_model;
 pub mod smoothing;
 pub mod triple;
+pub mod vibration;
 pub mod window;

@@ -10,6 +10,7 @@ use crate::facts::LogFacts;
 use crate::ideal::{Command, Ideal, ReferenceChange};
 use crate::sensor::{CHANNELS, Sensor};
 use crate::triple::Triple;
+use crate::vibration;
 use crate::window::{Window, held};
 
 /// Columns of a sensor's three channels, in the order of their active parameters.
@@ -83,6 +84,29 @@ pub struct Evaluation {
     pub covariates: Vec<Vec<f64>>,
     /// Temperature less its mean.
     pub temperature: Option<Vec<f64>>,
+}
+
+/// True where the value of an effect lies in the ideal readings.
+const fn in_reference(stage: Stage) -> bool {
+    matches!(stage, Stage::Reference | Stage::Time)
+}
+
+/// A reading that is cut off does not move with any parameter.
+fn still_where_cut_off(columns: &mut AxisColumns, before: &Triple, after: &Triple) {
+    for (axis, columns) in columns.iter_mut().enumerate() {
+        let rows = before.axis(axis).iter().zip(after.axis(axis));
+        let cut: Vec<usize> = rows
+            .enumerate()
+            .filter(|(_, (a, b))| (*a - *b).abs() > 0.0)
+            .map(|(i, _)| i)
+            .collect();
+        for column in columns.iter_mut().filter(|c| !c.is_empty()) {
+            for i in &cut {
+                // Not known stays not known.
+                column[*i] *= 0.0;
+            }
+        }
+    }
 }
 
 impl SensorModel {
@@ -179,6 +203,7 @@ impl SensorModel {
                 ideal: &ideal,
                 x: &ideal.f,
                 temperature: Some(&ones),
+                vibration: Some(&ones),
                 covariates: &covariates,
             };
             for slot in self.slots.iter().filter(|s| s.effect.sensors().contains(&sensor)) {
@@ -201,7 +226,7 @@ impl SensorModel {
     pub fn reference_change(&self) -> ReferenceChange {
         self.slots
             .iter()
-            .filter(|s| s.in_model && s.effect.card().stage == Stage::Reference)
+            .filter(|s| s.in_model && in_reference(s.effect.card().stage))
             .fold(ReferenceChange::default(), |change, s| {
                 change.and(s.effect.reference_change(&s.parameters))
             })
@@ -219,26 +244,39 @@ impl SensorModel {
             .iter()
             .map(|c| core.clone().map(|i| held(c, i)).collect())
             .collect();
+        let vibration = window.reading(Sensor::Acc).map(|_| vibration::power(window, facts.dt));
         // Readings are modelled from the quantities as they are; columns of silent axes would be noise.
         let [acc, gyr, mag] = facts.silent_axes;
-        let seen = facts.silent_axes.iter().any(|s| s.contains(&true)).then(|| Ideal {
-            omega: ideal.omega.without(gyr),
-            alpha: ideal.alpha.without(gyr),
-            f: ideal.f.without(acc),
-            m: ideal.m.without(mag),
-            ..ideal.clone()
-        });
+        let seen_of = |ideal: &Ideal| {
+            facts.silent_axes.iter().any(|s| s.contains(&true)).then(|| Ideal {
+                omega: ideal.omega.without(gyr),
+                alpha: ideal.alpha.without(gyr),
+                f: ideal.f.without(acc),
+                m: ideal.m.without(mag),
+                ..ideal.clone()
+            })
+        };
+        let seen = seen_of(&ideal);
+        let change = self.reference_change();
         let mut channels: Vec<Option<ChannelColumns>> = vec![None; CHANNELS];
         for sensor in Sensor::ALL {
             let Some(reading) = window.reading(sensor) else {
                 continue;
             };
+            let own = Ideal::of_sensor(window, facts, &change, sensor);
+            let own_seen = own.as_ref().and_then(seen_of);
+            let ideal = own.as_ref().unwrap_or(&ideal);
             let rows = Rows {
                 facts,
                 t: &window.t[core.clone()],
-                ideal: seen.as_ref().unwrap_or(&ideal),
+                ideal: if own.is_some() {
+                    own_seen.as_ref().unwrap_or(ideal)
+                } else {
+                    seen.as_ref().unwrap_or(ideal)
+                },
                 x: &ideal.f,
                 temperature: temperature.as_deref(),
+                vibration: vibration.as_deref(),
                 covariates: &covariates,
             };
             let reading_of = match sensor {
@@ -287,7 +325,14 @@ impl SensorModel {
         let mut out: AxisColumns =
             std::array::from_fn(|axis| vec![Vec::new(); self.active[3 * sensor.index() + axis].len()]);
         let mut columns = Columns::default();
-        for stage in [Stage::Reference, Stage::Input, Stage::Gain, Stage::Offset] {
+        for stage in [
+            Stage::Reference,
+            Stage::Time,
+            Stage::Input,
+            Stage::Gain,
+            Stage::Offset,
+            Stage::Range,
+        ] {
             let mut after: Option<Triple> = None;
             let seen = silent.contains(&true).then(|| x.without(silent));
             for slot in &self.slots {
@@ -300,6 +345,16 @@ impl SensorModel {
                     ..rows
                 };
                 slot.columns(&rows, sensor, &mut columns)?;
+                // The value of a reference effect is in the ideal readings already.
+                let counts = slot.in_model && !in_reference(stage);
+                let added = if counts {
+                    slot.effect.added(&rows, sensor, &slot.parameters)
+                } else {
+                    None
+                };
+                if let Some(added) = &added {
+                    after.get_or_insert_with(|| x.clone()).add(added, 1.0);
+                }
                 for axis in 0..3 {
                     let list = &self.active[3 * sensor.index() + axis];
                     let from = list.partition_point(|p| *p < slot.first);
@@ -311,10 +366,9 @@ impl SensorModel {
                     {
                         let value = slot.parameters[p - slot.first];
                         let column = columns.get(p - slot.first, axis);
-                        // The value of a reference effect is in the ideal readings already.
-                        if slot.in_model
+                        if counts
+                            && added.is_none()
                             && value != 0.0
-                            && stage != Stage::Reference
                             && let Some(column) = column
                         {
                             let target = &mut after.get_or_insert_with(|| x.clone()).0[axis];
@@ -327,6 +381,9 @@ impl SensorModel {
                 }
             }
             if let Some(after) = after {
+                if stage == Stage::Range {
+                    still_where_cut_off(&mut out, &x, &after);
+                }
                 x = after;
             }
         }

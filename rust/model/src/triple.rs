@@ -12,6 +12,15 @@ impl Triple {
         Self([vec![0.0; n], vec![0.0; n], vec![0.0; n]])
     }
 
+    /// Adds a multiple of another quantity of as many rows.
+    pub fn add(&mut self, other: &Self, factor: f64) {
+        for (own, other) in self.0.iter_mut().zip(&other.0) {
+            for (a, b) in own.iter_mut().zip(other) {
+                *a += factor * b;
+            }
+        }
+    }
+
     /// Appends a row.
     pub fn push(&mut self, v: &Vector3<f64>) {
         for axis in 0..3 {

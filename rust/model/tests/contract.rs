@@ -1,6 +1,8 @@
 //! Every built-in effect keeps the contract that fitting relies on.
 #![allow(missing_docs)]
 
+use imufit_attitude::Frame;
+use imufit_model::card::Found;
 use imufit_model::catalogue;
 use imufit_model::contract::check;
 use imufit_model::facts::LogFacts;
@@ -72,6 +74,7 @@ fn every_built_in_effect_keeps_the_contract() {
         t_start: t[0],
         t_end: t[n - 1],
         dt: 0.01,
+        frame: Frame::Ned,
         gravity: Vector3::new(0.0, 0.0, 9.80665),
         field: Vector3::new(20.0, 0.0, 44.0),
         field_estimated: false,
@@ -87,6 +90,7 @@ fn every_built_in_effect_keeps_the_contract() {
         position_columns: Some(NARROWEST),
         silent_axes: [[false; 3]; 3],
         reference_dt: 0.01,
+        ranges: [None; 3],
         rig: Some(rig(&t, &attitude)),
     };
     let mut effects = catalogue::built_in();
@@ -102,7 +106,7 @@ fn every_built_in_effect_keeps_the_contract() {
             .enumerate()
             .map(|(k, p)| {
                 let size = p.typical.unwrap_or(0.3) * (1.0 - 0.3 * k as f64);
-                if p.whole { 7.0 } else { size }
+                if p.found == Found::Search { 7.0 } else { size }
             })
             .collect();
         for at in [zero, typical] {

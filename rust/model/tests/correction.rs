@@ -6,7 +6,7 @@ use std::sync::Arc;
 use imufit_model::catalogue;
 use imufit_model::correction::{CorrectionError, correct};
 use imufit_model::effect::Effect;
-use imufit_model::facts::LogFacts;
+use imufit_model::facts::{Frame, LogFacts};
 use imufit_model::window::Window;
 
 const N: usize = 400;
@@ -51,7 +51,7 @@ fn a_turned_axis_and_a_missing_row_are_no_obstacle() {
         .flat_map(|x| [-x[0] + 0.5, 1.1 * x[1] + 0.1 * x[0], x[2]])
         .collect();
     let window = window(&t, &reading, None);
-    let facts = LogFacts::without_reference(&window, vec![], &[], None);
+    let facts = LogFacts::without_reference(&window, Frame::Ned, vec![], &[], None);
     let effects = stack(&[
         ("acc.scale", &[-2.0, 0.1, 0.0]),
         ("acc.misalignment", &[0.0, 0.0, 0.1, 0.0, 0.0, 0.0]),
@@ -77,7 +77,7 @@ fn a_lever_arm_reads_the_gyroscope_and_says_so_when_there_is_none() {
     let (acc, gyr) = (waves(&t, 9.0, 2.0), waves(&t, 2.0, 3.0));
     let effects = stack(&[("acc.lever_arm", &[0.1, 0.0, 0.0])]);
     let with = window(&t, &acc, Some(&gyr));
-    let facts = LogFacts::without_reference(&with, vec![], &[], None);
+    let facts = LogFacts::without_reference(&with, Frame::Ned, vec![], &[], None);
     let corrected = correct(&with, &facts, &effects).unwrap();
     assert!(corrected.readings[1].is_none());
     let found = corrected.readings[0].as_ref().unwrap();
@@ -86,7 +86,7 @@ fn a_lever_arm_reads_the_gyroscope_and_says_so_when_there_is_none() {
     let expected = acc[3 * i] + 0.1 * (gyr[3 * i + 1].powi(2) + gyr[3 * i + 2].powi(2));
     assert!((found.axis(0)[i] - expected).abs() < 1e-12);
     let without = window(&t, &acc, None);
-    let facts = LogFacts::without_reference(&without, vec![], &[], None);
+    let facts = LogFacts::without_reference(&without, Frame::Ned, vec![], &[], None);
     let error = correct(&without, &facts, &effects).err().unwrap().to_string();
     assert!(error.contains("acc.lever_arm") && error.contains("gyr_x"), "{error}");
 }
@@ -96,7 +96,7 @@ fn a_gain_without_inverse_is_named_alone() {
     let t = times();
     let acc = waves(&t, 9.0, 2.0);
     let window = window(&t, &acc, None);
-    let facts = LogFacts::without_reference(&window, vec![], &[], None);
+    let facts = LogFacts::without_reference(&window, Frame::Ned, vec![], &[], None);
     let effects = stack(&[("acc.bias", &[1.0, 0.0, 0.0]), ("acc.scale", &[0.0, -1.0, 0.0])]);
     let error = correct(&window, &facts, &effects).err().unwrap();
     assert!(matches!(error, CorrectionError::Singular { effects, row: 0, .. } if effects == "acc.scale"));

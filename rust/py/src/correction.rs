@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use imufit_attitude::Frame;
 use imufit_model::correction::{CorrectionError, correct, of_reference};
 use imufit_model::effect::{Effect, EffectError};
 use imufit_model::facts::LogFacts;
@@ -10,7 +11,7 @@ use numpy::{PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::errors::{from_effect, input_error, input_error_in_row};
+use crate::errors::{from_effect, input_error, input_error_in_row, value_error};
 use crate::model::PyEffect;
 use crate::window::ChunkArrays;
 
@@ -42,23 +43,25 @@ fn from_correction(py: Python<'_>, error: CorrectionError) -> PyErr {
 
 /// Undoes effects, each with its parameters, on all rows of a chunk, which is a whole log.
 ///
-/// `covariates` names the chunk's covariates; means that are None are those of the log.
+/// `frame` is that of the log's reference; `covariates` names the chunk's covariates; means that are None are those of the log.
 #[pyfunction]
-#[pyo3(signature = (chunk, effects, covariates, covariate_means, temperature_mean=None))]
+#[pyo3(signature = (chunk, effects, frame, covariates, covariate_means, temperature_mean=None))]
 fn correct_readings<'py>(
     py: Python<'py>,
     chunk: &Bound<'py, PyDict>,
     effects: Vec<(PyRef<'_, PyEffect>, Vec<f64>)>,
+    frame: &str,
     covariates: Vec<String>,
     covariate_means: Vec<Option<f64>>,
     temperature_mean: Option<f64>,
 ) -> PyResult<Corrections<'py>> {
     let effects: Vec<(Arc<dyn Effect>, Vec<f64>)> = effects.iter().map(|(e, p)| (e.0.clone(), p.clone())).collect();
+    let frame: Frame = frame.parse().map_err(value_error)?;
     let arrays = ChunkArrays::new(chunk)?;
     let window = arrays.window()?;
     let corrected = py
         .detach(|| {
-            let facts = LogFacts::without_reference(&window, covariates, &covariate_means, temperature_mean);
+            let facts = LogFacts::without_reference(&window, frame, covariates, &covariate_means, temperature_mean);
             correct(&window, &facts, &effects)
         })
         .map_err(|error| from_correction(py, error))?;

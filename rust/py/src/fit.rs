@@ -53,6 +53,7 @@ impl PySurvey {
         let frame: Frame = frame.parse().map_err(value_error)?;
         Ok(Self(Survey::new(Given {
             n,
+            frame,
             gravity: -frame.up() * gravity,
             field: mag_reference.map(Vector3::from),
             covariates,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use imufit_fit::bins::Bins;
-use imufit_model::card::{Card, Parameter, Stage};
+use imufit_model::card::{Card, Found, Parameter, Stage};
 use imufit_model::catalogue;
 use imufit_model::contract;
 use imufit_model::effect::Effect;
@@ -34,6 +34,12 @@ impl PyEffect {
         self.0.sensors().iter().map(|s| s.prefix()).collect()
     }
 
+    /// The column of a log that it reads besides sensors and reference: `temp`, a covariate, or None.
+    #[getter]
+    fn column(&self) -> Option<String> {
+        self.0.column().map(str::to_string)
+    }
+
     /// Its parameters: (name, unit, typical size or None).
     #[getter]
     fn parameters(&self) -> Vec<(String, String, Option<f64>)> {
@@ -45,11 +51,16 @@ impl PyEffect {
             .collect()
     }
 
-    /// Names of parameters that are whole numbers, which a search finds and no step moves.
+    /// Names of parameters that a search finds and no step moves.
     #[getter]
-    fn whole(&self) -> Vec<String> {
-        let parameters = &self.0.card().parameters;
-        parameters.iter().filter(|p| p.whole).map(|p| p.name.clone()).collect()
+    fn only_searched(&self) -> Vec<String> {
+        self.found(|found| found == Found::Search)
+    }
+
+    /// Names of parameters that a search finds, those that steps refine after it among them.
+    #[getter]
+    fn searched(&self) -> Vec<String> {
+        self.found(|found| found != Found::Steps)
     }
 
     /// Trial values of every parameter, where some can only be found by a search: at first a grid, then, around what
@@ -69,17 +80,21 @@ impl PyEffect {
     /// values.
     #[getter]
     fn nonlinear(&self) -> bool {
-        self.0.card().stage == Stage::Reference
+        let card = self.0.card();
+        let stepped = card.parameters.iter().any(|p| p.found == Found::SearchThenSteps);
+        stepped || matches!(card.stage, Stage::Reference | Stage::Time | Stage::Range)
     }
 
-    /// Stage at which it acts: reference, input, gain or offset.
+    /// Stage at which it acts: reference, time, input, gain, offset or range.
     #[getter]
     fn stage(&self) -> &'static str {
         match self.0.card().stage {
             Stage::Reference => "reference",
+            Stage::Time => "time",
             Stage::Input => "input",
             Stage::Gain => "gain",
             Stage::Offset => "offset",
+            Stage::Range => "range",
         }
     }
 
@@ -114,6 +129,17 @@ impl PyEffect {
         let py = chunk.py();
         py.detach(|| contract::check(&self.0, &at, &window, &facts.facts))
             .map_err(from_effect)
+    }
+}
+
+impl PyEffect {
+    fn found(&self, by: impl Fn(Found) -> bool) -> Vec<String> {
+        let parameters = &self.0.card().parameters;
+        parameters
+            .iter()
+            .filter(|p| by(p.found))
+            .map(|p| p.name.clone())
+            .collect()
     }
 }
 
@@ -225,6 +251,14 @@ impl PyFacts {
         (self.attitude_noise, self.position_noise)
     }
 
+    /// The same facts with what is known of the end of the sensors' ranges, m/s^2 and rad/s.
+    #[pyo3(signature = (acc=None, gyr=None))]
+    fn with_ranges(&self, acc: Option<f64>, gyr: Option<f64>) -> Self {
+        let mut out = self.clone();
+        out.facts.ranges = [acc, gyr, None];
+        out
+    }
+
     /// The same facts with the temperature and covariate means of the log that a model was fitted on.
     #[pyo3(signature = (temperature_mean=None, covariate_means=None))]
     fn with_means(
@@ -299,7 +333,7 @@ fn python_effect(
                 name,
                 unit,
                 typical,
-                whole: false,
+                found: Found::Steps,
             })
             .collect(),
     };

@@ -104,6 +104,7 @@ pub fn dependence(
             ideal: &trial.ideal,
             x: &x,
             temperature: Some(&trial.temperature),
+            vibration: Some(&trial.temperature),
             covariates: &covariates,
         };
         effect.columns(&rows, sensor, parameters, &mut columns)?;

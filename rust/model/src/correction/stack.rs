@@ -63,6 +63,8 @@ pub struct Block<'a> {
     pub ideal: Ideal,
     /// Temperature less its mean, K (n).
     pub temperature: Option<&'a [f64]>,
+    /// Power of the vibration, (m/s^2)^2 (n).
+    pub vibration: Option<&'a [f64]>,
     /// Covariates (n each).
     pub covariates: Vec<Vec<f64>>,
     /// Room for columns.
@@ -75,7 +77,7 @@ impl Block<'_> {
         quantity(&mut self.ideal, sensor).0.clone_from(x);
         let mut x = x.clone();
         let mut after = Triple::default();
-        for stage in [Stage::Input, Stage::Gain, Stage::Offset] {
+        for stage in [Stage::Input, Stage::Gain, Stage::Offset, Stage::Range] {
             let mut changed = false;
             for part in parts.iter().filter(|p| p.effect.card().stage == stage) {
                 if !changed {
@@ -89,8 +91,13 @@ impl Block<'_> {
                     ideal: &self.ideal,
                     x: &x,
                     temperature: self.temperature,
+                    vibration: self.vibration,
                     covariates: &self.covariates,
                 };
+                if let Some(added) = part.effect.added(&rows, sensor, &part.parameters) {
+                    after.add(&added, 1.0);
+                    continue;
+                }
                 part.effect
                     .columns(&rows, sensor, &part.parameters, &mut self.columns)?;
                 for (p, value) in part.parameters.iter().enumerate().filter(|(_, v)| **v != 0.0) {

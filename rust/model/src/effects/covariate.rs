@@ -1,7 +1,7 @@
 //! Any other column of the log acts on a sensor.
 
 use super::Words;
-use crate::card::{Card, Parameter, Stage, VECTOR};
+use crate::card::{Card, Found, Parameter, Stage, VECTOR};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
@@ -35,7 +35,7 @@ pub fn column(sensor: Sensor, name: &str) -> Covariate {
             name: (*v).to_string(),
             unit: format!("{}/{name}", sensor.unit()),
             typical: None,
-            whole: false,
+            found: Found::Steps,
         })
         .collect();
     Covariate {
@@ -62,6 +62,10 @@ impl Effect for Covariate {
             .covariate(&self.column)
             .is_none()
             .then(|| format!("the log has no column {}", self.column))
+    }
+
+    fn column(&self) -> Option<&str> {
+        Some(&self.column)
     }
 
     fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {

@@ -2,15 +2,23 @@
 
 pub mod bias;
 pub mod covariate;
+pub mod current;
+pub mod drift;
+pub mod earth_rate;
 pub mod field;
 pub mod g_sensitivity;
 pub mod iron;
 pub mod lever_arm;
 pub mod misalignment;
+pub mod nonlinearity;
 pub mod reference;
 pub mod rig;
+pub mod saturation;
 pub mod scale;
 pub mod temperature;
+pub mod timing;
+pub mod vibration;
+pub mod warmup;
 
 use crate::card::{Card, Parameter, Stage};
 use crate::effect::{Columns, Effect, EffectError, Rows};
@@ -27,6 +35,8 @@ pub enum Needs {
     Sensor,
     /// A thermometer.
     Temperature,
+    /// A covariate of this name.
+    Column(&'static str),
 }
 
 /// An effect on one sensor, linear in its parameters: a description and a function that fills its columns.
@@ -54,7 +64,20 @@ impl Effect for Linear {
         if !facts.sensors[self.sensor[0].index()] {
             return Some(format!("the log has no {}", self.sensor[0].name()));
         }
-        (self.needs == Needs::Temperature && !facts.has_temperature).then(|| "the log has no column temp".to_string())
+        let lacking = match self.needs {
+            Needs::Sensor => None,
+            Needs::Temperature => (!facts.has_temperature).then_some("temp"),
+            Needs::Column(name) => facts.covariate(name).is_none().then_some(name),
+        };
+        lacking.map(|column| format!("the log has no column {column}"))
+    }
+
+    fn column(&self) -> Option<&str> {
+        match self.needs {
+            Needs::Sensor => None,
+            Needs::Temperature => Some("temp"),
+            Needs::Column(name) => Some(name),
+        }
     }
 
     fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {

@@ -4,7 +4,7 @@
 //! `R = R_reference exp(u delta)`, hence `f x u delta`, `m x u delta` and `omega x u delta + u d(delta)/dt`.
 
 use super::Words;
-use crate::card::{Card, Parameter, Stage, parameters};
+use crate::card::{Card, Found, Parameter, Stage, parameters};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::ideal::{Command, ReferenceChange};
@@ -80,7 +80,7 @@ pub fn periodic() -> RigEffect {
         name: "N".to_string(),
         unit: "1".to_string(),
         typical: None,
-        whole: true,
+        found: Found::Search,
     });
     RigEffect {
         card: words.card("rig.periodic".to_string(), Stage::Reference, list),

@@ -1,0 +1,135 @@
+//! One sensor shows what was: late, or smoothed.
+
+use super::Words;
+use crate::card::{Card, Stage, parameters};
+use crate::effect::{Columns, Effect, EffectError, Rows};
+use crate::facts::LogFacts;
+use crate::ideal::{ReferenceChange, SensorTime};
+use crate::sensor::Sensor;
+
+/// What happens to the quantity in time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Delay,
+    Lag,
+}
+
+/// An effect on the time of one sensor.
+pub struct Timing {
+    card: Card,
+    kind: Kind,
+    sensor: [Sensor; 1],
+}
+
+fn one(sensor: Sensor, name: &str, kind: Kind, words: &Words, typical: f64) -> Timing {
+    Timing {
+        card: words.card(
+            format!("{}.{name}", sensor.prefix()),
+            Stage::Time,
+            parameters(&["tau"], "s", typical),
+        ),
+        kind,
+        sensor: [sensor],
+    }
+}
+
+/// `acc.delay`, `gyr.delay`, `mag.delay`: the reading of t shows the quantity of t - tau.
+pub fn delay(sensor: Sensor) -> Timing {
+    let words = match sensor {
+        Sensor::Acc => Words {
+            name: "late accelerometer",
+            physics: "the accelerometer's readings reach the log later than those of the other sensors: buffers, filters, another clock",
+            formula: "f(t - tau) - f(t)",
+            signature: "the residual of the accelerometer is proportional to the time derivative of its reading; the other sensors are in time",
+            mistaken_for: "acc.lowpass, which also smooths; ref.delay, if only the accelerometer moves; acc.lever_arm when rotations are harmonic",
+            confirm: "knock the body: the step in the accelerometer comes later than in the gyroscope, but as sharp",
+        },
+        Sensor::Gyr => Words {
+            name: "late gyroscope",
+            physics: "the gyroscope's readings reach the log later than those of the other sensors: buffers, filters, another clock",
+            formula: "omega(t - tau) - omega(t)",
+            signature: "the residual of the gyroscope is proportional to the angular acceleration; the other sensors are in time",
+            mistaken_for: "gyr.lowpass, which also smooths; ref.delay, if the other sensors hardly see the motion",
+            confirm: "stop a turn suddenly: the gyroscope stops later than the reference, but as sharply",
+        },
+        Sensor::Mag => Words {
+            name: "late magnetometer",
+            physics: "the magnetometer measures for some milliseconds, and what it found is read with the next round of the bus",
+            formula: "m(t - tau) - m(t)",
+            signature: "the residual of the magnetometer is proportional to omega x m; the other sensors are in time",
+            mistaken_for: "mag.soft_iron or mag.hard_iron when the sensor always turns the same way, ref.delay if only the magnetometer is looked at",
+            confirm: "turn at constant rate one way and back: the heading is behind in both, by the rate times tau",
+        },
+    };
+    // MPU6050 register map, DLPF_CFG: 4.9 ms at 44 Hz, 8.5 ms at 21 Hz. HMC5883L data sheet: 6 ms a measurement, read up to 13 ms later.
+    one(sensor, "delay", Kind::Delay, &words, 0.01)
+}
+
+/// `acc.lowpass`, `gyr.lowpass`: tau dy/dt = x - y.
+pub fn lowpass(sensor: Sensor) -> Timing {
+    let words = match sensor {
+        Sensor::Acc => Words {
+            name: "sluggish accelerometer",
+            physics: "a low-pass in the sensor or its supply averages over what was: the reading follows the specific force with a lag of first order",
+            formula: "y - f with tau dy/dt = f - y",
+            signature: "the residual of the accelerometer is proportional to the time derivative of its reading, and fast motion is damped; the other sensors are in time",
+            mistaken_for: "acc.delay, which is as late but damps nothing; ref.delay, if only the accelerometer moves",
+            confirm: "knock the body: the accelerometer creeps to its new value instead of stepping later",
+        },
+        _ => Words {
+            name: "sluggish gyroscope",
+            physics: "a low-pass in the sensor or its supply averages over what was: the reading follows the rate with a lag of first order",
+            formula: "y - omega with tau dy/dt = omega - y",
+            signature: "the residual of the gyroscope is proportional to the angular acceleration, and fast motion is damped; the other sensors are in time",
+            mistaken_for: "gyr.delay, which is as late but damps nothing; gyr.scale when all motion has one frequency",
+            confirm: "stop a turn suddenly: the rate creeps to zero; oscillate faster and faster: the amplitude falls",
+        },
+    };
+    // MPU6050 register map, DLPF_CFG: 10 Hz and 21 Hz as bandwidths, 1 / (2 pi f) = 16 ms and 8 ms.
+    one(sensor, "lowpass", Kind::Lag, &words, 0.01)
+}
+
+impl Effect for Timing {
+    fn card(&self) -> &Card {
+        &self.card
+    }
+
+    fn sensors(&self) -> &[Sensor] {
+        &self.sensor
+    }
+
+    fn not_testable(&self, facts: &LogFacts) -> Option<String> {
+        (!facts.sensors[self.sensor[0].index()]).then(|| format!("the log has no {}", self.sensor[0].name()))
+    }
+
+    fn columns(&self, rows: &Rows, sensor: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
+        let rate = match self.kind {
+            Kind::Delay => rows.ideal.rate(sensor),
+            Kind::Lag => rows.ideal.settling(sensor),
+        };
+        for axis in 0..3 {
+            out.set(0, axis, rate.axis(axis).iter().map(|v| -v));
+        }
+        Ok(())
+    }
+
+    fn strongly_curved(&self) -> bool {
+        true
+    }
+
+    fn reference_change(&self, parameters: &[f64]) -> ReferenceChange {
+        let time = match self.kind {
+            Kind::Delay => SensorTime {
+                delay: parameters[0],
+                lag: 0.0,
+            },
+            Kind::Lag => SensorTime {
+                delay: 0.0,
+                lag: parameters[0],
+            },
+        };
+        let mut change = ReferenceChange::default();
+        change.sensors[self.sensor[0].index()] = time;
+        change
+    }
+}

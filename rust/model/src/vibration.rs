@@ -1,0 +1,101 @@
+//! How strongly the accelerometer is shaken around each row.
+
+use crate::sensor::Sensor;
+use crate::window::Window;
+
+/// Rows to each side of the parabola that motion is taken to be, and the width of its Gaussian weights in rows: what it leaves
+/// lies above a tenth of the sampling rate, and above a fifth of it leaves nothing out.
+const HALF_WIDTH: usize = 8;
+const WEIGHT_WIDTH: f64 = 2.5;
+/// Time to each side of a row over which the power is a mean, s, and how many rows that may be at most.
+const REACH: f64 = 0.25;
+const MOST_ROWS: usize = 200;
+
+/// Weights with which the samples around a row make the value of the parabola through them there.
+fn parabola() -> [f64; 2 * HALF_WIDTH + 1] {
+    let offset = |j: usize| j as f64 - HALF_WIDTH as f64;
+    let gauss = |j: usize| (-0.5 * (offset(j) / WEIGHT_WIDTH).powi(2)).exp();
+    let moment = |power: i32| -> f64 { (0..=2 * HALF_WIDTH).map(|j| gauss(j) * offset(j).powi(power)).sum() };
+    let (m0, m2, m4) = (moment(0), moment(2), moment(4));
+    let determinant = m0 * m4 - m2 * m2;
+    std::array::from_fn(|j| gauss(j) * (m4 - m2 * offset(j).powi(2)) / determinant)
+}
+
+/// What a sample differs from the parabola through it and the samples around it; `None` where one is missing.
+fn beside_parabola(y: &[f64], n: usize, row: usize, axis: usize, weights: &[f64]) -> Option<f64> {
+    if row < HALF_WIDTH || row + HALF_WIDTH >= n {
+        return None;
+    }
+    let around = y[3 * (row - HALF_WIDTH) + axis..].iter().step_by(3);
+    let smooth: f64 = weights.iter().zip(around).map(|(w, v)| w * v).sum();
+    let left = y[3 * row + axis] - smooth;
+    left.is_finite().then_some(left)
+}
+
+/// Mean square of the vibration around each core row, all axes together, (m/s^2)^2: readings less the motion that a parabola follows.
+/// Where too little is known it is zero.
+pub fn power(window: &Window, dt: f64) -> Vec<f64> {
+    let Some(y) = window.reading(Sensor::Acc) else {
+        return vec![0.0; window.end - window.begin];
+    };
+    let n = window.len();
+    let reach = ((REACH / dt) as usize).clamp(1, MOST_ROWS);
+    let (first, last) = (window.begin.saturating_sub(reach), (window.end + reach).min(n));
+    let weights = parabola();
+    // Sums of squares and counts up to each row.
+    let mut sums = vec![(0.0, 0.0)];
+    let (mut square, mut count) = (0.0, 0.0);
+    for row in first..last {
+        let axes = [0, 1, 2].map(|axis| beside_parabola(y, n, row, axis, &weights));
+        if let [Some(a), Some(b), Some(c)] = axes {
+            square += a * a + b * b + c * c;
+            count += 1.0;
+        }
+        sums.push((square, count));
+    }
+    (window.begin..window.end)
+        .map(|row| {
+            let low = sums[row.saturating_sub(reach).max(first) - first];
+            let high = sums[(row + reach + 1).min(last) - first];
+            let samples: f64 = high.1 - low.1;
+            if samples > 0.0 { (high.0 - low.0) / samples } else { 0.0 }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fast_shaking_counts_and_motion_does_not() {
+        let n = 600;
+        let t: Vec<f64> = (0..n).map(|i| i as f64 * 0.01).collect();
+        // Motion at 1.5 Hz all the time; shaking at 28 Hz on two axes in the second half.
+        let acc: Vec<f64> = t
+            .iter()
+            .flat_map(|t| {
+                let motion = 6.0 * (9.4 * t).sin();
+                let shaking = if *t >= 3.0 { (176.0 * t).sin() } else { 0.0 };
+                [motion + shaking, 9.81, motion - 0.5 * shaking]
+            })
+            .collect();
+        let window = Window {
+            t: &t,
+            readings: [Some(&acc), None, None],
+            temperature: None,
+            attitude: None,
+            position: None,
+            reference_exact: None,
+            covariates: vec![],
+            offset: 0,
+            begin: 0,
+            end: n,
+        };
+        let power = power(&window, 0.01);
+        assert!(power[100] < 2e-3, "{}", power[100]);
+        assert!((power[450] - 0.625).abs() < 0.06, "{}", power[450]);
+        let part = super::power(&window.with_core(430, 460), 0.01);
+        assert!((part[20] - power[450]).abs() < 1e-12);
+    }
+}
