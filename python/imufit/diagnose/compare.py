@@ -125,6 +125,7 @@ def comparison(analysis: Analysis, step: Array) -> Comparison:
         spectra=_spectra(analysis, step),
         segments=tuple(segments[:WORST_SEGMENTS]),
         notes=notes(analysis),
+        data_faults=analysis.faults,
     )
 
 

@@ -40,6 +40,8 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         Candidates that are not to be considered.
     """
     analysis = fit.analysis
+    if any(fault.spoils for fault in analysis.faults):
+        return _spoilt(analysis)
     ids = analysis.slots
     slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
     result = _decided_by_fits(fit, analysis.problem.diagnose(analysis.fitted_slots, slots))
@@ -83,6 +85,23 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         experiment=experiment,
         sentence=sentence,
         notes=notes(analysis),
+        data_faults=analysis.faults,
+    )
+
+
+def _spoilt(analysis: Analysis) -> Diagnosis:
+    """Name the faults of the data that explain what is missing, and no effect."""
+    return Diagnosis(
+        verdict="unknown",
+        best=None,
+        ambiguous_with=(),
+        candidates=(),
+        unexplained=(),
+        model=analysis.model.effects,
+        experiment=None,
+        sentence=sentences.spoilt([fault for fault in analysis.faults if fault.spoils]),
+        notes=notes(analysis),
+        data_faults=analysis.faults,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from imufit.figures import quantity
-from imufit.results import Candidate, EffectCard, Parameter, Unexplained
+from imufit.results import Candidate, DataFault, EffectCard, Parameter, Unexplained
 
 
 def _capital(text: str) -> str:
@@ -76,6 +76,12 @@ def verdict(
         )
     text = f"{best.effect} is missing. {best.explanation}"
     return f"{text} Apart from it, {left}." if left else text
+
+
+def spoilt(faults: Sequence[DataFault]) -> str:
+    """Say which faults of the data have to be put right before any effect can be judged."""
+    said = " ".join(fault.sentence for fault in faults)
+    return f"The data are at fault, not the sensor ({', '.join(dict.fromkeys(f.fault for f in faults))}). {said}"
 
 
 def experiment(best: EffectCard, rivals: Sequence[EffectCard]) -> str:

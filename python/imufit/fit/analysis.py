@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.fit.data_faults import data_faults
 from imufit.fit.passes import CHANNELS, MIN_COVERAGE, Passes
 from imufit.fit.profile import Found, search
 from imufit.fit.users_effects import check_users_effects
@@ -18,6 +19,7 @@ from imufit.log import LogSource
 from imufit.model.catalogue import COLUMN, column_effects, effects, find_effect
 from imufit.model.sensor_model import SensorModel
 from imufit.progress import Progress
+from imufit.results import DataFault
 
 Array = NDArray[np.float64]
 
@@ -70,6 +72,7 @@ class Analysis:
     variance: list[float]
     floors: list[float]
     filters: list[list[float]]
+    faults: tuple[DataFault, ...] = ()
 
     @classmethod
     def of(cls, model: SensorModel, log: LogSource, progress: Progress, *, keep_constants: bool = False) -> Analysis:
@@ -89,6 +92,7 @@ class Analysis:
         passes = Passes(log, progress)
         facts, coverage = passes.survey()
         facts = facts.with_ranges(**passes.ranges())
+        faults = data_faults(passes, facts)
         if keep_constants and model.constants:
             facts = facts.with_means(model.constants.get("temperature_mean"), model.constants.get("covariate_means"))
         candidates, refused = _candidates(model, facts, coverage)
@@ -128,6 +132,7 @@ class Analysis:
             variance,
             floors,
             filters,
+            faults,
         )
 
     def around(

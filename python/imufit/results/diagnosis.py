@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
+from imufit.results.data_fault import DataFault, fault_table
 from imufit.results.json_value import json_value
 from imufit.results.parameter import Parameter, by_name, in_words
 from imufit.results.table import Table, html, page
@@ -192,6 +193,9 @@ class Diagnosis:
         The result in words.
     notes : tuple of str
         What the reader should know about these figures.
+    data_faults : tuple of DataFault
+        What is wrong with the data themselves. Where one of them spoils the log, the verdict is ``unknown`` and no
+        effect is judged.
     """
 
     verdict: str
@@ -203,6 +207,7 @@ class Diagnosis:
     experiment: str | None
     sentence: str
     notes: tuple[str, ...]
+    data_faults: tuple[DataFault, ...] = ()
 
     @property
     def best_candidate(self) -> Candidate | None:
@@ -210,7 +215,7 @@ class Diagnosis:
         return next((item for item in self.candidates if item.effect == self.best), None)
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of `diagnose`; model, experiment, sentence and notes besides."""
+        """JSON of `diagnose`; model, experiment, sentence, notes and faults of the data besides."""
         return {
             "verdict": self.verdict,
             "best": self.best,
@@ -221,6 +226,7 @@ class Diagnosis:
             "experiment": self.experiment,
             "sentence": self.sentence,
             "notes": list(self.notes),
+            "data_faults": [fault.to_dict() for fault in self.data_faults],
         }
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -295,12 +301,17 @@ class Diagnosis:
 
     def tables(self) -> tuple[Table, ...]:
         """Every table, most important first."""
-        return (self.candidate_table(), self.unexplained_table())
+        return (self.candidate_table(), self.unexplained_table(), fault_table(self.data_faults))
 
     def sentences(self) -> list[str]:
-        """Verdict, result, next experiment and notes."""
+        """Verdict, result, next experiment, faults of the data that only concern some rows, and notes."""
         experiment = f"Next: {self.experiment}" if self.experiment else ""
-        return [f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}", experiment, *self.notes]
+        verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
+        return [verdict, experiment, *self.local_faults(), *self.notes]
+
+    def local_faults(self) -> list[str]:
+        """Sentences on faults of the data beside which effects can be judged."""
+        return [str(fault) for fault in self.data_faults if not fault.spoils]
 
     def _repr_html_(self) -> str:
         return html(self.sentences(), self.tables())

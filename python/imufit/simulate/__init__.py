@@ -5,6 +5,7 @@ done to them as nature would: a late sensor is read earlier on the motion, a dis
 body. Nothing here uses the model that is fitted to such logs.
 """
 
+from imufit.simulate.faults import FAULTS, Fault, with_fault
 from imufit.simulate.grade import Grade, ParameterGrade, grade
 from imufit.simulate.hidden import OBSERVABLE, hidden
 from imufit.simulate.injections import INJECTIONS, Injection, injection
@@ -17,10 +18,12 @@ from imufit.simulate.size import SIZES
 from imufit.simulate.truth import Kinematics, Trajectory
 
 __all__ = [
+    "FAULTS",
     "INJECTIONS",
     "OBSERVABLE",
     "SCENARIOS",
     "SIZES",
+    "Fault",
     "Grade",
     "Injection",
     "Kinematics",
@@ -38,4 +41,5 @@ __all__ = [
     "sealed_path",
     "simulate",
     "unseal",
+    "with_fault",
 ]

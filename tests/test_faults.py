@@ -1,0 +1,112 @@
+"""Faults of the data: what is put in is named with its place and a remedy, and sound logs show none."""
+
+from dataclasses import replace
+
+import imufit
+import numpy as np
+import pytest
+from imufit import Diagnosis, Log, SensorModel
+from imufit.cli.app import main
+from imufit.faults import axes
+from imufit.simulate import FAULTS, simulate, with_fault
+
+GLOBAL = [
+    name for name in FAULTS if name.partition(".")[0] in ("units", "range", "axes", "mount", "frame", "reference")
+]
+
+
+def faulty(scenario: str, fault: str, seed: int = 1, duration: float = 20.0) -> Log:
+    return with_fault(simulate(scenario, {"acc.bias": None}, seed=seed, duration=duration), fault).to_log()
+
+
+def diagnosed(log: Log) -> Diagnosis:
+    return SensorModel().fit(log).diagnose()
+
+
+@pytest.mark.parametrize("fault", GLOBAL)
+def test_what_spoils_a_log_is_named_instead_of_an_effect(fault: str) -> None:
+    found = diagnosed(faulty("handheld", fault))
+    assert {each.fault for each in found.data_faults} == set(FAULTS[fault].names[:1])
+    assert found.verdict == "unknown"
+    assert found.best is None
+    assert found.candidates == ()
+    assert found.data_faults[0].remedy in found.sentence
+
+
+def mapped(log: Log, remedy: str) -> Log:
+    """Apply the mapping of columns that a remedy names, without units."""
+    table = log.to_dataframe()
+    text = remedy.partition("--map ")[2].strip("'.").split("'")[0].split(" ")[0].strip(".,")
+    pairs = [part.split("=") for part in text.split(",")]
+    for _target, source in pairs:
+        assert "[" not in source
+    new = {target: table[s.lstrip("-")] * (-1.0 if s.startswith("-") else 1.0) for target, s in pairs}
+    return Log.from_dataframe(table.assign(**new), log.metadata)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    ["axes.exchanged", "axes.flipped", "mount", "frame.gravity", "reference.conjugate", "reference.scalar_last"],
+)
+def test_the_remedy_cures(fault: str) -> None:
+    log = faulty("arm", fault)
+    (found,) = diagnosed(log).data_faults
+    cured = diagnosed(mapped(log, found.remedy))
+    assert cured.data_faults == ()
+    assert cured.best == "acc.bias"
+
+
+def test_a_field_estimated_from_wrong_axes_does_not_hide_them() -> None:
+    log = faulty("poses", "axes.exchanged", seed=3)
+    log = replace(log, metadata=replace(log.metadata, mag_reference=None))
+    sensors = {each.sensor for each in diagnosed(log).data_faults}
+    assert len(sensors) == 1
+    assert sensors <= {"acc", "gyr", "mag"}
+
+
+def test_an_angle_in_degrees_is_told_from_a_gyroscope_in_another_unit() -> None:
+    simulated = simulate("tilt", {}, seed=1, duration=20.0).to_log()
+    assert simulated.ref_angle is not None
+    table = {"acc": simulated.acc, "gyr": simulated.gyr, "ref_angle": np.degrees(simulated.ref_angle)}
+    log = Log.from_arrays(simulated.t, **table, frame="NED", rig_axis="x")
+    (found,) = diagnosed(log).data_faults
+    assert (found.fault, found.sensor) == ("units", "ref")
+    assert "ref_angle[deg]" in found.remedy
+
+
+def test_signed_permutations_are_undone_by_their_mapping() -> None:
+    y = np.array([1.0, 2.0, 3.0])
+    for matrix in axes.PERMUTATIONS[1:]:
+        shown = dict(zip(("gyr_x", "gyr_y", "gyr_z"), matrix @ y, strict=True))
+        undone = dict(shown)
+        for part in axes.mapping("gyr", matrix).split(","):
+            target, source = part.split("=")
+            undone[target] = shown[source.lstrip("-")] * (-1.0 if source.startswith("-") else 1.0)
+        np.testing.assert_allclose(list(undone.values()), y)
+    assert np.array_equal(axes.PERMUTATIONS[0], np.eye(3))
+    assert len(axes.PERMUTATIONS) == 48
+
+
+def test_the_command_line_names_the_fault(tmp_path, capsys) -> None:
+    path, page, json = (tmp_path / name for name in ("log.parquet", "page.html", "answer.json"))
+    assert main(["simulate", "handheld", "--fault", "mount", "--duration", "20", "-o", str(path)]) == 0
+    capsys.readouterr()
+    assert main(["diagnose", str(path), "--json", str(json), "--html", str(page)]) == 0
+    out = capsys.readouterr().out
+    assert "UNKNOWN" in out
+    assert "--map" in out
+    assert '"fault": "mount"' in json.read_text()
+    assert "Faults of the data" in page.read_text()
+    assert main(["compare", str(path), "--json", "-"]) == 0
+    assert '"fault": "mount"' in capsys.readouterr().out
+    assert main(["reveal", str(path)]) == 0
+    assert "mount" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("scenario", "effect"),
+    [("handheld", "ref.alignment"), ("arm", "acc.delay"), ("poses", "mag.soft_iron"), ("tilt", "rig.periodic")],
+)
+def test_large_effects_are_no_faults(scenario: str, effect: str) -> None:
+    log = simulate(scenario, {effect: None}, seed=2, duration=20.0, size=30.0, realistic=True).to_log()
+    assert imufit.SensorModel().compare(log).data_faults == ()
