@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from imufit import Diagnosis, Log, SensorModel
 from imufit.cli.app import main
-from imufit.faults import axes
+from imufit.faults import axes, row_faults
 from imufit.simulate import FAULTS, simulate, with_fault
 
 GLOBAL = [
@@ -110,3 +110,75 @@ def test_the_command_line_names_the_fault(tmp_path, capsys) -> None:
 def test_large_effects_are_no_faults(scenario: str, effect: str) -> None:
     log = simulate(scenario, {effect: None}, seed=2, duration=20.0, size=30.0, realistic=True).to_log()
     assert imufit.SensorModel().compare(log).data_faults == ()
+
+
+@pytest.mark.parametrize(("fault", "seed"), [("stuck", 1), ("duplicate", 1), ("duplicate", 2), ("backlog", 1)])
+def test_rows_at_fault_are_left_out_and_the_rest_is_judged(fault: str, seed: int) -> None:
+    sound = simulate("handheld", {"acc.bias": {"x": 0.05}}, seed=seed, duration=20.0)
+    log = with_fault(sound, fault).to_log()
+    found = diagnosed(log)
+    (named,) = found.data_faults
+    assert named.fault == fault
+    assert named.left_out
+    assert not named.spoils
+    assert found.best == "acc.bias"
+    assert str(named) in found.sentences()
+    # What was changed lies within the rows named.
+    rows = np.flatnonzero((log.t >= named.t_start) & (log.t <= named.t_end))
+    changed = [
+        np.flatnonzero(
+            ~np.isclose(getattr(log, name), getattr(sound, name), rtol=0, atol=0).reshape(log.n, -1).all(axis=1)
+        )
+        for name in ("t", "acc", "gyr", "mag")
+    ]
+    rows_changed = np.unique(np.concatenate(changed))
+    assert np.isin(rows_changed, rows).mean() > 0.97
+    assert len(rows) < 1.1 * len(rows_changed) + 3
+
+
+def test_clipped_rows_are_counted_beside_the_effect() -> None:
+    log = faulty("handheld", "clipped")
+    found = diagnosed(log)
+    assert {each.fault for each in found.data_faults} == {"clipped"}
+    assert log.gyr is not None
+    end = np.nanmax(np.abs(log.gyr))
+    for each in found.data_faults:
+        axis = "xyz".index(each.channel[-1])
+        assert each.rows == np.count_nonzero(np.abs(log.gyr[:, axis]) >= end)
+
+
+def coarse(log: Log) -> Log:
+    """Round readings to steps larger than the noise, as at rest or in text files they often are."""
+    assert log.acc is not None
+    assert log.gyr is not None
+    return replace(log, acc=np.round(log.acc / 0.1) * 0.1, gyr=np.round(log.gyr / 0.02) * 0.02, mag=None)
+
+
+@pytest.mark.parametrize("scenario", ["poses", "tilt", "turntable"])
+def test_coarse_steps_at_rest_are_neither_stuck_nor_copied(scenario: str) -> None:
+    log = coarse(simulate(scenario, {}, seed=4, duration=30.0).to_log())
+    assert SensorModel().compare(log).data_faults == ()
+
+
+def test_a_slow_sensor_whose_value_is_held_is_not_stuck() -> None:
+    log = simulate("handheld", {}, seed=4, duration=20.0).to_log()
+    assert log.mag is not None
+    held = log.mag[np.arange(log.n) // 10 * 10]
+    assert not any(each.fault in ("stuck", "duplicate") for each in diagnosed(replace(log, mag=held)).data_faults)
+
+
+def test_faults_are_the_same_in_a_log_read_in_pieces() -> None:
+    log = with_fault(simulate("handheld", {}, seed=2, duration=20.0), "duplicate").to_log()
+    whole, _ = row_faults(log)
+
+    class Pieces:
+        """The same log in small chunks."""
+
+        n, metadata, columns, path, notes = log.n, log.metadata, log.columns, None, ()
+
+        def chunks(self, rows: int, margin: int = 0):
+            return log.chunks(500, margin)
+
+    pieces, left_out = row_faults(Pieces())
+    assert [(f.fault, f.rows, f.t_start) for f in pieces] == [(f.fault, f.rows, f.t_start) for f in whole]
+    assert {sensor for sensor, _, _ in left_out} == {"acc", "gyr", "mag"}

@@ -91,8 +91,9 @@ class Analysis:
         """
         passes = Passes(log, progress)
         facts, coverage = passes.survey()
-        facts = facts.with_ranges(**passes.ranges())
-        faults = data_faults(passes, facts)
+        ends = passes.ranges()
+        facts = facts.with_ranges(**ends)
+        faults = data_faults(passes, facts, ends)
         if keep_constants and model.constants:
             facts = facts.with_means(model.constants.get("temperature_mean"), model.constants.get("covariate_means"))
         candidates, refused = _candidates(model, facts, coverage)

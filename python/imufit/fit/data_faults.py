@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from typing import Any
+
 from imufit import _imufit
-from imufit.faults import frame_faults
+from imufit.faults import ClippedRows, frame_faults
 from imufit.faults.samples import windows
 from imufit.fit.passes import Passes
 from imufit.results import DataFault
 
 
-def data_faults(passes: Passes, facts: _imufit.Facts) -> tuple[DataFault, ...]:
-    """Name what is wrong with the data of a log.
+def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float]) -> tuple[DataFault, ...]:
+    """Name what is wrong with the data of a log: what its rows showed, clipped readings, wrong units and frames.
 
     Parameters
     ----------
@@ -18,6 +21,15 @@ def data_faults(passes: Passes, facts: _imufit.Facts) -> tuple[DataFault, ...]:
         Over the log.
     facts : Facts
         Of the log as declared.
+    ends : mapping
+        End of the range of each sensor that has one.
     """
-    parts = windows(passes.chunks(facts.margin, "looking for faults of the data"), facts)
-    return tuple(frame_faults(parts, facts, passes.log.metadata))
+    clipped = ClippedRows(ends)
+
+    def counted() -> Iterator[dict[str, Any]]:
+        for chunk in passes.chunks(facts.margin, "looking for faults of the data"):
+            clipped.add(chunk)
+            yield chunk
+
+    parts = windows(counted(), facts)
+    return (*frame_faults(parts, facts, passes.log.metadata), *passes.row_faults, *clipped.faults())

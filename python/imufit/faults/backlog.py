@@ -1,0 +1,67 @@
+"""Rows stamped with their arrival: a receiver that had to catch up got them faster than they were taken.
+
+At the beginning of a log, or after a gap, rows come at more than one and a half times the usual rate until the backlog
+is used up. Their times say nothing of when they were taken.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from imufit.faults.row_fault import SENSORS, RowFault
+from imufit.log import Chunk
+
+FASTER: Final = 0.67
+"""Mean step of `ROWS` rows over the usual one, below which rows come too fast."""
+ROWS: Final = 10
+SURPLUS: Final = 20
+"""Rows more than there should be in the time."""
+GAP: Final = 5.0
+"""Steps without a row after which rows may have been held back."""
+MOST: Final = 0.4
+"""A larger share of fast rows is another rate, no backlog."""
+
+
+def backlogs(chunk: Chunk) -> list[RowFault]:
+    """Find rows that came in a burst, in the core of a chunk.
+
+    Parameters
+    ----------
+    chunk : Chunk
+        Rows with margins.
+    """
+    t = chunk.log.t
+    if t.size < 10 * ROWS:
+        return []
+    step = (t[ROWS:] - t[:-ROWS]) / ROWS
+    usual = float(np.median(step))
+    fast = step < FASTER * usual
+    if not fast.any() or fast.mean() > MOST:
+        return []
+    # Rows within a fast window, short interruptions included.
+    edges = np.flatnonzero(np.diff(fast.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    spans: list[list[int]] = []
+    for first, stop in edges:
+        if spans and first - spans[-1][1] < 2 * ROWS:
+            spans[-1][1] = int(stop) + ROWS
+        else:
+            spans.append([int(first), int(stop) + ROWS])
+    row = chunk.start - chunk.begin
+    sensors = tuple(name for name in SENSORS if getattr(chunk.log, name) is not None)
+    found = []
+    for first, stop in spans:
+        last = min(stop, t.size) - 1
+        span = float(t[last] - t[first])
+        surplus = (last - first) - span / usual
+        gap = float(np.max(np.diff(t[max(0, first - ROWS) : first + ROWS])))
+        held_back = row + first < 2 * ROWS or (gap > GAP * usual and gap / usual > 0.5 * surplus)
+        if surplus < SURPLUS or not held_back or first >= chunk.end or last < chunk.begin:
+            continue
+        low, high = max(first, chunk.begin), min(last, chunk.end - 1)
+        figures = {"rate": (last - first) / span, "usual": 1.0 / usual, "surplus": surplus}
+        found.append(
+            RowFault("backlog", sensors, "xyz", row + low, row + high + 1, float(t[low]), float(t[high]), figures)
+        )
+    return found
