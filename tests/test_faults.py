@@ -9,6 +9,7 @@ from imufit import Diagnosis, Log, SensorModel
 from imufit.cli.app import main
 from imufit.faults import axes, row_faults
 from imufit.simulate import FAULTS, simulate, with_fault
+from scipy.spatial.transform import Rotation
 
 GLOBAL = [
     name for name in FAULTS if name.partition(".")[0] in ("units", "range", "axes", "mount", "frame", "reference")
@@ -182,3 +183,56 @@ def test_faults_are_the_same_in_a_log_read_in_pieces() -> None:
     pieces, left_out = row_faults(Pieces())
     assert [(f.fault, f.rows, f.t_start) for f in pieces] == [(f.fault, f.rows, f.t_start) for f in whole]
     assert {sensor for sensor, _, _ in left_out} == {"acc", "gyr", "mag"}
+
+
+@pytest.mark.parametrize("scenario", ["arm", "tilt"])
+def test_a_drift_of_the_clocks_is_measured(scenario: str) -> None:
+    sound = simulate(scenario, {"acc.bias": None}, seed=5, duration=40.0)
+    log = with_fault(sound, "clock_drift").to_log()
+    (named,) = SensorModel().compare(log).data_faults
+    assert named.fault == "clock_drift"
+    # The reference of row t is that of t + drift (t - middle).
+    exact = sound.trajectory.at(log.t + 1e-3)
+    now = sound.trajectory.at(log.t)
+    turned = Rotation.from_matrix(now.rotation).inv() * log.reference
+    rate = Rotation.from_matrix(now.rotation).inv() * Rotation.from_matrix(exact.rotation)
+    ahead = np.sum(turned.as_rotvec() * rate.as_rotvec(), axis=1) / np.sum(rate.as_rotvec() ** 2, axis=1).clip(1e-8)
+    moving = np.linalg.norm(rate.as_rotvec(), axis=1) > 1e-4
+    drift = 1e-3 * np.polyfit(log.t[moving], ahead[moving], 1)[0]
+    figure = float(named.evidence.partition(" by ")[2].split()[0])
+    assert figure == pytest.approx(1e6 * abs(drift), rel=0.05)
+    assert ("fast" in named.evidence) == (drift > 0.0)
+
+
+@pytest.mark.parametrize("scenario", ["handheld", "poses"])
+def test_a_knock_is_placed_and_measured(scenario: str) -> None:
+    sound = simulate(scenario, {"gyr.bias": None}, seed=5, duration=40.0)
+    log = with_fault(sound, "knock").to_log()
+    found = diagnosed(log)
+    (named,) = found.data_faults
+    assert (found.verdict, found.best, named.fault) == ("unknown", None, "knock")
+    assert log.acc is not None
+    changed = log.t[np.flatnonzero((log.acc != sound.acc).any(axis=1))[0]]
+    assert named.t_start == pytest.approx(changed, abs=1.0)
+    angle = float(named.evidence.partition("turned by ")[2].split()[0])
+    assert 1.9 < angle < 4.1
+
+
+def turning_slowly(log: Log) -> Log:
+    """Let the mount give way steadily, by two degrees in all: no knock."""
+    course = (log.t - log.t[0]) / (log.t[-1] - log.t[0])
+    turn = Rotation.from_rotvec(np.radians(2.0) * course[:, None] * [[0.6, 0.0, 0.8]])
+    return replace(log, acc=turn.apply(log.acc), gyr=turn.apply(log.gyr), mag=turn.apply(log.mag))
+
+
+def test_a_mount_that_gives_way_steadily_is_no_knock() -> None:
+    log = turning_slowly(simulate("handheld", {}, seed=3, duration=40.0).to_log())
+    assert SensorModel().compare(log).data_faults == ()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "effect"), [("arm", "ref.delay"), ("handheld", "gyr.warmup"), ("poses", "acc.bias_drift")]
+)
+def test_effects_of_time_and_mount_are_no_faults(scenario: str, effect: str) -> None:
+    log = simulate(scenario, {effect: None}, seed=6, duration=30.0, size=3.0, realistic=True).to_log()
+    assert SensorModel().compare(log).data_faults == ()

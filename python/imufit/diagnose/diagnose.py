@@ -15,7 +15,7 @@ from imufit.diagnose.compare import notes
 from imufit.fit.analysis import BLOCKS, Analysis, Estimate
 from imufit.fit.profile import Found
 from imufit.model.catalogue import card_of
-from imufit.results import Candidate, Diagnosis, Parameter, Rival, Unexplained
+from imufit.results import Candidate, DataFault, Diagnosis, Parameter, Rival, Unexplained
 
 if TYPE_CHECKING:
     from imufit.fit import Fit
@@ -25,6 +25,8 @@ MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
 CLEARLY_WORSE = 0.1
 """Share of the drop in held-out error by which a fit must stay behind the best one to be out."""
+BESIDE = 10.0
+"""An effect is named beside a fault of the data only if it explains this many times more."""
 POWER = 0.84
 """Standard errors beyond the threshold at which an effect is seen with 80 % power."""
 
@@ -41,7 +43,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     """
     analysis = fit.analysis
     if any(fault.spoils for fault in analysis.faults):
-        return _spoilt(analysis)
+        return _spoilt(analysis, analysis.faults)
     ids = analysis.slots
     slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
     result = _decided_by_fits(fit, analysis.problem.diagnose(analysis.fitted_slots, slots))
@@ -62,6 +64,10 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         )
         for item in result["screened"]
     ]
+    largest = max((c.gain for c in candidates if c.status == "passed"), default=0.0)
+    faults = tuple(replace(fault, spoils=fault.gain * BESIDE > largest) for fault in analysis.faults)
+    if any(fault.spoils for fault in faults):
+        return _spoilt(analysis, faults)
     by_id = {candidate.effect: candidate for candidate in candidates}
     cards = {key: card_of(analysis.candidates[key]) for key in by_id}
     best = None if result["best"] is None else ids[result["best"]]
@@ -89,7 +95,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     )
 
 
-def _spoilt(analysis: Analysis) -> Diagnosis:
+def _spoilt(analysis: Analysis, faults: tuple[DataFault, ...]) -> Diagnosis:
     """Name the faults of the data that explain what is missing, and no effect."""
     return Diagnosis(
         verdict="unknown",
@@ -99,9 +105,9 @@ def _spoilt(analysis: Analysis) -> Diagnosis:
         unexplained=(),
         model=analysis.model.effects,
         experiment=None,
-        sentence=sentences.spoilt([fault for fault in analysis.faults if fault.spoils]),
+        sentence=sentences.spoilt([fault for fault in faults if fault.spoils]),
         notes=notes(analysis),
-        data_faults=analysis.faults,
+        data_faults=faults,
     )
 
 

@@ -40,6 +40,7 @@ def backlogs(chunk: Chunk) -> list[RowFault]:
     fast = step < FASTER * usual
     if not fast.any() or fast.mean() > MOST:
         return []
+    row = chunk.start - chunk.begin
     # Rows within a fast window, short interruptions included.
     edges = np.flatnonzero(np.diff(fast.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
     spans: list[list[int]] = []
@@ -47,8 +48,8 @@ def backlogs(chunk: Chunk) -> list[RowFault]:
         if spans and first - spans[-1][1] < 2 * ROWS:
             spans[-1][1] = int(stop) + ROWS
         else:
-            spans.append([int(first), int(stop) + ROWS])
-    row = chunk.start - chunk.begin
+            # What leads up to the first fast rows of a log is part of the burst.
+            spans.append([0 if row + first < 2 * ROWS else int(first), int(stop) + ROWS])
     sensors = tuple(name for name in SENSORS if getattr(chunk.log, name) is not None)
     found = []
     for first, stop in spans:

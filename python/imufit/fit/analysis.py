@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.faults import time_faults
 from imufit.fit.data_faults import data_faults
 from imufit.fit.passes import CHANNELS, MIN_COVERAGE, Passes
 from imufit.fit.profile import Found, search
@@ -111,6 +112,8 @@ class Analysis:
         passes.evidence(raw, facts, "taking evidence")
         step, raw_variance = _imufit.saturate(raw)
         _check_samples(log, model, raw_variance)
+        if not any(fault.spoils for fault in faults):
+            faults = (*faults, *time_faults(raw, raw_variance, _places(model, nuisance, candidates), facts))
         filters = passes.autocovariance(raw, facts, step).filters()
         floors = _floors(log, raw_variance)
         white, variance = raw, raw_variance
@@ -357,6 +360,17 @@ def _empty(
     filters: list[list[float]],
 ) -> _imufit.Evidence:
     return _imufit.Evidence(facts, _stack(model, nuisance), candidates, BLOCKS, filters)
+
+
+def _places(
+    model: SensorModel, nuisance: Mapping[str, list[float]], candidates: Mapping[str, _imufit.Effect]
+) -> dict[str, range]:
+    """Parameters of every effect in the evidence, by its id."""
+    places, first = {}, 0
+    for effect in [*(e for e, _ in _stack(model, nuisance)), *candidates.values()]:
+        places[effect.id] = range(first, first + len(effect.parameters))
+        first += len(effect.parameters)
+    return places
 
 
 def _stack(model: SensorModel, nuisance: Mapping[str, list[float]]) -> list[tuple[_imufit.Effect, list[float]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -35,6 +36,8 @@ class DataFault:
         True if the samples concerned were left out of the evidence; what is said of the log rests on the others.
     spoils : bool
         True if nothing can be said of effects before it is put right.
+    gain : float
+        Drop of the sum of squares, in units of the noise, that it explains beside every effect; NaN where not asked.
     """
 
     fault: str
@@ -47,6 +50,7 @@ class DataFault:
     remedy: str
     left_out: bool = False
     spoils: bool = False
+    gain: float = math.nan
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one fault."""
