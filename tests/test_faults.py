@@ -15,8 +15,11 @@ GLOBAL = [
     name for name in FAULTS if name.partition(".")[0] in ("units", "range", "axes", "mount", "frame", "reference")
 ]
 
+CURED = ("axes.exchanged", "axes.flipped", "mount", "frame.gravity", "reference.conjugate", "reference.scalar_last")
+"""Faults whose remedy is another mapping of columns."""
 
-def faulty(scenario: str, fault: str, seed: int = 1, duration: float = 20.0) -> Log:
+
+def faulty(scenario: str, fault: str, seed: int = 1, duration: float = 12.0) -> Log:
     return with_fault(simulate(scenario, {"acc.bias": None}, seed=seed, duration=duration), fault).to_log()
 
 
@@ -24,7 +27,7 @@ def diagnosed(log: Log) -> Diagnosis:
     return SensorModel().fit(log).diagnose()
 
 
-@pytest.mark.parametrize("fault", GLOBAL)
+@pytest.mark.parametrize("fault", [name for name in GLOBAL if name not in CURED])
 def test_what_spoils_a_log_is_named_instead_of_an_effect(fault: str) -> None:
     found = diagnosed(faulty("handheld", fault))
     assert {each.fault for each in found.data_faults} == set(FAULTS[fault].names[:1])
@@ -45,13 +48,11 @@ def mapped(log: Log, remedy: str) -> Log:
     return Log.from_dataframe(table.assign(**new), log.metadata)
 
 
-@pytest.mark.parametrize(
-    "fault",
-    ["axes.exchanged", "axes.flipped", "mount", "frame.gravity", "reference.conjugate", "reference.scalar_last"],
-)
+@pytest.mark.parametrize("fault", CURED)
 def test_the_remedy_cures(fault: str) -> None:
     log = faulty("arm", fault)
-    (found,) = diagnosed(log).data_faults
+    (found,) = SensorModel().compare(log).data_faults
+    assert found.fault == FAULTS[fault].names[0]
     cured = diagnosed(mapped(log, found.remedy))
     assert cured.data_faults == ()
     assert cured.best == "acc.bias"
@@ -90,7 +91,7 @@ def test_signed_permutations_are_undone_by_their_mapping() -> None:
 
 def test_the_command_line_names_the_fault(tmp_path, capsys) -> None:
     path, page, json = (tmp_path / name for name in ("log.parquet", "page.html", "answer.json"))
-    assert main(["simulate", "handheld", "--fault", "mount", "--duration", "20", "-o", str(path)]) == 0
+    assert main(["simulate", "handheld", "--fault", "mount", "--duration", "12", "-o", str(path)]) == 0
     capsys.readouterr()
     assert main(["diagnose", str(path), "--json", str(json), "--html", str(page)]) == 0
     out = capsys.readouterr().out

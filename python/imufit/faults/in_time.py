@@ -241,11 +241,13 @@ class _Answer:
 
 def _solved(normal: Array, right: Array) -> tuple[Array, float, int]:
     """Solution, drop of the sum of squares, and how many directions can be seen."""
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    power = np.diag(normal)
+    seen = power > 1e-12 * max(float(power.max()), 1e-300)
+    scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, power, 1.0)), 0.0)
+    values, vectors = np.linalg.eigh(normal * np.outer(scale, scale))
     kept = values > 1e-4
-    along = vectors[:, kept].T @ (right / scale)
-    solution = vectors[:, kept] @ (along / values[kept]) / scale
+    along = vectors[:, kept].T @ (right * scale)
+    solution = vectors[:, kept] @ (along / values[kept]) * scale
     return solution, float(np.sum(along**2 / values[kept])), int(kept.sum())
 
 
@@ -264,10 +266,11 @@ def _asked(question: _Course, course: Array) -> _Answer | None:
 
 def _hotelling(values: Array, covariance: Array, rank: int, count: int) -> float:
     """p-value of all values being zero."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    spread, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    power = np.diag(covariance)
+    scale = np.where(power > 0.0, 1.0 / np.sqrt(np.where(power > 0.0, power, 1.0)), 0.0)
+    spread, vectors = np.linalg.eigh(covariance * np.outer(scale, scale))
     kept = np.argsort(spread)[::-1][:rank]
-    z = vectors[:, kept].T @ (values / scale)
+    z = vectors[:, kept].T @ (values * scale)
     square = float(np.sum(z**2 / np.maximum(spread[kept], 1e-12)))
     return float(fisher.sf(square * (count - rank) / (rank * (count - 1.0)), rank, count - rank))
 
