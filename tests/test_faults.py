@@ -138,6 +138,24 @@ def test_rows_at_fault_are_left_out_and_the_rest_is_judged(fault: str, seed: int
     assert len(rows) < 1.1 * len(rows_changed) + 3
 
 
+def test_a_reading_that_is_clipped_most_of_the_time_is_not_stuck() -> None:
+    log = simulate("tilt", {}, seed=3, duration=20.0).to_log()
+    assert log.acc is not None
+    pinned = np.minimum(log.acc, np.nanquantile(log.acc, 0.3, axis=0))
+    found, left_out = row_faults(replace(log, acc=pinned))
+    assert found == []
+    assert left_out == []
+
+
+def test_a_dead_channel_is_stuck() -> None:
+    log = simulate("handheld", {}, seed=3, duration=20.0).to_log()
+    assert log.gyr is not None
+    (found,), _ = row_faults(replace(log, gyr=log.gyr * [1.0, 0.0, 1.0]))
+    assert (found.fault, found.channel, found.rows) == ("stuck", "gyr_y", log.n)
+    # Nothing is left out where too little would be left.
+    assert found.spoils
+
+
 def test_clipped_rows_are_counted_beside_the_effect() -> None:
     log = faulty("handheld", "clipped")
     found = diagnosed(log)

@@ -86,8 +86,8 @@ def _suspicious(values: Array) -> list[tuple[int, int]]:
     found = []
     for k in longest:
         value = values[edges[k]]
-        # At the end of its range a reading stands still for another reason.
-        at_end = value in (top, bottom) and lengths[k] < 0.5 * values.size
+        # At the end of its range a reading stands still for another reason; a dead channel has no other value.
+        at_end = (value == top) != (value == bottom)
         if lengths[k] > USUAL * usual and not at_end:
             found.append((int(edges[k]), int(edges[k + 1]) - 1))
     return found
