@@ -114,7 +114,7 @@ def test_large_effects_are_no_faults(scenario: str, effect: str) -> None:
     assert imufit.SensorModel().compare(log).data_faults == ()
 
 
-@pytest.mark.parametrize(("fault", "seed"), [("stuck", 1), ("duplicate", 1), ("duplicate", 2), ("backlog", 1)])
+@pytest.mark.parametrize(("fault", "seed"), [("stuck", 1), ("duplicate", 1), ("duplicate", 2)])
 def test_rows_at_fault_are_left_out_and_the_rest_is_judged(fault: str, seed: int) -> None:
     sound = simulate("handheld", {"acc.bias": {"x": 0.05}}, seed=seed, duration=20.0)
     log = with_fault(sound, fault).to_log()
@@ -136,6 +136,24 @@ def test_rows_at_fault_are_left_out_and_the_rest_is_judged(fault: str, seed: int
     rows_changed = np.unique(np.concatenate(changed))
     assert np.isin(rows_changed, rows).mean() > 0.97
     assert len(rows) < 1.1 * len(rows_changed) + 3
+
+
+def test_a_backlog_is_left_out_where_the_body_moves() -> None:
+    sound = simulate("handheld", {}, seed=1, duration=20.0)
+    log = with_fault(sound, "backlog").to_log()
+    (named,), left_out = row_faults(log)
+    changed = np.flatnonzero(log.t != sound.t)
+    assert named.fault == "backlog"
+    assert abs(named.rows - len(changed)) <= 12
+    assert named.left_out == bool(left_out)
+    assert log.ref_q is not None
+    still = replace(log, ref_q=np.tile(log.ref_q[:1], (log.n, 1)), ref_p=None)
+    (harmless,), kept = row_faults(still)
+    assert (harmless.fault, harmless.left_out, harmless.spoils, kept) == ("backlog", False, False, [])
+    turning = Rotation.from_rotvec(np.outer(log.t - log.t[0], [0.0, 0.0, 1.0]))
+    (moving,), blanked = row_faults(still.with_reference(turning))
+    assert moving.left_out
+    assert {sensor for sensor, _, _ in blanked} == {"acc", "gyr", "mag"}
 
 
 def test_a_reading_that_is_clipped_most_of_the_time_is_not_stuck() -> None:

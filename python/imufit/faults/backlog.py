@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from imufit.faults.row_fault import SENSORS, RowFault
-from imufit.log import Chunk
+from imufit.log import Chunk, Log
 
 FASTER: Final = 0.67
 """Mean step of `ROWS` rows over the usual one, below which rows come too fast."""
@@ -20,8 +20,25 @@ SURPLUS: Final = 20
 """Rows more than there should be in the time."""
 GAP: Final = 5.0
 """Steps without a row after which rows may have been held back."""
+TURNED: Final = 2e-3
+WENT: Final = 2e-3
+"""Turn, rad, and way, m, up to which the body was at rest."""
 MOST: Final = 0.4
 """A larger share of fast rows is another rate, no backlog."""
+
+
+def _moved(log: Log, low: int, high: int) -> bool:
+    """Whether the body moved between two rows; at rest a wrong time does no harm."""
+    if log.ref_q is None:
+        return True
+    q = log.ref_q[low : high + 1]
+    q = q[np.isfinite(q).all(axis=1)]
+    if not len(q):
+        return True
+    turned = 2.0 * np.arccos(np.clip(np.abs(q @ q[0]), 0.0, 1.0)).max()
+    place = np.zeros((1, 3)) if log.ref_p is None else log.ref_p[low : high + 1]
+    place = place[np.isfinite(place).all(axis=1)]
+    return bool(turned > TURNED or (len(place) and np.ptp(place, axis=0).max() > WENT))
 
 
 def backlogs(chunk: Chunk) -> list[RowFault]:
@@ -61,7 +78,8 @@ def backlogs(chunk: Chunk) -> list[RowFault]:
         if surplus < SURPLUS or not held_back or first >= chunk.end or last < chunk.begin:
             continue
         low, high = max(first, chunk.begin), min(last, chunk.end - 1)
-        figures = {"rate": (last - first) / span, "usual": 1.0 / usual, "surplus": surplus}
+        moved = float(_moved(chunk.log, low, high))
+        figures = {"rate": (last - first) / span, "usual": 1.0 / usual, "surplus": surplus, "moved": moved}
         found.append(
             RowFault("backlog", sensors, "xyz", row + low, row + high + 1, float(t[low]), float(t[high]), figures)
         )

@@ -45,9 +45,11 @@ def row_faults(log: LogSource) -> tuple[list[DataFault], list[LeftOut]]:
     found = _beside_each_other(found)
     faults, left_out = [], []
     for item in found:
-        kept = _share(found, item, log.n) > MOST
-        faults.append(_worded(item, left_out=not kept))
-        if not kept:
+        harmless = item.fault == "backlog" and not item.figures["moved"]
+        too_many = _share(found, item, log.n) > MOST
+        left_out_here = not (harmless or too_many)
+        faults.append(_worded(item, left_out=left_out_here, spoils=too_many and not harmless))
+        if left_out_here:
             left_out += [(sensor, item.first, item.stop) for sensor in item.sensors]
     return faults, left_out
 
@@ -74,7 +76,7 @@ def _share(found: Sequence[RowFault], item: RowFault, n: int) -> float:
     return max(sum(f.rows for f in same if sensor in f.sensors) / n for sensor in item.sensors)
 
 
-def _worded(item: RowFault, *, left_out: bool) -> DataFault:
+def _worded(item: RowFault, *, left_out: bool, spoils: bool) -> DataFault:
     sensor = item.sensors[0] if len(item.sensors) == 1 else None
     channel = f"{sensor}_{item.axes}" if sensor is not None and len(item.axes) == 1 else None
     words = {"stuck": _stuck, "duplicate": _duplicate, "backlog": _backlog}[item.fault]
@@ -89,7 +91,7 @@ def _worded(item: RowFault, *, left_out: bool) -> DataFault:
         evidence,
         remedy,
         left_out=left_out,
-        spoils=not left_out,
+        spoils=spoils,
     )
 
 
@@ -117,8 +119,9 @@ def _duplicate(item: RowFault) -> tuple[str, str]:
 
 def _backlog(item: RowFault) -> tuple[str, str]:
     rate, usual = item.figures["rate"], item.figures["usual"]
+    harmless = "" if item.figures["moved"] else " The body was at rest, so they do no harm here."
     return (
         f"{item.rows} rows at {quantity.span(item.t_start, item.t_end)} come at {rate:.0f} a second instead of "
-        f"{usual:.0f}: their times are those of arrival, not of sampling.",
+        f"{usual:.0f}: their times are those of arrival, not of sampling.{harmless}",
         "Let the sensor stamp its samples, or cut these rows off.",
     )
