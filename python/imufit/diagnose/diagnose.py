@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from imufit import _imufit
 from imufit.diagnose import sentences
@@ -149,7 +149,7 @@ def _candidate(
         Parameter(effect.id, name, grid.get(name, value), 0.0 if name in grid else error, unit, typical)
         for (name, unit, typical), (value, error) in zip(effect.parameters, item["parameters"], strict=True)
     )
-    threshold = float(student.isf(ALPHA / tested / 2, BLOCKS - 1)) + POWER
+    threshold = -float(stdtrit(BLOCKS - 1, ALPHA / tested / 2)) + POWER
     detectable = {
         p.name: (threshold * p.standard_error, p.unit)
         for p in parameters
