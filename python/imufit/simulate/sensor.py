@@ -36,6 +36,8 @@ class Situation:
     input : (n, 3), the true quantity at the sensor, body frame, its unit.
     force : (n, 3), true specific force at the body's origin, body frame, m/s^2.
     rotation : (n, 3, 3), true attitude of the sensor's axes, to the reference frame.
+    omega : (n, 3), true angular rate, body frame, rad/s.
+    position : (n, 3), true position of the body's origin, reference frame, m.
     since : (n,), time since the start of the log, s.
     warmth : (n,), temperature less its mean over the log, K.
     covariates : (n,) each, less their means over the log.
@@ -46,6 +48,8 @@ class Situation:
     input: Array
     force: Array
     rotation: Array
+    omega: Array
+    position: Array
     since: Array
     warmth: Array
     covariates: Mapping[str, Array]
@@ -71,9 +75,9 @@ class Sensor:
             total = total + disturbance(situation)
         return total
 
-    def digits(self, output: Array, noise: SensorNoise, rng: np.random.Generator, t: Array) -> Array:
+    def digits(self, output: Array, noise: SensorNoise, rng: np.random.Generator, t: Array, rates: Array) -> Array:
         """Return the recorded reading (n, 3): noise added, rounded, held within the range."""
-        return self.limited(noise.rounded(output + noise.draw(rng, t)))
+        return self.limited(noise.rounded(output + noise.draw(rng, t, rates)))
 
     def limited(self, output: Array) -> Array:
         """Return `output` held within the range."""
@@ -159,6 +163,8 @@ class Setup:
             input=self.input(name, felt, then) if sensor.lag == 0.0 else self._lagged(name, rows),
             force=felt.specific_force(surroundings.gravity),
             rotation=felt.rotation,
+            omega=felt.omega,
+            position=felt.position,
             since=rows.t - rows.t[0],
             warmth=warmth - np.mean(warmth),
             current=columns.get("motor_current", np.full(rows.t.size, np.nan)),
