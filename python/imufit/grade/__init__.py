@@ -6,9 +6,24 @@ on its set and its seed alone: `draw(set, seed)` makes it again, `trial(set, see
 
 from imufit.grade.blind_grade import BlindGrade
 from imufit.grade.mark import Marks
+from imufit.grade.power import PowerCurve, PowerPoint, power_curve
 from imufit.grade.protocol import grade, plan
 from imufit.grade.puzzle import Puzzle
 from imufit.grade.sets import SETS, BlindSet, draw
 from imufit.grade.trial import Trial, trial
 
-__all__ = ["SETS", "BlindGrade", "BlindSet", "Marks", "Puzzle", "Trial", "draw", "grade", "plan", "trial"]
+__all__ = [
+    "SETS",
+    "BlindGrade",
+    "BlindSet",
+    "Marks",
+    "PowerCurve",
+    "PowerPoint",
+    "Puzzle",
+    "Trial",
+    "draw",
+    "grade",
+    "plan",
+    "power_curve",
+    "trial",
+]

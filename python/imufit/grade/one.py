@@ -20,9 +20,9 @@ from imufit.grade.drawing import (
 )
 from imufit.grade.noises import everyday
 from imufit.grade.puzzle import Puzzle
-from imufit.simulate import Noise, simulate
+from imufit.simulate import Noise, injection, simulate
 
-_TWINS = {
+TWINS = {
     f"{sensor}.{name}": {f"{sensor}.{other}"}
     for sensor in ("acc", "gyr")
     for name, other in (("delay", "lowpass"), ("lowpass", "delay"))
@@ -54,7 +54,7 @@ def one(blind_set: str, seed: int, sizes: Sizes, realistic: bool = False) -> Puz
             if best is None or len(found.rivals) < len(best[1].rivals):
                 best = setting, found
             break
-        if best is not None and not set(best[1].rivals) - _TWINS.get(effect, set()):
+        if best is not None and not set(best[1].rivals) - TWINS.get(effect, set()):
             break
     if best is None:
         raise ImpossibleError(f"{effect}: no motion shows it with size {size:g}")
@@ -76,4 +76,7 @@ def hidden_in(setting: Setting, found: Drawn, kind: str = "", model: tuple[str, 
     """Return the log of a setting with one effect in it, and those of `model`, which are known."""
     effects = {**dict.fromkeys(model), found.effect: found.parameters}
     simulation = simulate(setting.scenario, effects, setting.seed, **setting.options)
-    return Puzzle("one", kind or found.effect, simulation, found.rivals, model)
+    twin = None
+    if setting.options["noise"].attitude_deg > 0.0 and not injection(found.effect).vibration:
+        twin = simulate(setting.scenario, {}, setting.seed, **setting.options)
+    return Puzzle("one", kind or found.effect, simulation, found.rivals, model, twin)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from typing import Any, TypeVar
 
 from imufit.grade.blind_grade import BlindGrade
 from imufit.grade.sets import SETS
-from imufit.grade.trial import Trial, trial
+from imufit.grade.trial import trial
 from imufit.progress import Progress, silent
+
+Result = TypeVar("Result")
 
 
 def plan(sets: Sequence[str], logs: int, seed: int) -> list[tuple[str, int]]:
@@ -63,29 +66,41 @@ def grade(
     """
     if unknown := [name for name in sets if name not in SETS]:
         raise ValueError(f"unknown set {unknown[0]!r}: use one of {', '.join(SETS)}")
-    tell = progress or silent
     jobs = plan(list(sets) or list(SETS), logs, seed)
-    if processes == 1:
-        trials = []
-        for done, job in enumerate(jobs):
-            tell(done, len(jobs), "diagnosing blind logs")
-            trials.append(trial(*job))
-        tell(len(jobs), len(jobs), "diagnosing blind logs")
-        return BlindGrade(tuple(trials))
-    return BlindGrade(tuple(_side_by_side(jobs, processes, tell)))
+    return BlindGrade(tuple(side_by_side(trial, jobs, processes, progress)))
 
 
-def _side_by_side(jobs: Sequence[tuple[str, int]], processes: int | None, tell: Progress) -> list[Trial]:
-    # A fresh interpreter for each worker: the compiled core's threads do not survive a fork.
+def side_by_side(
+    work: Callable[..., Result], jobs: Sequence[tuple[Any, ...]], processes: int | None, progress: Progress | None
+) -> list[Result]:
+    """Return what `work` makes of each job, in order; several at a time.
+
+    Parameters
+    ----------
+    work : callable
+        At the top of a module.
+    jobs : sequence of tuple
+        Its arguments.
+    processes : int, optional
+        Jobs at a time; default: one per processor. With 1 they are done in this process.
+    progress : callable, optional
+        Called with (jobs done, jobs in all, what is being done).
+    """
+    tell = progress or silent
+    done: list[Result] = []
     workers = min(processes or os.cpu_count() or 1, max(len(jobs), 1))
+    if workers == 1:
+        for job in jobs:
+            done.append(work(*job))
+            tell(len(done), len(jobs), "diagnosing blind logs")
+        return done
+    # A fresh interpreter for each worker: the compiled core's threads do not survive a fork.
     threads = max(1, (os.cpu_count() or 1) // workers)
-    trials: list[Trial] = []
     with ProcessPoolExecutor(workers, get_context("spawn"), _share_processors, (threads,)) as pool:
-        futures = [pool.submit(trial, *job) for job in jobs]
-        for future in futures:
-            trials.append(future.result())
-            tell(len(trials), len(jobs), "diagnosing blind logs")
-    return trials
+        for future in [pool.submit(work, *job) for job in jobs]:
+            done.append(future.result())
+            tell(len(done), len(jobs), "diagnosing blind logs")
+    return done
 
 
 def _share_processors(threads: int) -> None:

@@ -28,6 +28,8 @@ class Puzzle:
         Effects that really cannot be told from the hidden one in this log.
     model : tuple of str
         Effects that are known to be there: the ladder starts from them.
+    twin : Simulation or None
+        Where the reference has noise: the same log, down to each drawn number, with nothing hidden in it.
     causes : mapping
         For each channel, the quantities of the log that cause an effect outside the catalogue; empty where none does.
     """
@@ -37,6 +39,7 @@ class Puzzle:
     simulation: Simulation
     rivals: tuple[str, ...] = ()
     model: tuple[str, ...] = ()
+    twin: Simulation | None = None
     causes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property

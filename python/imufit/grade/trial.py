@@ -39,7 +39,8 @@ class Trial:
     ratio_start, ratio_end : float
         Held-out error over the noise floor that the ladder took, before and after it.
     true_ratio : float
-        Residual at the end of the ladder over the TRUE noise of the sensors, root mean square over the channels.
+        Residual at the end of the ladder over the true noise, root mean square over the channels. Where the reference
+        has noise, too: over the residual of the ideal sensor in the same log with nothing hidden.
     errors : tuple of float
         (estimate - truth) / standard error of each parameter that was recovered.
     drops : tuple of (float, float)
@@ -125,7 +126,7 @@ def judged(puzzle: Puzzle, result: Ladder, blind_set: str = "", seed: int = 0) -
         marks=marked(puzzle, answer),
         ratio_start=result.ratio_start,
         ratio_end=result.ratio_end,
-        true_ratio=true_ratio(puzzle.simulation, result),
+        true_ratio=true_ratio(puzzle, result),
         errors=_errors(puzzle, result),
         drops=tuple((step.before - step.expected, step.before - step.after) for step in result.steps),
     )
@@ -150,26 +151,36 @@ def _named(diagnosis: Diagnosis) -> tuple[str, ...]:
     return tuple(dict.fromkeys([diagnosis.best, *diagnosis.ambiguous_with]))
 
 
-def true_ratio(simulation: Simulation, result: Ladder) -> float:
-    """Return the residual at the end of the ladder over the sensors' true noise, root mean square over channels.
+def true_ratio(puzzle: Puzzle, result: Ladder) -> float:
+    """Return the residual at the end of the ladder over the true noise, root mean square over channels.
 
     Parameters
     ----------
-    simulation : Simulation
-        Knows the noise: each reading less what it would be without noise and rounding.
+    puzzle : Puzzle
+        Knows the noise.
     result : Ladder
         The ladder on its log.
     """
-    end = result.comparison_end
-    if end is None:
+    if result.comparison_end is None:
         return float("nan")
-    truth = {
+    truth = _noise_of(puzzle.simulation) if puzzle.twin is None else _residual_of(puzzle.twin)
+    squares = [(channel.rms / truth[channel.channel]) ** 2 for channel in result.comparison_end.channels]
+    return float(np.sqrt(np.mean(squares)))
+
+
+def _noise_of(simulation: Simulation) -> dict[str, float]:
+    """Return the root mean square of the noise of each channel, as it was drawn."""
+    return {
         f"{name}_{axis}": float(np.sqrt(np.nanmean(noise[:, k] ** 2)))
         for name, noise in simulation.noise.items()
         for k, axis in enumerate("xyz")
     }
-    squares = [(channel.rms / truth[channel.channel]) ** 2 for channel in end.channels if truth[channel.channel] > 0.0]
-    return float(np.sqrt(np.mean(squares))) if squares else float("nan")
+
+
+def _residual_of(twin: Simulation) -> dict[str, float]:
+    """Return the root mean square of what the ideal sensor leaves of each channel of a log with nothing hidden."""
+    comparison = SensorModel().compare(twin.to_log())
+    return {channel.channel: channel.rms for channel in comparison.channels}
 
 
 def _errors(puzzle: Puzzle, result: Ladder) -> tuple[float, ...]:

@@ -38,7 +38,7 @@ class Simulation:
     covariates : (n,) each.
     metadata : frame, gravity, mag_reference, rig_axis, sensor, noise: whichever apply.
     trajectory : the motion that the reference reports; `trajectory.at(t)` is exact.
-    noise : for each sensor, (n, 3), its readings less what they would be without noise and rounding.
+    noise : for each sensor, (n, 3), its readings less what they would be without noise, rounding and shaking.
     truth : what was injected. None of these three gets into the log.
     """
 
@@ -155,7 +155,9 @@ def _recorded(study: Study, truth: Truth, rig_axis: str, noise_in_metadata: bool
     for name, output in outputs(setup, rows, tuple(sampled)).items():
         sensor, rng = setup.sensors[name], stream(seed, f"noise {name}")
         digits = sensor.digits(output, noise.sensor(name), rng, t, rates)
-        errors[name] = np.where(sampled[name][:, None], digits - sensor.limited(output), np.nan)
+        shaking = study.environment.vibration if name == "acc" else None
+        calm = sensor.limited(output) - (0.0 if shaking is None else shaking.at(t - sensor.delay))
+        errors[name] = np.where(sampled[name][:, None], digits - calm, np.nan)
         sensors[name] = np.where(sampled[name][:, None], digits, np.nan)
 
     reference = rows.kinematics(trajectory, setup.reference_delay)
