@@ -11,13 +11,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
+from scipy.linalg import block_diag, solve_discrete_are
 from scipy.signal import lfilter, ss2tf
 
 from imufit.simulate.entry import Injection, Parameters
 from imufit.simulate.injections import INJECTIONS, injection
 from imufit.simulate.motion import Array
 from imufit.simulate.noise import SensorNoise
+from imufit.simulate.scenarios import SCENARIOS
 from imufit.simulate.sensor import SENSORS
 from imufit.simulate.study import Study
 
@@ -34,7 +35,9 @@ LATE = ("acc.delay", "gyr.delay", "mag.delay", "ref.delay", "acc.lowpass", "gyr.
 """Effects with one time each, which are not linear in it: they are fitted to each other by Newton's steps."""
 
 
-def whitening(noise: SensorNoise, step: float, share: float) -> tuple[Array, Array]:
+def whitening(
+    noise: SensorNoise, step: float, share: float, reference: tuple[int, float] = (0, 0.0)
+) -> tuple[Array, Array]:
     """Return numerator and denominator of the filter that makes a sensor's noise white, with unit variance.
 
     Parameters
@@ -45,20 +48,29 @@ def whitening(noise: SensorNoise, step: float, share: float) -> tuple[Array, Arr
         Time between two samples, s.
     share : float
         How many of the sensor's own samples each of them stands for: their white noise is averaged.
+    reference : (int, float)
+        Which difference quotient of the reference the ideal reading is, and the white noise of one of its samples.
     """
     white = max(noise.white, 1e-300) ** 2 / share
-    keep, drive = [], []
+    parts: list[tuple[Array, Array, Array]] = []  # transition, drive, what of the state is read
+    one = np.eye(1)
     if noise.coloured > 0.0:
-        keep.append(float(np.exp(-step / noise.correlation_time)))
-        drive.append(noise.coloured**2 * (1.0 - keep[-1] ** 2))
+        keep = float(np.exp(-step / noise.correlation_time))
+        parts.append((keep * one, noise.coloured**2 * (1.0 - keep**2) * one, one))
     if noise.random_walk > 0.0:
-        keep.append(1.0)
-        drive.append(noise.random_walk**2 * step)
-    if not keep:
+        parts.append((one, noise.random_walk**2 * step * one, one))
+    order, size = reference
+    if size > 0.0:
+        first = np.zeros((order + 1, order + 1))
+        first[0, 0] = size**2 / share
+        quotient = np.array([[1.0, -1.0], [1.0, -2.0, 1.0]][order - 1])[None] / step**order
+        parts.append((np.eye(order + 1, k=-1), first, quotient))
+    if not parts:
         return np.array([1.0 / np.sqrt(white)]), np.array([1.0])
+    f, q = (block_diag(*(part[k] for part in parts)) for k in (0, 1))
+    h = np.concatenate([part[2] for part in parts], axis=1)
     # In units of the white noise, so that the equation is well scaled.
-    f, h = np.diag(keep), np.ones((1, len(keep)))
-    p = solve_discrete_are(f.T, h.T, np.diag(drive) / white, np.eye(1))
+    p = solve_discrete_are(f.T, h.T, q / white, np.eye(1))
     variance = float((h @ p @ h.T)[0, 0]) + 1.0
     k = f @ p @ h.T / variance
     top, bottom = ss2tf(f - k @ h, k, -h, np.eye(1))
@@ -88,7 +100,12 @@ class Separation:
 
     def _filter(self, study: Study, name: str, rows: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[Array, Array]:
         count = max(int(np.sum(self.scale.sampled[name])), 1)
-        return whitening(study.noise.sensor(name), self._length / count, int(np.sum(rows)) / count)
+        noise, reference = study.noise, (0, 0.0)
+        if name == "gyr":
+            reference = 1, float(np.radians(noise.attitude_deg))
+        elif name == "acc" and SCENARIOS[study.scenario].position:
+            reference = 2, noise.position
+        return whitening(noise.sensor(name), self._length / count, int(np.sum(rows)) / count, reference)
 
     def signal(self, effect: str, parameters: Parameters) -> Array:
         """Return what an effect changes, (m,): all sensors one after the other, white, in standard deviations."""

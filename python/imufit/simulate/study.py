@@ -31,6 +31,7 @@ class Study:
 
     Attributes
     ----------
+    scenario, seed, rate : as given.
     trajectory, environment, noise : what the log is made from.
     rows, run : its rows.
     names : what the log has: of "acc", "gyr", "mag", "temp".
@@ -57,7 +58,7 @@ class Study:
             raise ValueError(f"duration {duration} s at {rate} Hz does not make two rows")
         if rig_axis not in AXES:
             raise ValueError(f"rig_axis is {rig_axis!r}: use x, y or z")
-        self.seed, self.rate = seed, rate
+        self.scenario, self.seed, self.rate = scenario, seed, rate
         self.trajectory = build(scenario, stream(seed, f"motion {scenario}"), duration, frame, AXES.index(rig_axis))
         kind = SCENARIOS[scenario]
         self.names = kind.sensors if sensors is None else _known_sensors(sensors)
