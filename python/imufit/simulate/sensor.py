@@ -22,6 +22,9 @@ SENSORS = ("acc", "gyr", "mag")
 LAG_STEP = 1e-3
 """Step (s) on which the differential equation of a lag is solved."""
 
+LAG_HISTORY = 60.0
+"""Time (s) before the log from which a lag is solved at most: sensors are not slower, and the grid stays small."""
+
 
 KEPT = 6
 """How many motions are kept while effects are tried out."""
@@ -175,7 +178,7 @@ class Setup:
     def _lagged(self, name: str, rows: Rows) -> Array:
         """Solve lag dy/dt = x - y on a fine grid, from a steady start, for an input that is linear within a step."""
         lag, delay = self.sensors[name].lag, self.sensors[name].delay
-        grid = rows.fine(float(np.ceil(12.0 * lag + delay)))
+        grid = rows.fine(float(np.ceil(min(12.0 * lag, LAG_HISTORY) + delay)))
         x = self.input(name, self.felt(grid.kinematics(self.trajectory, 0.0)), grid.t)
         keep = float(np.exp(-LAG_STEP / lag))
         slope = 1.0 - lag / LAG_STEP * (1.0 - keep)
