@@ -117,8 +117,8 @@ class Passes:
             raise InputError("no sensor of the log has a sample", file=log.path)
         return facts, dict(zip(["temp", *self.covariates], known / log.n, strict=True))
 
-    def ranges(self) -> dict[str, float]:
-        """Where the ranges of accelerometer and gyroscope end, m/s^2 and rad/s; none where no reading is cut off."""
+    def ranges(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Where the ranges of accelerometer and gyroscope seem to end, and their largest readings, m/s^2 and rad/s."""
         told = {sensor: self.log.metadata.extra.get(f"{sensor}_range") for sensor in ("acc", "gyr")}
         found: dict[str, float] = {}
         largest: dict[str, float] = {}
@@ -131,8 +131,7 @@ class Passes:
                 known = end if isinstance(end, int | float) and end > 0.0 else end_of_range(column, 0.0)
                 if known is not None:
                     found[sensor] = min(found.get(sensor, np.inf), float(known))
-        # A reading beyond it shows that it was no end.
-        return {sensor: end for sensor, end in found.items() if largest[sensor] <= end * (1.0 + 1e-6)}
+        return found, largest
 
     def _rig(self) -> tuple[int, list[float]] | None:
         """Axis of a one-axis rig and its attitude at the angle zero; None for a log of anything else."""

@@ -9,6 +9,7 @@ from imufit.results.comparison import ChannelResidual, Comparison, Panel, Spectr
 from imufit.results.diagnosis import Candidate, Diagnosis, Rival, Unexplained
 from imufit.results.effect_card import EffectCard
 from imufit.results.ladder import Ladder, Step
+from imufit.results.log_parameters import LogParameters
 from imufit.results.parameter import Parameter
 from imufit.results.table import Table
 from imufit.results.tilt import Mark, TiltComparison, TiltFigures
@@ -24,6 +25,7 @@ __all__ = [
     "Diagnosis",
     "EffectCard",
     "Ladder",
+    "LogParameters",
     "Mark",
     "Panel",
     "Parameter",

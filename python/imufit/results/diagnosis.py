@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
+from imufit.results.log_parameters import LogParameters, logs_json
 from imufit.results.parameter import Parameter, by_name, in_words
 from imufit.results.table import Table, html, page
 
@@ -72,6 +73,8 @@ class Candidate:
         ``passed``, ``not significant`` or ``not testable here``.
     minimal_detectable : dict
         Smallest detectable (value, unit) by parameter.
+    logs : tuple of LogParameters
+        Of several logs, where each has its own parameters of this effect; `parameters` are then their means.
     """
 
     effect: str
@@ -86,6 +89,7 @@ class Candidate:
     explanation: str
     status: str
     minimal_detectable: dict[str, tuple[float, str]]
+    logs: tuple[LogParameters, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one candidate; gain, status and smallest detectable sizes besides."""
@@ -105,6 +109,11 @@ class Candidate:
                 name: {"value": json_value(value), "unit": unit}
                 for name, (value, unit) in self.minimal_detectable.items()
             },
+            **(
+                {"logs": [{"file": log.file, "parameters": by_name(log.parameters)} for log in self.logs]}
+                if self.logs
+                else {}
+            ),
         }
 
     @property
@@ -192,6 +201,8 @@ class Diagnosis:
         The result in words.
     notes : tuple of str
         What the reader should know about these figures.
+    logs : tuple of LogParameters
+        Of several logs: how far each is above its noise floor, and the model's parameters that it has for itself.
     """
 
     verdict: str
@@ -203,6 +214,7 @@ class Diagnosis:
     experiment: str | None
     sentence: str
     notes: tuple[str, ...]
+    logs: tuple[LogParameters, ...] = ()
 
     @property
     def best_candidate(self) -> Candidate | None:
@@ -221,6 +233,7 @@ class Diagnosis:
             "experiment": self.experiment,
             "sentence": self.sentence,
             "notes": list(self.notes),
+            **logs_json(self.logs),
         }
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -10,6 +10,7 @@ from imufit.results.addition import surprise
 from imufit.results.comparison import Comparison
 from imufit.results.diagnosis import VERDICTS, Diagnosis
 from imufit.results.json_value import json_value
+from imufit.results.log_parameters import log_table, logs_json
 from imufit.results.parameter import by_effect
 from imufit.results.table import Table, html, page
 
@@ -106,6 +107,7 @@ class Ladder:
             "experiment": self.diagnosis.experiment,
             "sentence": self.sentence,
             "parameters": by_effect(getattr(self.fit, "parameters", ()) or ()),
+            **logs_json(self.diagnosis.logs),
         }
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -8,6 +8,7 @@ pub mod drift;
 pub mod estimate;
 pub mod held_out;
 pub mod jackknife;
+pub mod part;
 pub mod problem;
 pub mod residual;
 pub mod saturated;

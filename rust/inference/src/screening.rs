@@ -103,18 +103,21 @@ const HALVES_CHANCE: f64 = 5.0;
 fn halves_agree(question: &Question, whole: &Jackknife) -> bool {
     let p = question.model;
     let m = whole.estimate.len() - p;
-    let middle = question.white.len() / 2;
-    let solve = |blocks: &[NormalEquations]| {
+    // Of several logs the first halves against the second ones: whether logs agree is asked elsewhere.
+    let solve = |later: bool| {
         let mut sum = NormalEquations::zeros(question.precision.len());
-        for b in blocks {
-            sum.add(b, 1.0);
+        for log in question.logs.iter() {
+            let middle = log.start + log.len() / 2;
+            let half = if later { middle..log.end } else { log.start..middle };
+            for b in &question.white[half] {
+                sum.add(b, 1.0);
+            }
         }
         let solved = sum.solve(&question.precision)?;
         let covariance = solved.covariance().view((p, p), (m, m)).into_owned();
         Some((solved.solution.rows(p, m).into_owned(), covariance))
     };
-    let (Some((first, c1)), Some((second, c2))) = (solve(&question.white[..middle]), solve(&question.white[middle..]))
-    else {
+    let (Some((first, c1)), Some((second, c2))) = (solve(false), solve(true)) else {
         return true;
     };
     let Some(information) = Cholesky::new(&c1 + &c2) else {

@@ -1,6 +1,5 @@
 //! Adequate, missing, ambiguous or unknown: the only place where this is decided.
 
-use imufit_fit::evidence::Evidence;
 use imufit_model::sensor::CHANNELS;
 use imufit_model::sensor_model::Slot;
 use rayon::prelude::*;
@@ -134,8 +133,8 @@ pub fn passes(s: &Screened, adjusted: f64) -> bool {
 }
 
 /// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from.
-pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidates: &[usize]) -> Verdict {
-    let slots = evidence.layout.model.slots();
+pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize]) -> Verdict {
+    let slots = problem.slots.as_slice();
     let (screened, adjusted) = screen_all(problem, slots, model, candidates);
     let passing: Vec<&Screened> = screened
         .iter()
@@ -161,7 +160,7 @@ pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidate
     let fitted = indices(slots, &stack);
     let channels: Vec<usize> = (0..CHANNELS).collect();
     let base = screening::base(problem, &fitted);
-    let (mut unexplained, tried) = dependence::test(problem, evidence, &fitted, &base, &channels);
+    let (mut unexplained, tried) = dependence::test(problem, &fitted, &base, &channels);
     unexplained.retain(|d| d.p_value * tried as f64 <= ALPHA);
 
     let mut rivals = Vec::new();
