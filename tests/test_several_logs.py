@@ -6,6 +6,7 @@ from dataclasses import replace
 import imufit
 import numpy as np
 import pytest
+from cli_stand_in import run, strict_json
 from engine import swaying
 from imufit import Diagnosis, InputError, Log, SensorModel, simulate
 from imufit.simulate import Noise, SensorNoise
@@ -147,3 +148,90 @@ def test_effects_that_no_log_can_tell_of_are_refused():
         asked([handheld({}, 1), handheld({}, 2)], "mag.hard_iron")
     fit = SensorModel(["mag.hard_iron"]).fit([handheld({}, 1), handheld({}, 2, sensors=("gyr", "mag"))])
     assert np.isfinite(fit.ratio)
+
+
+SCALE = {"gyr.scale": {"x": 0.004, "z": -0.003}}
+
+
+@pytest.mark.parametrize("odd", [0, 2])
+def test_an_effect_of_one_log_in_three_is_no_property_of_the_sensor(odd):
+    logs = [handheld(SCALE if k == odd else {}, k) for k in range(3)]
+    answer = asked(logs)
+    assert (answer.verdict, answer.best) == ("unknown", None)
+    (found,) = answer.disagrees
+    assert (found.file, found.effect, found.wild) == (f"log {odd + 1}", "gyr.scale", True)
+    values, others = ({p.name: p for p in side} for side in (found.value, found.others))
+    assert abs(values["x"].value - 0.004) < 4.0 * values["x"].standard_error
+    assert abs(others["x"].value) < 4.0 * others["x"].standard_error
+    assert found.file in answer.sentence
+    (rest,) = answer.without
+    assert (rest.files, rest.verdict) == ((found.file,), "adequate")
+    told = answer.to_dict()["disagrees"][0]
+    assert {"file", "effect", "value", "others", "p_value"} <= told.keys()
+    assert told["p_value"] < 1e-6
+    # Nothing is added on such ground.
+    assert imufit.ladder(logs).model == ()
+
+
+def test_effects_that_cancel_in_two_logs_are_noticed_and_each_log_is_asked_alone():
+    logs = [handheld({"gyr.scale": {"x": way * 0.004}}, k) for k, way in ((1, 1.0), (2, -1.0))]
+    answer = asked(logs)
+    assert answer.verdict == "unknown"
+    assert {found.file for found in answer.disagrees} == {"log 1", "log 2"}
+    assert {(rest.verdict, rest.best) for rest in answer.without} == {("missing", "gyr.scale")}
+
+
+def test_a_log_with_an_effect_besides_is_named_beside_the_answer():
+    logs = [handheld(SCALE | ({"acc.lever_arm": {"x": 0.03}} if k == 1 else {}), k) for k in range(3)]
+    answer = asked(logs)
+    assert (answer.verdict, answer.best) == ("missing", "gyr.scale")
+    assert [(found.file, found.effect) for found in answer.disagrees] == [("log 2", "acc.lever_arm")]
+    assert answer.without == ()
+
+
+def test_a_small_difference_in_an_effect_of_the_model_is_told_and_spoils_nothing():
+    logs = [handheld({"gyr.scale": {"x": 0.004, "z": 0.003 - 0.0005 * (k == 1)}}, k) for k in range(3)]
+    answer = asked(logs, "gyr.scale")
+    assert [(found.file, found.effect, found.wild) for found in answer.disagrees] == [("log 2", "gyr.scale", False)]
+    own, other = answer.disagrees[0].leading()
+    assert own.name == "z"
+    assert abs(other.value - 0.003) < 4.0 * other.standard_error
+    assert "log 2" in answer.sentence
+
+
+def test_logs_of_one_sensor_agree_whatever_their_noise():
+    noise = Noise(
+        acc=SensorNoise(0.02, coloured=0.02, correlation_time=0.3),
+        gyr=SensorNoise(8.7e-4, random_walk=3e-5),
+    )
+    for first in range(0, 6, 3):
+        logs = [handheld(SCALE, seed, 30.0, noise=noise, noise_in_metadata=False) for seed in range(first, first + 3)]
+        answer = asked(logs)
+        assert (answer.verdict, answer.best, answer.disagrees) == ("missing", "gyr.scale", ())
+        assert asked(logs, "gyr.scale").disagrees == ()
+
+
+def test_commands_take_several_logs(capsys, tmp_path):
+    paths = [tmp_path / name for name in ("a.parquet", "b.parquet", "c.parquet")]
+    for k, path in enumerate(paths):
+        handheld({"gyr.bias": {"x": 0.01 * (k + 1)}} | (SCALE if k == 2 else {}), k).write(path)
+    code, out, err = run(capsys, "diagnose", *paths[:2], "--json", "-", "--html", tmp_path / "page.html")
+    assert (code, err) == (0, [])
+    answer = strict_json(out)
+    assert (answer["verdict"], answer["best"]) == ("missing", "gyr.bias")
+    assert [log["file"] for log in answer["candidates"][0]["logs"]] == ["a.parquet", "b.parquet"]
+    model = tmp_path / "model.toml"
+    code, out, err = run(capsys, "add", "gyr.bias", *paths, "-o", model)
+    assert (code, err) == (0, [])
+    code, out, err = run(capsys, "fit", *paths, "--effects", "gyr.bias")
+    assert (code, err) == (0, [])
+    assert "What each log has for itself" in out
+    code, out, err = run(capsys, "ladder", *paths, "--model", model, "--html", tmp_path / "page.html")
+    assert (code, err) == (0, [])
+    assert "c.parquet" in out.split("Without")[0]
+    assert "Without c.parquet" in (tmp_path / "page.html").read_text()
+    for command in (["diagnose", paths[0], paths[0]], ["ladder", paths[0], paths[1], tmp_path / "." / "a.parquet"]):
+        code, out, err = run(capsys, *command)
+        assert (code, out, len(err)) == (2, "", 1)
+        assert "a.parquet" in err[0]
+        assert "twice" in err[0]

@@ -358,15 +358,25 @@ class _Screened(TypedDict):
     expected_ratio: float
     testable: bool
     stable: bool
+    agreed: bool
     passed: bool
     parameters: list[tuple[float, float]]
 
 class _Dependence(TypedDict):
     channel: str
     covariate: str
+    log: int | None
     gain: float
     p_value: float
     shape: str
+
+class _Disagreement(TypedDict):
+    slot: int
+    log: int
+    own: list[tuple[float, float]]
+    others: list[tuple[float, float]]
+    p_value: float
+    wild: bool
 
 class _Verdict(TypedDict):
     verdict: str
@@ -376,6 +386,8 @@ class _Verdict(TypedDict):
     correlations: list[tuple[int, int, float]]
     screened: list[_Screened]
     unexplained: list[_Dependence]
+    disagreements: list[_Disagreement]
+    spoilt: bool
 
 class _ChannelResidual(TypedDict):
     channel: str

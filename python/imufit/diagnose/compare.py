@@ -34,7 +34,7 @@ OFF_FLOOR = 1.2
 
 
 def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
-    """Hold a fitted model against a log (default: its own), the parameters as they are.
+    """Hold a fitted model against a log (default: its own, of several the worst), the parameters as they are.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
     progress : callable
         Called with (rows done, rows in all, what is being done).
     """
-    own = 0 if log is None else next((k for k, known in enumerate(fit.logs) if known is log), None)
-    if own is None or (log is None and len(fit.logs) > 1):
-        return compare_model(fit.model, fit.logs[0] if log is None else log, progress)
+    if log is not None and not any(log is known for known in fit.logs):
+        return compare_model(fit.model, log, progress)
+    own = fit.worst if log is None else next(k for k, known in enumerate(fit.logs) if known is log)
     found = comparison(fit.analysis, fit.estimate.step, own)
     return _with_attitude(found, fit.model_of(own), fit.logs[own], progress)
 

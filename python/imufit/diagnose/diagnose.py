@@ -12,6 +12,7 @@ from scipy.stats import t as student
 
 from imufit import _imufit
 from imufit.diagnose import sentences
+from imufit.diagnose.agreement import answers_without, disagreements
 from imufit.diagnose.compare import notes
 from imufit.fit.analysis import OWN, Analysis, Estimate, pooled
 from imufit.log.several import name_of
@@ -70,9 +71,12 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     word = result["verdict"]
     unexplained = _unexplained(analysis, fit.estimate.step, result["unexplained"])
     named = best if word in ("missing", "ambiguous") else None
+    disagrees = disagreements(analysis, result["disagreements"])
+    without = answers_without(fit, result["disagreements"], diagnose) if result["spoilt"] else ()
     sentence = sentences.verdict(
         word, by_id[best] if best else None, cards[best] if best else None, rivals, unexplained
     )
+    sentence = sentences.with_disagreements(sentence, disagrees, spoilt=result["spoilt"])
     experiment = None
     if word == "ambiguous" and best is not None:
         experiment = sentences.experiment(cards[best], [cards[rival] for rival in rivals])
@@ -87,6 +91,8 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         sentence=sentence,
         notes=_notes(analysis),
         logs=fit.by_log,
+        disagrees=disagrees,
+        without=without,
     )
 
 
@@ -201,6 +207,8 @@ def _status(item: Mapping[str, Any]) -> str:
         return "not testable here"
     if item["passed"]:
         return "passed"
+    if not item["agreed"]:
+        return "logs disagree"
     if not item["stable"]:
         return "differs between halves"
     return "not significant" if item["plausible"] else "implausible size"

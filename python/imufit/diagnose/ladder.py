@@ -56,7 +56,7 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
         fit = addition.fit
         steps.append(Step(effect, addition.before, expected, addition.after, fit.training_ratio))
         diagnosis = diagnose(fit)
-    worst = max(range(len(first_fit.logs)), key=first_fit.log_ratio)
+    worst = first_fit.worst
     return Ladder(
         steps=tuple(steps),
         model=fit.model.effects,
@@ -75,7 +75,7 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
 
 def next_effect(fit: Fit, diagnosis: Diagnosis) -> str | None:
     """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well."""
-    if diagnosis.verdict == "adequate":
+    if diagnosis.verdict == "adequate" or diagnosis.without:
         return None
     if diagnosis.verdict == "ambiguous":
         return _beside_the_unsure(fit)

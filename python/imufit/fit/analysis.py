@@ -160,6 +160,19 @@ class Analysis:
             self, logs=tuple(evidence), model=model, own=values, candidates=asked, found=found, problem=problem
         )
 
+    def of_logs(self, chosen: Sequence[int]) -> Analysis:
+        """Return the same evidence of some of the logs alone; effects that none of them can tell of are left out."""
+        logs = [self.logs[k] for k in chosen]
+        known = {key for each in logs for key in each.slots}
+        effects = [key for key in self.model.effects if key in known]
+        values = {key: at for key, at in self.model.parameters.items() if key in known}
+        model = SensorModel(effects, values, constants=self.model.constants)
+        unnamed = tuple(key for key in self.unnamed if key in known)
+        candidates = {key: effect for key, effect in self.candidates.items() if key in known}
+        own = tuple(self.own[k] for k in chosen)
+        problem = _problem(logs, model, unnamed, candidates)
+        return Analysis(tuple(logs), model, own, unnamed, candidates, self.found, problem)
+
     @property
     def slots(self) -> list[str]:
         """Ids of all slots: the model's effects, the unnamed ones, the candidates."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +79,17 @@ class Fit:
         """
         return Fit(*self.analysis.solved_for(model, self.own))
 
+    def of_logs(self, chosen: Sequence[int]) -> Fit:
+        """Fit the same effects to some of the logs alone, from the evidence that there is.
+
+        Parameters
+        ----------
+        chosen : sequence of int
+            Numbers of the logs.
+        """
+        analysis = self.analysis.of_logs(chosen)
+        return Fit(analysis, analysis.estimate())
+
     @property
     def logs(self) -> tuple[LogSource, ...]:
         """The logs."""
@@ -109,6 +121,11 @@ class Fit:
             ]
         return tuple(found)
 
+    @property
+    def worst(self) -> int:
+        """Number of the log that stands highest above its noise floor."""
+        return max(range(len(self.logs)), key=self.log_ratio) if len(self.logs) > 1 else 0
+
     def log_ratio(self, log: int) -> float:
         """Return the residual RMS of one log over its noise floor, all channels.
 
@@ -139,7 +156,7 @@ class Fit:
         return self.model.listed()
 
     def compare(self, log: LogSource | None = None, progress: Progress | None = None) -> Comparison:
-        """Say where the model fails on a log (default: its own); parameters stay as they are.
+        """Say where the model fails on a log (default: its own, of several the worst); parameters stay as they are.
 
         Parameters
         ----------

@@ -7,6 +7,7 @@ from imufit.results.addition import Addition
 from imufit.results.attitude import AttitudeBins, AttitudeComparison, AttitudeDependence
 from imufit.results.comparison import ChannelResidual, Comparison, Panel, Spectrum, Where
 from imufit.results.diagnosis import Candidate, Diagnosis, Rival, Unexplained
+from imufit.results.disagreement import Disagreement, Without
 from imufit.results.effect_card import EffectCard
 from imufit.results.ladder import Ladder, Step
 from imufit.results.log_parameters import LogParameters
@@ -23,6 +24,7 @@ __all__ = [
     "ChannelResidual",
     "Comparison",
     "Diagnosis",
+    "Disagreement",
     "EffectCard",
     "Ladder",
     "LogParameters",
@@ -37,4 +39,5 @@ __all__ = [
     "TiltFigures",
     "Unexplained",
     "Where",
+    "Without",
 ]

@@ -2,6 +2,7 @@
 //!
 //! All of it works on [`imufit_fit::evidence::Evidence`]; no function here sees a row of the log.
 
+pub mod agreement;
 pub mod confounding;
 pub mod dependence;
 pub mod drift;

@@ -18,6 +18,8 @@ pub struct Problem {
     pub parts: Vec<Part>,
     /// Effects of all logs, each with its place among the parameters.
     pub slots: Vec<Slot>,
+    /// For each of them whether every log has its own parameters of it.
+    pub own: Vec<bool>,
     /// For each log the place of each of its parameters.
     pub places: Vec<Vec<usize>>,
     /// Blocks of each log.
@@ -93,6 +95,7 @@ impl Problem {
         Self {
             parts,
             slots,
+            own: own.to_vec(),
             places,
             logs: logs.into(),
             white: white_blocks,
@@ -224,6 +227,36 @@ impl Question {
             precision: self.precision.rows(0, self.model).into_owned(),
             model: self.model,
             sums: self.sums.iter().map(|s| s.with_sums(s.columns(&kept))).collect(),
+            logs: self.logs.clone(),
+        }
+    }
+
+    /// The same question where one log has a value of its own besides, in some directions, of what the parameters from `first` on
+    /// are in all logs: what these directions add there is asked about.
+    #[must_use]
+    pub fn with_own(&self, log: usize, first: usize, directions: &DMatrix<f64>) -> Self {
+        let p = self.precision.len();
+        let all: Vec<usize> = (0..p).collect();
+        let shared: Vec<usize> = (first..first + directions.nrows()).collect();
+        let elsewhere = DMatrix::zeros(directions.nrows(), directions.ncols());
+        let own = self.logs.get(log).cloned().unwrap_or_default();
+        let widened = |blocks: &[NormalEquations]| {
+            let with = |(b, block): (usize, &NormalEquations)| {
+                let directions = if own.contains(&b) { directions } else { &elsewhere };
+                block.reduced(&all, &shared, directions)
+            };
+            blocks.iter().enumerate().map(with).collect()
+        };
+        let sums = self.sums.iter().map(|s| {
+            let directions = if s.log == log { directions } else { &elsewhere };
+            s.reduced(&all, &shared, directions)
+        });
+        Self {
+            white: widened(&self.white),
+            raw: widened(&self.raw),
+            precision: self.precision.clone().resize_vertically(p + directions.ncols(), 1.0),
+            model: p,
+            sums: sums.collect(),
             logs: self.logs.clone(),
         }
     }

@@ -4,6 +4,7 @@ use imufit_model::sensor::CHANNELS;
 use imufit_model::sensor_model::Slot;
 use rayon::prelude::*;
 
+use crate::agreement::{self, Differing, Disagreement};
 use crate::confounding;
 use crate::dependence::{self, Dependence};
 use crate::problem::Problem;
@@ -15,6 +16,8 @@ pub const ALPHA: f64 = 0.003;
 const NAMED_SHARE: f64 = 0.8;
 /// A rival recovers at least this share of the best candidate's gain.
 const RIVAL_SHARE: f64 = 0.5;
+/// What logs disagree about spoils the answer if it explains this much more than the best candidate.
+const CLEARLY_MORE: f64 = 1.1;
 /// Steps looked ahead to see whether named effects together explain the residual.
 const LOOK_AHEAD: usize = 10;
 
@@ -62,6 +65,56 @@ pub struct Verdict {
     pub unexplained: Vec<Dependence>,
     /// Slots that forward selection would add, one after the other.
     pub path: Vec<usize>,
+    /// Logs that disagree about the best candidate, about an effect of the model, or about one that only some of them show.
+    pub disagreements: Vec<Disagreement>,
+    /// True if they differ so much that there is no answer for all of them.
+    pub spoilt: bool,
+}
+
+/// What logs disagree about, and whether that spoils the answer: a candidate that would bring more than the best one does, if
+/// each log had a value of its own, or an effect of the model. If nothing of that kind, what logs disagree about besides all
+/// that was found (`stack`).
+fn disagreements(
+    problem: &Problem,
+    model: &[usize],
+    stack: &[usize],
+    candidates: &[usize],
+    best: Option<&Screened>,
+) -> (Vec<Disagreement>, bool) {
+    if problem.parts.len() < 2 {
+        return (Vec::new(), false);
+    }
+    let slots = problem.slots.as_slice();
+    let without = |slot: usize| -> Vec<usize> { model.iter().copied().filter(|s| *s != slot).collect() };
+    let of_model: Vec<Differing> = model
+        .par_iter()
+        .filter_map(|slot| agreement::differing(problem, &indices(slots, &without(*slot)), *slot, model.len()))
+        .collect();
+    let differing = |on: &[usize]| -> Vec<Differing> {
+        let fitted = indices(slots, on);
+        let asked: Vec<usize> = candidates.iter().copied().filter(|s| !on.contains(s)).collect();
+        asked
+            .par_iter()
+            .filter_map(|slot| agreement::differing(problem, &fitted, *slot, asked.len()))
+            .collect()
+    };
+    // Only the one that explains most: candidates that look like it would all be named.
+    let most = |found: Vec<Differing>| {
+        let wild = found.into_iter().filter(|d| d.wild() && d.gain > 0.0);
+        wild.max_by(|a, b| a.gain.total_cmp(&b.gain))
+    };
+    let own = best.and_then(|best| best.differing.clone());
+    let wanted = best.map_or(0.0, |best| CLEARLY_MORE * best.gain);
+    // What logs disagree about in the model leaves traces that other effects could explain log by log.
+    let offered = of_model.is_empty().then(|| most(differing(model))).flatten();
+    let more = offered.filter(|d| d.gain > wanted);
+    let spoilt = more.is_some() || of_model.iter().any(Differing::wild);
+    let mut found: Vec<Disagreement> = of_model.into_iter().flat_map(|d| d.logs).collect();
+    found.extend(more.or(own).map_or_else(Vec::new, |d| d.logs));
+    if found.is_empty() && stack.len() > model.len() {
+        found = most(differing(stack)).map_or_else(Vec::new, |d| d.logs);
+    }
+    (found, spoilt)
 }
 
 fn indices(slots: &[Slot], chosen: &[usize]) -> Vec<usize> {
@@ -83,9 +136,9 @@ fn weigh_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[u
 }
 
 /// Judges a weighed candidate; where a search went before, each of its trials counts.
-fn judge(problem: &Problem, slots: &[Slot], weighed: Weighed) -> Screened {
+fn judge(problem: &Problem, slots: &[Slot], fitted: &[usize], weighed: Weighed) -> Screened {
     let slot = weighed.so_far().slot;
-    let mut screened = weighed.judged(problem, &indices(slots, &[slot]));
+    let mut screened = weighed.judged(problem, fitted, &indices(slots, &[slot]));
     screened.p_value = (screened.p_value * slots[slot].tried as f64).min(1.0);
     screened
 }
@@ -93,7 +146,9 @@ fn judge(problem: &Problem, slots: &[Slot], weighed: Weighed) -> Screened {
 /// Screens all candidates on top of a model: those that passed first, each group by held-out gain.
 fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> (Vec<Screened>, Vec<f64>) {
     let (weighed, tried) = weigh_all(problem, slots, model, candidates);
-    let mut screened: Vec<Screened> = weighed.into_par_iter().map(|w| judge(problem, slots, w)).collect();
+    let fitted = indices(slots, model);
+    let judge = |w| judge(problem, slots, &fitted, w);
+    let mut screened: Vec<Screened> = weighed.into_par_iter().map(judge).collect();
     let passed = |s: &Screened| passes(s, s.p_value * tried);
     screened.sort_by(|a, b| {
         passed(b)
@@ -108,11 +163,12 @@ fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[
 /// The best candidate that passes on top of a model; none below it is judged.
 fn best_of(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> Option<usize> {
     let (mut weighed, tried) = weigh_all(problem, slots, model, candidates);
+    let fitted = indices(slots, model);
     weighed.sort_by(|a, b| b.so_far().gain.total_cmp(&a.so_far().gain));
     weighed
         .into_iter()
         .filter(|w| promising(w.so_far()))
-        .map(|w| judge(problem, slots, w))
+        .map(|w| judge(problem, slots, &fitted, w))
         .find(|s| passes(s, s.p_value * tried))
         .map(|s| s.slot)
 }
@@ -127,9 +183,9 @@ fn promising(s: &Screened) -> bool {
     s.testable && s.gain > 0.0 && s.held_out.1 < s.held_out.0
 }
 
-/// True if a candidate is significant, of a size that sensors have, and both halves of the log agree about it.
+/// True if a candidate is significant, of a size that sensors have, and both halves of the log and all logs agree about it.
 pub fn passes(s: &Screened, adjusted: f64) -> bool {
-    significant(s, adjusted) && s.stable && s.plausible
+    significant(s, adjusted) && s.stable && s.plausible && s.agreed()
 }
 
 /// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from.
@@ -183,7 +239,9 @@ pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize]) -> Verdi
         }
     }
 
+    let (disagreements, spoilt) = disagreements(problem, model, &stack, candidates, passing.first().copied());
     let kind = match passing.first() {
+        _ if spoilt => Kind::Unknown,
         None if unexplained.is_empty() && !screened.iter().zip(&adjusted).any(|(s, a)| significant(s, *a)) => {
             Kind::Adequate
         }
@@ -213,5 +271,7 @@ pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize]) -> Verdi
         correlations,
         unexplained,
         path,
+        disagreements,
+        spoilt,
     }
 }

@@ -155,6 +155,7 @@ impl PyProblem {
             item.set_item("testable", s.testable)?;
             item.set_item("stable", s.stable)?;
             item.set_item("plausible", s.plausible)?;
+            item.set_item("agreed", s.agreed())?;
             item.set_item("passed", verdict::passes(s, *p))?;
             item.set_item("parameters", s.parameters.clone())?;
             list.append(item)?;
@@ -172,6 +173,19 @@ impl PyProblem {
             unexplained.append(item)?;
         }
         out.set_item("unexplained", unexplained)?;
+        let disagreements = PyList::empty(py);
+        for d in &v.disagreements {
+            let item = PyDict::new(py);
+            item.set_item("slot", d.slot)?;
+            item.set_item("log", d.log)?;
+            item.set_item("own", &d.own)?;
+            item.set_item("others", &d.others)?;
+            item.set_item("p_value", d.p_value)?;
+            item.set_item("wild", d.wild)?;
+            disagreements.append(item)?;
+        }
+        out.set_item("disagreements", disagreements)?;
+        out.set_item("spoilt", v.spoilt)?;
         Ok(out)
     }
 
