@@ -204,26 +204,23 @@ def test_logs_of_one_sensor_agree_whatever_their_noise():
         acc=SensorNoise(0.02, coloured=0.02, correlation_time=0.3),
         gyr=SensorNoise(8.7e-4, random_walk=3e-5),
     )
-    for first in range(0, 6, 3):
-        logs = [handheld(SCALE, seed, 30.0, noise=noise, noise_in_metadata=False) for seed in range(first, first + 3)]
-        answer = asked(logs)
-        assert (answer.verdict, answer.best, answer.disagrees) == ("missing", "gyr.scale", ())
-        assert asked(logs, "gyr.scale").disagrees == ()
+    logs = [handheld(SCALE, seed, 20.0, noise=noise, noise_in_metadata=False) for seed in range(3)]
+    answer = asked(logs)
+    assert (answer.verdict, answer.best, answer.disagrees) == ("missing", "gyr.scale", ())
+    assert asked(logs, "gyr.scale").disagrees == ()
 
 
 def test_commands_take_several_logs(capsys, tmp_path):
     paths = [tmp_path / name for name in ("a.parquet", "b.parquet", "c.parquet")]
     for k, path in enumerate(paths):
         handheld({"gyr.bias": {"x": 0.01 * (k + 1)}} | (SCALE if k == 2 else {}), k).write(path)
-    code, out, err = run(capsys, "diagnose", *paths[:2], "--json", "-", "--html", tmp_path / "page.html")
+    code, out, err = run(capsys, "diagnose", *paths[:2], "--json", "-")
     assert (code, err) == (0, [])
     answer = strict_json(out)
     assert (answer["verdict"], answer["best"]) == ("missing", "gyr.bias")
     assert [log["file"] for log in answer["candidates"][0]["logs"]] == ["a.parquet", "b.parquet"]
     model = tmp_path / "model.toml"
-    code, out, err = run(capsys, "add", "gyr.bias", *paths, "-o", model)
-    assert (code, err) == (0, [])
-    code, out, err = run(capsys, "fit", *paths, "--effects", "gyr.bias")
+    code, out, err = run(capsys, "fit", *paths, "--effects", "gyr.bias", "-o", model)
     assert (code, err) == (0, [])
     assert "What each log has for itself" in out
     code, out, err = run(capsys, "ladder", *paths, "--model", model, "--html", tmp_path / "page.html")

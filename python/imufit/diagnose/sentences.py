@@ -93,7 +93,7 @@ def with_disagreements(text: str, found: Sequence[Disagreement], *, spoilt: bool
 
 
 def _differences(found: Sequence[Disagreement]) -> str:
-    """What each log says; of two that differ from each other it is said once."""
+    """Say what each log says; of two that differ from each other it is said once."""
     first = found[0]
     if len(found) == 2 and found[1].value == first.others:
         return str(first).replace("the others", found[1].file)

@@ -316,11 +316,11 @@ class Diagnosis:
         return Table("Not explained by any effect", ("channel", "covariate", "shape", ">share", ">mostly at"), rows)
 
     def disagreement_table(self) -> Table:
-        """Logs that disagree; without rows where all agree."""
+        """Return the logs that disagree; without rows where all agree."""
         return disagreement_table(self.disagrees)
 
     def log_table(self) -> Table:
-        """What each of several logs has for itself; without rows for one log."""
+        """Return what each of several logs has for itself; without rows for one log."""
         return log_table(self.logs)
 
     def tables(self) -> tuple[Table, ...]:
