@@ -19,15 +19,16 @@ class Fit:
 
     parameters = BIAS
     ratio = 1.52
+    by_log = ()
 
-    def compare(self, log, progress):
+    def compare(self, log=None, progress=None):
         progress(1, 1, "compare")
         return comparison()
 
-    def diagnose(self, log, progress):
+    def diagnose(self, log=None, progress=None):
         return diagnosis()
 
-    def add(self, effect, log, progress):
+    def add(self, effect, log=None, progress=None):
         result = addition()
         object.__setattr__(result, "fit", self)
         return result

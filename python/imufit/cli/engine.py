@@ -22,6 +22,11 @@ def open_log(path: Path, mapping: Sequence[str] = ()) -> Any:
     return open_log(path, mapping=parse_mapping(*mapping) or None)
 
 
+def open_logs(paths: Sequence[Path], mapping: Sequence[str] = ()) -> list[Any]:
+    """Open logs of one sensor; `mapping` as for `open_log`."""
+    return [open_log(path, mapping) for path in paths]
+
+
 def read_log(path: Path, mapping: Sequence[str] = ()) -> Log:
     """Read a whole log into memory; `mapping` as for `open_log`."""
     from imufit.log import parse_mapping, read  # noqa: PLC0415
@@ -50,11 +55,11 @@ def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
     return imufit.SensorModel.load(path) if path is not None else imufit.SensorModel(list(effects))
 
 
-def ladder(log: Any, model: Any, progress: Progress) -> Ladder:
+def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     """Repeat diagnose and add until nothing is missing."""
     from imufit.diagnose.ladder import ladder  # noqa: PLC0415
 
-    return ladder(log, model=model, progress=progress)
+    return ladder(logs, model=model, progress=progress)
 
 
 def catalogue() -> list[EffectCard]:

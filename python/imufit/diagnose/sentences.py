@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from imufit.figures import quantity
-from imufit.results import Candidate, EffectCard, Parameter, Unexplained
+from imufit.results import Candidate, Disagreement, EffectCard, Parameter, Unexplained
 
 
 def _capital(text: str) -> str:
@@ -76,6 +76,28 @@ def verdict(
         )
     text = f"{best.effect} is missing. {best.explanation}"
     return f"{text} Apart from it, {left}." if left else text
+
+
+def with_disagreements(text: str, found: Sequence[Disagreement], *, spoilt: bool) -> str:
+    """Put logs that disagree into the answer: in its place where they spoil it, else after it."""
+    about = list(dict.fromkeys(item.effect for item in found))
+    if spoilt:
+        about = [key for key in about if any(item.wild for item in found if item.effect == key)][:1]
+        said = "The logs differ too much about {} for it to be a property of the sensor: {}."
+        text = ""
+    else:
+        said = "The logs differ about {}: {}."
+    for key in about:
+        text += " " + said.format(key, _differences([item for item in found if item.effect == key]))
+    return text.strip()
+
+
+def _differences(found: Sequence[Disagreement]) -> str:
+    """Say what each log says; of two that differ from each other it is said once."""
+    first = found[0]
+    if len(found) == 2 and found[1].value == first.others:
+        return str(first).replace("the others", found[1].file)
+    return "; ".join(map(str, found))
 
 
 def experiment(best: EffectCard, rivals: Sequence[EffectCard]) -> str:

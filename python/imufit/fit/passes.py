@@ -117,8 +117,8 @@ class Passes:
             raise InputError("no sensor of the log has a sample", file=log.path)
         return facts, dict(zip(["temp", *self.covariates], known / log.n, strict=True))
 
-    def ranges(self) -> dict[str, float]:
-        """Where readings of accelerometer and gyroscope may be cut off, m/s^2 and rad/s; none where no reading is."""
+    def ranges(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Where readings of accelerometer and gyroscope may be cut off, and their largest readings, m/s^2 and rad/s."""
         ends = {sensor: RangeEnd() for sensor in ("acc", "gyr")}
         for chunk in self.log.chunks(CHUNK_ROWS, 0):
             for sensor, end in ends.items():
@@ -130,10 +130,9 @@ class Passes:
         for sensor, end in ends.items():
             known = told[sensor]
             value = known if isinstance(known, int | float) and known > 0.0 else end.end()
-            # A reading beyond it shows that it was no end.
-            if value is not None and end.largest <= value * (1.0 + 1e-6):
+            if value is not None:
                 found[sensor] = float(value)
-        return found
+        return found, {sensor: end.largest for sensor, end in ends.items() if end.largest > 0.0}
 
     def _rig(self) -> tuple[int, list[float]] | None:
         """Axis of a one-axis rig and its attitude at the angle zero; None for a log of anything else."""

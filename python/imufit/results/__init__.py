@@ -7,8 +7,10 @@ from imufit.results.addition import Addition
 from imufit.results.attitude import AttitudeBins, AttitudeComparison, AttitudeDependence
 from imufit.results.comparison import ChannelResidual, Comparison, Panel, Spectrum, Where
 from imufit.results.diagnosis import Candidate, Diagnosis, Rival, Unexplained
+from imufit.results.disagreement import Disagreement, Without
 from imufit.results.effect_card import EffectCard
 from imufit.results.ladder import Ladder, Step
+from imufit.results.log_parameters import LogParameters
 from imufit.results.parameter import Parameter
 from imufit.results.table import Table
 from imufit.results.tilt import Mark, TiltComparison, TiltFigures
@@ -22,8 +24,10 @@ __all__ = [
     "ChannelResidual",
     "Comparison",
     "Diagnosis",
+    "Disagreement",
     "EffectCard",
     "Ladder",
+    "LogParameters",
     "Mark",
     "Panel",
     "Parameter",
@@ -35,4 +39,5 @@ __all__ = [
     "TiltFigures",
     "Unexplained",
     "Where",
+    "Without",
 ]

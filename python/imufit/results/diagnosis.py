@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
+from imufit.results.disagreement import Disagreement, Without, disagreement_table
 from imufit.results.json_value import json_value
+from imufit.results.log_parameters import LogParameters, log_table, logs_json
 from imufit.results.parameter import Parameter, by_name, in_words
 from imufit.results.table import Table, html, page
 
@@ -72,6 +74,8 @@ class Candidate:
         ``passed``, ``not significant`` or ``not testable here``.
     minimal_detectable : dict
         Smallest detectable (value, unit) by parameter.
+    logs : tuple of LogParameters
+        Of several logs, where each has its own parameters of this effect; `parameters` are then their means.
     """
 
     effect: str
@@ -86,6 +90,7 @@ class Candidate:
     explanation: str
     status: str
     minimal_detectable: dict[str, tuple[float, str]]
+    logs: tuple[LogParameters, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one candidate; gain, status and smallest detectable sizes besides."""
@@ -105,6 +110,11 @@ class Candidate:
                 name: {"value": json_value(value), "unit": unit}
                 for name, (value, unit) in self.minimal_detectable.items()
             },
+            **(
+                {"logs": [{"file": log.file, "parameters": by_name(log.parameters)} for log in self.logs]}
+                if self.logs
+                else {}
+            ),
         }
 
     @property
@@ -192,6 +202,12 @@ class Diagnosis:
         The result in words.
     notes : tuple of str
         What the reader should know about these figures.
+    logs : tuple of LogParameters
+        Of several logs: how far each is above its noise floor, and the model's parameters that it has for itself.
+    disagrees : tuple of Disagreement
+        Logs that have another value of an effect than the others.
+    without : tuple of Without
+        What the answer is without logs that disagree so much that there is none with them.
     """
 
     verdict: str
@@ -203,6 +219,9 @@ class Diagnosis:
     experiment: str | None
     sentence: str
     notes: tuple[str, ...]
+    logs: tuple[LogParameters, ...] = ()
+    disagrees: tuple[Disagreement, ...] = ()
+    without: tuple[Without, ...] = ()
 
     @property
     def best_candidate(self) -> Candidate | None:
@@ -221,6 +240,9 @@ class Diagnosis:
             "experiment": self.experiment,
             "sentence": self.sentence,
             "notes": list(self.notes),
+            **logs_json(self.logs),
+            **({"disagrees": [item.to_dict() for item in self.disagrees]} if self.logs else {}),
+            **({"without": [item.to_dict() for item in self.without]} if self.without else {}),
         }
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -293,14 +315,28 @@ class Diagnosis:
         )
         return Table("Not explained by any effect", ("channel", "covariate", "shape", ">share", ">mostly at"), rows)
 
+    def disagreement_table(self) -> Table:
+        """Return the logs that disagree; without rows where all agree."""
+        return disagreement_table(self.disagrees)
+
+    def log_table(self) -> Table:
+        """Return what each of several logs has for itself; without rows for one log."""
+        return log_table(self.logs)
+
     def tables(self) -> tuple[Table, ...]:
         """Every table, most important first."""
-        return (self.candidate_table(), self.unexplained_table())
+        return (
+            self.candidate_table(),
+            self.unexplained_table(),
+            self.disagreement_table(),
+            self.log_table(),
+        )
 
     def sentences(self) -> list[str]:
         """Verdict, result, next experiment and notes."""
         experiment = f"Next: {self.experiment}" if self.experiment else ""
-        return [f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}", experiment, *self.notes]
+        verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
+        return [verdict, *(f"{item}. {item.sentence}" for item in self.without), experiment, *self.notes]
 
     def _repr_html_(self) -> str:
         return html(self.sentences(), self.tables())

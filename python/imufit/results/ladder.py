@@ -10,6 +10,7 @@ from imufit.results.addition import surprise
 from imufit.results.comparison import Comparison
 from imufit.results.diagnosis import VERDICTS, Diagnosis
 from imufit.results.json_value import json_value
+from imufit.results.log_parameters import logs_json
 from imufit.results.parameter import by_effect
 from imufit.results.table import Table, html, page
 
@@ -106,6 +107,8 @@ class Ladder:
             "experiment": self.diagnosis.experiment,
             "sentence": self.sentence,
             "parameters": by_effect(getattr(self.fit, "parameters", ()) or ()),
+            **logs_json(self.diagnosis.logs),
+            **({"disagrees": [item.to_dict() for item in self.diagnosis.disagrees]} if self.diagnosis.logs else {}),
         }
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -151,7 +154,12 @@ class Ladder:
 
     def tables(self) -> tuple[Table, ...]:
         """Every table, most important first."""
-        return (self.step_table(), self.diagnosis.unexplained_table())
+        return (
+            self.step_table(),
+            self.diagnosis.unexplained_table(),
+            self.diagnosis.disagreement_table(),
+            self.diagnosis.log_table(),
+        )
 
     def sentences(self) -> list[str]:
         """Verdict, result, attitude, warnings, next experiment."""
@@ -162,7 +170,8 @@ class Ladder:
         )
         attitude = "" if self.attitude is None else self.attitude.sentence
         verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
-        return [verdict, result, attitude, *self.warnings(), experiment]
+        without = [f"{item}. {item.sentence}" for item in self.diagnosis.without]
+        return [verdict, *without, result, attitude, *self.warnings(), experiment]
 
     def _repr_html_(self) -> str:
         return html(self.sentences(), self.tables())

@@ -8,7 +8,7 @@ use imufit_model::sensor_model::Slot;
 
 use crate::problem::Problem;
 use crate::screening::{self, Screened};
-use crate::verdict::{indices, judge, passes, promising, significant, weigh_all};
+use crate::selection::{indices, judge, passes, promising, significant, weigh_all};
 
 /// More effects than this are no explanation.
 const MOST: usize = 4;
@@ -77,11 +77,12 @@ impl Search<'_> {
         let taken = |c: &usize| stack.contains(c) || dropped.contains(c);
         let left: Vec<usize> = self.candidates.iter().copied().filter(|c| !taken(c)).collect();
         let (mut weighed, tried) = weigh_all(self.problem, self.slots, &stack, &left);
+        let fitted = indices(self.slots, &stack);
         weighed.sort_by(|a, b| b.so_far().gain.total_cmp(&a.so_far().gain));
         weighed
             .into_iter()
             .filter(|w| promising(w.so_far()))
-            .map(|w| judge(self.problem, self.slots, w))
+            .map(|w| judge(self.problem, self.slots, &fitted, w))
             .find(|s| s.plausible && significant(s, s.p_value * tried))
             .map(|s| s.slot)
     }
@@ -96,7 +97,7 @@ impl Search<'_> {
         if !promising(weighed.so_far()) {
             return None;
         }
-        let judged = judge(self.problem, self.slots, weighed);
+        let judged = judge(self.problem, self.slots, &fitted, weighed);
         let adjusted = (judged.p_value * self.candidates.len() as f64).min(1.0);
         Some((judged, adjusted))
     }
