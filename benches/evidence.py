@@ -27,9 +27,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from imufit import Log, LogStream, SensorModel, _imufit, simulate
-from imufit.fit.analysis import BLOCKS, _candidates
+from imufit import Log, LogStream, _imufit, simulate
+from imufit.fit.log_evidence import BLOCKS
 from imufit.fit.passes import CHANNELS, Passes, chunk_arrays
+from imufit.fit.surveyed_log import SurveyedLog
 from imufit.progress import silent
 
 AXES = range(3)
@@ -131,7 +132,7 @@ def ours(log: Log) -> tuple[Callable[[], _imufit.Evidence], float, int]:
     start = time.perf_counter()
     facts, coverage = passes.survey()
     survey = time.perf_counter() - start
-    candidates, _ = _candidates(SensorModel(), facts, coverage)
+    candidates = SurveyedLog.of(passes, facts, coverage).effects
 
     def take() -> _imufit.Evidence:
         evidence = _imufit.Evidence(facts, [], list(candidates.values()), BLOCKS, [[] for _ in CHANNELS])
@@ -205,7 +206,7 @@ def stream(path: Path) -> None:
     log = LogStream(path)
     passes = Passes(log, silent)
     facts, coverage = passes.survey()
-    candidates, _ = _candidates(SensorModel(), facts, coverage)
+    candidates = SurveyedLog.of(passes, facts, coverage).effects
     evidence = _imufit.Evidence(facts, [], list(candidates.values()), BLOCKS, [[] for _ in CHANNELS])
     passes.evidence(evidence, facts, "")
     status = Path("/proc/self/status").read_text(encoding="ascii")

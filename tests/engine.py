@@ -101,4 +101,4 @@ def pieces(log: Log, covariates: Sequence[str], cuts: Sequence[int], margin: int
 
 def analysis_of(log: Log, *effects: str) -> Analysis:
     """Evidence of a log around the model of these effects, parameters zero."""
-    return Analysis.of(SensorModel(effects), log, silent)
+    return Analysis.of(SensorModel(effects), (log,), silent)

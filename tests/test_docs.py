@@ -59,7 +59,7 @@ def test_index_links_every_page():
 @pytest.mark.parametrize(
     ("file", "constant", "words"),
     [
-        ("rust/inference/src/verdict.rs", "ALPHA", "(Bonferroni) is at most {}, and"),
+        ("rust/inference/src/selection.rs", "ALPHA", "(Bonferroni) is at most {}, and"),
         ("rust/inference/src/verdict.rs", "NAMED_SHARE", "takes at least {:.0%} of its gain and"),
         ("rust/inference/src/verdict.rs", "LOOK_AHEAD", "up to {}, re-ranked"),
         ("rust/inference/src/held_out.rs", "FOLDS", "{} folds, each of"),
@@ -68,7 +68,7 @@ def test_index_links_every_page():
         ("rust/fit/src/bins.rs", "BINS", "up to {} bins"),
         ("rust/fit/src/whitening.rs", "MAX_ORDER", "filter** of order 0 to {}"),
         ("rust/model/src/bandwidth.rs", "TOLERANCE", "{}\\,\\sigma_{{\\text{{ref}}}}"),
-        ("python/imufit/fit/analysis.py", "BLOCKS", "B = {} blocks"),
+        ("python/imufit/fit/log_evidence.py", "BLOCKS", "B = {} blocks"),
         ("python/imufit/diagnose/ladder.py", "MATTERS", "at least {:.1%} off the held-out error"),
     ],
 )

@@ -24,11 +24,11 @@ def log():
 @pytest.fixture(scope="module")
 def checked(log):
     """A call that checks an effect on rows 200 to 800 of the log, at given parameters."""
-    analysis = analysis_of(log)
-    chunk = pieces(log, analysis.passes.covariates, [200, 800], analysis.facts.margin)[1]
+    surveyed = analysis_of(log).logs[0].surveyed
+    chunk = pieces(log, surveyed.passes.covariates, [200, 800], surveyed.facts.margin)[1]
 
     def check(effect_id: str, at: list[float]) -> None:
-        find_effect(effect_id).check(chunk, analysis.facts, at)
+        find_effect(effect_id).check(chunk, surveyed.facts, at)
 
     return check
 

@@ -273,3 +273,35 @@ def test_a_mount_that_gives_way_steadily_is_no_knock() -> None:
 def test_effects_of_time_and_mount_are_no_faults(scenario: str, effect: str) -> None:
     log = simulate(scenario, {effect: None}, seed=6, duration=30.0, size=3.0, realistic=True).to_log()
     assert SensorModel().compare(log).data_faults == ()
+
+
+def test_of_several_logs_the_faulty_one_is_named_and_the_answer_stands_without_it() -> None:
+    sound = [simulate("handheld", {"gyr.scale": {"x": 0.01}}, seed=seed, duration=12.0).to_log() for seed in (2, 3)]
+    turned = faulty("handheld", "mount")
+    found = SensorModel().fit([sound[0], turned, sound[1]]).diagnose()
+    assert (found.verdict, found.best) == ("unknown", None)
+    assert [(each.fault, each.file) for each in found.data_faults if each.spoils] == [("mount", "log 2")]
+    assert "The data of log 2 are at fault" in found.sentence
+    (rest,) = found.without
+    assert (rest.files, rest.verdict, rest.best) == (("log 2",), "missing", "gyr.scale")
+    # Of one log there is no file to name.
+    assert "file" not in diagnosed(turned).to_dict()["data_faults"][0]
+
+
+def test_samples_left_out_of_one_of_several_logs_do_no_harm() -> None:
+    stuck = with_fault(simulate("handheld", {"gyr.scale": {"x": 0.01}}, seed=2, duration=12.0), "stuck").to_log()
+    sound = simulate("handheld", {"gyr.scale": {"x": 0.01}}, seed=3, duration=12.0).to_log()
+    found = imufit.ladder([sound, stuck])
+    assert found.model == ("gyr.scale",)
+    assert found.verdict == "adequate"
+    assert [(each.fault, each.file) for each in found.diagnosis.data_faults] == [("stuck", "log 2")]
+    assert "log 2" in " ".join(found.sentences())
+
+
+def test_a_knock_in_one_of_several_logs_is_named_with_its_log() -> None:
+    logs = [simulate("handheld", {}, seed=5, duration=20.0).to_log()]
+    logs.append(with_fault(simulate("handheld", {}, seed=7, duration=20.0), "knock").to_log())
+    found = SensorModel().fit(logs).diagnose()
+    assert [(each.fault, each.file, each.spoils) for each in found.data_faults] == [("knock", "log 2", True)]
+    assert found.verdict == "unknown"
+    assert [each.verdict for each in found.without] == ["adequate"]

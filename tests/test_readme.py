@@ -15,6 +15,7 @@ PAGES = (
     "README.md",
     "docs/logs.md",
     "docs/own_effect.md",
+    "docs/several.md",
     "docs/calibration.md",
     "docs/replay.md",
     "docs/tuning.md",

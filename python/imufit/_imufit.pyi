@@ -25,6 +25,7 @@ __all__ = [
     "allan_freedom",
     "attitude_errors",
     "attitude_rmse",
+    "best_trial",
     "block_scatter",
     "built_in_effects",
     "concerns_reference",
@@ -250,6 +251,7 @@ class Facts:
     @property
     def reference_noise(self) -> tuple[float, float]: ...
     def with_ranges(self, acc: float | None = None, gyr: float | None = None) -> Facts: ...
+    def with_bins_of(self, others: Sequence[Facts]) -> Facts: ...
     def with_means(
         self, temperature_mean: float | None = None, covariate_means: Mapping[str, float] | None = None
     ) -> Facts: ...
@@ -305,7 +307,8 @@ class Profile:
         trials: Sequence[Sequence[float]],
     ) -> Profile: ...
     def add(self, chunk: _Chunk) -> None: ...
-    def best(self) -> tuple[int, list[float], float] | None: ...
+
+def best_trial(profiles: Sequence[Profile]) -> tuple[int, list[float], float] | None: ...
 
 @final
 class Evidence:
@@ -355,15 +358,25 @@ class _Screened(TypedDict):
     expected_ratio: float
     testable: bool
     stable: bool
+    agreed: bool
     passed: bool
     parameters: list[tuple[float, float]]
 
 class _Dependence(TypedDict):
     channel: str
     covariate: str
+    log: int | None
     gain: float
     p_value: float
     shape: str
+
+class _Disagreement(TypedDict):
+    slot: int
+    log: int
+    own: list[tuple[float, float]]
+    others: list[tuple[float, float]]
+    p_value: float
+    wild: bool
 
 class _Verdict(TypedDict):
     verdict: str
@@ -373,6 +386,8 @@ class _Verdict(TypedDict):
     correlations: list[tuple[int, int, float]]
     screened: list[_Screened]
     unexplained: list[_Dependence]
+    disagreements: list[_Disagreement]
+    spoilt: bool
 
 class _ChannelResidual(TypedDict):
     channel: str
@@ -398,10 +413,17 @@ class _Residual(TypedDict):
 
 @final
 class Problem:
-    def __new__(cls, white: Evidence, raw: Evidence, variance: Sequence[float], floors: Sequence[float]) -> Problem: ...
+    def __new__(
+        cls,
+        logs: Sequence[tuple[Evidence, Evidence, Sequence[float], Sequence[float], Sequence[int]]],
+        own: Sequence[bool],
+    ) -> Problem: ...
+    @property
+    def blocks(self) -> int: ...
+    def places(self, log: int) -> list[int]: ...
     def estimate(self, slots: Sequence[int]) -> _Estimate: ...
     def diagnose(self, model: Sequence[int], candidates: Sequence[int]) -> _Verdict: ...
-    def residual(self, step: _Numbers) -> _Residual: ...
+    def residual(self, step: _Numbers, log: int = 0) -> _Residual: ...
 
 def saturate(evidence: Evidence) -> tuple[_Array, list[float]]: ...
 

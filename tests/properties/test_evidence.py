@@ -43,7 +43,7 @@ class Rugged:
 
     def __init__(self) -> None:
         self.log = rugged_log()
-        self.analysis = analysis_of(self.log)
+        self.analysis = analysis_of(self.log).logs[0]
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def rugged():
 
 
 def taken(analysis, filters, chunks: Iterable[dict]) -> _imufit.Evidence:
-    asked = [(effect, [0.0] * len(effect.parameters)) for effect in analysis.candidates.values()]
+    asked = [(effect, [0.0] * len(effect.parameters)) for effect in analysis.surveyed.effects.values()]
     evidence = _imufit.Evidence(analysis.facts, [], asked, BLOCKS, filters)
     for chunk in chunks:
         evidence.add(chunk)
@@ -101,7 +101,7 @@ def test_chunks_of_any_size_give_the_same_evidence(rugged, rows, extra):
 
 def test_evidence_of_different_questions_cannot_be_added():
     log = swaying(duration=5.0, noise=1.0)
-    facts = analysis_of(log).facts
+    facts = analysis_of(log).logs[0].facts
     bias, arm = ((_imufit.find_effect(key), [0.0, 0.0, 0.0]) for key in ("gyr.bias", "acc.lever_arm"))
     one = _imufit.Evidence(facts, [], [bias], BLOCKS, NO_FILTERS)
     for other in (
@@ -115,7 +115,7 @@ def test_evidence_of_different_questions_cannot_be_added():
 
 def test_evidence_around_other_parameters_cannot_be_added():
     log = swaying(duration=5.0, noise=1.0)
-    facts = analysis_of(log).facts
+    facts = analysis_of(log).logs[0].facts
     bias = _imufit.find_effect("gyr.bias")
     one, other = (_imufit.Evidence(facts, [(bias, [x, 0.0, 0.0])], [], BLOCKS, NO_FILTERS) for x in (0.0, 1.0))
     with pytest.raises(ValueError, match="different layouts"):
@@ -126,7 +126,7 @@ def test_two_recordings_of_one_sensor_add_up():
     halves = [swaying(duration=20.0, noise=1.0, seed=seed) for seed in (1, 2)]
     later = halves[1].t + halves[0].t[-1] + 30.0
     whole = concatenate([halves[0], Log(**{**vars(halves[1]), "t": later})])
-    analysis = analysis_of(whole)
+    analysis = analysis_of(whole).logs[0]
     names = analysis.passes.covariates
     both = taken(analysis, NO_FILTERS, pieces(whole, names, [], 0))
     # The gap keeps the two apart, so that each may be read without the other.
@@ -184,7 +184,7 @@ def test_a_slow_magnetometer_keeps_its_samples_when_its_noise_is_coloured(mag_ra
     coloured = simulate.SensorNoise(0.1, coloured=0.5, correlation_time=correlation_time)
     noise = Noise(mag_rate=mag_rate, mag=coloured)
     log = simulate.simulate("handheld", {}, 1, 240.0, noise=noise, noise_in_metadata=False).to_log()
-    analysis = analysis_of(log, "mag.hard_iron")
+    analysis = analysis_of(log, "mag.hard_iron").logs[0]
     index = CHANNELS.index("mag_x")
     assert analysis.filters[index]
     assert analysis.white.count(index) > 0.9 * np.isfinite(log.mag[:, 0]).sum()

@@ -11,10 +11,11 @@ from imufit.cli.arguments import (
     html_option,
     json_option,
     keep_inputs,
-    log_argument,
+    logs_argument,
     model_option,
     model_output,
     plot_option,
+    title_of,
 )
 from imufit.cli.names import check_effects
 from imufit.cli.output import Output
@@ -23,7 +24,7 @@ from imufit.cli.progress import ProgressBar
 
 @click.command(short_help="Add an effect, refit, show the error before, expected and after.")
 @click.argument("effect", metavar="EFFECT")
-@log_argument
+@logs_argument
 @model_option
 @model_output
 @json_option
@@ -31,7 +32,7 @@ from imufit.cli.progress import ProgressBar
 @plot_option
 def add(
     effect: str,
-    log: Path,
+    logs: tuple[Path, ...],
     *,
     mapping: tuple[str, ...],
     model: Path | None,
@@ -40,14 +41,17 @@ def add(
     html_file: Path | None,
     plot_file: Path | None,
 ) -> None:
-    """Add EFFECT to the model of LOG, refit, and show the held-out error before, as expected and after."""
-    keep_inputs([log], [output, json_file, html_file, plot_file])
+    """Add EFFECT to the model of LOG, refit, and show the held-out error before, as expected and after.
+
+    Several LOGs of one sensor are fitted together.
+    """
+    keep_inputs(logs, [output, json_file, html_file, plot_file])
     check_effects([effect])
     out = Output(json_file)
     with ProgressBar() as progress:
-        opened = engine.open_log(log, mapping)
+        opened = engine.open_logs(logs, mapping)
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
-        addition = fit.add(effect, log=opened, progress=progress)
+        addition = fit.add(effect, progress=progress)
     out.say(addition.sentence, bold=True)
     out.say(addition.warning)
     out.tables(addition.tables())
@@ -60,4 +64,4 @@ def add(
     if html_file is not None:
         from imufit.report import page  # noqa: PLC0415
 
-        out.html(html_file, page(addition=addition, title=f"{log.name}: {effect} added"))
+        out.html(html_file, page(addition=addition, title=f"{title_of(logs)}: {effect} added"))

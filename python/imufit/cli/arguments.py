@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -79,6 +79,28 @@ def log_argument(command: Command) -> Command:
     """Add LOG and --map."""
     command = map_option(command)
     return click.argument("log", metavar="LOG", type=EXISTING)(command)
+
+
+def logs_argument(command: Command) -> Command:
+    """Add LOG... and --map: one log, or several of one sensor."""
+    command = map_option(command)
+    return click.argument("logs", metavar="LOG...", type=EXISTING, nargs=-1, required=True, callback=_each_once)(
+        command
+    )
+
+
+def _each_once(_ctx: click.Context, _param: click.Parameter, logs: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Refuse a file that is named twice: its rows must not count twice."""
+    known = [path.resolve() for path in logs]
+    for k, path in enumerate(logs):
+        if known[k] in known[:k]:
+            raise click.UsageError(f"{str(path)!r} is named twice: each log counts once")
+    return logs
+
+
+def title_of(logs: Sequence[Path]) -> str:
+    """Return what a page about one log, or about several, is called."""
+    return logs[0].name if len(logs) == 1 else f"{logs[0].name} and {len(logs) - 1} more"
 
 
 def model_option(command: Command) -> Command:

@@ -7,19 +7,27 @@ from pathlib import Path
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import html_option, json_option, keep_inputs, log_argument, model_option, plot_option
+from imufit.cli.arguments import (
+    html_option,
+    json_option,
+    keep_inputs,
+    logs_argument,
+    model_option,
+    plot_option,
+    title_of,
+)
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 
 
 @click.command(short_help="Which effect is missing, with its expected gain.")
-@log_argument
+@logs_argument
 @model_option
 @json_option
 @html_option
 @plot_option
 def diagnose(
-    log: Path,
+    logs: tuple[Path, ...],
     *,
     mapping: tuple[str, ...],
     model: Path | None,
@@ -27,14 +35,18 @@ def diagnose(
     html_file: Path | None,
     plot_file: Path | None,
 ) -> None:
-    """Say which effect is missing in the model of LOG, or that none is, or that this log cannot tell."""
-    keep_inputs([log, model], [json_file, html_file, plot_file])
+    """Say which effect is missing in the model of LOG, or that none is, or that this log cannot tell.
+
+    Several LOGs of one sensor are asked together: effects are the same in all of them, each has its own bias and mount,
+    and a log that disagrees is named.
+    """
+    keep_inputs([*logs, model], [json_file, html_file, plot_file])
     output = Output(json_file)
     with ProgressBar() as progress:
-        opened = engine.open_log(log, mapping)
+        opened = engine.open_logs(logs, mapping)
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
-        diagnosis = fit.diagnose(opened, progress=progress)
-        comparison = fit.compare(opened, progress=progress) if html_file is not None else None
+        diagnosis = fit.diagnose(progress=progress)
+        comparison = fit.compare(progress=progress) if html_file is not None else None
     verdict, *rest = diagnosis.sentences()
     output.say(verdict, bold=True)
     output.say(*rest)
@@ -45,5 +57,5 @@ def diagnose(
     if html_file is not None:
         from imufit.report import page  # noqa: PLC0415
 
-        title = f"{log.name}: which effect is missing"
+        title = f"{title_of(logs)}: which effect is missing"
         output.html(html_file, page(comparison=comparison, diagnosis=diagnosis, title=title))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from imufit.grade import BlindGrade
     from imufit.log import Contents, Log
     from imufit.results import EffectCard, Ladder
     from imufit.simulate import Grade, Simulation, Truth
@@ -19,6 +20,11 @@ def open_log(path: Path, mapping: Sequence[str] = ()) -> Any:
     from imufit.log import open_log, parse_mapping  # noqa: PLC0415
 
     return open_log(path, mapping=parse_mapping(*mapping) or None)
+
+
+def open_logs(paths: Sequence[Path], mapping: Sequence[str] = ()) -> list[Any]:
+    """Open logs of one sensor; `mapping` as for `open_log`."""
+    return [open_log(path, mapping) for path in paths]
 
 
 def read_log(path: Path, mapping: Sequence[str] = ()) -> Log:
@@ -49,11 +55,11 @@ def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
     return imufit.SensorModel.load(path) if path is not None else imufit.SensorModel(list(effects))
 
 
-def ladder(log: Any, model: Any, progress: Progress) -> Ladder:
+def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     """Repeat diagnose and add until nothing is missing."""
     from imufit.diagnose.ladder import ladder  # noqa: PLC0415
 
-    return ladder(log, model=model, progress=progress)
+    return ladder(logs, model=model, progress=progress)
 
 
 def catalogue() -> list[EffectCard]:
@@ -327,8 +333,15 @@ def grade_answer(truth: Truth, answer: Mapping[str, Any]) -> Grade:
     return grade(truth, answer)
 
 
-def grade_blind(*, logs: int, nothing: int, seed: int, scenarios: Sequence[str], progress: Progress) -> Any:
-    """Run the blind protocol on many hidden logs."""
-    from imufit.grade import SCENARIOS, grade  # noqa: PLC0415
+def blind_sets() -> Mapping[str, str]:
+    """Return the sets of blind logs with what they hide."""
+    from imufit.grade import SETS  # noqa: PLC0415
 
-    return grade(logs=logs, nothing=nothing, seed=seed, scenarios=scenarios or SCENARIOS, progress=progress)
+    return {name: blind_set.title for name, blind_set in SETS.items()}
+
+
+def grade_blind(*, sets: Sequence[str], logs: int, seed: int, processes: int | None, progress: Progress) -> BlindGrade:
+    """Run the blind protocol on many hidden logs."""
+    from imufit.grade import grade  # noqa: PLC0415
+
+    return grade(sets, logs=logs, seed=seed, processes=processes, progress=progress)

@@ -7,14 +7,14 @@ from pathlib import Path
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import effects_from_option, json_option, keep_inputs, log_argument, model_output, plot_option
+from imufit.cli.arguments import effects_from_option, json_option, keep_inputs, logs_argument, model_output, plot_option
 from imufit.cli.names import check_effects
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 
 
 @click.command(short_help="Fit a stack of effects.")
-@log_argument
+@logs_argument
 @click.option(
     "--effects", required=True, multiple=True, metavar="ID,ID,...", help="Effects of the model, in any order."
 )
@@ -23,7 +23,7 @@ from imufit.cli.progress import ProgressBar
 @json_option
 @plot_option
 def fit(
-    log: Path,
+    logs: tuple[Path, ...],
     *,
     mapping: tuple[str, ...],
     effects: tuple[str, ...],
@@ -31,11 +31,12 @@ def fit(
     json_file: Path | None,
     plot_file: Path | None,
 ) -> None:
-    """Fit the parameters of the given effects to LOG."""
+    """Fit the parameters of the given effects to LOG, or to several LOGs of one sensor together."""
     from imufit.figures import quantity  # noqa: PLC0415
+    from imufit.results.log_parameters import log_table  # noqa: PLC0415
     from imufit.results.parameter import parameter_table, plot_parameters  # noqa: PLC0415
 
-    keep_inputs([log], [output, json_file, plot_file])
+    keep_inputs(logs, [output, json_file, plot_file])
     names = [name.strip() for text in effects for name in text.split(",") if name.strip()]
     if not names:
         raise click.UsageError("--effects names no effect")
@@ -45,9 +46,10 @@ def fit(
     check_effects(names)
     out = Output(json_file)
     with ProgressBar() as progress:
-        fitted = engine.sensor_model(names).fit(engine.open_log(log, mapping), progress=progress)
+        fitted = engine.sensor_model(names).fit(engine.open_logs(logs, mapping), progress=progress)
     out.say(f"{' + '.join(names)}: residual {quantity.ratio(fitted.ratio)} times the noise floor.", bold=True)
     out.table(parameter_table(fitted.parameters, "Fitted parameters"))
+    out.table(log_table(fitted.by_log))
     if output is not None:
         fitted.save(output)
         out.wrote(output)

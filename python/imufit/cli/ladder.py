@@ -11,24 +11,25 @@ from imufit.cli.arguments import (
     html_option,
     json_option,
     keep_inputs,
-    log_argument,
+    logs_argument,
     model_option,
     model_output,
     plot_option,
+    title_of,
 )
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 
 
 @click.command(short_help="Repeat diagnose and add until nothing is missing.")
-@log_argument
+@logs_argument
 @model_option
 @model_output
 @json_option
 @html_option
 @plot_option
 def ladder(
-    log: Path,
+    logs: tuple[Path, ...],
     *,
     mapping: tuple[str, ...],
     model: Path | None,
@@ -37,11 +38,14 @@ def ladder(
     html_file: Path | None,
     plot_file: Path | None,
 ) -> None:
-    """Add the missing effects one by one to the model of LOG, and show the held-out error fall."""
-    keep_inputs([log], [output, json_file, html_file, plot_file])
+    """Add the missing effects one by one to the model of LOG, and show the held-out error fall.
+
+    Several LOGs of one sensor make one ladder: effects are the same in all of them, each has its own bias and mount.
+    """
+    keep_inputs(logs, [output, json_file, html_file, plot_file])
     out = Output(json_file)
     with ProgressBar() as progress:
-        opened = engine.open_log(log, mapping)
+        opened = engine.open_logs(logs, mapping)
         start = engine.sensor_model(path=model) if model is not None else None
         result = engine.ladder(opened, start, progress)
     verdict, *rest = result.sentences()
@@ -57,4 +61,4 @@ def ladder(
     if html_file is not None:
         from imufit.report import page  # noqa: PLC0415
 
-        out.html(html_file, page(ladder=result, title=f"{log.name}: the error ladder"))
+        out.html(html_file, page(ladder=result, title=f"{title_of(logs)}: the error ladder"))

@@ -33,9 +33,8 @@ def add(fit: Fit, effect_id: str, expected: float | None = None) -> Addition:
     analysis = fit.analysis
     model = fit.model.with_effect(effect_id)
     if effect_id not in analysis.candidates:
-        reason = analysis.refused.get(effect_id) or find_effect(effect_id).not_testable(analysis.facts)
-        reason = reason or "it is fitted along already"
-        raise InputError(f"effect {effect_id} cannot be added: {reason}", file=fit.log.path)
+        reason = analysis.refusal(find_effect(effect_id)) or "it is fitted along already"
+        raise InputError(f"effect {effect_id} cannot be added: {reason}", file=fit.logs[0].path)
     if expected is None:
         slot = analysis.slots.index(effect_id)
         expected = analysis.problem.estimate([*analysis.fitted_slots, slot])["held_out"]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.diagnose.attitude import attitude_comparison
 from imufit.fit.analysis import Analysis
+from imufit.fit.log_evidence import LogEvidence
 from imufit.fit.passes import CHANNELS, UNITS
 from imufit.progress import Progress
 from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
@@ -33,7 +34,7 @@ OFF_FLOOR = 1.2
 
 
 def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
-    """Hold a fitted model against a log (default: its own), the parameters as they are.
+    """Hold a fitted model against a log (default: its own, of several the worst), the parameters as they are.
 
     Parameters
     ----------
@@ -44,11 +45,11 @@ def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
     progress : callable
         Called with (rows done, rows in all, what is being done).
     """
-    if log is None or log is fit.log:
-        analysis, step = fit.analysis, fit.estimate.step
-    else:
+    if log is not None and not any(log is known for known in fit.logs):
         return compare_model(fit.model, log, progress)
-    return _with_attitude(comparison(analysis, step), fit.model, fit.log, progress)
+    own = fit.worst if log is None else next(k for k, known in enumerate(fit.logs) if known is log)
+    found = comparison(fit.analysis, fit.estimate.step, own)
+    return _with_attitude(found, fit.model_of(own), fit.logs[own], progress)
 
 
 def compare_model(model: SensorModel, log: LogSource, progress: Progress) -> Comparison:
@@ -63,7 +64,7 @@ def compare_model(model: SensorModel, log: LogSource, progress: Progress) -> Com
     progress : callable
         Called with (rows done, rows in all, what is being done).
     """
-    analysis = Analysis.of(model, log, progress, keep_constants=True)
+    analysis = Analysis.of(model, (log,), progress, keep_constants=True)
     found = comparison(analysis, analysis.estimate_unnamed().step)
     return _with_attitude(found, model, log, progress)
 
@@ -72,12 +73,13 @@ def _with_attitude(found: Comparison, model: SensorModel, log: LogSource, progre
     return replace(found, attitude=attitude_comparison(model, log, progress=progress))
 
 
-def comparison(analysis: Analysis, step: Array) -> Comparison:
-    """Comparison of a log with the model after a step of all parameters from where the evidence was taken."""
-    facts = analysis.facts
-    result = analysis.problem.residual(step)
-    floors = analysis.floors
-    edges = np.linspace(facts.t_start, facts.t_end, analysis.raw.blocks + 1)
+def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
+    """Comparison of one log with the model after a step of all parameters from where the evidence was taken."""
+    evidence = analysis.logs[log]
+    facts = evidence.facts
+    result = analysis.problem.residual(step, log)
+    floors = evidence.floors
+    edges = np.linspace(facts.t_start, facts.t_end, evidence.raw.blocks + 1)
     channels, where, segments = [], [], []
     spans = {}
     stands_out: dict[str, bool] = {}
@@ -122,10 +124,10 @@ def comparison(analysis: Analysis, step: Array) -> Comparison:
         attitude=None,
         where=tuple(where),
         panels=tuple(panels),
-        spectra=_spectra(analysis, step),
+        spectra=_spectra(evidence, analysis.own_step(log, step)),
         segments=tuple(segments[:WORST_SEGMENTS]),
-        notes=notes(analysis),
-        data_faults=analysis.faults,
+        notes=notes(evidence),
+        data_faults=evidence.faults,
     )
 
 
@@ -156,18 +158,19 @@ def _panel(item: Mapping[str, Any], floors: list[float], facts: _imufit.Facts) -
     )
 
 
-def _spectra(analysis: Analysis, step: Array) -> tuple[Spectrum, ...]:
+def _spectra(evidence: LogEvidence, step: Array) -> tuple[Spectrum, ...]:
     """Density of the residual of each channel, averaged over stretches without a gap (Welch's method)."""
     from scipy.signal import welch  # noqa: PLC0415  only needed here
 
     sums: dict[int, list[Array]] = {}
     frequency = np.empty(0)
-    rate = 1.0 / analysis.facts.dt
+    facts = evidence.facts
+    rate = 1.0 / facts.dt
     chunks = 0
-    for arrays in analysis.passes.chunks(analysis.facts.margin, "spectrum"):
-        residuals = _imufit.evaluate(analysis.raw, arrays, step)
+    for arrays in evidence.passes.chunks(facts.margin, "spectrum"):
+        residuals = _imufit.evaluate(evidence.raw, arrays, step)
         t = arrays["t"][arrays["begin"] : arrays["end"]]
-        steady = np.diff(t, prepend=t[0]) < 1.75 * analysis.facts.dt
+        steady = np.diff(t, prepend=t[0]) < 1.75 * facts.dt
         for index, residual in enumerate(residuals):
             if residual is None:
                 continue
@@ -186,28 +189,29 @@ def _spectra(analysis: Analysis, step: Array) -> tuple[Spectrum, ...]:
             f"({UNITS[CHANNELS[index][:3]]})^2/Hz",
             frequency[1:],
             np.mean(densities, axis=0)[1:],
-            2.0 * analysis.floors[index] ** 2 / rate,
+            2.0 * evidence.floors[index] ** 2 / rate,
         )
         for index, densities in sorted(sums.items())
     )
 
 
-def notes(analysis: Analysis) -> tuple[str, ...]:
+def notes(evidence: LogEvidence) -> tuple[str, ...]:
     """Return what the reader should know about the figures of this log."""
-    out = list(analysis.passes.log.notes)
-    stated = analysis.passes.log.metadata.noise
-    for index, (floor, variance) in enumerate(zip(analysis.floors, analysis.raw_variance, strict=True)):
+    log, facts = evidence.surveyed.log, evidence.facts
+    out = list(log.notes)
+    stated = log.metadata.noise
+    for index, (floor, variance) in enumerate(zip(evidence.floors, evidence.raw_variance, strict=True)):
         if index % 3 == 0 and CHANNELS[index][:3] in stated and np.isfinite(variance):
-            group = np.sqrt(np.mean(analysis.raw_variance[index : index + 3]))
+            group = np.sqrt(np.mean(evidence.raw_variance[index : index + 3]))
             if not 1 / OFF_FLOOR < group / floor < OFF_FLOOR:
                 sensor = CHANNELS[index][:3]
                 out.append(
                     f"The stated noise of {sensor} is {floor:.3g} {UNITS[sensor]}; what no effect explains here is "
                     f"{group:.3g} {UNITS[sensor]}."
                 )
-    if analysis.facts.field_estimated and "mag" in analysis.facts.sensors:
+    if facts.field_estimated and "mag" in facts.sensors:
         out.append("The reference field was estimated from this log and is fitted along.")
-    coloured = sorted({CHANNELS[k][:3] for k, taps in enumerate(analysis.filters) if taps})
+    coloured = sorted({CHANNELS[k][:3] for k, taps in enumerate(evidence.filters) if taps})
     if coloured:
         out.append(f"The residual noise of {', '.join(coloured)} is coloured; the fit whitens it.")
     return tuple(out)

@@ -7,18 +7,22 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import t as student
+from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from imufit import _imufit
 from imufit.diagnose import sentences
+from imufit.diagnose.agreement import answers_without, answers_without_faulty, disagreements
 from imufit.diagnose.compare import notes
-from imufit.fit.analysis import BLOCKS, Analysis, Estimate
-from imufit.fit.profile import Found
+from imufit.fit.analysis import OWN, Analysis, Estimate, pooled
+from imufit.log.several import name_of
 from imufit.model.catalogue import card_of
-from imufit.results import Candidate, DataFault, Diagnosis, Parameter, Rival, Unexplained
+from imufit.results import Candidate, DataFault, Diagnosis, LogParameters, Parameter, Rival, Unexplained
 
 if TYPE_CHECKING:
     from imufit.fit import Fit
+
+Array = NDArray[np.float64]
 
 ALPHA = 0.003
 MIN_CORRELATION = 0.3
@@ -43,7 +47,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     """
     analysis = fit.analysis
     if any(fault.spoils for fault in analysis.faults):
-        return _spoilt(analysis, analysis.faults)
+        return _spoilt(fit, analysis.faults)
     ids = analysis.slots
     slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
     result = _decided_by_fits(fit, analysis.problem.diagnose(analysis.fitted_slots, slots))
@@ -60,14 +64,16 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
             analysis.candidates[ids[item["slot"]]],
             confounded.get(ids[item["slot"]], []),
             tested,
-            analysis.found.get(ids[item["slot"]]),
+            analysis,
         )
         for item in result["screened"]
     ]
     largest = max((c.gain for c in candidates if c.status == "passed"), default=0.0)
+    # A fault is one log's, an effect explains something in all of them.
+    largest /= len(analysis.logs)
     faults = tuple(replace(fault, spoils=fault.gain * BESIDE > largest) for fault in analysis.faults)
     if any(fault.spoils for fault in faults):
-        return _spoilt(analysis, faults)
+        return _spoilt(fit, faults)
     by_id = {candidate.effect: candidate for candidate in candidates}
     cards = {key: card_of(analysis.candidates[key]) for key in by_id}
     best = None if result["best"] is None else ids[result["best"]]
@@ -75,9 +81,12 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     word = result["verdict"]
     unexplained = _unexplained(analysis, fit.estimate.step, result["unexplained"])
     named = best if word in ("missing", "ambiguous") else None
+    disagrees = disagreements(analysis, result["disagreements"])
+    without = answers_without(fit, result["disagreements"], diagnose) if result["spoilt"] else ()
     sentence = sentences.verdict(
         word, by_id[best] if best else None, cards[best] if best else None, rivals, unexplained
     )
+    sentence = sentences.with_disagreements(sentence, disagrees, spoilt=result["spoilt"])
     experiment = None
     if word == "ambiguous" and best is not None:
         experiment = sentences.experiment(cards[best], [cards[rival] for rival in rivals])
@@ -90,23 +99,29 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         model=analysis.model.effects,
         experiment=experiment,
         sentence=sentence,
-        notes=notes(analysis),
-        data_faults=analysis.faults,
+        notes=_notes(analysis),
+        logs=fit.by_log,
+        disagrees=disagrees,
+        without=without,
+        data_faults=faults,
     )
 
 
-def _spoilt(analysis: Analysis, faults: tuple[DataFault, ...]) -> Diagnosis:
+def _spoilt(fit: Fit, faults: tuple[DataFault, ...]) -> Diagnosis:
     """Name the faults of the data that explain what is missing, and no effect."""
+    spoiling = [fault for fault in faults if fault.spoils]
     return Diagnosis(
         verdict="unknown",
         best=None,
         ambiguous_with=(),
         candidates=(),
         unexplained=(),
-        model=analysis.model.effects,
+        model=fit.analysis.model.effects,
         experiment=None,
-        sentence=sentences.spoilt([fault for fault in faults if fault.spoils]),
-        notes=notes(analysis),
+        sentence=sentences.spoilt(spoiling),
+        notes=_notes(fit.analysis),
+        logs=fit.by_log,
+        without=answers_without_faulty(fit, {fault.file for fault in spoiling if fault.file is not None}, diagnose),
         data_faults=faults,
     )
 
@@ -157,7 +172,7 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _with(fit: Fit, effect: str, others: Sequence[str]) -> tuple[Analysis, Estimate]:
     """Fit one candidate, with the columns of some others around it."""
-    return fit.analysis.solved_for(fit.model.with_effect(effect), fit.unnamed, only=others)
+    return fit.analysis.solved_for(fit.model.with_effect(effect), fit.own, only=others)
 
 
 def _leaves(analysis: Analysis, other: str) -> bool:
@@ -166,15 +181,22 @@ def _leaves(analysis: Analysis, other: str) -> bool:
 
 
 def _candidate(
-    item: Mapping[str, Any], effect: _imufit.Effect, rivals: list[Rival], tested: int, found: Found | None
+    item: Mapping[str, Any], effect: _imufit.Effect, rivals: list[Rival], tested: int, analysis: Analysis
 ) -> Candidate:
+    found = analysis.found.get(effect.id)
     searched = {} if found is None else dict(zip((name for name, _, _ in effect.parameters), found.trial, strict=True))
     grid = {name: searched[name] for name in effect.searched if name in searched}
-    parameters = tuple(
-        Parameter(effect.id, name, grid.get(name, value), 0.0 if name in grid else error, unit, typical)
-        for (name, unit, typical), (value, error) in zip(effect.parameters, item["parameters"], strict=True)
-    )
-    threshold = float(student.isf(ALPHA / tested / 2, BLOCKS - 1)) + POWER
+
+    def named(values: Array, errors: Array) -> tuple[Parameter, ...]:
+        return tuple(
+            Parameter(effect.id, name, grid.get(name, float(value)), 0.0 if name in grid else float(error), unit, size)
+            for (name, unit, size), value, error in zip(effect.parameters, values, errors, strict=True)
+        )
+
+    # Of one log after the other, where each has its own.
+    by_log = np.asarray(item["parameters"]).reshape(-1, len(effect.parameters), 2)
+    parameters = named(*pooled(by_log[..., 0], by_log[..., 1]))
+    threshold = -float(stdtrit(analysis.problem.blocks - 1, ALPHA / tested / 2)) + POWER
     detectable = {
         p.name: (threshold * p.standard_error, p.unit)
         for p in parameters
@@ -193,8 +215,21 @@ def _candidate(
         explanation="",
         status=_status(item),
         minimal_detectable=detectable,
+        logs=_own_parameters(analysis, effect.id, [named(at[:, 0], at[:, 1]) for at in by_log]),
     )
     return replace(candidate, explanation=sentences.explanation(card_of(effect), candidate))
+
+
+def _own_parameters(
+    analysis: Analysis, effect_id: str, values: Sequence[tuple[Parameter, ...]]
+) -> tuple[LogParameters, ...]:
+    """Parameters of an effect by log, where there are several logs and each has its own."""
+    if len(analysis.logs) == 1 or effect_id not in OWN:
+        return ()
+    logs = analysis.having(effect_id)
+    return tuple(
+        LogParameters(name_of(analysis.logs[k].surveyed.log, k), own) for k, own in zip(logs, values, strict=True)
+    )
 
 
 def _status(item: Mapping[str, Any]) -> str:
@@ -202,6 +237,8 @@ def _status(item: Mapping[str, Any]) -> str:
         return "not testable here"
     if item["passed"]:
         return "passed"
+    if not item["agreed"]:
+        return "logs disagree"
     if not item["stable"]:
         return "differs between halves"
     return "not significant" if item["plausible"] else "implausible size"
@@ -211,21 +248,32 @@ def _unexplained(analysis: Analysis, step: Any, found: Sequence[Mapping[str, Any
     """Dependences that nothing in the catalogue explains, with their share of the excess and where in time it lies."""
     if not found:
         return ()
-    residual = analysis.problem.residual(step)
-    channels = {item["channel"]: item for item in residual["channels"]}
-    shares = {(item["channel"], item["covariate"]): item["share"] for item in residual["panels"]}
-    edges = np.linspace(analysis.facts.t_start, analysis.facts.t_end, analysis.raw.blocks + 1)
-    out = []
-    for item in found:
-        first, last = channels[item["channel"]]["stretch"]
-        out.append(
-            Unexplained(
-                item["channel"],
-                item["covariate"],
-                float(shares.get((item["channel"], item["covariate"]), 0.0)),
-                item["shape"],
-                float(edges[first]),
-                float(edges[last]),
-            )
-        )
-    return tuple(out)
+    residuals = [analysis.problem.residual(step, log) for log in range(len(analysis.logs))]
+    return tuple(_dependence(analysis, residuals, item) for item in found)
+
+
+def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item: Mapping[str, Any]) -> Unexplained:
+    """Say what one dependence is worth in the log where it is worth most."""
+
+    def share(log: int) -> float:
+        panels = residuals[log]["panels"]
+        same = (p["share"] for p in panels if (p["channel"], p["covariate"]) == (item["channel"], item["covariate"]))
+        return float(next(same, 0.0))
+
+    concerned = range(len(residuals)) if item["log"] is None else [item["log"]]
+    having = [log for log in concerned if any(c["channel"] == item["channel"] for c in residuals[log]["channels"])]
+    log = max(having, key=share)
+    facts = analysis.logs[log].facts
+    edges = np.linspace(facts.t_start, facts.t_end, analysis.logs[log].raw.blocks + 1)
+    first, last = next(c["stretch"] for c in residuals[log]["channels"] if c["channel"] == item["channel"])
+    return Unexplained(
+        item["channel"], item["covariate"], share(log), item["shape"], float(edges[first]), float(edges[last])
+    )
+
+
+def _notes(analysis: Analysis) -> tuple[str, ...]:
+    """Return what the reader should know of the logs; of several each note tells which of them it is about."""
+    found = [(each.surveyed.log, notes(each)) for each in analysis.logs]
+    if len(found) == 1:
+        return found[0][1]
+    return tuple(f"{name_of(log, k)}: {note}" for k, (log, own) in enumerate(found) for note in own)

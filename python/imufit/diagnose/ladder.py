@@ -7,7 +7,7 @@ from imufit.diagnose.attitude import attitude_comparison
 from imufit.diagnose.compare import comparison
 from imufit.diagnose.diagnose import diagnose
 from imufit.fit import Fit
-from imufit.log import LogSource
+from imufit.log.several import Logs
 from imufit.model import SensorModel
 from imufit.progress import Progress, silent
 from imufit.results import Candidate, Diagnosis, Ladder, Step
@@ -17,13 +17,13 @@ MATTERS = 0.002
 """Share of the held-out error that an effect must take away to be added beside something unknown."""
 
 
-def ladder(log: LogSource, model: SensorModel | None = None, progress: Progress | None = None) -> Ladder:
+def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | None = None) -> Ladder:
     """Repeat diagnose and add until nothing is missing, or until the log cannot tell what is.
 
     Parameters
     ----------
-    log : Log or LogStream
-        With reference attitude.
+    log : Log, LogStream or a sequence of them
+        With reference attitude; several logs are of one sensor.
     model : SensorModel, optional
         Where to start from; default: the ideal sensor.
     progress : callable, optional
@@ -56,16 +56,17 @@ def ladder(log: LogSource, model: SensorModel | None = None, progress: Progress 
         fit = addition.fit
         steps.append(Step(effect, addition.before, expected, addition.after, fit.training_ratio))
         diagnosis = diagnose(fit)
+    worst = first_fit.worst
     return Ladder(
         steps=tuple(steps),
         model=fit.model.effects,
         verdict=diagnosis.verdict,
         ratio_start=start,
         ratio_end=fit.ratio,
-        attitude=attitude_comparison(fit.model, log, progress=progress or silent),
+        attitude=attitude_comparison(fit.model_of(worst), fit.logs[worst], progress=progress or silent),
         diagnosis=diagnosis,
-        comparison_start=comparison(first_fit.analysis, first_fit.estimate.step),
-        comparison_end=comparison(fit.analysis, fit.estimate.step),
+        comparison_start=comparison(first_fit.analysis, first_fit.estimate.step, worst),
+        comparison_end=comparison(fit.analysis, fit.estimate.step, worst),
         first=first,
         fit=fit,
         sentence=_sentence(start, fit.ratio, steps, diagnosis),
@@ -74,7 +75,7 @@ def ladder(log: LogSource, model: SensorModel | None = None, progress: Progress 
 
 def next_effect(fit: Fit, diagnosis: Diagnosis) -> str | None:
     """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well."""
-    if diagnosis.verdict == "adequate":
+    if diagnosis.verdict == "adequate" or diagnosis.without:
         return None
     if diagnosis.verdict == "ambiguous":
         return _beside_the_unsure(fit)

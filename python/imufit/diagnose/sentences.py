@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from imufit.figures import quantity
-from imufit.results import Candidate, DataFault, EffectCard, Parameter, Unexplained
+from imufit.results import Candidate, DataFault, Disagreement, EffectCard, Parameter, Unexplained
 
 
 def _capital(text: str) -> str:
@@ -81,7 +81,31 @@ def verdict(
 def spoilt(faults: Sequence[DataFault]) -> str:
     """Say which faults of the data have to be put right before any effect can be judged."""
     said = " ".join(fault.sentence for fault in faults)
-    return f"The data are at fault, not the sensor ({', '.join(dict.fromkeys(f.fault for f in faults))}). {said}"
+    kinds = ", ".join(dict.fromkeys(fault.fault for fault in faults))
+    logs = ", ".join(dict.fromkeys(fault.file for fault in faults if fault.file is not None))
+    return f"The data{f' of {logs}' if logs else ''} are at fault, not the sensor ({kinds}). {said}"
+
+
+def with_disagreements(text: str, found: Sequence[Disagreement], *, spoilt: bool) -> str:
+    """Put logs that disagree into the answer: in its place where they spoil it, else after it."""
+    about = list(dict.fromkeys(item.effect for item in found))
+    if spoilt:
+        about = [key for key in about if any(item.wild for item in found if item.effect == key)][:1]
+        said = "The logs differ too much about {} for it to be a property of the sensor: {}."
+        text = ""
+    else:
+        said = "The logs differ about {}: {}."
+    for key in about:
+        text += " " + said.format(key, _differences([item for item in found if item.effect == key]))
+    return text.strip()
+
+
+def _differences(found: Sequence[Disagreement]) -> str:
+    """Say what each log says; of two that differ from each other it is said once."""
+    first = found[0]
+    if len(found) == 2 and found[1].value == first.others:
+        return str(first).replace("the others", found[1].file)
+    return "; ".join(map(str, found))
 
 
 def experiment(best: EffectCard, rivals: Sequence[EffectCard]) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Final
 
 import numpy as np
 
 from imufit.faults.row_fault import UNITS
 from imufit.figures import quantity
+from imufit.replay.clipped import end_of_range
 from imufit.results.data_fault import DataFault
 
 LEAST: Final = 3
@@ -21,11 +22,14 @@ class ClippedRows:
     Parameters
     ----------
     ends : mapping
-        End of the range of each sensor that has one, m/s^2 and rad/s.
+        End of the range of each sensor that may have one, m/s^2 and rad/s.
+    certain : collection of str
+        Sensors whose metadata tell it. Of the others the readings have to show that they are pinned there.
     """
 
-    def __init__(self, ends: Mapping[str, float]) -> None:
+    def __init__(self, ends: Mapping[str, float], certain: Collection[str] = ()) -> None:
         self._ends = dict(ends)
+        self._certain = set(certain)
         self._rows: dict[str, int] = {}
         self._first: dict[str, float] = {}
         self._last: dict[str, float] = {}
@@ -38,6 +42,10 @@ class ClippedRows:
             if column is None:
                 continue
             at_end = np.abs(column[core]) >= end * (1.0 - 1e-9)
+            if sensor not in self._certain and at_end.any():
+                found = end_of_range(column[core], 0.0)
+                if found is not None and found >= end * (1.0 - 1e-9):
+                    self._certain.add(sensor)
             for axis, name in enumerate("xyz"):
                 rows = np.flatnonzero(at_end[:, axis])
                 if rows.size:
@@ -50,9 +58,9 @@ class ClippedRows:
         """Name the channels that are clipped."""
         found = []
         for channel, rows in self._rows.items():
-            if rows < LEAST:
-                continue
             sensor = channel[:3]
+            if rows < LEAST or sensor not in self._certain:
+                continue
             end = quantity.quantity(self._ends[sensor], UNITS[sensor])
             first, last = self._first[channel], self._last[channel]
             evidence = (

@@ -8,7 +8,6 @@ often each sample of the block occurs in the rows around, and must be less than 
 
 from __future__ import annotations
 
-import itertools
 from typing import Final
 
 import numpy as np
@@ -81,24 +80,27 @@ def _copies(codes: NDArray[np.uint64]) -> list[tuple[int, int, int]]:
     n = codes.size
     if n < 4 * SAMPLES:
         return []
-    order = np.argsort(codes, kind="stable")
-    same = codes[order[1:]] == codes[order[:-1]]
-    later, earlier = order[1:][same], order[:-1][same]
-    if later.size < SAMPLES:
+    # Most logs have no two samples alike, and a sort tells that quicker than the order of the samples is found.
+    ordered = np.sort(codes)
+    if np.count_nonzero(ordered[1:] == ordered[:-1]) < SAMPLES:
         return []
+    order = np.argsort(codes, kind="stable")
+    same = ordered[1:] == ordered[:-1]
+    later, earlier = order[1:][same], order[:-1][same]
     lag = np.zeros(n, np.intp)
     lag[later] = later - earlier
     edges = np.flatnonzero(np.concatenate(([True], lag[1:] != lag[:-1], [True])))
-    _, inverse, counts = np.unique(codes, return_inverse=True, return_counts=True)
-    lengths = np.sort(np.diff(edges)[lag[edges[:-1]] > 0])[::-1]
-    by_chance = int(lengths[_TRUE]) if lengths.size > _TRUE else 1
-    least = max(SAMPLES, LONGER * by_chance)
+    spans = np.column_stack([edges[:-1], edges[1:]])[lag[edges[:-1]] > 0]
+    lengths = spans[:, 1] - spans[:, 0]
+    by_chance = int(np.sort(lengths)[-1 - _TRUE]) if lengths.size > _TRUE else 1
     found = []
-    for first, stop in itertools.pairwise(edges):
-        if lag[first] == 0 or stop - first < least or np.unique(codes[first:stop]).size < SAMPLES:
+    for first, stop in spans[lengths >= max(SAMPLES, LONGER * by_chance)]:
+        kinds, inverse = np.unique(codes[first:stop], return_inverse=True)
+        if kinds.size < SAMPLES:
             continue
+        counts = np.searchsorted(ordered, kinds, "right") - np.searchsorted(ordered, kinds, "left")
         # Without the pair itself.
-        share = (counts[inverse[first:stop]] - 1.5) / n
+        share = (counts[inverse] - 1.5) / n
         if np.sum(np.log10(share)) + 2.0 * np.log10(n) < np.log10(CHANCE):
             found.append((int(first), int(stop), int(lag[first])))
     return found

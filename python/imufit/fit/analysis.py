@@ -1,32 +1,35 @@
-"""Evidence of one log around one model: what every question is asked of."""
+"""Evidence of one log, or of several of one sensor, around one model: what every question is asked of."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.errors import InputError
-from imufit.faults import time_faults
-from imufit.fit.data_faults import data_faults
-from imufit.fit.passes import CHANNELS, MIN_COVERAGE, Passes
+from imufit.fit.log_evidence import LogEvidence, Values
 from imufit.fit.profile import Found, search
+from imufit.fit.surveyed_log import SurveyedLog, survey
 from imufit.fit.users_effects import check_users_effects
 from imufit.log import LogSource
-from imufit.model.catalogue import COLUMN, column_effects, effects, find_effect
+from imufit.log.several import name_of
+from imufit.model.catalogue import COLUMN, find_effect
 from imufit.model.sensor_model import SensorModel
 from imufit.progress import Progress
 from imufit.results import DataFault
 
 Array = NDArray[np.float64]
 
-BLOCKS = 48
 FIELD_REFERENCE = "mag.field_reference"
 """Fitted along, unnamed, wherever the reference field was estimated from the log itself."""
+
+OWN = frozenset({"acc.bias", "gyr.bias", "ref.alignment", "ref.tilt", FIELD_REFERENCE})
+"""What each log has for itself: zeros come with switching on, mount, table and field with setting up.
+
+All other effects are the sensor's, and the same in every log."""
 
 MAX_ITERATIONS = 6
 
@@ -38,7 +41,8 @@ class Estimate:
     Attributes
     ----------
     values, errors : dict of int to ndarray
-        By slot: parameter values and standard errors, SI units.
+        By slot: parameter values and standard errors, SI units; of an effect that each log has for itself those of
+        one log after the other.
     step : ndarray
         (p,) step of every parameter of the evidence.
     held_out, training : float
@@ -54,150 +58,157 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """Evidence of a log with the columns of every effect, taken around given parameter values.
+    """Evidence of one log or of several with the columns of every effect, taken around given parameter values.
 
     Slots are effects in a fixed order: those of the model, the unnamed ones that are always fitted, the candidates.
+
+    Attributes
+    ----------
+    logs : tuple of LogEvidence
+        Evidence of each log.
+    model : SensorModel
+        The effects and the parameters that all logs share.
+    own : tuple of dict
+        For each log the parameters that it has for itself, the unnamed effects among them.
+    unnamed : tuple of str
+        Effects that are always fitted along.
+    candidates : dict of str to Effect
+        What else at least one log can tell of.
+    found : dict of str to Found
+        What searches found for the candidates.
+    problem : Problem
+        All logs together.
     """
 
-    passes: Passes
-    facts: _imufit.Facts
+    logs: tuple[LogEvidence, ...]
     model: SensorModel
-    nuisance: dict[str, list[float]]
+    own: tuple[dict[str, list[float]], ...]
+    unnamed: tuple[str, ...]
     candidates: dict[str, _imufit.Effect]
     found: dict[str, Found]
-    refused: dict[str, str]
-    raw: _imufit.Evidence
-    white: _imufit.Evidence
     problem: _imufit.Problem
-    raw_variance: list[float]
-    variance: list[float]
-    floors: list[float]
-    filters: list[list[float]]
-    faults: tuple[DataFault, ...] = ()
 
     @classmethod
-    def of(cls, model: SensorModel, log: LogSource, progress: Progress, *, keep_constants: bool = False) -> Analysis:
-        """Survey a log, find its noise and take its evidence around a model.
+    def of(
+        cls, model: SensorModel, logs: Sequence[LogSource], progress: Progress, *, keep_constants: bool = False
+    ) -> Analysis:
+        """Survey logs of one sensor, find their noise and take their evidence around a model.
 
         Parameters
         ----------
         model : SensorModel
             Effects and parameters to take the evidence around.
-        log : LogSource
-            The log.
+        logs : sequence of LogSource
+            The logs.
         progress : callable
             Told of the rows done.
         keep_constants : bool
-            Temperatures and covariates count from the means that the model was fitted with, not from this log's.
+            Temperatures and covariates count from the means that the model was fitted with, not from these logs'.
         """
-        passes = Passes(log, progress)
-        facts, coverage = passes.survey()
-        ends = passes.ranges()
-        facts = facts.with_ranges(**ends)
-        faults = data_faults(passes, facts, ends)
-        if keep_constants and model.constants:
-            facts = facts.with_means(model.constants.get("temperature_mean"), model.constants.get("covariate_means"))
-        candidates, refused = _candidates(model, facts, coverage)
+        surveyed = survey(model, logs, progress, keep_constants=keep_constants)
         for effect, _ in model.stack():
-            reason = effect.not_testable(facts) or _not_covered(effect, coverage)
-            if reason is not None:
-                raise InputError(f"effect {effect.id} cannot be fitted: {reason}", file=log.path)
-        check_users_effects(passes, facts, [*model.effects, *candidates])
-        nuisance = {}
-        if facts.field_estimated and FIELD_REFERENCE not in model.effects:
-            nuisance = {FIELD_REFERENCE: [0.0, 0.0, 0.0]}
-        model = _started(passes, facts, model, nuisance)
-        found = search(passes, facts, _stack(model, nuisance), candidates)
-        raw = _empty(facts, model, nuisance, _asked(candidates, found), [[] for _ in CHANNELS])
-        passes.evidence(raw, facts, "taking evidence")
-        step, raw_variance = _imufit.saturate(raw)
-        _check_samples(log, model, raw_variance)
-        if not any(fault.spoils for fault in faults):
-            faults = (*faults, *time_faults(raw, raw_variance, _places(model, nuisance, candidates), facts))
-        filters = passes.autocovariance(raw, facts, step).filters()
-        floors = _floors(log, raw_variance)
-        white, variance = raw, raw_variance
-        if any(filters):
-            white = passes.evidence(raw.with_filters(filters), facts, "whitening the evidence")
-            _, variance = _imufit.saturate(white)
-        problem = _imufit.Problem(white, raw, variance, floors)
+            reasons = [each.refusal(effect) for each in surveyed]
+            if None not in reasons:
+                raise InputError(f"effect {effect.id} cannot be fitted: {reasons[0]}", file=surveyed[0].log.path)
+        unnamed: tuple[str, ...] = ()
+        if any(each.facts.field_estimated for each in surveyed) and FIELD_REFERENCE not in model.effects:
+            unnamed = (FIELD_REFERENCE,)
+        fixed = {*model.effects, *unnamed}
+        candidates = {key: each.effects[key] for each in surveyed for key in each.effects if key not in fixed}
+        for each in surveyed:
+            own_candidates = [key for key in each.effects if key not in fixed]
+            check_users_effects(each.passes, each.facts, [*model.effects, *own_candidates])
+        own = _with_own(surveyed, model, unnamed, tuple({} for _ in surveyed))
+        model = _started(surveyed, model, own)
+        fitted = [_fitted(each, model, unnamed, values) for each, values in zip(surveyed, own, strict=True)]
+        found = search(surveyed, fitted, candidates)
+        evidence = [LogEvidence.of(each, values, found) for each, values in zip(surveyed, fitted, strict=True)]
         return cls(
-            passes,
-            facts,
-            model,
-            nuisance,
-            candidates,
-            found,
-            refused,
-            raw,
-            white,
-            problem,
-            raw_variance,
-            variance,
-            floors,
-            filters,
-            faults,
+            tuple(evidence), model, own, unnamed, candidates, found, _problem(evidence, model, unnamed, candidates)
         )
 
     def around(
         self,
         model: SensorModel,
-        nuisance: Mapping[str, list[float]],
+        own: Sequence[Values],
         *,
         with_candidates: bool = True,
         only: Collection[str] | None = None,
         lean: bool = False,
     ) -> Analysis:
-        """Evidence of the same log around other parameter values or another stack of effects.
+        """Evidence of the same logs around other parameter values or another stack of effects.
 
         Without candidates, or with only some of them, it is quicker to take; lean, for the next iteration of a fit, it
         does not tell the residual as it stands either, only whitened.
         """
-        known = {**self.candidates, **dict(zip(self.model.effects, (e for e, _ in self.model.stack()), strict=True))}
-        candidates = {
+        surveyed = [each.surveyed for each in self.logs]
+        fixed = {*model.effects, *self.unnamed}
+        asked = {
             key: effect
-            for key, effect in known.items()
-            if key not in model.effects and key not in nuisance and (only is None or key in only)
+            for each in surveyed
+            for key, effect in each.effects.items()
+            if key not in fixed and (only is None or key in only) and with_candidates and not lean
         }
-        asked = candidates if with_candidates and not lean else {}
         starts = {
             key: self.found[key].start for key in model.effects if key in self.found and key not in self.model.effects
         }
         model = model.starting_at(starts)
-        found = search(self.passes, self.facts, _stack(model, nuisance), asked)
-        white = _empty(self.facts, model, nuisance, _asked(asked, found), self.filters)
-        self.passes.evidence(white, self.facts, "taking evidence")
-        raw = white
-        if not lean and any(self.filters):
-            plain = white.with_filters([[] for _ in CHANNELS])
-            raw = self.passes.evidence(plain, self.facts, "taking evidence as it stands")
-        # The noise is that of the first evidence, which every effect of the catalogue was fitted to.
-        problem = _imufit.Problem(white, raw, self.variance, self.floors)
+        values = _with_own(surveyed, model, self.unnamed, own)
+        fitted = [_fitted(each, model, self.unnamed, at) for each, at in zip(surveyed, values, strict=True)]
+        found = search(surveyed, fitted, asked)
+        evidence = [each.around(at, list(asked), found, lean=lean) for each, at in zip(self.logs, fitted, strict=True)]
+        problem = _problem(evidence, model, self.unnamed, asked)
         return replace(
-            self,
-            model=model,
-            nuisance=dict(nuisance),
-            candidates=candidates,
-            found=found,
-            raw=raw,
-            white=white,
-            problem=problem,
+            self, logs=tuple(evidence), model=model, own=values, candidates=asked, found=found, problem=problem
         )
+
+    def of_logs(self, chosen: Sequence[int]) -> Analysis:
+        """Return the same evidence of some of the logs alone; effects that none of them can tell of are left out."""
+        logs = [self.logs[k] for k in chosen]
+        known = {key for each in logs for key in each.slots}
+        effects = [key for key in self.model.effects if key in known]
+        values = {key: at for key, at in self.model.parameters.items() if key in known}
+        model = SensorModel(effects, values, constants=self.model.constants)
+        unnamed = tuple(key for key in self.unnamed if key in known)
+        candidates = {key: effect for key, effect in self.candidates.items() if key in known}
+        own = tuple(self.own[k] for k in chosen)
+        problem = _problem(logs, model, unnamed, candidates)
+        return Analysis(tuple(logs), model, own, unnamed, candidates, self.found, problem)
 
     @property
     def slots(self) -> list[str]:
         """Ids of all slots: the model's effects, the unnamed ones, the candidates."""
-        return [*self.model.effects, *self.nuisance, *self.candidates]
+        return [*self.model.effects, *self.unnamed, *self.candidates]
 
     @property
     def fitted_slots(self) -> list[int]:
         """Slots that are fitted: the model's effects and the unnamed ones."""
-        return list(range(len(self.model.effects) + len(self.nuisance)))
+        return list(range(len(self.model.effects) + len(self.unnamed)))
 
     @property
     def candidate_slots(self) -> list[int]:
         """Slots of the candidates."""
         return list(range(len(self.fitted_slots), len(self.slots)))
+
+    @property
+    def faults(self) -> tuple[DataFault, ...]:
+        """What is wrong with the data of the logs; of several each fault tells which of them it is in."""
+        if len(self.logs) == 1:
+            return self.logs[0].faults
+        names = [name_of(each.surveyed.log, k) for k, each in enumerate(self.logs)]
+        return tuple(
+            replace(fault, file=name) for name, each in zip(names, self.logs, strict=True) for fault in each.faults
+        )
+
+    def refusal(self, effect: _imufit.Effect) -> str | None:
+        """Return why no log can tell of an effect; None if one can."""
+        reasons = [each.surveyed.refusal(effect) for each in self.logs]
+        return None if None in reasons else reasons[0]
+
+    def having(self, effect_id: str) -> list[int]:
+        """Return the logs with parameters of an effect for themselves; the first stands for all where it is shared."""
+        known = [k for k, each in enumerate(self.logs) if effect_id in each.slots]
+        return known if effect_id in OWN else known[:1]
 
     def estimate(self) -> Estimate:
         """Fit the model's effects (and the unnamed ones) to the evidence."""
@@ -207,13 +218,20 @@ class Analysis:
         """Keep the model as it is and fit only what is always fitted along."""
         return self._estimate(self.fitted_slots[len(self.model.effects) :])
 
+    def _present(self, slot: int) -> list[float]:
+        """Values that the evidence was taken around, of one log after the other where each has its own."""
+        key = self.slots[slot]
+        if key in OWN:
+            return [value for log in self.having(key) for value in self.own[log][key]]
+        return self.model.stack()[slot][1]
+
     def _estimate(self, chosen: list[int]) -> Estimate:
         result = self.problem.estimate(chosen)
         values, errors, at = {}, {}, 0
-        present = [*(v for _, v in self.model.stack()), *self.nuisance.values()]
         for slot in chosen:
-            count = len(present[slot])
-            values[slot] = self._within_reach(slot, np.asarray(present[slot]) + result["step"][at : at + count])
+            present = np.asarray(self._present(slot))
+            count = present.size
+            values[slot] = self._within_reach(slot, present + result["step"][at : at + count])
             errors[slot] = result["standard_error"][at : at + count]
             at += count
         return Estimate(values, errors, result["full_step"], result["held_out"], result["training"])
@@ -229,37 +247,49 @@ class Analysis:
                 values[k] = min(max(values[k], low), high)
         return values
 
-    def moved_to(self, estimate: Estimate) -> tuple[SensorModel, dict[str, list[float]]]:
-        """Return the model and the unnamed effects with estimated parameters."""
-        ids = self.slots
+    def moved_to(self, estimate: Estimate) -> tuple[SensorModel, tuple[dict[str, list[float]], ...]]:
+        """Return the model with estimated parameters, and those that each log has for itself.
+
+        In the model, what each log has for itself stands with its mean.
+        """
         parameters, errors = {}, {}
-        for slot in range(len(self.model.effects)):
-            effect = find_effect(ids[slot])
+        own: tuple[dict[str, list[float]], ...] = tuple({} for _ in self.logs)
+        for slot, key in enumerate(self.slots[: len(self.fitted_slots)]):
+            effect = find_effect(key)
+            logs = self.having(key) if key in OWN else [0]
+            values = estimate.values[slot].reshape(len(logs), -1)
+            spread = estimate.errors[slot].reshape(len(logs), -1)
+            if key in OWN:
+                for log, at in zip(logs, values, strict=True):
+                    own[log][key] = [float(value) for value in at]
+            if slot >= len(self.model.effects):
+                continue
             names = [name for name, _, _ in effect.parameters]
-            parameters[ids[slot]] = dict(zip(names, map(float, estimate.values[slot]), strict=True))
-            errors[ids[slot]] = dict(zip(names, map(float, estimate.errors[slot]), strict=True))
-            errors[ids[slot]] |= dict.fromkeys(effect.only_searched, 0.0)
-        nuisance = {
-            ids[slot]: [float(v) for v in estimate.values[slot]]
-            for slot in self.fitted_slots
-            if ids[slot] in self.nuisance
-        }
+            mean, error = pooled(values, spread)
+            parameters[key] = dict(zip(names, map(float, mean), strict=True))
+            errors[key] = dict(zip(names, map(float, error), strict=True))
+            errors[key] |= dict.fromkeys(effect.only_searched, 0.0)
+        facts = [each.facts for each in self.logs]
+        means = {name: mean for each in reversed(facts) for name, mean in each.covariate_means.items()}
         constants = {
-            "temperature_mean": self.facts.temperature_mean if self.facts.has_temperature else None,
+            "temperature_mean": next((each.temperature_mean for each in facts if each.has_temperature), None),
             "covariate_means": {
                 name: mean
-                for name, mean in self.facts.covariate_means.items()
+                for name, mean in means.items()
                 if any(key.endswith(COLUMN + name) for key in self.model.effects)
             },
         }
         kept = {key: value for key, value in constants.items() if value is not None and value != {}}
-        return SensorModel(self.model.effects, parameters, constants=kept, standard_errors=errors), nuisance
+        return SensorModel(self.model.effects, parameters, constants=kept, standard_errors=errors), own
+
+    def own_step(self, log: int, step: Array) -> Array:
+        """Return a step of all parameters as one of the parameters of one log's evidence."""
+        return step[self.problem.places(log)]
 
     def converged(self, estimate: Estimate) -> bool:
         """Return whether no parameter still moves by more than a tenth of its standard error."""
-        present = [*(v for _, v in self.model.stack()), *self.nuisance.values()]
         return all(
-            bool(np.all(np.abs(estimate.values[slot] - present[slot]) <= 0.1 * estimate.errors[slot]))
+            bool(np.all(np.abs(estimate.values[slot] - self._present(slot)) <= 0.1 * estimate.errors[slot]))
             for slot in estimate.values
         )
 
@@ -267,7 +297,7 @@ class Analysis:
     def linear(self) -> bool:
         """True if the reading is proportional to the fitted parameters, so that one solution is exact."""
         stages = {effect.stage for effect, _ in self.model.stack()}
-        stages |= {find_effect(key).stage for key in self.nuisance} if "gain" in stages else set()
+        stages |= {find_effect(key).stage for key in self.unnamed} if "gain" in stages else set()
         return not any(effect.nonlinear for effect, _ in self.model.stack()) and not {"input", "gain"} <= stages
 
     def solved(self) -> tuple[Analysis, Estimate]:
@@ -281,7 +311,7 @@ class Analysis:
     def solved_for(
         self,
         model: SensorModel,
-        nuisance: Mapping[str, list[float]],
+        own: Sequence[Values],
         *,
         with_candidates: bool = True,
         only: Collection[str] | None = None,
@@ -291,7 +321,7 @@ class Analysis:
         Without candidates, or with only some of them, it is quicker to take, and enough to know how well that stack
         does.
         """
-        best, estimate = self.around(model, nuisance, lean=True)._iterated()
+        best, estimate = self.around(model, own, lean=True)._iterated()
         best = best.around(*best.moved_to(estimate), with_candidates=with_candidates, only=only)
         return best, best.estimate()
 
@@ -305,100 +335,55 @@ class Analysis:
         return analysis, estimate
 
 
-def _check_samples(log: LogSource, model: SensorModel, variance: list[float]) -> None:
-    """Refuse a log of which too few samples can be used for any sensor, or for one that an effect acts on."""
-    used = {channel[:3] for channel, v in zip(CHANNELS, variance, strict=True) if np.isfinite(v)}
-    remedy = "Check that sensors and reference cover the same time."
-    if not used:
-        raise InputError("too few samples have a reference around them", file=log.path, remedy=remedy)
-    for effect, _ in model.stack():
-        if not used.intersection(effect.sensors):
-            sensors = " and ".join(effect.sensors)
-            raise InputError(
-                f"effect {effect.id} cannot be fitted: too few samples of {sensors} have a reference around them",
-                file=log.path,
-                remedy=remedy,
-            )
+def pooled(values: Array, errors: Array) -> tuple[Array, Array]:
+    """Mean of values of several logs (logs, k), weighted by their errors, and its standard error."""
+    if len(values) == 1:
+        return values[0], errors[0]
+    known = np.isfinite(errors) & (errors > 0.0)
+    weights = np.where(known, 1.0 / np.where(known, errors, 1.0) ** 2, 0.0)
+    weights = np.where(known.any(axis=0), weights, 1.0)
+    sums = weights.sum(axis=0)
+    error = np.where(known.any(axis=0), 1.0 / np.sqrt(sums), np.nan)
+    return (weights * values).sum(axis=0) / sums, error
 
 
-def _candidates(
-    model: SensorModel, facts: _imufit.Facts, coverage: Mapping[str, float]
-) -> tuple[dict[str, _imufit.Effect], dict[str, str]]:
-    """Effects that can be asked about on this log, and why the others cannot."""
-    own = [name for name in coverage if name != "temp"]
-    named = {(sensor, effect.column) for effect in effects().values() for sensor in effect.sensors}
-    columns = {
-        key: effect
-        for key, effect in column_effects(own, facts.sensors).items()
-        if (effect.sensors[0], effect.column) not in named
-    }
-    offered: dict[str, Any] = {**effects(), **columns}
-    candidates, refused = {}, {}
-    for key, effect in offered.items():
-        if key in model.effects or (key == FIELD_REFERENCE and facts.field_estimated):
-            continue
-        reason = effect.not_testable(facts) or _not_covered(effect, coverage)
-        if reason is None:
-            candidates[key] = effect
-        else:
-            refused[key] = reason
-    return candidates, refused
+def _with_own(
+    logs: Sequence[SurveyedLog], model: SensorModel, unnamed: Sequence[str], known: Sequence[Values]
+) -> tuple[dict[str, list[float]], ...]:
+    """Values that each log has for itself: those known, else the model's, else zero."""
+    starts = {key: values for key, values in model.parameters.items() if key in OWN}
+    out = []
+    for each, values in zip(logs, known, strict=True):
+        own = {key: list(starts[key].values()) for key in starts if each.refusal(find_effect(key)) is None}
+        own |= {key: [0.0] * len(find_effect(key).parameters) for key in unnamed if key in each.effects}
+        out.append(own | {key: list(values[key]) for key in own if key in values})
+    return tuple(out)
 
 
-def _not_covered(effect: _imufit.Effect, coverage: Mapping[str, float]) -> str | None:
-    column = effect.column
-    if column is None or coverage.get(column, 0.0) >= MIN_COVERAGE:
-        return None
-    return f"column {column} is known in only {100 * coverage.get(column, 0.0):.0f} % of the rows"
+def _fitted(each: SurveyedLog, model: SensorModel, unnamed: Sequence[str], own: Values) -> dict[str, list[float]]:
+    """Effects that are fitted to one log, with their parameters."""
+    named = {effect.id: own.get(effect.id, values) for effect, values in model.stack() if each.refusal(effect) is None}
+    return named | {key: own[key] for key in unnamed if key in own}
 
 
-def _empty(
-    facts: _imufit.Facts,
-    model: SensorModel,
-    nuisance: Mapping[str, list[float]],
-    candidates: list[tuple[_imufit.Effect, list[float]]],
-    filters: list[list[float]],
-) -> _imufit.Evidence:
-    return _imufit.Evidence(facts, _stack(model, nuisance), candidates, BLOCKS, filters)
+def _problem(
+    logs: Sequence[LogEvidence], model: SensorModel, unnamed: Sequence[str], candidates: Collection[str]
+) -> _imufit.Problem:
+    slots = {key: slot for slot, key in enumerate([*model.effects, *unnamed, *candidates])}
+    return _imufit.Problem(
+        [(each.white, each.raw, each.variance, each.floors, [slots[key] for key in each.slots]) for each in logs],
+        [key in OWN for key in slots],
+    )
 
 
-def _places(
-    model: SensorModel, nuisance: Mapping[str, list[float]], candidates: Mapping[str, _imufit.Effect]
-) -> dict[str, range]:
-    """Parameters of every effect in the evidence, by its id."""
-    places, first = {}, 0
-    for effect in [*(e for e, _ in _stack(model, nuisance)), *candidates.values()]:
-        places[effect.id] = range(first, first + len(effect.parameters))
-        first += len(effect.parameters)
-    return places
-
-
-def _stack(model: SensorModel, nuisance: Mapping[str, list[float]]) -> list[tuple[_imufit.Effect, list[float]]]:
-    return [*model.stack(), *((find_effect(key), values) for key, values in nuisance.items())]
-
-
-def _asked(
-    candidates: Mapping[str, _imufit.Effect], found: Mapping[str, Found]
-) -> list[tuple[_imufit.Effect, list[float]]]:
-    return [
-        (effect, found[key].trial if key in found else [0.0] * len(effect.parameters))
-        for key, effect in candidates.items()
-    ]
-
-
-def _started(
-    passes: Passes, facts: _imufit.Facts, model: SensorModel, nuisance: Mapping[str, list[float]]
-) -> SensorModel:
+def _started(logs: Sequence[SurveyedLog], model: SensorModel, own: Sequence[Values]) -> SensorModel:
     """Find where to start for effects of the model that need a search and have no values yet."""
     for effect, values in model.stack():
-        if not any(values) and effect.search(facts):
-            others = [(e, v) for e, v in _stack(model, nuisance) if e.id != effect.id]
-            found = search(passes, facts, others, {effect.id: effect})
+        if not any(values) and any(effect.search(each.facts) for each in logs):
+            others = [
+                {key: at for key, at in _fitted(each, model, list(at_own), at_own).items() if key != effect.id}
+                for each, at_own in zip(logs, own, strict=True)
+            ]
+            found = search(logs, others, {effect.id: effect})
             model = model.starting_at({key: item.start for key, item in found.items()})
     return model
-
-
-def _floors(log: LogSource, variance: list[float]) -> list[float]:
-    """Noise floor of each channel: from the metadata, else what no effect of the catalogue explains."""
-    given = log.metadata.noise
-    return [given.get(channel[:3]) or float(np.sqrt(v)) for channel, v in zip(CHANNELS, variance, strict=True)]

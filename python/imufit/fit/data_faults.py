@@ -22,9 +22,10 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
     facts : Facts
         Of the log as declared.
     ends : mapping
-        End of the range of each sensor that has one.
+        End of the range of each sensor that may have one.
     """
-    clipped = ClippedRows(ends)
+    told = passes.log.metadata.extra
+    clipped = ClippedRows(ends, [sensor for sensor in ends if f"{sensor}_range" in told])
 
     def counted() -> Iterator[dict[str, Any]]:
         for chunk in passes.chunks(facts.margin, "looking for faults of the data"):

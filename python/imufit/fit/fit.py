@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from imufit.errors import InputError
-from imufit.fit.analysis import Analysis, Estimate
+from imufit.fit.analysis import OWN, Analysis, Estimate
+from imufit.log.several import Logs, logs_of, name_of
+from imufit.model.catalogue import find_effect
 from imufit.model.sensor_model import SensorModel
 from imufit.progress import Progress, silent
-from imufit.results import Parameter
+from imufit.results import LogParameters, Parameter
+from imufit.results.log_parameters import logs_json
 from imufit.results.parameter import by_effect, parameter_frame, parameter_table, plot_parameters
 
 if TYPE_CHECKING:
@@ -21,20 +27,22 @@ if TYPE_CHECKING:
 
 
 class Fit:
-    """A sensor model fitted to a log, with the evidence that answers further questions.
+    """A sensor model fitted to a log, or to several of one sensor, with the evidence that answers further questions.
 
     Attributes
     ----------
     model : SensorModel
-        The model with its fitted parameters.
-    log : LogSource
-        The log it was fitted to.
+        The model with its fitted parameters; what each log has for itself (its bias) stands with its mean.
+    own : tuple of dict
+        For each log the values of the effects that it has for itself, unnamed ones among them.
+    logs : tuple of LogSource
+        The logs it was fitted to.
     ratio : float
         Held-out residual RMS over the noise floor, all channels (1 = at the floor).
     training_ratio : float
         The same on the data of the fit.
     analysis : Analysis
-        Evidence of the log around the fitted parameters.
+        Evidence of the logs around the fitted parameters.
     estimate : Estimate
         Parameters, standard errors and held-out error that the evidence gives.
     """
@@ -42,39 +50,105 @@ class Fit:
     def __init__(self, analysis: Analysis, estimate: Estimate) -> None:
         self.analysis = analysis
         self.estimate = estimate
-        self.model, self.unnamed = analysis.moved_to(estimate)
+        self.model, self.own = analysis.moved_to(estimate)
         self.ratio = estimate.held_out
         self.training_ratio = estimate.training
 
     @classmethod
-    def of(cls, model: SensorModel, log: LogSource, progress: Progress | None = None) -> Fit:
-        """Fit a model to a log; see :meth:`imufit.SensorModel.fit`.
+    def of(cls, model: SensorModel, log: Logs, progress: Progress | None = None) -> Fit:
+        """Fit a model to a log or to several of one sensor; see :meth:`imufit.SensorModel.fit`.
 
         Parameters
         ----------
         model : SensorModel
             Effects, and the values to start from.
-        log : Log or LogStream
+        log : Log, LogStream or a sequence of them
             With reference attitude.
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
         """
-        return cls(*Analysis.of(model, log, progress or silent).solved())
+        return cls(*Analysis.of(model, logs_of(log), progress or silent).solved())
 
     def moved(self, model: SensorModel) -> Fit:
-        """Fit another stack of effects to the same log, starting from this one's values.
+        """Fit another stack of effects to the same logs, starting from this one's values.
 
         Parameters
         ----------
         model : SensorModel
             The other stack.
         """
-        return Fit(*self.analysis.solved_for(model, self.unnamed))
+        return Fit(*self.analysis.solved_for(model, self.own))
+
+    def of_logs(self, chosen: Sequence[int]) -> Fit:
+        """Fit the same effects to some of the logs alone, from the evidence that there is.
+
+        Parameters
+        ----------
+        chosen : sequence of int
+            Numbers of the logs.
+        """
+        analysis = self.analysis.of_logs(chosen)
+        return Fit(analysis, analysis.estimate())
 
     @property
-    def log(self) -> LogSource:
-        """The log."""
-        return self.analysis.passes.log
+    def logs(self) -> tuple[LogSource, ...]:
+        """The logs."""
+        return tuple(each.surveyed.log for each in self.analysis.logs)
+
+    @property
+    def by_log(self) -> tuple[LogParameters, ...]:
+        """What each of several logs has for itself, and how far it is above its noise floor; empty for one log."""
+        if len(self.logs) == 1:
+            return ()
+        return tuple(
+            LogParameters(name_of(log, k), self._own_parameters(k), self.log_ratio(k))
+            for k, log in enumerate(self.logs)
+        )
+
+    def _own_parameters(self, log: int) -> tuple[Parameter, ...]:
+        found: list[Parameter] = []
+        for slot, key in enumerate(self.model.effects):
+            if key not in OWN or log not in self.analysis.having(key):
+                continue
+            effect = find_effect(key)
+            at = self.analysis.having(key).index(log) * len(effect.parameters)
+            errors = self.estimate.errors[slot][at : at + len(effect.parameters)]
+            found += [
+                Parameter(key, name, value, float(error), unit, typical)
+                for (name, unit, typical), value, error in zip(
+                    effect.parameters, self.own[log][key], errors, strict=True
+                )
+            ]
+        return tuple(found)
+
+    @property
+    def worst(self) -> int:
+        """Number of the log that stands highest above its noise floor."""
+        return max(range(len(self.logs)), key=self.log_ratio) if len(self.logs) > 1 else 0
+
+    def log_ratio(self, log: int) -> float:
+        """Return the residual RMS of one log over its noise floor, all channels.
+
+        Parameters
+        ----------
+        log : int
+            Number of the log.
+        """
+        channels = self.analysis.problem.residual(self.estimate.step, log)["channels"]
+        floors = self.analysis.logs[log].floors
+        square = sum(item["n"] * (item["rms"] / floors[item["index"]]) ** 2 for item in channels)
+        return float(np.sqrt(square / sum(item["n"] for item in channels)))
+
+    def model_of(self, log: int) -> SensorModel:
+        """Return the model with the values that one log has for itself.
+
+        Parameters
+        ----------
+        log : int
+            Number of the log.
+        """
+        own = {key: values for key, values in self.own[log].items() if key in self.model.effects}
+        return self.model.starting_at(own)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -82,7 +156,7 @@ class Fit:
         return self.model.listed()
 
     def compare(self, log: LogSource | None = None, progress: Progress | None = None) -> Comparison:
-        """Say where the model fails on a log (default: its own); parameters stay as they are.
+        """Say where the model fails on a log (default: its own, of several the worst); parameters stay as they are.
 
         Parameters
         ----------
@@ -100,12 +174,12 @@ class Fit:
 
         return compare(self, log, progress or silent)
 
-    def diagnose(self, log: LogSource | None = None, progress: Progress | None = None) -> Diagnosis:
+    def diagnose(self, log: Logs | None = None, progress: Progress | None = None) -> Diagnosis:
         """Say which effect is missing from the model, judged on a log (default: its own); fitted parameters move along.
 
         Parameters
         ----------
-        log : Log or LogStream, optional
+        log : Log, LogStream or a sequence of them, optional
             With reference attitude.
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
@@ -114,15 +188,15 @@ class Fit:
 
         return diagnose(self.on(log, progress or silent))
 
-    def add(self, effect: str, log: LogSource | None = None, progress: Progress | None = None) -> Addition:
+    def add(self, effect: str, log: Logs | None = None, progress: Progress | None = None) -> Addition:
         """Add an effect to the model and refit.
 
         Parameters
         ----------
         effect : str
             Id such as ``gyr.g_sensitivity``.
-        log : Log or LogStream, optional
-            Log to fit to; default: its own.
+        log : Log, LogStream or a sequence of them, optional
+            Logs to fit to; default: its own.
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
 
@@ -140,17 +214,17 @@ class Fit:
 
         return add(self.on(log, progress or silent), effect)
 
-    def on(self, log: LogSource | None, progress: Progress) -> Fit:
-        """Return this fit if `log` is its own log, else the model refitted to `log`.
+    def on(self, log: Logs | None, progress: Progress) -> Fit:
+        """Return this fit if `log` is what it was fitted to, else the model refitted to `log`.
 
         Parameters
         ----------
-        log : Log or LogStream, optional
-            The log in question; None is its own.
+        log : Log, LogStream or a sequence of them, optional
+            The logs in question; None is its own.
         progress : callable
             Called with (rows done, rows in all, what is being done).
         """
-        if log is None or log is self.log:
+        if log is None or logs_of(log) == self.logs:
             return self
         return Fit.of(self.model, log, progress)
 
@@ -171,7 +245,8 @@ class Fit:
             "parameters": by_effect(self.parameters),
             "ratio": self.ratio,
             "training_ratio": self.training_ratio,
-            "n": self.log.n,
+            "n": sum(log.n for log in self.logs),
+            **logs_json(self.by_log),
         }
 
     def to_dataframe(self) -> pd.DataFrame:

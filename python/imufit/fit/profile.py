@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from imufit import _imufit
-from imufit.fit.passes import Passes
+from imufit.fit.surveyed_log import SurveyedLog
+from imufit.model.catalogue import find_effect
 
 CHANCE = 20.0
 """Drop of the sum of squares, in units of the noise, below which the best of a grid is not worth a finer one."""
-
-Stack = Sequence[tuple[_imufit.Effect, list[float]]]
 
 
 @dataclass(frozen=True)
@@ -31,18 +30,16 @@ class Found:
 
 
 def search(
-    passes: Passes, facts: _imufit.Facts, stack: Stack, candidates: Mapping[str, _imufit.Effect]
+    logs: Sequence[SurveyedLog], fitted: Sequence[Mapping[str, list[float]]], candidates: Mapping[str, _imufit.Effect]
 ) -> dict[str, Found]:
-    """Search for those candidates that have something to search for, each alone on top of a model.
+    """Search for those candidates that have something to search for, each alone on top of a model, in all logs at once.
 
     Parameters
     ----------
-    passes : Passes
-        Over the log.
-    facts : Facts
-        Of the log.
-    stack : sequence of (Effect, list of float)
-        Effects of the model with their parameters, which move along.
+    logs : sequence of SurveyedLog
+        The logs.
+    fitted : sequence of mapping
+        For each log the effects of its model with their parameters, which move along.
     candidates : mapping
         Effects by id.
 
@@ -52,25 +49,40 @@ def search(
         By id, for those of the candidates that have a grid.
     """
     found: dict[str, Found] = {}
-    grids = {key: effect.search(facts) for key, effect in candidates.items()}
+    tellers = {
+        key: [k for k, each in enumerate(logs) if each.refusal(effect) is None] for key, effect in candidates.items()
+    }
+    # The longest log tells of the longest times.
+    guides = {key: logs[max(known, key=lambda k: _duration(logs[k]))].facts for key, known in tellers.items() if known}
+    grids = {key: candidates[key].search(facts) for key, facts in guides.items()}
     grids = {key: grid for key, grid in grids.items() if grid}
     finer = 0
     while grids:
-        profiles = {key: _imufit.Profile(facts, stack, candidates[key], grid) for key, grid in grids.items()}
-        for arrays in passes.chunks(facts.margin, "searching periods and widths"):
-            for profile in profiles.values():
-                profile.add(arrays)
-        for key, profile in profiles.items():
-            best = profile.best()
+        profiles: dict[str, list[_imufit.Profile]] = {key: [] for key in grids}
+        for k, (each, values) in enumerate(zip(logs, fitted, strict=True)):
+            stack = [(find_effect(key), at) for key, at in values.items()]
+            asked = [key for key in grids if k in tellers[key]]
+            own = [_imufit.Profile(each.facts, stack, candidates[key], grids[key]) for key in asked]
+            for arrays in each.passes.chunks(each.facts.margin, "searching periods and widths") if own else ():
+                for profile in own:
+                    profile.add(arrays)
+            for key, profile in zip(asked, own, strict=True):
+                profiles[key].append(profile)
+        for key, searches in profiles.items():
+            best = _imufit.best_trial(searches)
             grid = grids.pop(key)
             if best is not None:
                 number, step, gain = best
                 found[key] = _found(candidates[key], grid[number], step)
                 if gain > CHANCE:
-                    grids[key] = candidates[key].search(facts, found[key].trial, finer)
+                    grids[key] = candidates[key].search(guides[key], found[key].trial, finer)
         grids = {key: grid for key, grid in grids.items() if grid}
         finer += 1
     return found
+
+
+def _duration(each: SurveyedLog) -> float:
+    return each.facts.t_end - each.facts.t_start
 
 
 def _found(effect: _imufit.Effect, trial: list[float], step: list[float]) -> Found:

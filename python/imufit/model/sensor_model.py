@@ -18,6 +18,7 @@ from imufit.results import Parameter
 if TYPE_CHECKING:
     from imufit.fit import Fit
     from imufit.log import Log, LogSource
+    from imufit.log.several import Logs
     from imufit.progress import Progress
     from imufit.results import Comparison
 
@@ -127,13 +128,13 @@ class SensorModel:
             self.effects, self.parameters | named, constants=self.constants, standard_errors=self.standard_errors
         )
 
-    def fit(self, log: LogSource, progress: Progress | None = None) -> Fit:
-        """Fit the parameters to a log with reference, starting from the present values.
+    def fit(self, log: Logs, progress: Progress | None = None) -> Fit:
+        """Fit the parameters to a log with reference, or to several of one sensor, starting from the present values.
 
         Parameters
         ----------
-        log : Log or LogStream
-            With at least one sensor and a reference attitude.
+        log : Log, LogStream or a sequence of them
+            With at least one sensor and a reference attitude. Several logs share all effects but biases and mounts.
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
 

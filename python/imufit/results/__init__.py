@@ -8,8 +8,10 @@ from imufit.results.attitude import AttitudeBins, AttitudeComparison, AttitudeDe
 from imufit.results.comparison import ChannelResidual, Comparison, Panel, Spectrum, Where
 from imufit.results.data_fault import DataFault
 from imufit.results.diagnosis import Candidate, Diagnosis, Rival, Unexplained
+from imufit.results.disagreement import Disagreement, Without
 from imufit.results.effect_card import EffectCard
 from imufit.results.ladder import Ladder, Step
+from imufit.results.log_parameters import LogParameters
 from imufit.results.parameter import Parameter
 from imufit.results.table import Table
 from imufit.results.tilt import Mark, TiltComparison, TiltFigures
@@ -24,8 +26,10 @@ __all__ = [
     "Comparison",
     "DataFault",
     "Diagnosis",
+    "Disagreement",
     "EffectCard",
     "Ladder",
+    "LogParameters",
     "Mark",
     "Panel",
     "Parameter",
@@ -37,4 +41,5 @@ __all__ = [
     "TiltFigures",
     "Unexplained",
     "Where",
+    "Without",
 ]

@@ -38,6 +38,8 @@ class DataFault:
         True if nothing can be said of effects before it is put right.
     gain : float
         Drop of the sum of squares, in units of the noise, that it explains beside every effect; NaN where not asked.
+    file : str or None
+        Of several logs: what the log is called that it is in.
     """
 
     fault: str
@@ -51,16 +53,18 @@ class DataFault:
     left_out: bool = False
     spoils: bool = False
     gain: float = math.nan
+    file: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of one fault."""
-        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+        """JSON of one fault; the key ``file`` only where there are several logs."""
+        names = [name for name in self.__dataclass_fields__ if name != "file" or self.file is not None]
+        return {name: json_value(getattr(self, name)) for name in names}
 
     @property
     def sentence(self) -> str:
         """Evidence, what was done about it, and the remedy."""
         done = " Those samples are left out here." if self.left_out else ""
-        return f"{self.evidence}{done} {self.remedy}"
+        return f"{'' if self.file is None else f'{self.file}: '}{self.evidence}{done} {self.remedy}"
 
     def __str__(self) -> str:
         return f"Data fault ({self.fault}): {self.sentence}"
@@ -68,8 +72,10 @@ class DataFault:
 
 def fault_table(faults: Sequence[DataFault]) -> Table:
     """Faults with where they lie."""
+    several = any(item.file is not None for item in faults)
     rows = tuple(
         (
+            *([item.file or "-"] if several else []),
             item.fault,
             item.channel or item.sensor or "all",
             quantity.span(item.t_start, item.t_end),
@@ -78,4 +84,5 @@ def fault_table(faults: Sequence[DataFault]) -> Table:
         )
         for item in faults
     )
-    return Table("Faults of the data", ("fault", "where", ">time", ">rows", "samples"), rows)
+    log = ("log",) if several else ()
+    return Table("Faults of the data", (*log, "fault", "where", ">time", ">rows", "samples"), rows)

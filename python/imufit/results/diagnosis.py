@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
 from imufit.results.data_fault import DataFault, fault_table
+from imufit.results.disagreement import Disagreement, Without, disagreement_table
 from imufit.results.json_value import json_value
+from imufit.results.log_parameters import LogParameters, log_table, logs_json
 from imufit.results.parameter import Parameter, by_name, in_words
 from imufit.results.table import Table, html, page
 
@@ -73,6 +75,8 @@ class Candidate:
         ``passed``, ``not significant`` or ``not testable here``.
     minimal_detectable : dict
         Smallest detectable (value, unit) by parameter.
+    logs : tuple of LogParameters
+        Of several logs, where each has its own parameters of this effect; `parameters` are then their means.
     """
 
     effect: str
@@ -87,6 +91,7 @@ class Candidate:
     explanation: str
     status: str
     minimal_detectable: dict[str, tuple[float, str]]
+    logs: tuple[LogParameters, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one candidate; gain, status and smallest detectable sizes besides."""
@@ -106,6 +111,11 @@ class Candidate:
                 name: {"value": json_value(value), "unit": unit}
                 for name, (value, unit) in self.minimal_detectable.items()
             },
+            **(
+                {"logs": [{"file": log.file, "parameters": by_name(log.parameters)} for log in self.logs]}
+                if self.logs
+                else {}
+            ),
         }
 
     @property
@@ -193,6 +203,13 @@ class Diagnosis:
         The result in words.
     notes : tuple of str
         What the reader should know about these figures.
+    logs : tuple of LogParameters
+        Of several logs: how far each is above its noise floor, and the model's parameters that it has for itself.
+    disagrees : tuple of Disagreement
+        Logs that have another value of an effect than the others.
+    without : tuple of Without
+        What the answer is without logs that disagree so much, or whose data are so faulty, that there is none with
+        them.
     data_faults : tuple of DataFault
         What is wrong with the data themselves. Where one of them spoils the log, the verdict is ``unknown`` and no
         effect is judged.
@@ -207,6 +224,9 @@ class Diagnosis:
     experiment: str | None
     sentence: str
     notes: tuple[str, ...]
+    logs: tuple[LogParameters, ...] = ()
+    disagrees: tuple[Disagreement, ...] = ()
+    without: tuple[Without, ...] = ()
     data_faults: tuple[DataFault, ...] = ()
 
     @property
@@ -227,6 +247,9 @@ class Diagnosis:
             "sentence": self.sentence,
             "notes": list(self.notes),
             "data_faults": [fault.to_dict() for fault in self.data_faults],
+            **logs_json(self.logs),
+            **({"disagrees": [item.to_dict() for item in self.disagrees]} if self.logs else {}),
+            **({"without": [item.to_dict() for item in self.without]} if self.without else {}),
         }
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -299,15 +322,30 @@ class Diagnosis:
         )
         return Table("Not explained by any effect", ("channel", "covariate", "shape", ">share", ">mostly at"), rows)
 
+    def disagreement_table(self) -> Table:
+        """Return the logs that disagree; without rows where all agree."""
+        return disagreement_table(self.disagrees)
+
+    def log_table(self) -> Table:
+        """Return what each of several logs has for itself; without rows for one log."""
+        return log_table(self.logs)
+
     def tables(self) -> tuple[Table, ...]:
         """Every table, most important first."""
-        return (self.candidate_table(), self.unexplained_table(), fault_table(self.data_faults))
+        return (
+            self.candidate_table(),
+            self.unexplained_table(),
+            self.disagreement_table(),
+            self.log_table(),
+            fault_table(self.data_faults),
+        )
 
     def sentences(self) -> list[str]:
         """Verdict, result, next experiment, faults of the data that only concern some rows, and notes."""
         experiment = f"Next: {self.experiment}" if self.experiment else ""
         verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
-        return [verdict, experiment, *self.local_faults(), *self.notes]
+        without = [f"{item}. {item.sentence}" for item in self.without]
+        return [verdict, *without, experiment, *self.local_faults(), *self.notes]
 
     def local_faults(self) -> list[str]:
         """Sentences on faults of the data beside which effects can be judged."""

@@ -11,6 +11,7 @@ from imufit.results.comparison import Comparison
 from imufit.results.data_fault import fault_table
 from imufit.results.diagnosis import VERDICTS, Diagnosis
 from imufit.results.json_value import json_value
+from imufit.results.log_parameters import logs_json
 from imufit.results.parameter import by_effect
 from imufit.results.table import Table, html, page
 
@@ -108,6 +109,8 @@ class Ladder:
             "data_faults": [fault.to_dict() for fault in self.diagnosis.data_faults],
             "sentence": self.sentence,
             "parameters": by_effect(getattr(self.fit, "parameters", ()) or ()),
+            **logs_json(self.diagnosis.logs),
+            **({"disagrees": [item.to_dict() for item in self.diagnosis.disagrees]} if self.diagnosis.logs else {}),
         }
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -153,8 +156,13 @@ class Ladder:
 
     def tables(self) -> tuple[Table, ...]:
         """Every table, most important first."""
-        faults = fault_table(self.diagnosis.data_faults)
-        return (self.step_table(), self.diagnosis.unexplained_table(), faults)
+        return (
+            self.step_table(),
+            self.diagnosis.unexplained_table(),
+            self.diagnosis.disagreement_table(),
+            self.diagnosis.log_table(),
+            fault_table(self.diagnosis.data_faults),
+        )
 
     def sentences(self) -> list[str]:
         """Verdict, result, attitude, warnings, next experiment, faults of the data that only concern some rows."""
@@ -165,7 +173,9 @@ class Ladder:
         )
         attitude = "" if self.attitude is None else self.attitude.sentence
         verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
-        return [verdict, result, attitude, *self.warnings(), experiment, *self.diagnosis.local_faults()]
+        without = [f"{item}. {item.sentence}" for item in self.diagnosis.without]
+        faults = self.diagnosis.local_faults()
+        return [verdict, *without, result, attitude, *self.warnings(), experiment, *faults]
 
     def _repr_html_(self) -> str:
         return html(self.sentences(), self.tables())

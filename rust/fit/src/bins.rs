@@ -32,6 +32,19 @@ pub struct Bins {
     pub edges: Vec<Vec<f64>>,
 }
 
+/// Samples of every covariate of a log.
+#[derive(Clone, Debug)]
+pub struct CovariateSamples {
+    /// Names of the covariates.
+    pub names: Vec<String>,
+    /// Samples of each.
+    pub values: Vec<Vec<f64>>,
+    /// Noise of the reference's rates, rad/s.
+    pub rate_noise: f64,
+    /// Noise of the reference's specific forces, m/s^2.
+    pub force_noise: f64,
+}
+
 impl Bins {
     /// Names of the covariates of a log with these columns of its own.
     pub fn covariate_names(own: &[String]) -> Vec<String> {
@@ -53,14 +66,30 @@ impl Bins {
         }
     }
 
-    /// Bins of equal count from samples of each covariate; `rate_noise` (rad/s) and `force_noise` (m/s^2) are the noise of
-    /// the reference's own rates and specific forces. Rows sorted into bins by their reference's noise
-    /// would show a dependence that is none: no edge is put where many rows lie within that noise.
-    pub fn new(own: &[String], samples: &mut [Vec<f64>], rate_noise: f64, force_noise: f64) -> Self {
-        let edges = samples
-            .iter_mut()
+    /// Bins of equal count from samples of one log, or of several together: for the covariates of the first of them. Rows sorted
+    /// into bins by their reference's noise would show a dependence that is none: no edge is put where many rows lie within
+    /// that noise.
+    pub fn new(logs: &[&CovariateSamples]) -> Self {
+        let Some(first) = logs.first() else {
+            return Self {
+                names: Vec::new(),
+                edges: Vec::new(),
+            };
+        };
+        let most = |noise: fn(&CovariateSamples) -> f64| logs.iter().map(|l| noise(l)).fold(0.0, f64::max);
+        let (rate_noise, force_noise) = (most(|l| l.rate_noise), most(|l| l.force_noise));
+        let edges = first
+            .names
+            .iter()
             .enumerate()
-            .map(|(covariate, sample)| {
+            .map(|(covariate, name)| {
+                // Each log has a time of its own.
+                let concerned = if covariate == 0 { &logs[..1] } else { logs };
+                let of_log = |log: &&CovariateSamples| {
+                    let k = log.names.iter().position(|n| n == name);
+                    k.map_or_else(Vec::new, |k| log.values[k].clone())
+                };
+                let mut sample: Vec<f64> = concerned.iter().flat_map(of_log).collect();
                 let noise = match covariate {
                     2..=4 => force_noise,
                     5..=8 => rate_noise,
@@ -87,7 +116,7 @@ impl Bins {
             })
             .collect();
         Self {
-            names: Self::covariate_names(own),
+            names: first.names.clone(),
             edges,
         }
     }

@@ -112,6 +112,23 @@ impl NormalEquations {
         }
     }
 
+    /// The same equations among those of `parameters` parameters, where each of their own has its place.
+    #[must_use]
+    pub fn placed(&self, places: &[usize], parameters: usize) -> Self {
+        let mut out = Self {
+            square: self.square,
+            n: self.n,
+            ..Self::zeros(parameters)
+        };
+        for (j, q) in places.iter().enumerate() {
+            for (i, p) in places.iter().enumerate() {
+                out.gram[(*p, *q)] = self.gram[(i, j)];
+            }
+            out.right[*q] = self.right[j];
+        }
+        out
+    }
+
     /// Solves the equations with a prior of zero mean and the given precisions; `None` if that fails.
     pub fn solve(&self, precision: &DVector<f64>) -> Option<Solved> {
         let p = self.parameters();

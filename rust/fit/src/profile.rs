@@ -149,7 +149,7 @@ impl Profile {
         Ok((0..CHANNELS).map(of_channel).collect())
     }
 
-    /// Equations of the model and one trial over all channels.
+    /// Equations of one log's model and one trial over all channels.
     fn equations(&self, trial: usize, weights: &[f64; CHANNELS]) -> NormalEquations {
         let range = self.range(trial);
         let mut out = NormalEquations::zeros(self.fitted + range.len());
@@ -191,50 +191,86 @@ impl Profile {
         square.max(0.0) / sums.n.max(1) as f64
     }
 
-    /// The trial that lowers the sum of squares most; `None` without trials or samples.
-    pub fn best(&self) -> Option<Best> {
-        let mut found: Option<(usize, DVector<f64>)> = None;
-        let mut gain = 0.0;
-        for _ in 0..ROUNDS {
-            let mut weights = [0.0; CHANNELS];
-            for (channel, weight) in weights.iter_mut().enumerate() {
-                let sums = &self.channels[channel];
-                if sums.n == 0 {
-                    continue;
-                }
-                let last = sums.base.nrows() - 1;
-                let present = sums.base[(last, last)] / sums.n as f64;
-                let left = found
-                    .as_ref()
-                    .map_or(present, |(trial, step)| self.mean_square(*trial, step, channel));
-                // A noiseless channel must not outweigh the rest beyond what numbers can hold.
-                *weight = 1.0 / left.max(1e-12 * present).max(f64::MIN_POSITIVE);
+    /// Weight of each channel: one over what a trial leaves of it (`None`: over what there is).
+    fn weights(&self, left: Option<(usize, &DVector<f64>)>) -> [f64; CHANNELS] {
+        let mut weights = [0.0; CHANNELS];
+        for (channel, weight) in weights.iter_mut().enumerate() {
+            let sums = &self.channels[channel];
+            if sums.n == 0 {
+                continue;
             }
-            let solved: Vec<(usize, f64, DVector<f64>)> = (0..self.trials)
-                .into_par_iter()
-                .filter_map(|trial| {
-                    let equations = self.equations(trial, &weights);
-                    let precision = DVector::zeros(equations.parameters());
-                    let step = equations.solve(&precision)?.solution;
-                    let square = equations.residual_square(&step);
-                    square.is_finite().then_some((trial, square, step))
-                })
-                .collect();
-            let (trial, square, step) = solved.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-            let alone = self
-                .equations(trial, &weights)
-                .selected(&(0..self.fitted).collect::<Vec<_>>());
-            let without = alone.solve(&DVector::zeros(self.fitted))?.solution;
-            gain = alone.residual_square(&without) - square;
-            found = Some((trial, step));
+            let last = sums.base.nrows() - 1;
+            let present = sums.base[(last, last)] / sums.n as f64;
+            let left = left.map_or(present, |(trial, step)| self.mean_square(trial, step, channel));
+            // A noiseless channel must not outweigh the rest beyond what numbers can hold.
+            *weight = 1.0 / left.max(1e-12 * present).max(f64::MIN_POSITIVE);
         }
-        found.map(|(trial, step)| {
-            let own = step.rows(self.fitted, step.len() - self.fitted);
-            Best {
-                trial,
-                parameters: own.iter().copied().collect(),
-                gain,
-            }
-        })
+        weights
     }
+}
+
+/// The trial that lowers the sum of squares of all logs most; `None` without trials or samples. The searches are for the same
+/// trials; the candidate's parameters are the same in all logs, the model's move along in each log by themselves.
+pub fn best(logs: &[&Profile]) -> Option<Best> {
+    let trials = logs.iter().map(|l| l.trials).min()?;
+    let starts: Vec<usize> = logs
+        .iter()
+        .scan(0, |next, l| {
+            let start = *next;
+            *next += l.fitted;
+            Some(start)
+        })
+        .collect();
+    let fitted: usize = logs.iter().map(|l| l.fitted).sum();
+    // Places of one log's parameters among those of all logs, the candidate's last.
+    let places = |log: usize, trial: usize| -> Vec<usize> {
+        let own = logs[log].range(trial).len();
+        (starts[log]..starts[log] + logs[log].fitted)
+            .chain(fitted..fitted + own)
+            .collect()
+    };
+    let equations = |trial: usize, weights: &[[f64; CHANNELS]]| {
+        let own = logs.iter().map(|l| l.range(trial).len()).max().unwrap_or(0);
+        let mut sum = NormalEquations::zeros(fitted + own);
+        for (log, profile) in logs.iter().enumerate() {
+            let part = profile.equations(trial, &weights[log]);
+            sum.add(&part.placed(&places(log, trial), fitted + own), 1.0);
+        }
+        sum
+    };
+    let mut found: Option<(usize, DVector<f64>)> = None;
+    let mut gain = 0.0;
+    for _ in 0..ROUNDS {
+        let weights: Vec<[f64; CHANNELS]> = (0..logs.len())
+            .map(|log| {
+                let step = found
+                    .as_ref()
+                    .map(|(trial, step)| (*trial, step.select_rows(&places(log, *trial))));
+                logs[log].weights(step.as_ref().map(|(trial, step)| (*trial, step)))
+            })
+            .collect();
+        let solved: Vec<(usize, f64, DVector<f64>)> = (0..trials)
+            .into_par_iter()
+            .filter_map(|trial| {
+                let equations = equations(trial, &weights);
+                let precision = DVector::zeros(equations.parameters());
+                let step = equations.solve(&precision)?.solution;
+                let square = equations.residual_square(&step);
+                square.is_finite().then_some((trial, square, step))
+            })
+            .collect();
+        let (trial, square, step) = solved.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let alone = equations(trial, &weights).selected(&(0..fitted).collect::<Vec<_>>());
+        let without = alone.solve(&DVector::zeros(fitted))?.solution;
+        gain = alone.residual_square(&without) - square;
+        found = Some((trial, step));
+    }
+    found.map(|(trial, step)| {
+        let own = step.rows(fitted, step.len() - fitted);
+        Best {
+            trial,
+            parameters: own.iter().copied().collect(),
+            gain,
+        }
+    })
 }

@@ -8,7 +8,7 @@ use imufit_model::smoothing::Smoothing;
 use imufit_model::window::Window;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::bins::Bins;
+use crate::bins::{Bins, CovariateSamples};
 use crate::reference_width::{self, SampledRow, SampledRows};
 use crate::travel::Travel;
 
@@ -203,8 +203,8 @@ impl Survey {
         }
     }
 
-    /// The facts, and the bins of every covariate.
-    pub fn finish(mut self) -> (LogFacts, Bins) {
+    /// The facts, and samples of every covariate.
+    pub fn finish(mut self) -> (LogFacts, CovariateSamples) {
         let mean = |(sum, n): (f64, usize)| if n == 0 { f64::NAN } else { sum / n as f64 };
         let estimated = self.given.field.is_none() && self.field.1 > 0;
         let field = self.given.field.unwrap_or_else(|| {
@@ -215,13 +215,14 @@ impl Survey {
             }
         });
         let dt = median(&mut self.steps);
-        let attitude_smoothing = reference_width::of_attitude(&self.attitude_width, &self.width_rows);
+        let attitude_smoothing = reference_width::of_attitude(&self.attitude_width, &self.width_rows, self.given.n);
         let position_smoothing = self.has_position.then(|| {
             reference_width::of_position(
                 &self.position_width,
                 &self.attitude_width,
                 attitude_smoothing,
                 &self.width_rows,
+                self.given.n,
             )
         });
         let facts = LogFacts {
@@ -258,8 +259,13 @@ impl Survey {
             + facts
                 .position_smoothing
                 .map_or(0.0, |s| self.position_width.derivative_noise(s));
-        let bins = Bins::new(&self.given.covariates, &mut self.samples, rate, force);
-        (facts, bins)
+        let samples = CovariateSamples {
+            names: Bins::covariate_names(&self.given.covariates),
+            values: self.samples,
+            rate_noise: rate,
+            force_noise: force,
+        };
+        (facts, samples)
     }
 
     /// For each sensor the axes along which its ideal reading is nothing but the noise of the reference.

@@ -1,6 +1,5 @@
 //! What a residual depends on, whatever the shape: a few orthogonal contrasts over the bins of each covariate.
 
-use imufit_fit::evidence::Evidence;
 use imufit_fit::normal_equations::NormalEquations;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::{DMatrix, DVector};
@@ -13,13 +12,18 @@ use crate::screening;
 /// Contrasts over the bins: polynomials of the bin's rank up to this degree.
 pub const CONTRASTS: usize = 5;
 
+/// The covariate that every log has for itself.
+const TIME: &str = "t";
+
 /// How a channel's residual depends on a covariate.
 #[derive(Clone, Debug)]
 pub struct Dependence {
     /// Channel index.
     pub channel: usize,
-    /// Covariate index of the bins.
-    pub covariate: usize,
+    /// Name of the covariate.
+    pub covariate: String,
+    /// The log concerned; `None` for all that have the covariate.
+    pub log: Option<usize>,
     /// p-value over blocks.
     pub p_value: f64,
     /// Held-out gain in units of the noise variance.
@@ -46,53 +50,90 @@ fn contrasts(bins: usize) -> DMatrix<f64> {
     q
 }
 
-/// Equations of the model's parameters (`fitted`, block by block) and the contrasts of one covariate in one channel.
-fn question(
-    problem: &Problem,
-    evidence: &Evidence,
-    model: &[usize],
-    fitted: &[NormalEquations],
+/// A covariate that a channel is tested against.
+struct Asked {
     channel: usize,
-    covariate: usize,
-) -> Option<Question> {
-    let bins = evidence.layout.bins.edges[covariate].len() + 1;
-    if bins < 2 {
-        return None;
+    name: String,
+    /// The log concerned; `None` for all that have the covariate.
+    log: Option<usize>,
+    /// Its index among the bins of each log; `None` where the log has it not or is not concerned.
+    index: Vec<Option<usize>>,
+}
+
+/// Every covariate of any log. What a residual depends on is the same in all logs, and so are the edges of their bins; time is
+/// another one in each log.
+fn covariates(problem: &Problem) -> Vec<(String, Option<usize>, Vec<Option<usize>>)> {
+    let bins = |log: usize| &problem.parts[log].white.layout.bins;
+    let mut names: Vec<&String> = Vec::new();
+    for name in (0..problem.parts.len()).flat_map(|log| &bins(log).names) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
     }
+    let of_log = |name: &str, log: usize| {
+        let index = bins(log).names.iter().position(|n| n == name)?;
+        (!bins(log).edges[index].is_empty()).then_some(index)
+    };
+    let logs = 0..problem.parts.len();
+    let mut out = Vec::new();
+    for name in names {
+        if name == TIME && logs.len() > 1 {
+            out.extend(logs.clone().map(|log| {
+                let index = logs.clone().map(|other| of_log(name, log).filter(|_| other == log));
+                (name.clone(), Some(log), index.collect())
+            }));
+        } else {
+            out.push((name.clone(), None, logs.clone().map(|log| of_log(name, log)).collect()));
+        }
+    }
+    out
+}
+
+/// Equations of the model's parameters (`fitted`, block by block) and the contrasts of one covariate in one channel.
+fn question(problem: &Problem, model: &[usize], fitted: &[NormalEquations], asked: &Asked) -> Option<Question> {
+    let channel = asked.channel;
+    let edges = |log: usize| asked.index[log].map(|k| problem.parts[log].white.layout.bins.edges[k].len());
+    let bins = (0..problem.parts.len()).find_map(edges)? + 1;
     let q = contrasts(bins);
     let (p, m) = (model.len(), q.ncols());
-    let weight = problem.weights[channel];
-    let active = &evidence.layout.model.active()[channel];
-    let width = active.len() + 1;
     let mut white = Vec::with_capacity(problem.blocks());
-    let columns: Vec<(usize, usize)> = model
-        .iter()
-        .enumerate()
-        .filter_map(|(k, parameter)| active.binary_search(parameter).ok().map(|a| (k, a)))
-        .collect();
-    for (b, inner) in fitted.iter().enumerate() {
-        let mut out = NormalEquations::zeros(p + m);
-        out.gram.view_mut((0, 0), (p, p)).copy_from(&inner.gram);
-        out.right.rows_mut(0, p).copy_from(&inner.right);
-        (out.square, out.n) = (inner.square, inner.n);
-        if let Some(block) = evidence.get(b, channel) {
-            let (counts, sums) = (&block.bin_count[covariate], &block.bin_sum[covariate]);
-            for bin in 0..bins {
-                for i in 0..m {
-                    let qi = weight * q[(bin, i)];
-                    for j in 0..m {
-                        out.gram[(p + i, p + j)] += qi * counts[bin] * q[(bin, j)];
+    for (log, part) in problem.parts.iter().enumerate() {
+        let evidence = &part.white;
+        let weight = part.weights()[channel];
+        let active = &evidence.layout.model.active()[channel];
+        let width = active.len() + 1;
+        let columns: Vec<(usize, usize)> = active
+            .iter()
+            .enumerate()
+            .filter_map(|(a, own)| {
+                let parameter = problem.places[log][*own];
+                model.iter().position(|j| *j == parameter).map(|k| (k, a))
+            })
+            .collect();
+        for (b, inner) in fitted[problem.logs[log].clone()].iter().enumerate() {
+            let mut out = NormalEquations::zeros(p + m);
+            out.gram.view_mut((0, 0), (p, p)).copy_from(&inner.gram);
+            out.right.rows_mut(0, p).copy_from(&inner.right);
+            (out.square, out.n) = (inner.square, inner.n);
+            if let (Some(covariate), Some(block)) = (asked.index[log], evidence.get(b, channel)) {
+                let (counts, sums) = (&block.bin_count[covariate], &block.bin_sum[covariate]);
+                for bin in 0..bins {
+                    for i in 0..m {
+                        let qi = weight * q[(bin, i)];
+                        for j in 0..m {
+                            out.gram[(p + i, p + j)] += qi * counts[bin] * q[(bin, j)];
+                        }
+                        for (k, a) in &columns {
+                            let v = qi * sums[bin * width + a];
+                            out.gram[(p + i, *k)] += v;
+                            out.gram[(*k, p + i)] += v;
+                        }
+                        out.right[p + i] += qi * sums[bin * width + width - 1];
                     }
-                    for (k, a) in &columns {
-                        let v = qi * sums[bin * width + a];
-                        out.gram[(p + i, *k)] += v;
-                        out.gram[(*k, p + i)] += v;
-                    }
-                    out.right[p + i] += qi * sums[bin * width + width - 1];
                 }
             }
+            white.push(out);
         }
-        white.push(out);
     }
     let mut total = NormalEquations::zeros(p + m);
     for b in &white {
@@ -110,11 +151,11 @@ fn question(
         .sums
         .iter()
         .map(|s| {
-            let mut own = DMatrix::zeros(problem.blocks(), p + m);
+            let mut own = DMatrix::zeros(problem.logs[s.log].len(), p + m);
             own.columns_mut(0, p).copy_from(&s.columns(model));
-            if s.channel == channel {
-                for b in 0..problem.blocks() {
-                    if let Some(block) = evidence.get(b, channel) {
+            if let (true, Some(covariate)) = (s.channel == channel, asked.index[s.log]) {
+                for b in 0..problem.logs[s.log].len() {
+                    if let Some(block) = problem.parts[s.log].white.get(b, channel) {
                         let counts = DVector::from_column_slice(&block.bin_count[covariate]);
                         own.view_mut((b, p), (1, m)).copy_from(&q.tr_mul(&counts).transpose());
                     }
@@ -129,6 +170,7 @@ fn question(
         precision,
         model: p,
         sums,
+        logs: problem.logs.clone(),
     })
 }
 
@@ -144,24 +186,27 @@ fn drop(question: &Question) -> f64 {
 }
 
 /// Tests every channel against every covariate on top of the model; best held-out gain first. Only what could be significant at `alpha` is worked out.
-pub fn test(
-    problem: &Problem,
-    evidence: &Evidence,
-    model: &[usize],
-    base: &HeldOut,
-    channels: &[usize],
-) -> (Vec<Dependence>, usize) {
+pub fn test(problem: &Problem, model: &[usize], base: &HeldOut, channels: &[usize]) -> (Vec<Dependence>, usize) {
     let fitted: Vec<NormalEquations> = problem.white.iter().map(|b| b.selected(model)).collect();
-    let asked: Vec<(usize, usize)> = channels
-        .iter()
-        .filter(|c| **c < CHANNELS && problem.weights[**c] > 0.0)
-        .flat_map(|c| (0..evidence.layout.bins.names.len()).map(|k| (*c, k)))
-        .collect();
+    let covariates = covariates(problem);
+    let mut asked: Vec<Asked> = Vec::new();
+    for channel in channels.iter().copied().filter(|c| *c < CHANNELS) {
+        let seen: Vec<bool> = problem.parts.iter().map(|p| p.weights()[channel] > 0.0).collect();
+        for (name, log, index) in &covariates {
+            let index = index.iter().zip(&seen).map(|(k, seen)| k.filter(|_| *seen));
+            asked.push(Asked {
+                channel,
+                name: name.clone(),
+                log: *log,
+                index: index.collect(),
+            });
+        }
+    }
     let answers: Vec<Option<Dependence>> = asked
         .par_iter()
-        .filter_map(|(channel, covariate)| {
-            let q = question(problem, evidence, model, &fitted, *channel, *covariate)?;
-            Some(found(&q, base, *channel, *covariate))
+        .filter_map(|asked| {
+            let q = question(problem, model, &fitted, asked)?;
+            Some(found(&q, base, asked))
         })
         .collect();
     let tried = answers.len();
@@ -171,7 +216,7 @@ pub fn test(
 }
 
 /// What there is of one dependence, if it is worth a full test.
-fn found(q: &Question, base: &HeldOut, channel: usize, covariate: usize) -> Option<Dependence> {
+fn found(q: &Question, base: &HeldOut, asked: &Asked) -> Option<Dependence> {
     if drop(q) < 25.0 {
         return None;
     }
@@ -186,8 +231,9 @@ fn found(q: &Question, base: &HeldOut, channel: usize, covariate: usize) -> Opti
         b.rows(first, b.len() - first).iter().copied().collect()
     });
     Some(Dependence {
-        channel,
-        covariate,
+        channel: asked.channel,
+        covariate: asked.name.clone(),
+        log: asked.log,
         p_value,
         gain,
         shape,

@@ -29,9 +29,11 @@ struct Strength {
     smoother: DMatrix<f64>,
 }
 
-/// Block sums of one channel over the parameters of a question.
+/// Block sums of one channel of one log over the parameters of a question.
 #[derive(Clone)]
 pub struct ChannelSums {
+    /// Number of the log: each starts with a zero of its own.
+    pub log: usize,
     /// Channel index.
     pub channel: usize,
     /// Weight of the channel.
@@ -89,25 +91,32 @@ fn strengths(count: &DVector<f64>) -> Vec<Strength> {
         .collect()
 }
 
-/// Block sums of every channel over all parameters.
-pub fn channel_sums(white: &Evidence, weights: &[f64; CHANNELS]) -> Vec<ChannelSums> {
+/// Block sums of every channel of a log over all `parameters`, among which its own have their places.
+pub fn channel_sums(
+    log: usize,
+    white: &Evidence,
+    weights: &[f64; CHANNELS],
+    places: &[usize],
+    parameters: usize,
+) -> Vec<ChannelSums> {
     let blocks = white.layout.blocks;
     let mut out: Vec<ChannelSums> = Vec::new();
     for channel in (0..CHANNELS).filter(|c| weights[*c] > 0.0) {
-        let mut sums = DMatrix::zeros(blocks, white.layout.model.parameters());
+        let mut sums = DMatrix::zeros(blocks, parameters);
         let (mut right, mut count) = (DVector::zeros(blocks), DVector::zeros(blocks));
         let active = &white.layout.model.active()[channel];
         for b in 0..blocks {
             let Some(block) = white.get(b, channel) else { continue };
             count[b] = block.n as f64;
             for (k, p) in active.iter().enumerate() {
-                sums[(b, *p)] = block.sum[k];
+                sums[(b, places[*p])] = block.sum[k];
             }
             right[b] = block.sum[active.len()];
         }
         let same = out.iter().find(|o| o.count == count).map(|o| o.strengths.clone());
         let strengths = same.unwrap_or_else(|| Arc::new(strengths(&count)));
         out.push(ChannelSums {
+            log,
             channel,
             weight: weights[channel],
             sums,
@@ -134,6 +143,7 @@ impl ChannelSums {
     #[must_use]
     pub fn with_sums(&self, sums: DMatrix<f64>) -> Self {
         Self {
+            log: self.log,
             channel: self.channel,
             weight: self.weight,
             sums,
@@ -240,13 +250,14 @@ impl Wandering<'_> {
     }
 }
 
-/// How strongly the zeros of each sensor wander, every strength of the grid being as good before the log is seen.
+/// How strongly the zeros of each sensor wander in each log, every strength of the grid being as good before the log is seen.
 fn wandering(channels: &[ChannelSums]) -> Vec<Wandering<'_>> {
     let mut found = Vec::new();
-    for sensor in 0..3 {
+    let logs = channels.iter().map(|c| c.log + 1).max().unwrap_or(0);
+    for (log, sensor) in (0..logs).flat_map(|log| (0..3).map(move |sensor| (log, sensor))) {
         let own: Vec<&ChannelSums> = channels
             .iter()
-            .filter(|c| c.channel / 3 == sensor && !c.strengths.is_empty())
+            .filter(|c| c.log == log && c.channel / 3 == sensor && !c.strengths.is_empty())
             .collect();
         let Some(first) = own.first() else { continue };
         let strengths = first.strengths.len();
@@ -347,6 +358,7 @@ mod tests {
             });
             let (sums, strengths) = (DMatrix::from_element(48, 1, 100.0), strengths.clone());
             ChannelSums {
+                log: 0,
                 channel: 3,
                 weight: 1.0,
                 sums,

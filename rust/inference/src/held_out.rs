@@ -30,7 +30,7 @@ pub fn held_out(question: &Question) -> HeldOut {
         let mut judged = NormalEquations::zeros(question.precision.len());
         let mut judged_raw = NormalEquations::zeros(question.precision.len());
         for b in 0..blocks {
-            if in_fold(b) || (b > 0 && in_fold(b - 1)) || (b + 1 < blocks && in_fold(b + 1)) {
+            if question.beside(b).any(in_fold) {
                 training.add(&question.white[b], -1.0);
             }
             if in_fold(b) {

@@ -25,11 +25,10 @@ const SPARE_BLOCKS: usize = 4;
 fn left_out(question: &Question, group: usize) -> Option<Vec<DVector<f64>>> {
     let total = question.total();
     question
-        .white
-        .chunks(group)
-        .map(|chunk| {
+        .groups(group)
+        .map(|blocks| {
             let mut sum = NormalEquations::zeros(question.precision.len());
-            for b in chunk {
+            for b in &question.white[blocks] {
                 sum.add(b, 1.0);
             }
             sum

@@ -2,14 +2,18 @@
 //!
 //! All of it works on [`imufit_fit::evidence::Evidence`]; no function here sees a row of the log.
 
+pub mod agreement;
 pub mod confounding;
 pub mod dependence;
 pub mod drift;
 pub mod estimate;
 pub mod held_out;
 pub mod jackknife;
+pub mod part;
 pub mod problem;
 pub mod residual;
 pub mod saturated;
 pub mod screening;
+pub mod selection;
+pub mod together;
 pub mod verdict;

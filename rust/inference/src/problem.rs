@@ -1,16 +1,29 @@
-//! The least-squares problem of a whole log, block by block, in units of its noise.
+//! The least-squares problem of a log, or of several of one sensor, block by block, in units of its noise.
 
-use imufit_fit::evidence::Evidence;
+use std::ops::Range;
+use std::sync::Arc;
+
 use imufit_fit::normal_equations::NormalEquations;
 use imufit_model::card::Found;
-use imufit_model::sensor::CHANNELS;
+use imufit_model::sensor_model::Slot;
 use nalgebra::{DMatrix, DVector};
 
 use crate::drift::{self, ChannelSums};
+use crate::part::{self, Part};
 use crate::saturated::assemble;
 
-/// Evidence in the form that every question is asked of.
+/// Evidence in the form that every question is asked of: the blocks of all logs, one log after the other.
 pub struct Problem {
+    /// The logs.
+    pub parts: Vec<Part>,
+    /// Effects of all logs, each with its place among the parameters.
+    pub slots: Vec<Slot>,
+    /// For each of them whether every log has its own parameters of it.
+    pub own: Vec<bool>,
+    /// For each log the place of each of its parameters.
+    pub places: Vec<Vec<usize>>,
+    /// Blocks of each log.
+    pub logs: Arc<[Range<usize>]>,
     /// Whitened equations of each block over all parameters; observations have unit variance.
     pub white: Vec<NormalEquations>,
     /// Unwhitened equations; residuals are in units of the noise floor.
@@ -21,9 +34,7 @@ pub struct Problem {
     pub typical: Vec<bool>,
     /// Value that a parameter of a candidate has if it is there at all: one that only a search finds, and that the readings themselves tell.
     pub known: Vec<Option<f64>>,
-    /// Weight of each channel in `white`.
-    pub weights: [f64; CHANNELS],
-    /// Block sums of every channel, for zeros that wander.
+    /// Block sums of every channel of every log, for zeros that wander.
     pub sums: Vec<ChannelSums>,
 }
 
@@ -39,6 +50,8 @@ pub struct Question {
     pub model: usize,
     /// Block sums of every channel over the same parameters, for zeros that wander.
     pub sums: Vec<ChannelSums>,
+    /// Blocks of each log: those of different logs are no neighbours.
+    pub logs: Arc<[Range<usize>]>,
 }
 
 /// Plausible sizes are this many times the typical ones.
@@ -47,21 +60,27 @@ const PLAUSIBLE: f64 = 3.0;
 const STANDING_OUT: f64 = 100.0;
 
 impl Problem {
-    /// From whitened and unwhitened evidence, the variance of whitened residuals and the noise floors.
-    pub fn new(white: &Evidence, raw: &Evidence, variance: &[f64; CHANNELS], floors: &[f64; CHANNELS]) -> Self {
-        let weights = variance.map(|v| if v > 0.0 && v.is_finite() { 1.0 / v } else { 0.0 });
-        let raw_weights = floors.map(|f| if f > 0.0 && f.is_finite() { 1.0 / (f * f) } else { 0.0 });
-        let blocks = white.layout.blocks;
-        let white_blocks: Vec<_> = (0..blocks).map(|b| assemble(white, b, &weights)).collect();
-        let raw_blocks: Vec<_> = (0..blocks).map(|b| assemble(raw, b, &raw_weights)).collect();
-        let p = white.layout.model.parameters();
+    /// From the evidence of one log or of several; `own` tells which of all logs' slots each log has for itself.
+    pub fn new(parts: Vec<Part>, own: &[bool]) -> Self {
+        let (slots, places) = part::joined(&parts, own);
+        let p = slots.last().map_or(0, |s| s.first + s.parameters.len());
+        let mut logs: Vec<Range<usize>> = Vec::with_capacity(parts.len());
+        let (mut white_blocks, mut raw_blocks, mut sums) = (Vec::new(), Vec::new(), Vec::new());
+        for (log, (part, places)) in parts.iter().zip(&places).enumerate() {
+            let (weights, raw_weights) = (part.weights(), part.raw_weights());
+            let blocks = part.white.layout.blocks;
+            logs.push(white_blocks.len()..white_blocks.len() + blocks);
+            white_blocks.extend((0..blocks).map(|b| assemble(&part.white, b, &weights).placed(places, p)));
+            raw_blocks.extend((0..blocks).map(|b| assemble(&part.raw, b, &raw_weights).placed(places, p)));
+            sums.extend(drift::channel_sums(log, &part.white, &weights, places, p));
+        }
         let mut plausible = DVector::zeros(p);
         let mut typical = vec![false; p];
         let mut known = vec![None; p];
-        for slot in white.layout.model.slots() {
+        for slot in &slots {
             let parameters = &slot.effect.card().parameters;
             let searched = !slot.in_model && parameters.iter().all(|p| p.found == Found::Search);
-            for (k, card) in parameters.iter().enumerate() {
+            for (k, card) in parameters.iter().cycle().take(slot.parameters.len()).enumerate() {
                 known[slot.first + k] = searched.then_some(slot.parameters[k]);
                 let j = slot.first + k;
                 let information: f64 = white_blocks.iter().map(|b| b.gram[(j, j)]).sum();
@@ -73,16 +92,26 @@ impl Problem {
                 };
             }
         }
-        let sums = drift::channel_sums(white, &weights);
         Self {
+            parts,
+            slots,
+            own: own.to_vec(),
+            places,
+            logs: logs.into(),
             white: white_blocks,
             raw: raw_blocks,
             plausible,
             typical,
             known,
-            weights,
             sums,
         }
+    }
+
+    /// What all parameters are for one log's own ones.
+    pub fn of_log(&self, log: usize, all: &DVector<f64>) -> DVector<f64> {
+        self.places
+            .get(log)
+            .map_or_else(|| DVector::zeros(0), |places| all.select_rows(places))
     }
 
     /// Number of blocks.
@@ -182,6 +211,7 @@ impl Problem {
             precision,
             model: p,
             sums,
+            logs: self.logs.clone(),
         }
     }
 }
@@ -197,7 +227,55 @@ impl Question {
             precision: self.precision.rows(0, self.model).into_owned(),
             model: self.model,
             sums: self.sums.iter().map(|s| s.with_sums(s.columns(&kept))).collect(),
+            logs: self.logs.clone(),
         }
+    }
+
+    /// The same question where one log has a value of its own besides, in some directions, of what the parameters from `first` on
+    /// are in all logs: what these directions add there is asked about.
+    #[must_use]
+    pub fn with_own(&self, log: usize, first: usize, directions: &DMatrix<f64>) -> Self {
+        let p = self.precision.len();
+        let all: Vec<usize> = (0..p).collect();
+        let shared: Vec<usize> = (first..first + directions.nrows()).collect();
+        let elsewhere = DMatrix::zeros(directions.nrows(), directions.ncols());
+        let own = self.logs.get(log).cloned().unwrap_or_default();
+        let widened = |blocks: &[NormalEquations]| {
+            let with = |(b, block): (usize, &NormalEquations)| {
+                let directions = if own.contains(&b) { directions } else { &elsewhere };
+                block.reduced(&all, &shared, directions)
+            };
+            blocks.iter().enumerate().map(with).collect()
+        };
+        let sums = self.sums.iter().map(|s| {
+            let directions = if s.log == log { directions } else { &elsewhere };
+            s.reduced(&all, &shared, directions)
+        });
+        Self {
+            white: widened(&self.white),
+            raw: widened(&self.raw),
+            precision: self.precision.clone().resize_vertically(p + directions.ncols(), 1.0),
+            model: p,
+            sums: sums.collect(),
+            logs: self.logs.clone(),
+        }
+    }
+
+    /// Blocks taken together `group` at a time, never those of two logs.
+    pub fn groups(&self, group: usize) -> impl Iterator<Item = Range<usize>> + '_ {
+        self.logs.iter().flat_map(move |log| {
+            log.clone()
+                .step_by(group)
+                .map(move |first| first..(first + group).min(log.end))
+        })
+    }
+
+    /// Blocks beside a block in the same log, with the block itself.
+    pub fn beside(&self, block: usize) -> Range<usize> {
+        let log = self.logs.iter().find(|log| log.contains(&block));
+        log.map_or(block..block + 1, |log| {
+            block.saturating_sub(1).max(log.start)..(block + 2).min(log.end)
+        })
     }
 
     /// Sum over blocks, the wandering of zeros taken into account, for several strengths of it, each with its weight; empty if no

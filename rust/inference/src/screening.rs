@@ -5,6 +5,7 @@ use imufit_model::sensor_model::Slot;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::agreement::{self, Differing};
 use crate::held_out::{self, HeldOut};
 use crate::jackknife::{self, Jackknife};
 use crate::problem::{Problem, Question};
@@ -34,6 +35,15 @@ pub struct Screened {
     pub stable: bool,
     /// False if a parameter lies far beyond what such sensors can have.
     pub plausible: bool,
+    /// What logs disagree about; `None` where they agree.
+    pub differing: Option<Differing>,
+}
+
+impl Screened {
+    /// False if logs differ so much about it that it is no property of the sensor.
+    pub fn agreed(&self) -> bool {
+        !self.differing.as_ref().is_some_and(Differing::wild)
+    }
 }
 
 /// Parameter indices of slots.
@@ -74,7 +84,7 @@ pub fn p_value_with_drift(question: &Question) -> f64 {
 }
 
 /// p-value of the candidate's parameters from equations of unit variance.
-fn wald(question: &Question, total: &NormalEquations) -> f64 {
+pub(crate) fn wald(question: &Question, total: &NormalEquations) -> f64 {
     let Some(solved) = total.solve(&question.precision) else {
         return 1.0;
     };
@@ -103,18 +113,21 @@ const HALVES_CHANCE: f64 = 5.0;
 fn halves_agree(question: &Question, whole: &Jackknife) -> bool {
     let p = question.model;
     let m = whole.estimate.len() - p;
-    let middle = question.white.len() / 2;
-    let solve = |blocks: &[NormalEquations]| {
+    // Of several logs the first halves against the second ones: whether logs agree is asked elsewhere.
+    let solve = |later: bool| {
         let mut sum = NormalEquations::zeros(question.precision.len());
-        for b in blocks {
-            sum.add(b, 1.0);
+        for log in question.logs.iter() {
+            let middle = log.start + log.len() / 2;
+            let half = if later { middle..log.end } else { log.start..middle };
+            for b in &question.white[half] {
+                sum.add(b, 1.0);
+            }
         }
         let solved = sum.solve(&question.precision)?;
         let covariance = solved.covariance().view((p, p), (m, m)).into_owned();
         Some((solved.solution.rows(p, m).into_owned(), covariance))
     };
-    let (Some((first, c1)), Some((second, c2))) = (solve(&question.white[..middle]), solve(&question.white[middle..]))
-    else {
+    let (Some((first, c1)), Some((second, c2))) = (solve(false), solve(true)) else {
         return true;
     };
     let Some(information) = Cholesky::new(&c1 + &c2) else {
@@ -158,6 +171,7 @@ pub fn weigh(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, ca
         testable: jackknife::possible(&question),
         stable: true,
         plausible: true,
+        differing: None,
         directions,
     };
     if answer.testable {
@@ -200,6 +214,7 @@ fn weigh_known(
         testable: seen > 1.0,
         stable: true,
         plausible: true,
+        differing: None,
         directions: DMatrix::from_iterator(values.len(), 1, values.iter().copied()),
     };
     Weighed {
@@ -235,7 +250,7 @@ impl Weighed {
     }
 
     /// Asks whether it can be chance, whether both halves agree, and what its parameters are.
-    pub fn judged(self, problem: &Problem, candidate: &[usize]) -> Screened {
+    pub fn judged(self, problem: &Problem, model: &[usize], candidate: &[usize]) -> Screened {
         let Self {
             question,
             answer: mut out,
@@ -258,6 +273,7 @@ impl Weighed {
         let m = out.directions.ncols();
         if out.p_value < CLEARLY_CHANCE {
             out.stable = halves_agree(&question, &fine);
+            out.differing = agreement::differing(problem, model, out.slot, 1);
         }
         let beta = fine.estimate.rows(question.model, m).into_owned();
         let values: DVector<f64> = &out.directions * &beta;

@@ -1,21 +1,24 @@
 //! Adequate, missing, ambiguous or unknown: the only place where this is decided.
 
-use imufit_fit::evidence::Evidence;
 use imufit_model::sensor::CHANNELS;
 use imufit_model::sensor_model::Slot;
 use rayon::prelude::*;
 
+use crate::agreement::{self, Differing, Disagreement};
 use crate::confounding;
 use crate::dependence::{self, Dependence};
+use crate::held_out;
 use crate::problem::Problem;
-use crate::screening::{self, Screened, Weighed, parameters_of};
+use crate::screening::{self, Screened};
+use crate::selection::{ALPHA, best_of, indices, passes, screen_all, significant};
+use crate::together;
 
-/// Chance of any false alarm over all candidates tried.
-pub const ALPHA: f64 = 0.003;
 /// A named effect must explain this share of what depends on anything in its sensors, or the answer is "unknown".
 const NAMED_SHARE: f64 = 0.8;
 /// A rival recovers at least this share of the best candidate's gain.
 const RIVAL_SHARE: f64 = 0.5;
+/// What logs disagree about spoils the answer if it explains this much more than the best candidate.
+const CLEARLY_MORE: f64 = 1.1;
 /// Steps looked ahead to see whether named effects together explain the residual.
 const LOOK_AHEAD: usize = 10;
 
@@ -63,140 +66,200 @@ pub struct Verdict {
     pub unexplained: Vec<Dependence>,
     /// Slots that forward selection would add, one after the other.
     pub path: Vec<usize>,
+    /// Logs that disagree about the best candidate, about an effect of the model, or about one that only some of them show.
+    pub disagreements: Vec<Disagreement>,
+    /// True if they differ so much that there is no answer for all of them.
+    pub spoilt: bool,
 }
 
-fn indices(slots: &[Slot], chosen: &[usize]) -> Vec<usize> {
-    let mut parameters = parameters_of(chosen.iter().map(|s| &slots[*s]));
-    parameters.sort_unstable();
-    parameters
-}
-
-/// Weighs all candidates on top of a model, and says how many can be tested.
-fn weigh_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> (Vec<Weighed>, f64) {
-    let fitted = indices(slots, model);
-    let base = screening::base(problem, &fitted);
-    let weighed: Vec<Weighed> = candidates
+/// What logs disagree about, and whether that spoils the answer: a candidate that would bring more than the best one does, if
+/// each log had a value of its own, or an effect of the model. If nothing of that kind, what logs disagree about besides all
+/// that was found (`stack`).
+fn disagreements(
+    problem: &Problem,
+    model: &[usize],
+    stack: &[usize],
+    candidates: &[usize],
+    best: Option<&Screened>,
+) -> (Vec<Disagreement>, bool) {
+    if problem.parts.len() < 2 {
+        return (Vec::new(), false);
+    }
+    let slots = problem.slots.as_slice();
+    let without = |slot: usize| -> Vec<usize> { model.iter().copied().filter(|s| *s != slot).collect() };
+    let of_model: Vec<Differing> = model
         .par_iter()
-        .map(|s| screening::weigh(problem, &fitted, &base, *s, &indices(slots, &[*s])))
+        .filter_map(|slot| agreement::differing(problem, &indices(slots, &without(*slot)), *slot, model.len()))
         .collect();
-    let tried = weighed.iter().filter(|w| w.so_far().testable).count().max(1) as f64;
-    (weighed, tried)
-}
-
-/// Judges a weighed candidate; where a search went before, each of its trials counts.
-fn judge(problem: &Problem, slots: &[Slot], weighed: Weighed) -> Screened {
-    let slot = weighed.so_far().slot;
-    let mut screened = weighed.judged(problem, &indices(slots, &[slot]));
-    screened.p_value = (screened.p_value * slots[slot].tried as f64).min(1.0);
-    screened
-}
-
-/// Screens all candidates on top of a model: those that passed first, each group by held-out gain.
-fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> (Vec<Screened>, Vec<f64>) {
-    let (weighed, tried) = weigh_all(problem, slots, model, candidates);
-    let mut screened: Vec<Screened> = weighed.into_par_iter().map(|w| judge(problem, slots, w)).collect();
-    let passed = |s: &Screened| passes(s, s.p_value * tried);
-    screened.sort_by(|a, b| {
-        passed(b)
-            .cmp(&passed(a))
-            .then(b.testable.cmp(&a.testable))
-            .then(b.gain.total_cmp(&a.gain))
-    });
-    let adjusted = screened.iter().map(|s| (s.p_value * tried).min(1.0)).collect();
-    (screened, adjusted)
-}
-
-/// The best candidate that passes on top of a model; none below it is judged.
-fn best_of(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> Option<usize> {
-    let (mut weighed, tried) = weigh_all(problem, slots, model, candidates);
-    weighed.sort_by(|a, b| b.so_far().gain.total_cmp(&a.so_far().gain));
-    weighed
-        .into_iter()
-        .filter(|w| promising(w.so_far()))
-        .map(|w| judge(problem, slots, w))
-        .find(|s| passes(s, s.p_value * tried))
-        .map(|s| s.slot)
-}
-
-/// True if a candidate lowers the held-out error and is no chance finding.
-fn significant(s: &Screened, adjusted: f64) -> bool {
-    adjusted <= ALPHA && promising(s)
-}
-
-/// True if a candidate can be tested and lowers the held-out error, whitened and as it stands.
-fn promising(s: &Screened) -> bool {
-    s.testable && s.gain > 0.0 && s.held_out.1 < s.held_out.0
-}
-
-/// True if a candidate is significant, of a size that sensors have, and both halves of the log agree about it.
-pub fn passes(s: &Screened, adjusted: f64) -> bool {
-    significant(s, adjusted) && s.stable && s.plausible
+    let differing = |on: &[usize]| -> Vec<Differing> {
+        let fitted = indices(slots, on);
+        let asked: Vec<usize> = candidates.iter().copied().filter(|s| !on.contains(s)).collect();
+        asked
+            .par_iter()
+            .filter_map(|slot| agreement::differing(problem, &fitted, *slot, asked.len()))
+            .collect()
+    };
+    // Only the one that explains most: candidates that look like it would all be named.
+    let most = |found: Vec<Differing>| {
+        let wild = found.into_iter().filter(|d| d.wild() && d.gain > 0.0);
+        wild.max_by(|a, b| a.gain.total_cmp(&b.gain))
+    };
+    let own = best.and_then(|best| best.differing.clone());
+    let wanted = best.map_or(0.0, |best| CLEARLY_MORE * best.gain);
+    // What logs disagree about in the model leaves traces that other effects could explain log by log.
+    let offered = of_model.is_empty().then(|| most(differing(model))).flatten();
+    let more = offered.filter(|d| d.gain > wanted);
+    let spoilt = more.is_some() || of_model.iter().any(Differing::wild);
+    let mut found: Vec<Disagreement> = of_model.into_iter().flat_map(|d| d.logs).collect();
+    found.extend(more.or(own).map_or_else(Vec::new, |d| d.logs));
+    if found.is_empty() && stack.len() > model.len() {
+        found = most(differing(stack)).map_or_else(Vec::new, |d| d.logs);
+    }
+    (found, spoilt)
 }
 
 /// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from.
-pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidates: &[usize]) -> Verdict {
-    let slots = evidence.layout.model.slots();
-    let (screened, adjusted) = screen_all(problem, slots, model, candidates);
+pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize]) -> Verdict {
+    let slots = problem.slots.as_slice();
+    let (mut screened, mut adjusted) = screen_all(problem, slots, model, candidates);
+    let single = settle(problem, model, candidates, &screened, &adjusted, &[]);
+    let best_gain = single.best.map_or(0.0, |b| gain_of(&screened, b));
+    let hidden = |(s, a): (&Screened, &f64)| significant(s, *a) && s.plausible && !s.stable && s.gain > best_gain;
+    let doubtful = single.kind == Kind::Unknown || screened.iter().zip(&adjusted).any(hidden);
+    let mut settled = single;
+    if doubtful {
+        let members = together::find(problem, slots, model, candidates);
+        if !members.is_empty() {
+            let several = settle(problem, model, candidates, &screened, &adjusted, &members);
+            if several.kind != Kind::Unknown {
+                settled = several;
+                put_first(&mut screened, &mut adjusted, members);
+            }
+        }
+    }
+    Verdict {
+        kind: settled.kind,
+        best: settled.best,
+        rivals: settled.rivals,
+        screened,
+        adjusted,
+        correlations: settled.correlations,
+        unexplained: settled.unexplained,
+        path: settled.path,
+        disagreements: settled.disagreements,
+        spoilt: settled.spoilt,
+    }
+}
+
+fn gain_of(screened: &[Screened], slot: usize) -> f64 {
+    screened.iter().find(|s| s.slot == slot).map_or(0.0, |s| s.gain)
+}
+
+/// Puts effects first that pass beside one another: what each brings alone stays, how sure it is comes from beside the others.
+fn put_first(screened: &mut Vec<Screened>, adjusted: &mut Vec<f64>, members: Vec<Screened>) {
+    let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
+    for member in members.into_iter().rev() {
+        if let Some(at) = screened.iter().position(|s| s.slot == member.slot) {
+            let alone = screened.remove(at);
+            adjusted.remove(at);
+            adjusted.insert(0, (member.p_value * tried).min(1.0));
+            let (gain, gain_error) = (alone.gain, alone.gain_error);
+            let (held_out, expected_ratio) = (alone.held_out, alone.expected_ratio);
+            screened.insert(
+                0,
+                Screened {
+                    gain,
+                    gain_error,
+                    held_out,
+                    expected_ratio,
+                    ..member
+                },
+            );
+        }
+    }
+}
+
+/// An answer on the way to the verdict.
+struct Settled {
+    kind: Kind,
+    best: Option<usize>,
+    rivals: Vec<usize>,
+    correlations: Vec<(usize, usize, f64)>,
+    unexplained: Vec<Dependence>,
+    path: Vec<usize>,
+    disagreements: Vec<Disagreement>,
+    spoilt: bool,
+}
+
+/// What the screening says if the candidates `chosen`, which pass beside one another, are taken together; if there are none, the best
+/// one that passes alone is taken.
+fn settle(
+    problem: &Problem,
+    model: &[usize],
+    candidates: &[usize],
+    screened: &[Screened],
+    adjusted: &[f64],
+    chosen: &[Screened],
+) -> Settled {
+    let slots = problem.slots.as_slice();
     let passing: Vec<&Screened> = screened
         .iter()
-        .zip(&adjusted)
+        .zip(adjusted)
         .filter(|(s, a)| passes(s, **a))
         .map(|(s, _)| s)
         .collect();
-    let best = passing.first().map(|s| s.slot);
+    let first = chosen.first().or_else(|| passing.first().copied());
+    let best = first.map(|s| s.slot);
+    let others: Vec<usize> = chosen.iter().skip(1).map(|s| s.slot).collect();
 
     let mut path = Vec::new();
     let mut stack = model.to_vec();
     let mut next = best;
+    let mut ready = others.iter().copied();
     while let Some(slot) = next {
         path.push(slot);
         stack.push(slot);
         if path.len() >= LOOK_AHEAD {
             break;
         }
-        let left: Vec<usize> = candidates.iter().copied().filter(|c| !stack.contains(c)).collect();
-        next = best_of(problem, slots, &stack, &left);
+        next = ready.next().or_else(|| {
+            let left: Vec<usize> = candidates.iter().copied().filter(|c| !stack.contains(c)).collect();
+            best_of(problem, slots, &stack, &left)
+        });
     }
 
     let fitted = indices(slots, &stack);
     let channels: Vec<usize> = (0..CHANNELS).collect();
     let base = screening::base(problem, &fitted);
-    let (mut unexplained, tried) = dependence::test(problem, evidence, &fitted, &base, &channels);
+    let (mut unexplained, tried) = dependence::test(problem, &fitted, &base, &channels);
     unexplained.retain(|d| d.p_value * tried as f64 <= ALPHA);
 
-    let mut rivals = Vec::new();
-    let mut correlations = Vec::new();
-    if let Some(first) = passing.first() {
-        let fitted = indices(slots, model);
-        let own = indices(slots, &[first.slot]);
-        let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
-        for other in passing.iter().skip(1) {
-            let theirs = indices(slots, &[other.slot]);
-            let beta: Vec<f64> = first.parameters.iter().map(|p| p.0).collect();
-            let c = confounding::correlation(problem, &fitted, &own, &beta, &theirs);
-            correlations.push((first.slot, other.slot, c));
-            if other.gain >= RIVAL_SHARE * first.gain
-                && confounding::p_value_given(problem, &fitted, &theirs, &own) * tried * slots[other.slot].tried as f64
-                    > ALPHA
-            {
-                rivals.push(other.slot);
-            }
-        }
-    }
+    let beside: Vec<usize> = model.iter().chain(&others).copied().collect();
+    let (rivals, correlations) = best.map_or_else(Default::default, |best| {
+        rivals_of(problem, slots, &beside, candidates, screened, &passing, best)
+    });
 
-    let kind = match passing.first() {
-        None if unexplained.is_empty() && !screened.iter().zip(&adjusted).any(|(s, a)| significant(s, *a)) => {
+    let (disagreements, spoilt) = disagreements(problem, model, &stack, candidates, first);
+    let kind = match best {
+        _ if spoilt => Kind::Unknown,
+        None if unexplained.is_empty() && !screened.iter().zip(adjusted).any(|(s, a)| significant(s, *a)) => {
             Kind::Adequate
         }
         None => Kind::Unknown,
         Some(first) => {
-            let sensors = slots[first.slot].effect.sensors();
+            let sensors = slots[first].effect.sensors();
             let left = unexplained
                 .iter()
                 .filter(|d| sensors.iter().any(|s| s.index() == d.channel / 3))
                 .map(|d| d.gain)
                 .fold(0.0, f64::max);
-            if first.gain < NAMED_SHARE * (first.gain + left) {
+            let gain = if chosen.is_empty() {
+                gain_of(screened, first)
+            } else {
+                let alone = screening::base(problem, &indices(slots, model));
+                held_out::gain(&alone, &base).0
+            };
+            if gain < NAMED_SHARE * (gain + left) {
                 Kind::Unknown
             } else if rivals.is_empty() {
                 Kind::Missing
@@ -205,14 +268,58 @@ pub fn decide(problem: &Problem, evidence: &Evidence, model: &[usize], candidate
             }
         }
     };
-    Verdict {
+    Settled {
         kind,
         best,
         rivals,
-        screened,
-        adjusted,
         correlations,
         unexplained,
         path,
+        disagreements,
+        spoilt,
     }
+}
+
+/// Candidates that explain as well as the best what is left beside a model, and how much passing ones look like it.
+fn rivals_of(
+    problem: &Problem,
+    slots: &[Slot],
+    beside: &[usize],
+    candidates: &[usize],
+    screened: &[Screened],
+    passing: &[&Screened],
+    best: usize,
+) -> (Vec<usize>, Vec<(usize, usize, f64)>) {
+    let fitted = indices(slots, beside);
+    let own = indices(slots, &[best]);
+    let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
+    let alone = passing.first().is_some_and(|s| s.slot == best);
+    let others: Vec<Screened>;
+    let compared: Vec<&Screened> = if alone {
+        passing.to_vec()
+    } else {
+        // Beside other effects a candidate is worth something else than alone.
+        let left: Vec<usize> = candidates.iter().copied().filter(|c| !beside.contains(c)).collect();
+        let (all, adjusted) = screen_all(problem, slots, beside, &left);
+        let passing = all.into_iter().zip(adjusted).filter(|(s, a)| passes(s, *a));
+        others = passing.map(|(s, _)| s).collect();
+        others.iter().collect()
+    };
+    let Some(first) = compared.iter().find(|s| s.slot == best) else {
+        return Default::default();
+    };
+    let beta: Vec<f64> = first.parameters.iter().map(|p| p.0).collect();
+    let (mut rivals, mut correlations) = (Vec::new(), Vec::new());
+    for other in compared.iter().filter(|s| s.slot != best) {
+        let theirs = indices(slots, &[other.slot]);
+        let c = confounding::correlation(problem, &fitted, &own, &beta, &theirs);
+        correlations.push((best, other.slot, c));
+        if other.gain >= RIVAL_SHARE * first.gain
+            && confounding::p_value_given(problem, &fitted, &theirs, &own) * tried * slots[other.slot].tried as f64
+                > ALPHA
+        {
+            rivals.push(other.slot);
+        }
+    }
+    (rivals, correlations)
 }

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use imufit_attitude::Frame;
+use imufit_fit::bins::Bins;
 use imufit_fit::evidence::{Evidence, Layout};
 use imufit_fit::noise::Autocovariance;
-use imufit_fit::profile::Profile;
+use imufit_fit::profile::{self, Profile};
 use imufit_fit::survey::{Given, Survey};
 use imufit_fit::whitening::filter_from_autocovariance;
 use imufit_model::rig::Rig;
@@ -79,11 +80,13 @@ impl PySurvey {
     fn finish(&self) -> PyFacts {
         let (attitude, position) = self.0.widths();
         let (attitude_noise, position_noise) = (attitude.noise(), position.noise());
-        let (facts, mut bins) = self.0.clone().finish();
+        let (facts, samples) = self.0.clone().finish();
+        let mut bins = Bins::new(&[&samples]);
         bins.centre_temperature(facts.temperature_mean);
         PyFacts {
             facts,
             bins,
+            samples: Arc::new(samples),
             attitude_noise,
             position_noise,
         }
@@ -206,13 +209,15 @@ impl PyProfile {
         let window = arrays.window()?;
         py.detach(|| self.0.add(&window)).map_err(from_effect)
     }
+}
 
-    /// Number of the best trial, the candidate's parameters as a step finds them, and the drop of the sum of squares in
-    /// units of the noise; None where no sample can be used.
-    fn best(&self, py: Python<'_>) -> Option<(usize, Vec<f64>, f64)> {
-        let best = py.detach(|| self.0.best())?;
-        Some((best.trial, best.parameters, best.gain))
-    }
+/// Number of the best trial of searches over several logs for the same trials, the candidate's parameters as a step finds
+/// them, and the drop of the sum of squares in units of the noise; None where no sample can be used.
+#[pyfunction]
+fn best_trial(py: Python<'_>, profiles: Vec<PyRef<'_, PyProfile>>) -> Option<(usize, Vec<f64>, f64)> {
+    let logs: Vec<&Profile> = profiles.iter().map(|p| &p.0).collect();
+    let best = py.detach(|| profile::best(&logs))?;
+    Some((best.trial, best.parameters, best.gain))
 }
 
 /// Residual of each of the nine channels over the core rows of a chunk, (rows,), SI units (magnetometer uT), after a
@@ -289,6 +294,7 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<PyEvidence>()?;
     m.add_class::<PyProfile>()?;
     m.add_class::<PyAutocovariance>()?;
+    m.add_function(wrap_pyfunction!(best_trial, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate, m)?)?;
     Ok(())
 }

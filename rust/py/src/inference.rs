@@ -1,9 +1,10 @@
 //! Questions asked of the evidence.
 
 use imufit_inference::dependence::shape_name;
+use imufit_inference::part::Part;
 use imufit_inference::problem::Problem;
 use imufit_inference::screening::parameters_of;
-use imufit_inference::{estimate, residual, saturated, screening, verdict};
+use imufit_inference::{estimate, residual, saturated, screening, selection, verdict};
 use imufit_model::sensor::{CHANNELS, channel_name};
 use nalgebra::DVector;
 use numpy::PyArray1;
@@ -31,57 +32,90 @@ fn nine(name: &str, values: &[f64]) -> PyResult<[f64; CHANNELS]> {
         .map_err(|_| value_error(format!("{name} must have {CHANNELS} numbers")))
 }
 
-/// Evidence of a log, whitened and not, ready to be asked.
+/// One log's share of a problem: whitened and plain evidence, variance of the whitened residual of each of the nine channels,
+/// their noise floors in their units, and for each slot of the evidence its slot among those of all logs.
+type LogEvidence<'py> = (
+    PyRef<'py, PyEvidence>,
+    PyRef<'py, PyEvidence>,
+    Vec<f64>,
+    Vec<f64>,
+    Vec<usize>,
+);
+
+/// Evidence of one log or of several of one sensor, whitened and not, ready to be asked.
 #[pyclass(name = "Problem", frozen, module = "imufit._imufit")]
-pub struct PyProblem {
-    problem: Problem,
-    white: imufit_fit::evidence::Evidence,
-    raw: imufit_fit::evidence::Evidence,
-    floors: [f64; CHANNELS],
-}
+pub struct PyProblem(Problem);
 
 #[pymethods]
 impl PyProblem {
-    /// `variance`: of the whitened residual of each of the nine channels; `floors`: their noise floors, in their units.
+    /// `logs`: for each log its whitened and its plain evidence, the variance of the whitened residual of each of the nine
+    /// channels, their noise floors in their units, and for each slot of the evidence its slot among those of all logs.
+    /// `own`: for each of these whether every log has its own parameters of it.
     #[new]
-    fn new(
-        py: Python<'_>,
-        white: &PyEvidence,
-        raw: &PyEvidence,
-        variance: Vec<f64>,
-        floors: Vec<f64>,
-    ) -> PyResult<Self> {
-        let (variance, floors) = (nine("variance", &variance)?, nine("floors", &floors)?);
-        let (white, raw) = (white.0.clone(), raw.0.clone());
-        let problem = py.detach(|| Problem::new(&white, &raw, &variance, &floors));
-        Ok(Self {
-            problem,
-            white,
-            raw,
-            floors,
-        })
+    fn new(py: Python<'_>, logs: Vec<LogEvidence<'_>>, own: Vec<bool>) -> PyResult<Self> {
+        let mut parts = Vec::with_capacity(logs.len());
+        for (white, raw, variance, floors, slots) in logs {
+            let known = white.0.layout.model.slots().len();
+            if slots.len() != known || slots.iter().any(|s| *s >= own.len()) {
+                return Err(value_error(
+                    "every slot of the evidence needs one among those of all logs",
+                ));
+            }
+            parts.push(Part {
+                white: white.0.clone(),
+                raw: raw.0.clone(),
+                variance: nine("variance", &variance)?,
+                floors: nine("floors", &floors)?,
+                slots,
+            });
+        }
+        for number in 0..own.len() {
+            let mut having = parts.iter().filter_map(|part| {
+                let k = part.slots.iter().position(|s| *s == number)?;
+                let slot = &part.white.layout.model.slots()[k];
+                Some((slot.effect.card().id.as_str(), slot.parameters.len()))
+            });
+            let Some(first) = having.next() else {
+                return Err(value_error(format!("no log has the slot {number}")));
+            };
+            if having.any(|other| other != first) {
+                return Err(value_error(format!("the logs have different effects in slot {number}")));
+            }
+        }
+        Ok(Self(py.detach(|| Problem::new(parts, &own))))
+    }
+
+    /// For each of a log's own parameters its place among those of all logs.
+    fn places(&self, log: usize) -> PyResult<Vec<usize>> {
+        Ok(self.part(log)?.1.to_vec())
+    }
+
+    /// Number of blocks of all logs.
+    #[getter]
+    fn blocks(&self) -> usize {
+        self.0.blocks()
     }
 
     /// Fits the slots given: step and standard error (k,) of each of their k parameters, SI units; full step (p,) of
     /// all; held-out and training residual RMS over noise floor.
     fn estimate<'py>(&self, py: Python<'py>, slots: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
-        let all = self.white.layout.model.slots();
+        let all = &self.0.slots;
         if slots.iter().any(|s| *s >= all.len()) {
             return Err(value_error("there is no such slot"));
         }
         let parameters = parameters_of(slots.iter().map(|s| &all[*s]));
         let (fitted, base) = py.detach(|| {
             (
-                estimate::estimate(&self.problem, &parameters),
-                screening::base(&self.problem, &parameters),
+                estimate::estimate(&self.0, &parameters),
+                screening::base(&self.0, &parameters),
             )
         });
         let fitted = fitted.ok_or_else(|| value_error("the normal equations cannot be solved"))?;
-        let mut step = DVector::zeros(self.white.layout.model.parameters());
+        let mut step = DVector::zeros(self.0.plausible.len());
         for (k, p) in parameters.iter().enumerate() {
             step[*p] = fitted.step[k];
         }
-        let (square, n) = training(self, &step);
+        let (square, n) = training(&self.0, &step);
         let p = parameters.len();
         let out = PyDict::new(py);
         out.set_item("parameters", parameters)?;
@@ -101,7 +135,7 @@ impl PyProblem {
         model: Vec<usize>,
         candidates: Vec<usize>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let v = py.detach(|| verdict::decide(&self.problem, &self.white, &model, &candidates));
+        let v = py.detach(|| verdict::decide(&self.0, &model, &candidates));
         let out = PyDict::new(py);
         out.set_item("verdict", v.kind.word())?;
         out.set_item("best", v.best)?;
@@ -121,7 +155,8 @@ impl PyProblem {
             item.set_item("testable", s.testable)?;
             item.set_item("stable", s.stable)?;
             item.set_item("plausible", s.plausible)?;
-            item.set_item("passed", verdict::passes(s, *p))?;
+            item.set_item("agreed", s.agreed())?;
+            item.set_item("passed", selection::passes(s, *p))?;
             item.set_item("parameters", s.parameters.clone())?;
             list.append(item)?;
         }
@@ -130,28 +165,45 @@ impl PyProblem {
         for d in &v.unexplained {
             let item = PyDict::new(py);
             item.set_item("channel", channel_name(d.channel))?;
-            item.set_item("covariate", &self.white.layout.bins.names[d.covariate])?;
+            item.set_item("covariate", &d.covariate)?;
+            item.set_item("log", d.log)?;
             item.set_item("gain", d.gain)?;
             item.set_item("p_value", d.p_value)?;
             item.set_item("shape", shape_name(&d.shape))?;
             unexplained.append(item)?;
         }
         out.set_item("unexplained", unexplained)?;
+        let disagreements = PyList::empty(py);
+        for d in &v.disagreements {
+            let item = PyDict::new(py);
+            item.set_item("slot", d.slot)?;
+            item.set_item("log", d.log)?;
+            item.set_item("own", &d.own)?;
+            item.set_item("others", &d.others)?;
+            item.set_item("p_value", d.p_value)?;
+            item.set_item("wild", d.wild)?;
+            disagreements.append(item)?;
+        }
+        out.set_item("disagreements", disagreements)?;
+        out.set_item("spoilt", v.spoilt)?;
         Ok(out)
     }
 
-    /// Residual at a step (p,) of all parameters: RMS and mean by channel and block, and binned panels, in the
+    /// Residual of one log at a step (p,) of all parameters: RMS and mean by channel and block, and binned panels, in the
     /// channels' units.
-    fn residual<'py>(&self, py: Python<'py>, step: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
-        if step.len() != self.raw.layout.model.parameters() {
+    #[pyo3(signature = (step, log=0))]
+    fn residual<'py>(&self, py: Python<'py>, step: Vec<f64>, log: usize) -> PyResult<Bound<'py, PyDict>> {
+        if step.len() != self.0.plausible.len() {
             return Err(value_error("step must have one number per parameter"));
         }
-        let step = DVector::from_vec(step);
-        let channels = residual::channels(&self.raw, &step);
+        let (part, _) = self.part(log)?;
+        let step = self.0.of_log(log, &DVector::from_vec(step));
+        let raw = &part.raw;
+        let channels = residual::channels(raw, &step);
         let out = PyDict::new(py);
         let (list, panels) = (PyList::empty(py), PyList::empty(py));
         for c in &channels {
-            let floor = self.floors[c.channel];
+            let floor = part.floors[c.channel];
             let item = PyDict::new(py);
             item.set_item("channel", channel_name(c.channel))?;
             item.set_item("index", c.channel)?;
@@ -161,18 +213,18 @@ impl PyProblem {
             item.set_item("block_rms", PyArray1::from_slice(py, &c.block_rms))?;
             item.set_item("stretch", residual::stretch(&c.block_rms, floor))?;
             list.append(item)?;
-            for p in residual::panels(&self.raw, &step, c.channel, floor) {
+            for p in residual::panels(raw, &step, c.channel, floor) {
                 let item = PyDict::new(py);
                 item.set_item("channel", channel_name(p.channel))?;
-                item.set_item("covariate", &self.raw.layout.bins.names[p.covariate])?;
+                item.set_item("covariate", &raw.layout.bins.names[p.covariate])?;
                 item.set_item(
                     "unit",
-                    imufit_fit::bins::Bins::unit(&self.raw.layout.bins.names[p.covariate]),
+                    imufit_fit::bins::Bins::unit(&raw.layout.bins.names[p.covariate]),
                 )?;
-                let mut edges = self.raw.layout.bins.edges[p.covariate].clone();
+                let mut edges = raw.layout.bins.edges[p.covariate].clone();
                 if p.covariate == 1 {
                     for edge in &mut edges {
-                        *edge += self.raw.layout.facts.temperature_mean;
+                        *edge += raw.layout.facts.temperature_mean;
                     }
                 }
                 item.set_item("edges", PyArray1::from_vec(py, edges))?;
@@ -188,15 +240,26 @@ impl PyProblem {
     }
 }
 
-/// Squared residual in units of the floors, and number of samples.
-fn training(problem: &PyProblem, step: &DVector<f64>) -> (f64, f64) {
+impl PyProblem {
+    /// A log and the places of its parameters.
+    fn part(&self, log: usize) -> PyResult<(&Part, &[usize])> {
+        let found = self.0.parts.get(log).zip(self.0.places.get(log));
+        let (part, places) = found.ok_or_else(|| value_error("there is no such log"))?;
+        Ok((part, places))
+    }
+}
+
+/// Squared residual in units of the floors over all logs, and number of samples.
+fn training(problem: &Problem, step: &DVector<f64>) -> (f64, f64) {
     let (mut square, mut count) = (0.0, 0.0);
-    for channel in 0..CHANNELS {
-        let floor = problem.floors[channel];
-        let (s, n) = saturated::channel_square(&problem.raw, channel, step);
-        if n > 0 && floor > 0.0 {
-            square += s / (floor * floor);
-            count += n as f64;
+    for (log, part) in problem.parts.iter().enumerate() {
+        let step = problem.of_log(log, step);
+        for (channel, floor) in part.floors.iter().enumerate() {
+            let (s, n) = saturated::channel_square(&part.raw, channel, &step);
+            if n > 0 && *floor > 0.0 {
+                square += s / (floor * floor);
+                count += n as f64;
+            }
         }
     }
     (square, count)

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use imufit_fit::bins::Bins;
+use imufit_fit::bins::{Bins, CovariateSamples};
 use imufit_model::card::{Card, Found, Parameter, Stage};
 use imufit_model::catalogue;
 use imufit_model::contract;
@@ -149,6 +149,7 @@ impl PyEffect {
 pub struct PyFacts {
     pub facts: LogFacts,
     pub bins: Bins,
+    pub samples: Arc<CovariateSamples>,
     pub attitude_noise: f64,
     pub position_noise: f64,
 }
@@ -256,6 +257,18 @@ impl PyFacts {
     fn with_ranges(&self, acc: Option<f64>, gyr: Option<f64>) -> Self {
         let mut out = self.clone();
         out.facts.ranges = [acc, gyr, None];
+        out
+    }
+
+    /// The same facts with bins of the covariates that are the same for all of several logs.
+    fn with_bins_of(&self, others: Vec<PyRef<'_, Self>>) -> Self {
+        let mut out = self.clone();
+        let logs: Vec<&CovariateSamples> = std::iter::once(&self.samples)
+            .chain(others.iter().map(|o| &o.samples))
+            .map(Arc::as_ref)
+            .collect();
+        out.bins = Bins::new(&logs);
+        out.bins.centre_temperature(out.facts.temperature_mean);
         out
     }
 

@@ -1,0 +1,170 @@
+"""Evidence of one log: its noise and its Gram matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from imufit import _imufit
+from imufit.errors import InputError
+from imufit.faults import time_faults
+from imufit.fit.passes import CHANNELS, Passes
+from imufit.fit.profile import Found
+from imufit.fit.surveyed_log import SurveyedLog
+from imufit.log import LogSource
+from imufit.model.catalogue import find_effect
+from imufit.results import DataFault
+
+BLOCKS = 48
+Values = Mapping[str, list[float]]
+
+
+@dataclass(frozen=True, eq=False)
+class LogEvidence:
+    """Evidence of one log with the columns of every effect that it can tell of, taken around given parameter values.
+
+    Attributes
+    ----------
+    surveyed : SurveyedLog
+        The log.
+    slots : tuple of str
+        Effects in the order of their columns: those of the model, the unnamed ones, the candidates.
+    raw, white : Evidence
+        As it stands, and whitened.
+    raw_variance, variance : list of float
+        Of the residual of each channel that no effect explains, as it stands and whitened.
+    floors : list of float
+        Noise floor of each channel.
+    filters : list of list of float
+        Whitening filter of each channel.
+    faults : tuple of DataFault
+        What is wrong with the data of the log.
+    """
+
+    surveyed: SurveyedLog
+    slots: tuple[str, ...]
+    raw: _imufit.Evidence
+    white: _imufit.Evidence
+    raw_variance: list[float]
+    variance: list[float]
+    floors: list[float]
+    filters: list[list[float]]
+    faults: tuple[DataFault, ...] = ()
+
+    @property
+    def passes(self) -> Passes:
+        """Passes over the log."""
+        return self.surveyed.passes
+
+    @property
+    def facts(self) -> _imufit.Facts:
+        """What is known of the log as a whole."""
+        return self.surveyed.facts
+
+    @classmethod
+    def of(cls, surveyed: SurveyedLog, fitted: Values, found: Mapping[str, Found]) -> LogEvidence:
+        """Find the noise of a log and take its evidence.
+
+        Parameters
+        ----------
+        surveyed : SurveyedLog
+            The log.
+        fitted : mapping of str to list of float
+            Effects to take the evidence around, the model's and the unnamed ones, with their parameters.
+        found : mapping of str to Found
+            What searches found for the other effects.
+        """
+        passes, facts = surveyed.passes, surveyed.facts
+        candidates = [key for key in surveyed.effects if key not in fitted]
+        raw = _empty(surveyed, fitted, candidates, found, [[] for _ in CHANNELS])
+        passes.evidence(raw, facts, "taking evidence")
+        step, raw_variance = _imufit.saturate(raw)
+        _check_samples(surveyed.log, fitted, raw_variance)
+        slots = (*fitted, *candidates)
+        faults = surveyed.faults
+        if not any(fault.spoils for fault in faults):
+            faults = (*faults, *time_faults(raw, raw_variance, _places(surveyed, slots), facts))
+        filters = passes.autocovariance(raw, facts, step).filters()
+        floors = _floors(surveyed.log, raw_variance)
+        white, variance = raw, raw_variance
+        if any(filters):
+            white = passes.evidence(raw.with_filters(filters), facts, "whitening the evidence")
+            _, variance = _imufit.saturate(white)
+        return cls(surveyed, slots, raw, white, raw_variance, variance, floors, filters, faults)
+
+    def around(
+        self, fitted: Values, candidates: Sequence[str], found: Mapping[str, Found], *, lean: bool = False
+    ) -> LogEvidence:
+        """Evidence of the same log around other parameter values or another stack of effects.
+
+        Parameters
+        ----------
+        fitted : mapping of str to list of float
+            As for :meth:`of`.
+        candidates : sequence of str
+            Effects whose columns are taken besides, where the log can tell of them.
+        found : mapping of str to Found
+            As for :meth:`of`.
+        lean : bool
+            Tell the residual only whitened, not as it stands.
+        """
+        passes, facts = self.passes, self.facts
+        asked = [key for key in candidates if key in self.surveyed.effects]
+        white = _empty(self.surveyed, fitted, asked, found, self.filters)
+        passes.evidence(white, facts, "taking evidence")
+        raw = white
+        if not lean and any(self.filters):
+            plain = white.with_filters([[] for _ in CHANNELS])
+            raw = passes.evidence(plain, facts, "taking evidence as it stands")
+        # The noise is that of the first evidence, which every effect of the catalogue was fitted to.
+        return replace(self, slots=(*fitted, *asked), raw=raw, white=white)
+
+
+def _empty(
+    surveyed: SurveyedLog,
+    fitted: Values,
+    candidates: Sequence[str],
+    found: Mapping[str, Found],
+    filters: list[list[float]],
+) -> _imufit.Evidence:
+    stack = [(find_effect(key), values) for key, values in fitted.items()]
+    asked = [(surveyed.effects[key], _trial(surveyed.effects[key], found.get(key))) for key in candidates]
+    return _imufit.Evidence(surveyed.facts, stack, asked, BLOCKS, filters)
+
+
+def _places(surveyed: SurveyedLog, slots: Sequence[str]) -> dict[str, range]:
+    """Parameters of every effect in the evidence, by its id."""
+    places, first = {}, 0
+    for key in slots:
+        effect = surveyed.effects.get(key) or find_effect(key)
+        places[key] = range(first, first + len(effect.parameters))
+        first += len(effect.parameters)
+    return places
+
+
+def _trial(effect: _imufit.Effect, found: Found | None) -> list[float]:
+    return [0.0] * len(effect.parameters) if found is None else found.trial
+
+
+def _check_samples(log: LogSource, fitted: Values, variance: list[float]) -> None:
+    """Refuse a log of which too few samples can be used for any sensor, or for one that an effect acts on."""
+    used = {channel[:3] for channel, v in zip(CHANNELS, variance, strict=True) if np.isfinite(v)}
+    remedy = "Check that sensors and reference cover the same time."
+    if not used:
+        raise InputError("too few samples have a reference around them", file=log.path, remedy=remedy)
+    for effect in map(find_effect, fitted):
+        if not used.intersection(effect.sensors):
+            sensors = " and ".join(effect.sensors)
+            raise InputError(
+                f"effect {effect.id} cannot be fitted: too few samples of {sensors} have a reference around them",
+                file=log.path,
+                remedy=remedy,
+            )
+
+
+def _floors(log: LogSource, variance: list[float]) -> list[float]:
+    """Noise floor of each channel: from the metadata, else what no effect of the catalogue explains."""
+    given = log.metadata.noise
+    return [given.get(channel[:3]) or float(np.sqrt(v)) for channel, v in zip(CHANNELS, variance, strict=True)]
