@@ -9,6 +9,7 @@ from imufit.cli import engine
 from imufit.cli.app import main
 from imufit.figures.style import new_figure
 from imufit.log import Log
+from imufit.results import Table
 from imufit.simulate import Grade, ParameterGrade
 from loop_results import BIAS, addition, card, comparison, diagnosis, ladder
 
@@ -56,8 +57,11 @@ class Study:
     def to_dict(self):
         return {"correct": True}
 
-    def __str__(self):
-        return "3 of 3 right"
+    def tables(self):
+        return (Table("Blind logs", ("set", ">named"), (("one", "2/3"),)),)
+
+    def lines(self):
+        return ["missed: --set one --seed 7 --logs 1: " + "a long story " * 20 + "ends here"]
 
 
 class Replay:
@@ -107,6 +111,7 @@ def install(monkeypatch):
         ("hidden", simulation),
         ("unseal", Truth()),
         ("grade_answer", mark),
+        ("blind_sets", {"one": "One effect.", "nothing": "None."}),
         ("grade_blind", Study()),
     ):
         note(name, result)

@@ -30,7 +30,7 @@ def log(tmp_path):
         (["replay", "LOG", "--filter", "mahony"], "filters"),
         (["convert", "LOG", "-o", "new.parquet"], "missing"),
         (["reveal", "LOG"], "truth"),
-        (["grade", "--logs", "2", "--nothing", "1"], "correct"),
+        (["grade", "--logs", "2", "--set", "one", "--seed", "7"], "correct"),
         (["simulate", "handheld", "--hidden", "1", "-o", "new.parquet"], "sealed"),
         (["demo", "-o", "shown"], "ladder"),
     ],
@@ -138,6 +138,17 @@ def test_reveal_tells_and_grades(capsys, tmp_path, log):
     assert "0.0202 deg/s per g" in out
     assert "The answer names gyr.g_sensitivity: right." in out
     assert "0.01967 ± 0.00056 deg/s per g" in out
+
+
+def test_grade_tells_a_fresh_seed_the_marks_and_each_failure_on_a_line(capsys, calls):
+    code, out, _ = run(capsys, "grade", "--set", "one", "--set", "nothing", "--logs", "3", "--processes", "1")
+    assert code == 0
+    _, _, given = next(call for call in calls if call[0] == "grade_blind")
+    assert (given["sets"], given["logs"], given["processes"]) == (("one", "nothing"), 3, 1)
+    assert f"--seed {given['seed']} repeats this" in out
+    assert "2/3" in out
+    (line,) = [line for line in out.splitlines() if "--set one --seed 7 --logs 1" in line]
+    assert line.endswith("ends here")
 
 
 def test_explain_prints_a_card_or_the_catalogue(capsys):

@@ -8,7 +8,7 @@ from imufit.simulate import INJECTIONS, SCENARIOS, SIZES, injection, simulate
 from imufit.simulate.environment import field_vector, gravity_vector
 from imufit.simulate.noise import Noise, SensorNoise
 from imufit.simulate.sensor import Rows, Setup, readings
-from imufit.simulate.separation import distance
+from imufit.simulate.separation import Separation, near
 from imufit.simulate.study import Study
 from scipy.spatial.transform import Rotation
 
@@ -251,12 +251,10 @@ def test_effect_that_a_motion_cannot_show_is_refused_rather_than_made_huge():
 
 def test_delay_and_lag_of_one_sensor_are_too_near_and_a_bias_is_far_from_its_rivals():
     study = Study("handheld", [], duration=30.0)
-    coarse, share = study.coarse()
-    near, rival = distance(coarse, "gyr.lowpass", study.draw("gyr.lowpass", "small"), ())
-    assert rival == "gyr.delay"
-    assert near * share < 1.0
-    near, _ = distance(coarse, "acc.bias", study.draw("acc.bias", "large"), ())
-    assert near * share > 1000.0
+    separation = Separation(study, ())
+    slow = separation.distances("gyr.lowpass", study.draw("gyr.lowpass", "small"))
+    assert near(slow, 1.0) == ("gyr.delay",)
+    assert min(separation.distances("acc.bias", study.draw("acc.bias", "large")).values()) > 1000.0
 
 
 def test_setup_without_effects_reads_ideal_values():

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from imufit.grade import BlindGrade
     from imufit.log import Contents, Log
     from imufit.results import EffectCard, Ladder
     from imufit.simulate import Grade, Simulation, Truth
@@ -308,8 +309,15 @@ def grade_answer(truth: Truth, answer: Mapping[str, Any]) -> Grade:
     return grade(truth, answer)
 
 
-def grade_blind(*, logs: int, nothing: int, seed: int, scenarios: Sequence[str], progress: Progress) -> Any:
-    """Run the blind protocol on many hidden logs."""
-    from imufit.grade import SCENARIOS, grade  # noqa: PLC0415
+def blind_sets() -> Mapping[str, str]:
+    """Return the sets of blind logs with what they hide."""
+    from imufit.grade import SETS  # noqa: PLC0415
 
-    return grade(logs=logs, nothing=nothing, seed=seed, scenarios=scenarios or SCENARIOS, progress=progress)
+    return {name: blind_set.title for name, blind_set in SETS.items()}
+
+
+def grade_blind(*, sets: Sequence[str], logs: int, seed: int, processes: int | None, progress: Progress) -> BlindGrade:
+    """Run the blind protocol on many hidden logs."""
+    from imufit.grade import grade  # noqa: PLC0415
+
+    return grade(sets, logs=logs, seed=seed, processes=processes, progress=progress)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from pathlib import Path
 
 import click
@@ -14,24 +15,32 @@ from imufit.cli.progress import ProgressBar
 
 
 @click.command(short_help="The blind protocol: how often the answer is right.")
-@click.option("--logs", type=click.IntRange(min=0), default=60, show_default=True, help="Logs with a hidden effect.")
-@click.option("--nothing", type=click.IntRange(min=0), default=30, show_default=True, help="Logs with none.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="First seed.")
 @click.option(
-    "--scenario",
-    "scenarios",
+    "--set",
+    "sets",
     multiple=True,
-    type=Known("scenario", lambda: list(engine.scenarios())),
-    metavar="SCENARIO",
-    help="Motion of the logs; repeatable. Without it turntable, poses, arm, handheld.",
+    type=Known("set", lambda: list(engine.blind_sets())),
+    metavar="SET",
+    help="Kind of logs; repeatable. Without it all of them: one, small, one-realistic, small-realistic, nothing, two, "
+    "outside, confounded, separated, columns.",
 )
+@click.option("--logs", type=click.IntRange(min=1), default=20, show_default=True, help="Logs of each set.")
+@click.option("--seed", type=click.IntRange(min=0), help="Of the first log of each set; fresh without it.")
+@click.option("--processes", type=click.IntRange(min=1), help="Logs at a time; one per processor without it.")
 @json_option
-def grade(*, logs: int, nothing: int, seed: int, scenarios: tuple[str, ...], json_file: Path | None) -> None:
-    """Diagnose many simulated logs without knowing what was done to them, and grade the answers."""
-    if logs + nothing == 0:
-        raise click.UsageError("--logs and --nothing are both 0: there is nothing to grade")
+def grade(*, sets: tuple[str, ...], logs: int, seed: int | None, processes: int | None, json_file: Path | None) -> None:
+    """Diagnose many simulated logs without knowing what was done to them, and mark the answers.
+
+    Each log depends on its set and its seed alone: what failed is told with both, so that it can be repeated.
+    """
     out = Output(json_file)
+    first = secrets.randbelow(10**9) if seed is None else seed
+    if seed is None:
+        out.say(f"Seeds from {first} on: --seed {first} repeats this.")
     with ProgressBar() as progress:
-        result = engine.grade_blind(logs=logs, nothing=nothing, seed=seed, scenarios=scenarios, progress=progress)
-    out.say(str(result))
-    out.json(result.to_dict())
+        result = engine.grade_blind(sets=sets, logs=logs, seed=first, processes=processes, progress=progress)
+    out.tables(result.tables())
+    failures = result.lines()
+    out.say("Each log that failed, with what repeats it alone:" if failures else "Nothing failed.")
+    out.lines(failures)
+    out.json({"seed": first, **result.to_dict()})

@@ -40,6 +40,11 @@ class Output:
             if sentence:
                 self._console.print(sentence, style="bold" if bold else None)
 
+    def lines(self, lines: Iterable[str]) -> None:
+        """Print lines as they are, however long."""
+        for line in lines:
+            self._console.print(line, soft_wrap=True)
+
     def table(self, table: Table, limit: int | None = None) -> None:
         """Print a table, if it has rows."""
         if not table.rows:

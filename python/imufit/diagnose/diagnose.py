@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from imufit import _imufit
 from imufit.diagnose import sentences
@@ -166,7 +166,7 @@ def _candidate(
     # Of one log after the other, where each has its own.
     by_log = np.asarray(item["parameters"]).reshape(-1, len(effect.parameters), 2)
     parameters = named(*pooled(by_log[..., 0], by_log[..., 1]))
-    threshold = float(student.isf(ALPHA / tested / 2, analysis.problem.blocks - 1)) + POWER
+    threshold = -float(stdtrit(analysis.problem.blocks - 1, ALPHA / tested / 2)) + POWER
     detectable = {
         p.name: (threshold * p.standard_error, p.unit)
         for p in parameters

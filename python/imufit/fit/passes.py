@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.fit.range_end import RangeEnd
 from imufit.log import Chunk, LogSource
 from imufit.progress import Progress
-from imufit.replay.clipped import end_of_range
 
 CHUNK_ROWS = 65536
 SURVEY_MARGIN = 4096
@@ -118,20 +118,21 @@ class Passes:
         return facts, dict(zip(["temp", *self.covariates], known / log.n, strict=True))
 
     def ranges(self) -> tuple[dict[str, float], dict[str, float]]:
-        """Where the ranges of accelerometer and gyroscope seem to end, and their largest readings, m/s^2 and rad/s."""
-        told = {sensor: self.log.metadata.extra.get(f"{sensor}_range") for sensor in ("acc", "gyr")}
-        found: dict[str, float] = {}
-        largest: dict[str, float] = {}
+        """Where readings of accelerometer and gyroscope may be cut off, and the largest, m/s^2 and rad/s."""
+        ends = {sensor: RangeEnd() for sensor in ("acc", "gyr")}
         for chunk in self.log.chunks(CHUNK_ROWS, 0):
-            for sensor, end in told.items():
+            for sensor, end in ends.items():
                 column = getattr(chunk.log, sensor)
-                if column is None or not np.isfinite(column).any():
-                    continue
-                largest[sensor] = max(largest.get(sensor, 0.0), float(np.nanmax(np.abs(column))))
-                known = end if isinstance(end, int | float) and end > 0.0 else end_of_range(column, 0.0)
-                if known is not None:
-                    found[sensor] = min(found.get(sensor, np.inf), float(known))
-        return found, largest
+                if column is not None:
+                    end.add(column)
+        told = {sensor: self.log.metadata.extra.get(f"{sensor}_range") for sensor in ends}
+        found: dict[str, float] = {}
+        for sensor, end in ends.items():
+            known = told[sensor]
+            value = known if isinstance(known, int | float) and known > 0.0 else end.end()
+            if value is not None:
+                found[sensor] = float(value)
+        return found, {sensor: end.largest for sensor, end in ends.items()}
 
     def _rig(self) -> tuple[int, list[float]] | None:
         """Axis of a one-axis rig and its attitude at the angle zero; None for a log of anything else."""

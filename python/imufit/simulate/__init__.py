@@ -5,10 +5,13 @@ done to them as nature would: a late sensor is read earlier on the motion, a dis
 body. Nothing here uses the model that is fitted to such logs.
 """
 
+from imufit.simulate.courses import Course, Line, Mixture, Wandering
+from imufit.simulate.entry import Injection
 from imufit.simulate.grade import Grade, ParameterGrade, grade
 from imufit.simulate.hidden import OBSERVABLE, hidden
-from imufit.simulate.injections import INJECTIONS, Injection, injection
+from imufit.simulate.injections import INJECTIONS, injection
 from imufit.simulate.noise import Noise, SensorNoise
+from imufit.simulate.outside import OUTSIDE, Outside
 from imufit.simulate.scenario import Scenario
 from imufit.simulate.scenarios import SCENARIOS
 from imufit.simulate.sealed import Truth, seal, sealed_path, unseal
@@ -19,18 +22,24 @@ from imufit.simulate.truth import Kinematics, Trajectory
 __all__ = [
     "INJECTIONS",
     "OBSERVABLE",
+    "OUTSIDE",
     "SCENARIOS",
     "SIZES",
+    "Course",
     "Grade",
     "Injection",
     "Kinematics",
+    "Line",
+    "Mixture",
     "Noise",
+    "Outside",
     "ParameterGrade",
     "Scenario",
     "SensorNoise",
     "Simulation",
     "Trajectory",
     "Truth",
+    "Wandering",
     "grade",
     "hidden",
     "injection",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imufit.simulate.courses import Course
 from imufit.simulate.motion import Array, Signal, Sinusoids, Steps
 
 GRAVITY = 9.80665
@@ -158,6 +159,6 @@ class Environment:
 
     gravity: Array
     field: Array
-    temperature: Temperature
-    covariates: Mapping[str, Covariate]
+    temperature: Course
+    covariates: Mapping[str, Course]
     vibration: Vibration | None = None

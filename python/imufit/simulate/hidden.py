@@ -10,7 +10,7 @@ from imufit.simulate.environment import stream
 from imufit.simulate.injections import injection
 from imufit.simulate.scenarios import SCENARIOS
 from imufit.simulate.sealed import Truth
-from imufit.simulate.separation import APART, distance
+from imufit.simulate.separation import APART, Separation
 from imufit.simulate.simulation import Simulation, simulate
 from imufit.simulate.size import SIZES
 from imufit.simulate.study import Study
@@ -149,6 +149,5 @@ def _distinguishable(study: Study, effect: str, size: str | float, attempt: int)
     sizes = {} if entry.stage == "range" else entry.typical
     if any(abs(parameters[name]) > LARGEST * size for name, size in sizes.items()):
         return None
-    coarse, share = study.coarse()
-    near, _ = distance(coarse, effect, parameters, COLUMNS)
-    return parameters if near * share >= APART else None
+    distances = Separation(study, COLUMNS).distances(effect, parameters)
+    return parameters if min(distances.values()) >= APART else None

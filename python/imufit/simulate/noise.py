@@ -19,6 +19,8 @@ class SensorNoise:
     Attributes
     ----------
     white : standard deviation of the white noise of one sample, behind the sensor's own filter if it has one.
+    growth_with_rate : by which share of itself the white noise grows for each rad/s of angular rate; 0 = not.
+    growth_with_time : by which share of itself the white noise has grown at the end of the log; 0 = not.
     bandwidth : corner (Hz) of the sensor's own first-order low-pass, through which the white noise goes; None = none.
     coloured : standard deviation of first-order autoregressive noise on top of it; 0 = none.
     correlation_time : time (s) in which the correlation of the coloured noise falls to 1/e.
@@ -32,6 +34,8 @@ class SensorNoise:
     random_walk: float = 0.0
     resolution: float = 0.0
     bandwidth: float | None = None
+    growth_with_rate: float = 0.0
+    growth_with_time: float = 0.0
 
     @classmethod
     def from_density(
@@ -51,7 +55,7 @@ class SensorNoise:
         white = density * float(np.sqrt(0.5 * np.pi * bandwidth))
         return cls(white, random_walk=random_walk, resolution=resolution, bandwidth=bandwidth)
 
-    def draw(self, rng: np.random.Generator, t: Array) -> Array:
+    def draw(self, rng: np.random.Generator, t: Array, rates: Array | None = None) -> Array:
         """Return noise (n, 3) for samples at times `t` (s), without the rounding.
 
         Parameters
@@ -60,8 +64,14 @@ class SensorNoise:
             Source of randomness.
         t : ndarray
             (n,) times, s.
+        rates : ndarray, optional
+            (n, 3) true angular rate, rad/s; without it the noise is as at rest.
         """
         noise = self.white * rng.standard_normal((t.size, 3))
+        if self.growth_with_rate > 0.0 and rates is not None:
+            noise *= 1.0 + self.growth_with_rate * np.linalg.norm(rates, axis=1)[:, None]
+        if self.growth_with_time > 0.0:
+            noise *= 1.0 + self.growth_with_time * ((t - t[0]) / max(float(t[-1] - t[0]), 1e-9))[:, None]
         gaps = np.diff(t, prepend=t[0])
         if self.bandwidth is not None:
             noise = _correlated(noise, gaps, 1.0 / (2.0 * np.pi * self.bandwidth))
@@ -153,6 +163,24 @@ class Noise:
             dropped=0.002,
             mag_rate=50.0,
         )
+
+    @classmethod
+    def heteroscedastic(cls, with_rate: float = 0.0, with_time: float = 0.0) -> Noise:
+        """Return the defaults with white noise that grows.
+
+        Parameters
+        ----------
+        with_rate : float
+            Share of itself by which it grows for each rad/s of angular rate.
+        with_time : float
+            Share of itself by which it has grown at the end of the log.
+        """
+        plain = cls()
+        grown = {
+            name: replace(plain.sensor(name), growth_with_rate=with_rate, growth_with_time=with_time)
+            for name in ("acc", "gyr", "mag")
+        }
+        return cls(acc=grown["acc"], gyr=grown["gyr"], mag=grown["mag"])
 
     @classmethod
     def mpu6050(cls, acc_bandwidth: float = 21.0, gyr_bandwidth: float = 20.0) -> Noise:

@@ -107,6 +107,21 @@ def _turntable(plan: Plan) -> Trajectory:
     return Trajectory([Fixed(inclination), table, legs])
 
 
+def _one_way(plan: Plan) -> Trajectory:
+    """Spin about an axis that is none of the body's, always the same way, at several rates, with stops between."""
+    rng = plan.rng
+    inclination = rotation_from_vector(np.radians(rng.uniform(35.0, 55.0)) * (X if rng.random() < 0.5 else Y))
+    along = rng.uniform(0.45, 1.0, 3) * rng.choice([-1.0, 1.0], 3)
+    away, _ = Rotation.align_vectors([Z], [along])
+    start, rates = [], [0.0]
+    spell = plan.duration / 8.0
+    for k in range(8):
+        start += [(k + 0.1) * spell, (k + 0.85) * spell]
+        rates += [rng.uniform(0.6, 2.8), 0.0]
+    table = Joint(Z, Cruise(np.array(start), np.full(len(start), 0.1 * spell), np.array(rates)))
+    return Trajectory([Fixed(inclination), table, Fixed(np.asarray(away.as_matrix()))])
+
+
 def _about_z(rng: np.random.Generator) -> Array:
     return rotation_from_vector(rng.uniform(-np.pi, np.pi) * Z)
 
@@ -176,6 +191,10 @@ SCENARIOS: Mapping[str, Scenario] = {
     "turntable": Scenario(
         "An inclined rate table spins the sensor both ways about its x, y and z axis in turn, with stops between.",
         _turntable,
+    ),
+    "one_way": Scenario(
+        "An inclined rate table always spins the same way, about an axis that is none of the sensor's, at eight rates.",
+        _one_way,
     ),
     "arm": Scenario(
         "A robot arm swings the sensor back and forth about changing axes; attitude and position are recorded.",

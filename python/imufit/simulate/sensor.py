@@ -22,6 +22,9 @@ SENSORS = ("acc", "gyr", "mag")
 LAG_STEP = 1e-3
 """Step (s) on which the differential equation of a lag is solved."""
 
+LAG_HISTORY = 60.0
+"""Time (s) before the log from which a lag is solved at most: sensors are not slower, and the grid stays small."""
+
 
 KEPT = 6
 """How many motions are kept while effects are tried out."""
@@ -36,6 +39,8 @@ class Situation:
     input : (n, 3), the true quantity at the sensor, body frame, its unit.
     force : (n, 3), true specific force at the body's origin, body frame, m/s^2.
     rotation : (n, 3, 3), true attitude of the sensor's axes, to the reference frame.
+    omega : (n, 3), true angular rate, body frame, rad/s.
+    position : (n, 3), true position of the body's origin, reference frame, m.
     since : (n,), time since the start of the log, s.
     warmth : (n,), temperature less its mean over the log, K.
     covariates : (n,) each, less their means over the log.
@@ -46,6 +51,8 @@ class Situation:
     input: Array
     force: Array
     rotation: Array
+    omega: Array
+    position: Array
     since: Array
     warmth: Array
     covariates: Mapping[str, Array]
@@ -71,9 +78,9 @@ class Sensor:
             total = total + disturbance(situation)
         return total
 
-    def digits(self, output: Array, noise: SensorNoise, rng: np.random.Generator, t: Array) -> Array:
+    def digits(self, output: Array, noise: SensorNoise, rng: np.random.Generator, t: Array, rates: Array) -> Array:
         """Return the recorded reading (n, 3): noise added, rounded, held within the range."""
-        return self.limited(noise.rounded(output + noise.draw(rng, t)))
+        return self.limited(noise.rounded(output + noise.draw(rng, t, rates)))
 
     def limited(self, output: Array) -> Array:
         """Return `output` held within the range."""
@@ -159,6 +166,8 @@ class Setup:
             input=self.input(name, felt, then) if sensor.lag == 0.0 else self._lagged(name, rows),
             force=felt.specific_force(surroundings.gravity),
             rotation=felt.rotation,
+            omega=felt.omega,
+            position=felt.position,
             since=rows.t - rows.t[0],
             warmth=warmth - np.mean(warmth),
             current=columns.get("motor_current", np.full(rows.t.size, np.nan)),
@@ -169,7 +178,7 @@ class Setup:
     def _lagged(self, name: str, rows: Rows) -> Array:
         """Solve lag dy/dt = x - y on a fine grid, from a steady start, for an input that is linear within a step."""
         lag, delay = self.sensors[name].lag, self.sensors[name].delay
-        grid = rows.fine(float(np.ceil(12.0 * lag + delay)))
+        grid = rows.fine(float(np.ceil(min(12.0 * lag, LAG_HISTORY) + delay)))
         x = self.input(name, self.felt(grid.kinematics(self.trajectory, 0.0)), grid.t)
         keep = float(np.exp(-LAG_STEP / lag))
         slope = 1.0 - lag / LAG_STEP * (1.0 - keep)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from imufit.log import Log
+from imufit.simulate.courses import Course
 from imufit.simulate.environment import GRAVITY, Environment, stream
 from imufit.simulate.injections import injection, order
 from imufit.simulate.motion import Array
@@ -37,7 +38,8 @@ class Simulation:
     covariates : (n,) each.
     metadata : frame, gravity, mag_reference, rig_axis, sensor, noise: whichever apply.
     trajectory : the motion that the reference reports; `trajectory.at(t)` is exact.
-    truth : what was injected. Neither of these two gets into the log.
+    noise : for each sensor, (n, 3), its readings less what they would be without noise, rounding and shaking.
+    truth : what was injected. None of these three gets into the log.
     """
 
     t: Array
@@ -52,6 +54,7 @@ class Simulation:
     covariates: Mapping[str, Array]
     metadata: Mapping[str, Any]
     trajectory: Trajectory
+    noise: Mapping[str, Array]
     truth: Truth
 
     def to_log(self) -> Log:
@@ -82,6 +85,7 @@ def simulate(
     frame: str = "NED",
     sensors: Sequence[str] | None = None,
     covariates: Sequence[str] = (),
+    courses: Mapping[str, Course] | None = None,
     noise: Noise | None = None,
     realistic: bool = False,
     rig_axis: str = "x",
@@ -99,6 +103,7 @@ def simulate(
     frame : reference frame: "NED", "ENU" or "NWU".
     sensors : which of "acc", "gyr", "mag", "temp" the log has; default those of the scenario.
     covariates : further columns, such as "motor_current" and "vbat"; those that an effect needs are there anyhow.
+    courses : for "temp" or a covariate the course that it takes, instead of one by chance.
     noise : random errors; default those of the scenario: white noise, on a machine tool an MPU6050's.
     realistic : whether the default is `Noise.realistic()` instead.
     rig_axis : axis of a one-axis rig: "x", "y" or "z".
@@ -123,6 +128,7 @@ def simulate(
         frame=frame,
         sensors=sensors,
         covariates=covariates,
+        courses=courses,
         noise=noise,
         realistic=realistic,
         rig_axis=rig_axis,
@@ -144,8 +150,14 @@ def _recorded(study: Study, truth: Truth, rig_axis: str, noise_in_metadata: bool
     for name in sorted(truth.effects, key=order):
         injection(name).apply(setup, truth.effects[name], study.run)
     sensors: dict[str, Array | None] = dict.fromkeys(SENSORS)
+    errors: dict[str, Array] = {}
+    rates = rows.kinematics(setup.trajectory, 0.0).omega
     for name, output in outputs(setup, rows, tuple(sampled)).items():
-        digits = setup.sensors[name].digits(output, noise.sensor(name), stream(seed, f"noise {name}"), t)
+        sensor, rng = setup.sensors[name], stream(seed, f"noise {name}")
+        digits = sensor.digits(output, noise.sensor(name), rng, t, rates)
+        shaking = study.environment.vibration if name == "acc" else None
+        calm = sensor.limited(output) - (0.0 if shaking is None else shaking.at(t - sensor.delay))
+        errors[name] = np.where(sampled[name][:, None], digits - calm, np.nan)
         sensors[name] = np.where(sampled[name][:, None], digits, np.nan)
 
     reference = rows.kinematics(trajectory, setup.reference_delay)
@@ -166,6 +178,7 @@ def _recorded(study: Study, truth: Truth, rig_axis: str, noise_in_metadata: bool
         covariates={name: course.at(t) for name, course in study.environment.covariates.items()},
         metadata=_metadata(study, truth.scenario, rig_axis if kind.rig else None, noise_in_metadata),
         trajectory=trajectory,
+        noise=errors,
         truth=truth,
     )
 

@@ -8,13 +8,14 @@ they are and change what the reference predicts; for these it is the change of (
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import brentq
 
+from imufit.simulate.entry import Injection, Parameters, Run
 from imufit.simulate.environment import Environment
-from imufit.simulate.injections import Injection, Parameters, Run, injection
+from imufit.simulate.injections import injection
 from imufit.simulate.motion import Array
 from imufit.simulate.sensor import Rows, Setup, discrepancy, readings
 from imufit.simulate.truth import Trajectory
@@ -68,10 +69,12 @@ class Scale:
         entry.apply(setup, parameters, self.run)
         return discrepancy(setup, self.rows, tuple(name for name in entry.sensors if name in self.sampled))
 
-    def draw(self, effect: str, size: float, rng: np.random.Generator) -> dict[str, float]:
-        """Return parameters in a random direction with which the effect has the wanted size."""
+    def draw(self, effect: str, size: float, rng: np.random.Generator, only: Sequence[str] = ()) -> dict[str, float]:
+        """Return random parameters with which the effect has the wanted size; all but those in `only` are zero."""
         entry = injection(effect)
         direction = entry.direction(rng, self.run)
+        if only:
+            direction = {name: value if name in only else 0.0 for name, value in direction.items()}
         peak = self._peak(entry)
 
         def ratio(factor: float) -> float:

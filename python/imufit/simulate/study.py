@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from imufit.simulate.courses import Course
+from imufit.simulate.entry import Run
 from imufit.simulate.environment import (
     Environment,
     Temperature,
@@ -15,7 +17,7 @@ from imufit.simulate.environment import (
     gravity_vector,
     stream,
 )
-from imufit.simulate.injections import Run, injection
+from imufit.simulate.injections import injection
 from imufit.simulate.noise import Noise, magnetometer_rows, sampling_times
 from imufit.simulate.scenarios import SCENARIOS, build
 from imufit.simulate.sensor import SENSORS, Rows
@@ -29,6 +31,7 @@ class Study:
 
     Attributes
     ----------
+    scenario, seed, rate : as given.
     trajectory, environment, noise : what the log is made from.
     rows, run : its rows.
     names : what the log has: of "acc", "gyr", "mag", "temp".
@@ -46,6 +49,7 @@ class Study:
         frame: str = "NED",
         sensors: Sequence[str] | None = None,
         covariates: Sequence[str] = (),
+        courses: Mapping[str, Course] | None = None,
         noise: Noise | None = None,
         realistic: bool = False,
         rig_axis: str = "x",
@@ -54,13 +58,13 @@ class Study:
             raise ValueError(f"duration {duration} s at {rate} Hz does not make two rows")
         if rig_axis not in AXES:
             raise ValueError(f"rig_axis is {rig_axis!r}: use x, y or z")
-        self.seed, self.rate = seed, rate
+        self.scenario, self.seed, self.rate = scenario, seed, rate
         self.trajectory = build(scenario, stream(seed, f"motion {scenario}"), duration, frame, AXES.index(rig_axis))
         kind = SCENARIOS[scenario]
         self.names = kind.sensors if sensors is None else _known_sensors(sensors)
         self.noise = noise or (Noise.realistic() if realistic else kind.noise())
         self.environment = _environment(
-            effects, seed, duration, rate, frame=frame, covariates=covariates, field=kind.field
+            effects, seed, duration, rate, frame=frame, covariates=covariates, courses=courses or {}, field=kind.field
         )
         t = sampling_times(self.noise, seed, duration, rate)
         self.rows, self.run = Rows(t), Run(frame, float(t[0]), float(t[-1]))
@@ -131,15 +135,17 @@ def _environment(
     *,
     frame: str,
     covariates: Sequence[str],
+    courses: Mapping[str, Course],
     field: tuple[float, float],
 ) -> Environment:
     needed = [injection(name) for name in effects]
     columns = [*covariates, *(entry.column for entry in needed if entry.column is not None)]
+    columns += [name for name in courses if name != "temp"]
     vibrating = any(entry.vibration for entry in needed)
     return Environment(
         gravity=gravity_vector(frame),
         field=field_vector(frame, field),
-        temperature=Temperature.random(stream(seed, "temperature"), duration),
-        covariates={name: covariate(name, seed, duration) for name in dict.fromkeys(columns)},
+        temperature=courses.get("temp") or Temperature.random(stream(seed, "temperature"), duration),
+        covariates={name: courses.get(name) or covariate(name, seed, duration) for name in dict.fromkeys(columns)},
         vibration=Vibration.random(stream(seed, "vibration"), duration, rate) if vibrating else None,
     )

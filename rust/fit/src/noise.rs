@@ -4,9 +4,15 @@ use imufit_model::effect::EffectError;
 use imufit_model::facts::LOOKBACK;
 use imufit_model::sensor::{CHANNELS, Sensor};
 use imufit_model::window::Window;
+use rayon::prelude::*;
 
 use crate::evidence::{Layout, Samples};
 use crate::whitening::MAX_ORDER;
+
+/// Rows worked on at a time.
+const PART: usize = 4096;
+/// Rows looked at, at most about: parts spread evenly over the log tell the noise as well as all of it.
+const ROWS: usize = 1 << 17;
 
 /// Autocovariances of the residual left by given parameters (all of them, candidates too), summed over windows.
 #[derive(Clone, Debug)]
@@ -27,8 +33,34 @@ impl Default for Autocovariance {
 }
 
 impl Autocovariance {
-    /// Adds the core rows of a window: the residual less the columns times `step`.
+    /// Adds core rows of a window, of a long log only some parts: the residual less the columns times `step`.
     pub fn add(&mut self, window: &Window, layout: &Layout, step: &[f64]) -> Result<(), EffectError> {
+        let every = layout.facts.n.div_ceil(ROWS).max(1);
+        let starts: Vec<usize> = (window.begin..window.end)
+            .step_by(PART)
+            .filter(|begin| ((window.offset + begin) / PART).is_multiple_of(every))
+            .collect();
+        let parts: Vec<Result<Self, EffectError>> = starts
+            .into_par_iter()
+            .map(|begin| {
+                let end = (begin + PART).min(window.end);
+                Self::of(&window.part(begin, end, layout.facts.margin()), layout, step)
+            })
+            .collect();
+        // Summed in the order of time, so that the result does not depend on the number of threads.
+        for part in parts {
+            let part = part?;
+            let pairs = self.sums.iter_mut().flatten().zip(part.sums.iter().flatten());
+            pairs.for_each(|(a, b)| *a += b);
+            let pairs = self.counts.iter_mut().flatten().zip(part.counts.iter().flatten());
+            pairs.for_each(|(a, b)| *a += b);
+        }
+        Ok(())
+    }
+
+    /// That of the core rows of one window.
+    fn of(window: &Window, layout: &Layout, step: &[f64]) -> Result<Self, EffectError> {
+        let mut out = Self::default();
         let core = window.begin;
         let window = window.with_core(core.saturating_sub(LOOKBACK), window.end);
         let evaluation = layout.model.evaluate(&window, &layout.facts)?;
@@ -46,13 +78,13 @@ impl Autocovariance {
                         if samples.rows[k] - samples.rows[k - lag] > LOOKBACK {
                             break;
                         }
-                        self.sums[channel][lag] += now * residual[samples.rows[k - lag]];
-                        self.counts[channel][lag] += 1;
+                        out.sums[channel][lag] += now * residual[samples.rows[k - lag]];
+                        out.counts[channel][lag] += 1;
                     }
                 }
             }
         }
-        Ok(())
+        Ok(out)
     }
 
     /// Autocovariance of a channel, lag 0 first, and its number of samples. It ends with the last lag that most samples

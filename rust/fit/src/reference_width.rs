@@ -93,8 +93,8 @@ pub fn still_axes(widths: &Bandwidth, chosen: Smoothing) -> [bool; 3] {
     sum.map(|s| (s / n.max(1.0)).sqrt() < TURNING * noise)
 }
 
-/// Width for the attitude.
-pub fn of_attitude(widths: &Bandwidth, rows: &SampledRows) -> Smoothing {
+/// Width for the attitude of a log of `n` rows.
+pub fn of_attitude(widths: &Bandwidth, rows: &SampledRows, n: usize) -> Smoothing {
     let error: Vec<f64> = (0..WIDTHS.len())
         .map(|k| {
             let sample: Vec<_> = widths
@@ -111,11 +111,17 @@ pub fn of_attitude(widths: &Bandwidth, rows: &SampledRows) -> Smoothing {
             unexplained(&sample)
         })
         .collect();
-    widths.choose(&error)
+    widths.choose(&error, n)
 }
 
 /// Width for the position, with the rates of the attitude at the width chosen for it.
-pub fn of_position(widths: &Bandwidth, attitude: &Bandwidth, chosen: Smoothing, rows: &SampledRows) -> Smoothing {
+pub fn of_position(
+    widths: &Bandwidth,
+    attitude: &Bandwidth,
+    chosen: Smoothing,
+    rows: &SampledRows,
+    n: usize,
+) -> Smoothing {
     let k = WIDTHS.iter().position(|w| *w == chosen).unwrap_or(0);
     let rates: HashMap<usize, (Vector3<f64>, Vector3<f64>)> = attitude
         .sampled(k)
@@ -152,5 +158,5 @@ pub fn of_position(widths: &Bandwidth, attitude: &Bandwidth, chosen: Smoothing, 
             unexplained(&sample)
         })
         .collect();
-    widths.choose(&error)
+    widths.choose(&error, n)
 }

@@ -215,13 +215,14 @@ impl Survey {
             }
         });
         let dt = median(&mut self.steps);
-        let attitude_smoothing = reference_width::of_attitude(&self.attitude_width, &self.width_rows);
+        let attitude_smoothing = reference_width::of_attitude(&self.attitude_width, &self.width_rows, self.given.n);
         let position_smoothing = self.has_position.then(|| {
             reference_width::of_position(
                 &self.position_width,
                 &self.attitude_width,
                 attitude_smoothing,
                 &self.width_rows,
+                self.given.n,
             )
         });
         let facts = LogFacts {

@@ -14,4 +14,5 @@ pub mod problem;
 pub mod residual;
 pub mod saturated;
 pub mod screening;
+pub mod together;
 pub mod verdict;

@@ -151,6 +151,8 @@ pub struct Weighed {
     question: Question,
     answer: Screened,
     known: bool,
+    /// Parameters of the model that it was weighed on.
+    model: Vec<usize>,
 }
 
 /// Weighs one candidate on top of the model's parameters.
@@ -183,6 +185,7 @@ pub fn weigh(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, ca
         question,
         answer,
         known: false,
+        model: model.to_vec(),
     }
 }
 
@@ -221,6 +224,7 @@ fn weigh_known(
         question,
         answer,
         known: true,
+        model: model.to_vec(),
     }
 }
 
@@ -250,11 +254,12 @@ impl Weighed {
     }
 
     /// Asks whether it can be chance, whether both halves agree, and what its parameters are.
-    pub fn judged(self, problem: &Problem, model: &[usize], candidate: &[usize]) -> Screened {
+    pub fn judged(self, problem: &Problem, candidate: &[usize]) -> Screened {
         let Self {
             question,
             answer: mut out,
             known,
+            model,
         } = self;
         if !out.testable {
             return out;
@@ -273,7 +278,7 @@ impl Weighed {
         let m = out.directions.ncols();
         if out.p_value < CLEARLY_CHANCE {
             out.stable = halves_agree(&question, &fine);
-            out.differing = agreement::differing(problem, model, out.slot, 1);
+            out.differing = agreement::differing(problem, &model, out.slot, 1);
         }
         let beta = fine.estimate.rows(question.model, m).into_owned();
         let values: DVector<f64> = &out.directions * &beta;

@@ -7,8 +7,10 @@ use rayon::prelude::*;
 use crate::agreement::{self, Differing, Disagreement};
 use crate::confounding;
 use crate::dependence::{self, Dependence};
+use crate::held_out;
 use crate::problem::Problem;
 use crate::screening::{self, Screened, Weighed, parameters_of};
+use crate::together;
 
 /// Chance of any false alarm over all candidates tried.
 pub const ALPHA: f64 = 0.003;
@@ -117,14 +119,19 @@ fn disagreements(
     (found, spoilt)
 }
 
-fn indices(slots: &[Slot], chosen: &[usize]) -> Vec<usize> {
+pub(crate) fn indices(slots: &[Slot], chosen: &[usize]) -> Vec<usize> {
     let mut parameters = parameters_of(chosen.iter().map(|s| &slots[*s]));
     parameters.sort_unstable();
     parameters
 }
 
 /// Weighs all candidates on top of a model, and says how many can be tested.
-fn weigh_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> (Vec<Weighed>, f64) {
+pub(crate) fn weigh_all(
+    problem: &Problem,
+    slots: &[Slot],
+    model: &[usize],
+    candidates: &[usize],
+) -> (Vec<Weighed>, f64) {
     let fitted = indices(slots, model);
     let base = screening::base(problem, &fitted);
     let weighed: Vec<Weighed> = candidates
@@ -136,9 +143,9 @@ fn weigh_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[u
 }
 
 /// Judges a weighed candidate; where a search went before, each of its trials counts.
-fn judge(problem: &Problem, slots: &[Slot], fitted: &[usize], weighed: Weighed) -> Screened {
+pub(crate) fn judge(problem: &Problem, slots: &[Slot], weighed: Weighed) -> Screened {
     let slot = weighed.so_far().slot;
-    let mut screened = weighed.judged(problem, fitted, &indices(slots, &[slot]));
+    let mut screened = weighed.judged(problem, &indices(slots, &[slot]));
     screened.p_value = (screened.p_value * slots[slot].tried as f64).min(1.0);
     screened
 }
@@ -146,8 +153,7 @@ fn judge(problem: &Problem, slots: &[Slot], fitted: &[usize], weighed: Weighed) 
 /// Screens all candidates on top of a model: those that passed first, each group by held-out gain.
 fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> (Vec<Screened>, Vec<f64>) {
     let (weighed, tried) = weigh_all(problem, slots, model, candidates);
-    let fitted = indices(slots, model);
-    let judge = |w| judge(problem, slots, &fitted, w);
+    let judge = |w| judge(problem, slots, w);
     let mut screened: Vec<Screened> = weighed.into_par_iter().map(judge).collect();
     let passed = |s: &Screened| passes(s, s.p_value * tried);
     screened.sort_by(|a, b| {
@@ -163,23 +169,22 @@ fn screen_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[
 /// The best candidate that passes on top of a model; none below it is judged.
 fn best_of(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> Option<usize> {
     let (mut weighed, tried) = weigh_all(problem, slots, model, candidates);
-    let fitted = indices(slots, model);
     weighed.sort_by(|a, b| b.so_far().gain.total_cmp(&a.so_far().gain));
     weighed
         .into_iter()
         .filter(|w| promising(w.so_far()))
-        .map(|w| judge(problem, slots, &fitted, w))
+        .map(|w| judge(problem, slots, w))
         .find(|s| passes(s, s.p_value * tried))
         .map(|s| s.slot)
 }
 
 /// True if a candidate lowers the held-out error and is no chance finding.
-fn significant(s: &Screened, adjusted: f64) -> bool {
+pub(crate) fn significant(s: &Screened, adjusted: f64) -> bool {
     adjusted <= ALPHA && promising(s)
 }
 
 /// True if a candidate can be tested and lowers the held-out error, whitened and as it stands.
-fn promising(s: &Screened) -> bool {
+pub(crate) fn promising(s: &Screened) -> bool {
     s.testable && s.gain > 0.0 && s.held_out.1 < s.held_out.0
 }
 
@@ -191,26 +196,112 @@ pub fn passes(s: &Screened, adjusted: f64) -> bool {
 /// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from.
 pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize]) -> Verdict {
     let slots = problem.slots.as_slice();
-    let (screened, adjusted) = screen_all(problem, slots, model, candidates);
+    let (mut screened, mut adjusted) = screen_all(problem, slots, model, candidates);
+    let single = settle(problem, model, candidates, &screened, &adjusted, &[]);
+    let best_gain = single.best.map_or(0.0, |b| gain_of(&screened, b));
+    let hidden = |(s, a): (&Screened, &f64)| significant(s, *a) && s.plausible && !s.stable && s.gain > best_gain;
+    let doubtful = single.kind == Kind::Unknown || screened.iter().zip(&adjusted).any(hidden);
+    let mut settled = single;
+    if doubtful {
+        let members = together::find(problem, slots, model, candidates);
+        let chosen: Vec<usize> = members.iter().map(|m| m.slot).collect();
+        if !members.is_empty() {
+            let several = settle(problem, model, candidates, &screened, &adjusted, &chosen);
+            if several.kind != Kind::Unknown {
+                settled = several;
+                put_first(&mut screened, &mut adjusted, members);
+            }
+        }
+    }
+    let stack: Vec<usize> = model.iter().chain(&settled.path).copied().collect();
+    let best = screened.iter().find(|s| Some(s.slot) == settled.best);
+    let (disagreements, spoilt) = disagreements(problem, model, &stack, candidates, best);
+    Verdict {
+        kind: if spoilt { Kind::Unknown } else { settled.kind },
+        best: settled.best,
+        rivals: settled.rivals,
+        screened,
+        adjusted,
+        correlations: settled.correlations,
+        unexplained: settled.unexplained,
+        path: settled.path,
+        disagreements,
+        spoilt,
+    }
+}
+
+fn gain_of(screened: &[Screened], slot: usize) -> f64 {
+    screened.iter().find(|s| s.slot == slot).map_or(0.0, |s| s.gain)
+}
+
+/// Puts effects first that pass beside one another: what each brings alone stays, how sure it is comes from beside the others.
+fn put_first(screened: &mut Vec<Screened>, adjusted: &mut Vec<f64>, members: Vec<Screened>) {
+    let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
+    for member in members.into_iter().rev() {
+        if let Some(at) = screened.iter().position(|s| s.slot == member.slot) {
+            let alone = screened.remove(at);
+            adjusted.remove(at);
+            adjusted.insert(0, (member.p_value * tried).min(1.0));
+            let (gain, gain_error) = (alone.gain, alone.gain_error);
+            let (held_out, expected_ratio) = (alone.held_out, alone.expected_ratio);
+            screened.insert(
+                0,
+                Screened {
+                    gain,
+                    gain_error,
+                    held_out,
+                    expected_ratio,
+                    ..member
+                },
+            );
+        }
+    }
+}
+
+/// An answer on the way to the verdict.
+struct Settled {
+    kind: Kind,
+    best: Option<usize>,
+    rivals: Vec<usize>,
+    correlations: Vec<(usize, usize, f64)>,
+    unexplained: Vec<Dependence>,
+    path: Vec<usize>,
+}
+
+/// What the screening says if the candidates `chosen`, which pass beside one another, are taken together; if there are none, the best
+/// one that passes alone is taken.
+fn settle(
+    problem: &Problem,
+    model: &[usize],
+    candidates: &[usize],
+    screened: &[Screened],
+    adjusted: &[f64],
+    chosen: &[usize],
+) -> Settled {
+    let slots = problem.slots.as_slice();
     let passing: Vec<&Screened> = screened
         .iter()
-        .zip(&adjusted)
+        .zip(adjusted)
         .filter(|(s, a)| passes(s, **a))
         .map(|(s, _)| s)
         .collect();
-    let best = passing.first().map(|s| s.slot);
+    let best = chosen.first().copied().or_else(|| passing.first().map(|s| s.slot));
+    let others = chosen.get(1..).unwrap_or_default();
 
     let mut path = Vec::new();
     let mut stack = model.to_vec();
     let mut next = best;
+    let mut ready = others.iter().copied();
     while let Some(slot) = next {
         path.push(slot);
         stack.push(slot);
         if path.len() >= LOOK_AHEAD {
             break;
         }
-        let left: Vec<usize> = candidates.iter().copied().filter(|c| !stack.contains(c)).collect();
-        next = best_of(problem, slots, &stack, &left);
+        next = ready.next().or_else(|| {
+            let left: Vec<usize> = candidates.iter().copied().filter(|c| !stack.contains(c)).collect();
+            best_of(problem, slots, &stack, &left)
+        });
     }
 
     let fitted = indices(slots, &stack);
@@ -219,41 +310,30 @@ pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize]) -> Verdi
     let (mut unexplained, tried) = dependence::test(problem, &fitted, &base, &channels);
     unexplained.retain(|d| d.p_value * tried as f64 <= ALPHA);
 
-    let mut rivals = Vec::new();
-    let mut correlations = Vec::new();
-    if let Some(first) = passing.first() {
-        let fitted = indices(slots, model);
-        let own = indices(slots, &[first.slot]);
-        let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
-        for other in passing.iter().skip(1) {
-            let theirs = indices(slots, &[other.slot]);
-            let beta: Vec<f64> = first.parameters.iter().map(|p| p.0).collect();
-            let c = confounding::correlation(problem, &fitted, &own, &beta, &theirs);
-            correlations.push((first.slot, other.slot, c));
-            if other.gain >= RIVAL_SHARE * first.gain
-                && confounding::p_value_given(problem, &fitted, &theirs, &own) * tried * slots[other.slot].tried as f64
-                    > ALPHA
-            {
-                rivals.push(other.slot);
-            }
-        }
-    }
+    let beside: Vec<usize> = model.iter().chain(others).copied().collect();
+    let (rivals, correlations) = best.map_or_else(Default::default, |best| {
+        rivals_of(problem, slots, &beside, candidates, screened, &passing, best)
+    });
 
-    let (disagreements, spoilt) = disagreements(problem, model, &stack, candidates, passing.first().copied());
-    let kind = match passing.first() {
-        _ if spoilt => Kind::Unknown,
-        None if unexplained.is_empty() && !screened.iter().zip(&adjusted).any(|(s, a)| significant(s, *a)) => {
+    let kind = match best {
+        None if unexplained.is_empty() && !screened.iter().zip(adjusted).any(|(s, a)| significant(s, *a)) => {
             Kind::Adequate
         }
         None => Kind::Unknown,
         Some(first) => {
-            let sensors = slots[first.slot].effect.sensors();
+            let sensors = slots[first].effect.sensors();
             let left = unexplained
                 .iter()
                 .filter(|d| sensors.iter().any(|s| s.index() == d.channel / 3))
                 .map(|d| d.gain)
                 .fold(0.0, f64::max);
-            if first.gain < NAMED_SHARE * (first.gain + left) {
+            let gain = if chosen.is_empty() {
+                gain_of(screened, first)
+            } else {
+                let alone = screening::base(problem, &indices(slots, model));
+                held_out::gain(&alone, &base).0
+            };
+            if gain < NAMED_SHARE * (gain + left) {
                 Kind::Unknown
             } else if rivals.is_empty() {
                 Kind::Missing
@@ -262,16 +342,56 @@ pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize]) -> Verdi
             }
         }
     };
-    Verdict {
+    Settled {
         kind,
         best,
         rivals,
-        screened,
-        adjusted,
         correlations,
         unexplained,
         path,
-        disagreements,
-        spoilt,
     }
+}
+
+/// Candidates that explain as well as the best what is left beside a model, and how much passing ones look like it.
+fn rivals_of(
+    problem: &Problem,
+    slots: &[Slot],
+    beside: &[usize],
+    candidates: &[usize],
+    screened: &[Screened],
+    passing: &[&Screened],
+    best: usize,
+) -> (Vec<usize>, Vec<(usize, usize, f64)>) {
+    let fitted = indices(slots, beside);
+    let own = indices(slots, &[best]);
+    let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
+    let alone = passing.first().is_some_and(|s| s.slot == best);
+    let others: Vec<Screened>;
+    let compared: Vec<&Screened> = if alone {
+        passing.to_vec()
+    } else {
+        // Beside other effects a candidate is worth something else than alone.
+        let left: Vec<usize> = candidates.iter().copied().filter(|c| !beside.contains(c)).collect();
+        let (all, adjusted) = screen_all(problem, slots, beside, &left);
+        let passing = all.into_iter().zip(adjusted).filter(|(s, a)| passes(s, *a));
+        others = passing.map(|(s, _)| s).collect();
+        others.iter().collect()
+    };
+    let Some(first) = compared.iter().find(|s| s.slot == best) else {
+        return Default::default();
+    };
+    let beta: Vec<f64> = first.parameters.iter().map(|p| p.0).collect();
+    let (mut rivals, mut correlations) = (Vec::new(), Vec::new());
+    for other in compared.iter().filter(|s| s.slot != best) {
+        let theirs = indices(slots, &[other.slot]);
+        let c = confounding::correlation(problem, &fitted, &own, &beta, &theirs);
+        correlations.push((best, other.slot, c));
+        if other.gain >= RIVAL_SHARE * first.gain
+            && confounding::p_value_given(problem, &fitted, &theirs, &own) * tried * slots[other.slot].tried as f64
+                > ALPHA
+        {
+            rivals.push(other.slot);
+        }
+    }
+    (rivals, correlations)
 }

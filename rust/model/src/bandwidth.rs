@@ -10,7 +10,7 @@ use crate::window::Window;
 
 /// The widths tried, narrowest first. The last ones follow no motion that a sensor could: they are for references that shake near
 /// half their own sampling rate, and only the sensor can ask for them.
-pub const WIDTHS: [Smoothing; 13] = [
+pub const WIDTHS: [Smoothing; 15] = [
     NARROWEST,
     Smoothing {
         degree: 8,
@@ -49,6 +49,14 @@ pub const WIDTHS: [Smoothing; 13] = [
         half_width: 48,
     },
     Smoothing {
+        degree: 6,
+        half_width: 64,
+    },
+    Smoothing {
+        degree: 6,
+        half_width: 86,
+    },
+    Smoothing {
         degree: 2,
         half_width: 1,
     },
@@ -63,7 +71,7 @@ pub const WIDTHS: [Smoothing; 13] = [
 ];
 
 /// Number of widths that the reference alone may choose from.
-const ORDERED: usize = 10;
+const ORDERED: usize = 12;
 
 const NOISE_FIT: Smoothing = Smoothing {
     degree: 8,
@@ -77,6 +85,10 @@ const GROUPS: [f64; 5] = [0.3, 0.7, 0.9, 0.97, 1.0];
 /// Two widths agree if the mean square of their difference is at most this much above what noise explains, plus three times its own scatter.
 const TOLERANCE: f64 = 1.1;
 const SCATTER: f64 = 3.0;
+/// Mean square that the widest width that agrees misses of the motion, over all rows, beside the noise of the difference.
+const MISSED: f64 = 0.01;
+/// By how much that falls with each narrower one: the sixth power of their ratio, squared.
+const NARROWER: f64 = 36.0;
 /// Share of the rows that a width must reach.
 const REACH: f64 = 0.9;
 /// The reference's noise buries the sensor if a wider polynomial lowers the unexplained mean square by this factor.
@@ -267,27 +279,30 @@ impl Bandwidth {
             .collect()
     }
 
-    /// Index of the width that the reference alone allows: one narrower than the widest that still agrees with its neighbour.
-    fn allowed(&self) -> usize {
+    /// Index of the width that the reference alone allows for a log of so many rows.
+    ///
+    /// What the widest that agrees with its neighbour misses of the motion is small beside the noise of one row, but it has the
+    /// shape of the motion, so that over many rows it would show as a wrong scale. Each narrower width misses some [`NARROWER`] times less.
+    fn allowed(&self, rows: usize) -> usize {
         let agreeing = self.excess().iter().take_while(|excess| **excess <= TOLERANCE).count();
-        if agreeing == ORDERED - 1 {
-            agreeing
-        } else {
-            agreeing.saturating_sub(1)
-        }
+        let missed = MISSED * rows as f64;
+        let back = (missed.max(1.0).ln() / NARROWER.ln()).ceil().clamp(1.0, 2.0);
+        agreeing.saturating_sub(back as usize)
     }
 
     /// The width to use. Where the noise of the reference is not white (interpolated, quantised, filtered), its neighbours
     /// never agree and the reference alone would ask for the narrowest width, whose noise buries the sensor. So the sensor is asked too:
-    /// `error[k]` is the mean square of what it leaves unexplained of the derivative at width `k`.
-    /// Only where that falls by more than [`BURIED`] is a wider one taken, one narrower than the best.
-    pub fn choose(&self, error: &[f64]) -> Smoothing {
-        let allowed = self.allowed();
+    /// `error[k]` is the mean square of what it leaves unexplained of the derivative at width `k`, summed over the axes.
+    /// Only where that, less what white noise of the reference makes of it, falls by more than [`BURIED`] is a wider one taken, one
+    /// narrower than the best. `rows` is the length of the log.
+    pub fn choose(&self, error: &[f64], rows: usize) -> Smoothing {
+        let allowed = self.allowed(rows);
+        let white = 3.0 * self.derivative_noise(WIDTHS[allowed]).powi(2);
         let best = (0..error.len())
             .filter(|k| error[*k].is_finite() && self.reaches(*k))
             .min_by(|a, b| error[*a].total_cmp(&error[*b]));
         match best {
-            Some(best) if best > allowed && error.get(allowed).is_none_or(|e| *e > BURIED * error[best]) => {
+            Some(best) if best > allowed && error.get(allowed).is_none_or(|e| e - white > BURIED * error[best]) => {
                 WIDTHS[if best < ORDERED { (best - 1).max(allowed) } else { best }]
             }
             _ => WIDTHS[allowed],

@@ -79,6 +79,10 @@ pub struct Ideal {
     pub m: Triple,
     /// Its time derivative in the body frame.
     pub m_rate: Triple,
+    /// What a reading follows beyond `omega`, see [`Kinematics::omega_detail`].
+    pub omega_detail: Triple,
+    /// What a reading follows beyond `f`.
+    pub f_detail: Triple,
     /// Attitude of the sensor, body to reference frame.
     pub attitude: Vec<UnitQuaternion<f64>>,
     /// What the one-axis rig was told to do; empty without a rig.
@@ -173,6 +177,7 @@ impl Ideal {
         Kinematics {
             attitude: k.attitude * turn,
             omega: omega + rig.axis * error_rate,
+            omega_detail: turn.inverse_transform_vector(&k.omega_detail),
             alpha: turn.inverse_transform_vector(&k.alpha)
                 + omega.cross(&rig.axis) * error_rate
                 + rig.axis * error_acceleration,
@@ -209,7 +214,7 @@ impl Ideal {
         Some(now)
     }
 
-    const fn triples(&mut self) -> [&mut Triple; 6] {
+    const fn triples(&mut self) -> [&mut Triple; 8] {
         [
             &mut self.omega,
             &mut self.alpha,
@@ -217,7 +222,18 @@ impl Ideal {
             &mut self.f_rate,
             &mut self.m,
             &mut self.m_rate,
+            &mut self.omega_detail,
+            &mut self.f_detail,
         ]
+    }
+
+    /// What a sensor reads beyond the smooth quantity that columns are made of; `None` for a magnetometer, which needs no derivative.
+    pub const fn detail(&self, sensor: Sensor) -> Option<&Triple> {
+        match sensor {
+            Sensor::Acc => Some(&self.f_detail),
+            Sensor::Gyr => Some(&self.omega_detail),
+            Sensor::Mag => None,
+        }
     }
 
     /// Time derivative of what a sensor reads.
@@ -260,6 +276,10 @@ impl Ideal {
         self.f_rate.push(&f_rate);
         self.m.push(&m);
         self.m_rate.push(&-omega.cross(&m));
+        self.omega_detail
+            .push(&change.alignment.inverse_transform_vector(&k.omega_detail));
+        self.f_detail
+            .push(&attitude.inverse_transform_vector(&(change.tilt * k.acceleration_detail)));
         self.attitude.push(attitude);
     }
 

@@ -21,6 +21,10 @@ pub struct Kinematics {
     pub acceleration: Vector3<f64>,
     /// Jerk in the reference frame, m/s^3.
     pub jerk: Vector3<f64>,
+    /// What the narrower polynomials, which follow every detail of the motion and of the reference's noise, add to `omega`.
+    pub omega_detail: Vector3<f64>,
+    /// The same for `acceleration`.
+    pub acceleration_detail: Vector3<f64>,
 }
 
 /// Times and row numbers of the rows that carry a reference, cut into segments without gaps.
@@ -251,9 +255,9 @@ fn rates(phi: Vector3<f64>, d: Vector3<f64>, dd: Vector3<f64>) -> (Vector3<f64>,
 /// Polynomials for one reference quantity.
 #[derive(Clone, Copy, Debug)]
 pub struct Widths {
-    /// For the ideal readings themselves.
+    /// For the ideal readings that measured ones are compared with: nothing of the motion may be lost.
     pub value: Smoothing,
-    /// For the derivatives that only enter columns.
+    /// For what enters columns, where noise would shrink every parameter (errors in variables).
     pub columns: Smoothing,
 }
 
@@ -278,20 +282,27 @@ pub fn kinematics(
             let at = window.t[i] + shift;
             let (centre, d) = rotation.as_mut()?.rotation_derivatives(at, attitude.value)?;
             let phi = Vector3::from(d[0]);
-            let (omega, mut alpha) = rates(phi, Vector3::from(d[1]), Vector3::from(d[2]));
+            let (mut omega, mut alpha) = rates(phi, Vector3::from(d[1]), Vector3::from(d[2]));
+            let mut omega_detail = Vector3::zeros();
             if let Some((reference, width)) = smooth_rotation.as_mut() {
                 let (_, d) = reference.rotation_derivatives(at, *width)?;
-                alpha = rates(Vector3::from(d[0]), Vector3::from(d[1]), Vector3::from(d[2])).1;
+                let smooth = rates(Vector3::from(d[0]), Vector3::from(d[1]), Vector3::from(d[2]));
+                omega_detail = omega - smooth.0;
+                (omega, alpha) = smooth;
             }
+            let mut acceleration_detail = Vector3::zeros();
             let (acceleration, jerk) = match translation.as_mut() {
                 None => (Vector3::zeros(), Vector3::zeros()),
                 Some((reference, s)) => {
                     let d = reference.position_derivatives(at, *s)?;
-                    let jerk = match smooth_translation.as_mut() {
-                        None => d[3],
-                        Some((reference, width)) => reference.position_derivatives(at, *width)?[3],
-                    };
-                    (Vector3::from(d[2]), Vector3::from(jerk))
+                    match smooth_translation.as_mut() {
+                        None => (Vector3::from(d[2]), Vector3::from(d[3])),
+                        Some((reference, width)) => {
+                            let smooth = reference.position_derivatives(at, *width)?;
+                            acceleration_detail = Vector3::from(d[2]) - Vector3::from(smooth[2]);
+                            (Vector3::from(smooth[2]), Vector3::from(smooth[3]))
+                        }
+                    }
                 }
             };
             let attitude = centre * UnitQuaternion::from_scaled_axis(phi);
@@ -301,6 +312,8 @@ pub fn kinematics(
                 alpha,
                 acceleration,
                 jerk,
+                omega_detail,
+                acceleration_detail,
             })
         })
         .collect()

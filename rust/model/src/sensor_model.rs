@@ -284,7 +284,7 @@ impl SensorModel {
                 Sensor::Gyr => &ideal.omega,
                 Sensor::Mag => &ideal.m,
             };
-            let (modelled, columns) = self.predict(rows, reading_of.clone(), sensor)?;
+            let (modelled, columns) = self.predict(rows, reading_of.clone(), ideal.detail(sensor), sensor)?;
             for (axis, columns) in columns.into_iter().enumerate() {
                 let residual = core
                     .clone()
@@ -318,8 +318,15 @@ impl SensorModel {
             .collect())
     }
 
-    /// Modelled readings of one sensor and the columns of its three channels, stage after stage.
-    fn predict(&self, rows: Rows, mut x: Triple, sensor: Sensor) -> Result<(Triple, AxisColumns), EffectError> {
+    /// Modelled readings of one sensor and the columns of its three channels, stage after stage. Columns are made of the smooth
+    /// quantity; `detail` joins it before readings are cut off.
+    fn predict(
+        &self,
+        rows: Rows,
+        mut x: Triple,
+        detail: Option<&Triple>,
+        sensor: Sensor,
+    ) -> Result<(Triple, AxisColumns), EffectError> {
         let n = rows.len();
         let silent = rows.facts.silent_axes[sensor.index()];
         let mut out: AxisColumns =
@@ -333,6 +340,9 @@ impl SensorModel {
             Stage::Offset,
             Stage::Range,
         ] {
+            if let (Stage::Range, Some(detail)) = (stage, detail) {
+                x.add(detail, 1.0);
+            }
             let mut after: Option<Triple> = None;
             let seen = silent.contains(&true).then(|| x.without(silent));
             for slot in &self.slots {

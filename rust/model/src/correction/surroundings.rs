@@ -88,7 +88,7 @@ pub fn width(x: &Triple, t: &[f64]) -> Smoothing {
     let window = as_position(t, &readings);
     let mut widths = Bandwidth::of_reading();
     widths.add(&window, (0..t.len()).step_by(t.len().div_ceil(SAMPLES).max(1)));
-    widths.choose(&[])
+    widths.choose(&[], 0)
 }
 
 /// Time derivative in every row, from a local polynomial through the samples around it; NaN where there are too few.
