@@ -28,7 +28,7 @@ class LogEvidence:
     surveyed : SurveyedLog
         The log.
     slots : tuple of str
-        Effects in the order of their columns: those of the model, the unnamed ones, the candidates.
+        Effects in the order of their columns: those of the model, the unnamed ones, the candidates, the probes.
     raw, white : Evidence
         As it stands, and whitened.
     raw_variance, variance : list of float
@@ -72,7 +72,7 @@ class LogEvidence:
             What searches found for the other effects.
         """
         passes, facts = surveyed.passes, surveyed.facts
-        candidates = [key for key in surveyed.effects if key not in fitted]
+        candidates = [key for key in surveyed.columns if key not in fitted]
         raw = _empty(surveyed, fitted, candidates, found, [[] for _ in CHANNELS])
         passes.evidence(raw, facts, "taking evidence")
         step, raw_variance = _imufit.saturate(raw)
@@ -103,7 +103,7 @@ class LogEvidence:
             Tell the residual only whitened, not as it stands.
         """
         passes, facts = self.passes, self.facts
-        asked = [key for key in candidates if key in self.surveyed.effects]
+        asked = [key for key in candidates if key in self.surveyed.columns]
         white = _empty(self.surveyed, fitted, asked, found, self.filters)
         passes.evidence(white, facts, "taking evidence")
         raw = white
@@ -122,7 +122,8 @@ def _empty(
     filters: list[list[float]],
 ) -> _imufit.Evidence:
     stack = [(find_effect(key), values) for key, values in fitted.items()]
-    asked = [(surveyed.effects[key], _trial(surveyed.effects[key], found.get(key))) for key in candidates]
+    columns = surveyed.columns
+    asked = [(columns[key], _trial(columns[key], found.get(key))) for key in candidates]
     return _imufit.Evidence(surveyed.facts, stack, asked, BLOCKS, filters)
 
 
