@@ -12,6 +12,8 @@ use crate::{screening, selection};
 /// Contrasts over the bins: polynomials of the bin's rank up to this degree.
 pub const CONTRASTS: usize = 5;
 
+const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// The covariate that every log has for itself.
 const TIME: &str = "t";
 
@@ -255,12 +257,23 @@ pub fn test_probes(problem: &Problem, stack: &[usize], probes: &[usize]) -> (Vec
             let certain = |(value, error): &(f64, f64)| (value / error.max(f64::MIN_POSITIVE)).abs();
             let parameters = judged.parameters.iter().map(certain).enumerate();
             let (largest, _) = parameters.max_by(|a, b| a.1.total_cmp(&b.1))?;
-            // Parameters of a vector belong to an axis each, those of a gradient to all.
-            let axis = if slot.parameters.len() == 3 { largest } else { 0 };
+            // Parameters of vectors belong to an axis each, those of a gradient to all.
+            let axis = if slot.parameters.len().is_multiple_of(3) {
+                largest % 3
+            } else {
+                0
+            };
             let card = slot.effect.card();
+            // What the axis itself causes is called as its own bins are.
+            let own = matches!(card.name.as_str(), "f" | "omega");
+            let covariate = if own {
+                format!("{}_{}", card.name, AXES[axis])
+            } else {
+                card.name.clone()
+            };
             Some(Dependence {
                 channel: 3 * sensor.index() + axis,
-                covariate: card.name.clone(),
+                covariate,
                 log: None,
                 p_value: judged.p_value,
                 gain: judged.gain,

@@ -11,7 +11,7 @@ use crate::held_out;
 use crate::problem::Problem;
 use crate::screening::{self, Screened};
 use crate::selection::{ALPHA, best_of, indices, passes, screen_all, significant};
-use crate::together;
+use crate::{steps, together};
 
 /// A named effect must explain this share of what depends on anything in its sensors, or the answer is "unknown".
 const NAMED_SHARE: f64 = 0.8;
@@ -238,6 +238,9 @@ fn settle(
     let (mut probed, tried) = dependence::test_probes(problem, &stack, probes);
     probed.retain(|d| d.p_value * tried as f64 <= ALPHA);
     unexplained.extend(probed);
+    let (mut stepping, tried) = steps::test(problem, &fitted);
+    stepping.retain(|d| d.p_value * tried as f64 <= ALPHA);
+    unexplained.extend(stepping);
     unexplained.sort_by(|a, b| b.gain.total_cmp(&a.gain));
 
     let beside: Vec<usize> = model.iter().chain(&others).copied().collect();

@@ -21,9 +21,18 @@ enum Kind {
     Gain(usize),
     /// k (c - mean) (d - mean).
     Product(Quantity, Quantity),
+    /// k x where |x| is below one of [`SMALL`] times the full scale of such a motion.
+    NearZero,
     /// R^T G p with G symmetric and without trace, as the gradient of a field without sources is.
     Gradient,
 }
+
+/// Parts of gravity (m/s^2) and of one rad/s below which a reading may be something else than a smaller reading.
+const SMALL: [f64; 5] = [0.005, 0.01, 0.02, 0.04, 0.08];
+/// Parameters of a probe near zero: each part, x, y and z.
+const NEAR_ZERO: [&str; 15] = [
+    "x1", "y1", "z1", "x2", "y2", "z2", "x3", "y3", "z3", "x4", "y4", "z4", "x5", "y5", "z5",
+];
 
 /// A quantity beside the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +57,9 @@ pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
     }
     let mut kinds = Vec::new();
     for sensor in Sensor::ALL.into_iter().filter(|s| facts.sensors[s.index()]) {
+        if sensor != Sensor::Mag {
+            kinds.push((sensor, Kind::NearZero));
+        }
         kinds.extend((0..columns).map(|c| (sensor, Kind::Gain(c))));
         for (k, first) in quantities.iter().enumerate() {
             let others = quantities[k + 1..].iter();
@@ -79,6 +91,12 @@ impl Probe {
                 &["x", "y", "z"],
                 format!("{}*{}", name(*a), name(*b)),
                 "both act together",
+            ),
+            Kind::NearZero => (
+                Stage::Gain,
+                &NEAR_ZERO,
+                if sensor == Sensor::Acc { "f" } else { "omega" }.to_string(),
+                "another gain about zero",
             ),
             Kind::Gradient => (
                 Stage::Offset,
@@ -150,6 +168,19 @@ impl Effect for Probe {
                 if let (Some(a), Some(b)) = (deviation(rows, *a), deviation(rows, *b)) {
                     for axis in 0..3 {
                         out.set(axis, axis, a.iter().zip(&b).map(|(a, b)| a * b));
+                    }
+                }
+            }
+            Kind::NearZero => {
+                let full = if self.sensor[0] == Sensor::Acc {
+                    rows.facts.gravity.norm()
+                } else {
+                    1.0
+                };
+                for (k, part) in SMALL.iter().enumerate() {
+                    for axis in 0..3 {
+                        let small = |x: &f64| if x.abs() < part * full { *x } else { 0.0 * x };
+                        out.set(3 * k + axis, axis, rows.x.axis(axis).iter().map(small));
                     }
                 }
             }
