@@ -3,6 +3,7 @@
 Every run draws new seeds; IMUFIT_SEED repeats one (it is told with a failure).
 """
 
+import json
 import os
 import secrets
 
@@ -106,3 +107,9 @@ def test_unknown_set_is_refused():
         draw("tow", 1)
     with pytest.raises(ValueError, match="unknown set 'tow'"):
         grade(["tow"], logs=1)
+
+
+def test_marks_come_back_from_json(marks):
+    again = BlindGrade.from_dict(json.loads(json.dumps(marks.to_dict())))
+    assert again.to_dict() == marks.to_dict()
+    assert str(again) == str(marks)
