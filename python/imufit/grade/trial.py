@@ -82,10 +82,8 @@ class Trial:
         return cls(blind_set=data["set"], answer=Answer(**answer), marks=Marks(**data["marks"]), **rest)
 
     def __str__(self) -> str:
-        said = " ".join(
-            [self.answer.verdict, ", ".join(self.answer.named)]
-            + ([f"(first {' over '.join(self.answer.unexplained[0])})"] if self.answer.unexplained else [])
-        ).strip()
+        first = f"(first {' over '.join(self.answer.unexplained[0])})" if self.answer.unexplained else ""
+        said = " ".join(filter(None, [self.answer.verdict, ", ".join(self.answer.named), first]))
         climbed = f"; ladder + {' + '.join(self.answer.steps)} -> {self.answer.end}" if self.answer.steps else ""
         rivals = f" (like {', '.join(self.rivals)})" if self.rivals else ""
         return (
