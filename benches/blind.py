@@ -5,7 +5,8 @@ growing sizes. Fresh seeds unless `--seed` is given. Without `--write` the table
 they go between the marks of docs/blind.md, and the curve to docs/pictures/blind_power.png.
 
 Run: ``python benches/blind.py [--write] [--seed N] [--logs N] [--power N] [--processes N] [--set NAME]...
-[--json FILE]``. On two processors it takes about an hour.
+[--from FILE]... [--json FILE]``. On two processors it takes about an hour. `--from` takes marks and power curve of
+earlier runs (`imufit grade --json FILE`, or `--json` here) in place of new ones.
 """
 
 import argparse
@@ -34,6 +35,13 @@ def judged(sets: list[str], logs: int | None, seed: int, processes: int | None) 
         found = grade([name], logs=logs or SETS[name].logs, seed=seed, processes=processes, progress=told)
         trials += found.trials
     return BlindGrade(tuple(trials))
+
+
+def together(files: list[Path]) -> tuple[BlindGrade, PowerCurve | None]:
+    found = [json.loads(file.read_text(encoding="utf-8")) for file in files]
+    points = [point for each in found for point in (each.get("power") or {}).get("points", [])]
+    trials = [trial for each in found for trial in BlindGrade.from_dict(each).trials]
+    return BlindGrade(tuple(trials)), PowerCurve.from_dict({"points": points}) if points else None
 
 
 def demands(result: BlindGrade) -> Table:
@@ -82,9 +90,16 @@ def markdown(table: Table) -> str:
     return "\n".join(f"| {line} |" if line != rule else f"|{line}|" for line in lines)
 
 
-def section(result: BlindGrade, curve: PowerCurve | None, seed: int) -> str:
+def seeds(result: BlindGrade) -> str:
+    first = {trial.blind_set: min(t.seed for t in result.of(trial.blind_set)) for trial in result.trials}
+    if len(set(first.values())) == 1:
+        return f"Seeds from {next(iter(first.values()))} on,"
+    return "First seeds " + ", ".join(f"{seed} (`{name}`)" for name, seed in first.items()) + ";"
+
+
+def section(result: BlindGrade, curve: PowerCurve | None) -> str:
     parts = [
-        f"Seeds from {seed} on, {len(result.trials)} logs, {platform.machine()}, CPython {platform.python_version()}.",
+        f"{seeds(result)} {len(result.trials)} logs, {platform.machine()}, CPython {platform.python_version()}.",
         markdown(demands(result)),
         "At the end of the ladder:",
         markdown(ends(result)),
@@ -112,16 +127,20 @@ def main() -> None:
     parser.add_argument("--power", type=int, default=44, help="effects of the power curve; 0 leaves it out")
     parser.add_argument("--processes", type=int, help="logs at a time")
     parser.add_argument("--set", dest="sets", action="append", choices=list(SETS), help="only these sets; repeatable")
+    parser.add_argument("--from", dest="files", action="append", type=Path, help="marks of an earlier run; repeatable")
     parser.add_argument("--json", type=Path, help="write every figure to this file")
     given = parser.parse_args()
     print(f"seed {given.seed}", file=sys.stderr)
-    result = judged(given.sets or list(SETS), given.logs, given.seed, given.processes)
     curve = None
-    if given.power:
+    if given.files:
+        result, curve = together(given.files)
+    else:
+        result = judged(given.sets or list(SETS), given.logs, given.seed, given.processes)
+    if given.power and curve is None:
         print("\npower curve", file=sys.stderr)
         curve = power_curve(logs=given.power, seed=given.seed, processes=given.processes, progress=told)
     print(file=sys.stderr)
-    text = section(result, curve, given.seed)
+    text = section(result, curve)
     print(text)
     if given.json:
         found = {"seed": given.seed, **result.to_dict(), "power": None if curve is None else curve.to_dict()}

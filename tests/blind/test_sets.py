@@ -3,6 +3,7 @@
 Every run draws new seeds; IMUFIT_SEED repeats one (it is told with a failure).
 """
 
+import json
 import os
 import secrets
 
@@ -19,23 +20,23 @@ SURE = tuple(name for name in SETS if name not in ("small", "small-realistic", "
 
 @pytest.fixture(scope="module")
 def marks() -> BlindGrade:
-    return grade(SURE, logs=2, seed=SEED, processes=1)
+    return grade(SURE, logs=1, seed=SEED, processes=1)
 
 
 def test_answers_are_right_nearly_always(marks):
-    assert len(marks.trials) == 2 * len(SURE)
-    assert len(marks.failures) <= 3, f"IMUFIT_SEED={SEED}\n{marks}"
+    assert len(marks.trials) == len(SURE)
+    assert len(marks.failures) <= 2, f"IMUFIT_SEED={SEED}\n{marks}"
 
 
 def test_ladder_ends_at_the_true_noise(marks):
     ends = [t.true_ratio for t in marks.trials if t.answer.end == "adequate" and not t.marks.faults]
-    assert len(ends) >= 6
+    assert len(ends) >= 3
     assert np.median(ends) == pytest.approx(1.0, abs=0.01), f"IMUFIT_SEED={SEED}\n{marks}"
 
 
 def test_parameters_are_within_their_errors(marks):
     errors = [error for each in marks.trials for error in each.errors]
-    assert len(errors) >= 8
+    assert len(errors) >= 4
     assert np.sqrt(np.mean(np.square(errors))) < 2.0, f"IMUFIT_SEED={SEED}\n{marks}"
 
 
@@ -44,7 +45,7 @@ def test_table_counts_what_the_marks_say(marks):
     assert list(rows) == list(SURE)
     for name, row in rows.items():
         trials = marks.of(name)
-        assert row["logs"] == 2
+        assert row["logs"] == 1
         for mark in ("named", "wrong", "missed", "alarm", "single", "needless"):
             asked = [getattr(each.marks, mark) for each in trials]
             assert (mark in row) == (asked[0] is not None)
@@ -75,7 +76,7 @@ def test_effects_in_turn_are_the_whole_catalogue():
     assert len([name for name in effects() if ".column:" in name]) == 3
 
 
-@pytest.mark.parametrize("number", range(0, len(PAIRS), 3))
+@pytest.mark.parametrize("number", [0, 4, 8])
 def test_pair_is_the_same_in_one_log_and_not_in_the_other(number):
     together, apart = draw("confounded", number), draw("separated", number)
     pair = list(PAIRS.values())[number]
@@ -106,3 +107,9 @@ def test_unknown_set_is_refused():
         draw("tow", 1)
     with pytest.raises(ValueError, match="unknown set 'tow'"):
         grade(["tow"], logs=1)
+
+
+def test_marks_come_back_from_json(marks):
+    again = BlindGrade.from_dict(json.loads(json.dumps(marks.to_dict())))
+    assert again.to_dict() == marks.to_dict()
+    assert str(again) == str(marks)

@@ -74,6 +74,8 @@ class Analysis:
         Effects that are always fitted along.
     candidates : dict of str to Effect
         What else at least one log can tell of.
+    probes : tuple of str
+        Dependences without a name that are asked about once nothing else explains more.
     found : dict of str to Found
         What searches found for the candidates.
     problem : Problem
@@ -85,6 +87,7 @@ class Analysis:
     own: tuple[dict[str, list[float]], ...]
     unnamed: tuple[str, ...]
     candidates: dict[str, _imufit.Effect]
+    probes: tuple[str, ...]
     found: dict[str, Found]
     problem: _imufit.Problem
 
@@ -123,9 +126,9 @@ class Analysis:
         fitted = [_fitted(each, model, unnamed, values) for each, values in zip(surveyed, own, strict=True)]
         found = search(surveyed, fitted, candidates)
         evidence = [LogEvidence.of(each, values, found) for each, values in zip(surveyed, fitted, strict=True)]
-        return cls(
-            tuple(evidence), model, own, unnamed, candidates, found, _problem(evidence, model, unnamed, candidates)
-        )
+        probes = _probes(surveyed)
+        problem = _problem(evidence, model, unnamed, [*candidates, *probes])
+        return cls(tuple(evidence), model, own, unnamed, candidates, probes, found, problem)
 
     def around(
         self,
@@ -156,10 +159,18 @@ class Analysis:
         values = _with_own(surveyed, model, self.unnamed, own)
         fitted = [_fitted(each, model, self.unnamed, at) for each, at in zip(surveyed, values, strict=True)]
         found = search(surveyed, fitted, asked)
-        evidence = [each.around(at, list(asked), found, lean=lean) for each, at in zip(self.logs, fitted, strict=True)]
-        problem = _problem(evidence, model, self.unnamed, asked)
+        probes = _probes(surveyed) if with_candidates and not lean and only is None else ()
+        columns = [*asked, *probes]
+        evidence = [each.around(at, columns, found, lean=lean) for each, at in zip(self.logs, fitted, strict=True)]
         return replace(
-            self, logs=tuple(evidence), model=model, own=values, candidates=asked, found=found, problem=problem
+            self,
+            logs=tuple(evidence),
+            model=model,
+            own=values,
+            candidates=asked,
+            probes=probes,
+            found=found,
+            problem=_problem(evidence, model, self.unnamed, columns),
         )
 
     def of_logs(self, chosen: Sequence[int]) -> Analysis:
@@ -172,13 +183,14 @@ class Analysis:
         unnamed = tuple(key for key in self.unnamed if key in known)
         candidates = {key: effect for key, effect in self.candidates.items() if key in known}
         own = tuple(self.own[k] for k in chosen)
-        problem = _problem(logs, model, unnamed, candidates)
-        return Analysis(tuple(logs), model, own, unnamed, candidates, self.found, problem)
+        probes = tuple(key for key in self.probes if key in known)
+        problem = _problem(logs, model, unnamed, [*candidates, *probes])
+        return Analysis(tuple(logs), model, own, unnamed, candidates, probes, self.found, problem)
 
     @property
     def slots(self) -> list[str]:
-        """Ids of all slots: the model's effects, the unnamed ones, the candidates."""
-        return [*self.model.effects, *self.unnamed, *self.candidates]
+        """Ids of all slots: the model's effects, the unnamed ones, the candidates, the probes."""
+        return [*self.model.effects, *self.unnamed, *self.candidates, *self.probes]
 
     @property
     def fitted_slots(self) -> list[int]:
@@ -188,7 +200,13 @@ class Analysis:
     @property
     def candidate_slots(self) -> list[int]:
         """Slots of the candidates."""
-        return list(range(len(self.fitted_slots), len(self.slots)))
+        first = len(self.fitted_slots)
+        return list(range(first, first + len(self.candidates)))
+
+    @property
+    def probe_slots(self) -> list[int]:
+        """Slots of the probes."""
+        return list(range(len(self.slots) - len(self.probes), len(self.slots)))
 
     @property
     def faults(self) -> tuple[DataFault, ...]:
@@ -364,6 +382,10 @@ def _fitted(each: SurveyedLog, model: SensorModel, unnamed: Sequence[str], own: 
     """Effects that are fitted to one log, with their parameters."""
     named = {effect.id: own.get(effect.id, values) for effect, values in model.stack() if each.refusal(effect) is None}
     return named | {key: own[key] for key in unnamed if key in own}
+
+
+def _probes(logs: Sequence[SurveyedLog]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(key for each in logs for key in each.probes))
 
 
 def _problem(

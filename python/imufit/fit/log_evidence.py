@@ -30,7 +30,7 @@ class LogEvidence:
     surveyed : SurveyedLog
         The log.
     slots : tuple of str
-        Effects in the order of their columns: those of the model, the unnamed ones, the candidates.
+        Effects in the order of their columns: those of the model, the unnamed ones, the candidates, the probes.
     raw, white : Evidence
         As it stands, and whitened.
     raw_variance, variance : list of float
@@ -77,7 +77,7 @@ class LogEvidence:
             What searches found for the other effects.
         """
         passes, facts = surveyed.passes, surveyed.facts
-        candidates = [key for key in surveyed.effects if key not in fitted]
+        candidates = [key for key in surveyed.columns if key not in fitted]
         raw = _empty(surveyed, fitted, candidates, found, [[] for _ in CHANNELS])
         passes.evidence(raw, facts, "taking evidence")
         step, raw_variance = _imufit.saturate(raw)
@@ -111,7 +111,7 @@ class LogEvidence:
             Tell the residual only whitened, not as it stands.
         """
         passes, facts = self.passes, self.facts
-        asked = [key for key in candidates if key in self.surveyed.effects]
+        asked = [key for key in candidates if key in self.surveyed.columns]
         white = _empty(self.surveyed, fitted, asked, found, self.filters)
         passes.evidence(white, facts, "taking evidence")
         raw = white
@@ -130,15 +130,17 @@ def _empty(
     filters: list[list[float]],
 ) -> _imufit.Evidence:
     stack = [(find_effect(key), values) for key, values in fitted.items()]
-    asked = [(surveyed.effects[key], _trial(surveyed.effects[key], found.get(key))) for key in candidates]
+    columns = surveyed.columns
+    asked = [(columns[key], _trial(columns[key], found.get(key))) for key in candidates]
     return _imufit.Evidence(surveyed.facts, stack, asked, BLOCKS, filters)
 
 
 def _places(surveyed: SurveyedLog, slots: Sequence[str]) -> dict[str, range]:
-    """Parameters of every effect in the evidence, by its id."""
+    """Parameters of every effect and probe in the evidence, by its id."""
+    columns = surveyed.columns
     places, first = {}, 0
     for key in slots:
-        effect = surveyed.effects.get(key) or find_effect(key)
+        effect = columns.get(key) or find_effect(key)
         places[key] = range(first, first + len(effect.parameters))
         first += len(effect.parameters)
     return places

@@ -35,6 +35,8 @@ class SurveyedLog:
         Effects that it can tell of, by id.
     refused : dict of str to str
         Why it cannot tell of the others.
+    probes : dict of str to Effect
+        Dependences without a name that it can be asked about, see `rust/model/src/probes.rs`.
     faults : tuple of DataFault
         What is wrong with its data, as far as rows, units and frames show.
     """
@@ -44,6 +46,7 @@ class SurveyedLog:
     coverage: dict[str, float]
     effects: dict[str, _imufit.Effect]
     refused: dict[str, str]
+    probes: dict[str, _imufit.Effect]
     faults: tuple[DataFault, ...] = ()
 
     @classmethod
@@ -68,7 +71,13 @@ class SurveyedLog:
         reasons = {key: _refusal(effect, facts, coverage) for key, effect in offered.items()}
         testable = {key: effect for key, effect in offered.items() if reasons[key] is None}
         refused = {key: reason for key, reason in reasons.items() if reason is not None}
-        return cls(passes, facts, coverage, testable, refused, faults)
+        probes = {effect.id: effect for effect in _imufit.probes(facts)}
+        return cls(passes, facts, coverage, testable, refused, probes, faults)
+
+    @property
+    def columns(self) -> dict[str, _imufit.Effect]:
+        """Everything that columns are taken of: effects and probes."""
+        return {**self.effects, **self.probes}
 
     @property
     def log(self) -> LogSource:

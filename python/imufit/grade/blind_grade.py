@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +29,17 @@ class BlindGrade:
     """
 
     trials: tuple[Trial, ...]
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> BlindGrade:
+        """Return what `to_dict` told, also after a way through JSON.
+
+        Parameters
+        ----------
+        data : mapping
+            Of `to_dict`.
+        """
+        return cls(tuple(Trial.from_dict(each) for each in data["trials"]))
 
     def of(self, blind_set: str) -> tuple[Trial, ...]:
         """Return the trials of one set.

@@ -22,4 +22,5 @@ def nothing(blind_set: str, seed: int) -> Puzzle:
         noise=NOISES[kind](),
         noise_in_metadata=bool(seed % 2),
     )
-    return Puzzle("nothing", kind, simulation)
+    noisy_reference = NOISES[kind]().attitude_deg > 0.0
+    return Puzzle("nothing", kind, simulation, twin=simulation if noisy_reference else None)

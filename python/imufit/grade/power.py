@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 POWER_SIZES = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
 """Root mean square of the hidden effect over the white noise of its sensor."""
+
+STRIDE = 17
+"""From one seed to the next that many effects are passed over, so that a few of them are of all kinds."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,17 @@ class PowerCurve:
     """
 
     points: tuple[PowerPoint, ...]
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> PowerCurve:
+        """Return what `to_dict` told, also after a way through JSON.
+
+        Parameters
+        ----------
+        data : mapping
+            Of `to_dict`.
+        """
+        return cls(tuple(PowerPoint(**point) for point in data["points"]))
 
     def shares(self, realistic: bool) -> list[dict[str, Any]]:
         """Return for each size the share named alone, named at all, and named wrongly, with 95 % intervals.
@@ -149,7 +163,7 @@ def points_of(seed: int, realistic: bool, sizes: Sequence[float]) -> list[PowerP
     rng, simulation_seed = rng_of("power", seed)
     names = effects()
     options = settings(rng, realistic)
-    setting, effect = _apart(Setting("", simulation_seed, options), names[seed % len(names)], rng)
+    setting, effect = _apart(Setting("", simulation_seed, options), names[STRIDE * seed % len(names)], rng)
     study = setting.study([effect])
     found = []
     for size in sizes:

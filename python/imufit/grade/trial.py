@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -67,17 +68,33 @@ class Trial:
         found = {**asdict(self), "marks": self.marks.to_dict()}
         return {"set": found.pop("blind_set"), **found}
 
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Trial:
+        """Return the trial that `to_dict` told, also after a way through JSON.
+
+        Parameters
+        ----------
+        data : mapping
+            Of `to_dict`.
+        """
+        answer = {name: _tuples(value) for name, value in data["answer"].items()}
+        rest = {name: _tuples(value) for name, value in data.items() if name not in ("set", "answer", "marks")}
+        return cls(blind_set=data["set"], answer=Answer(**answer), marks=Marks(**data["marks"]), **rest)
+
     def __str__(self) -> str:
-        said = " ".join(
-            [self.answer.verdict, ", ".join(self.answer.named)]
-            + ([f"(first {' over '.join(self.answer.unexplained[0])})"] if self.answer.unexplained else [])
-        ).strip()
+        first = f"(first {' over '.join(self.answer.unexplained[0])})" if self.answer.unexplained else ""
+        said = " ".join(filter(None, [self.answer.verdict, ", ".join(self.answer.named), first]))
         climbed = f"; ladder + {' + '.join(self.answer.steps)} -> {self.answer.end}" if self.answer.steps else ""
         rivals = f" (like {', '.join(self.rivals)})" if self.rivals else ""
         return (
             f"{', '.join(self.marks.faults) or 'right'}: --set {self.blind_set} --seed {self.seed} --logs 1: "
             f"{self.scenario}, {self.kind}, size {self.size:.2f}{rivals}; answer {said}{climbed}"
         )
+
+
+def _tuples(value: Any) -> Any:
+    """Return lists, which JSON makes of tuples, as tuples again."""
+    return tuple(map(_tuples, value)) if isinstance(value, list | tuple) else value
 
 
 def trial(blind_set: str, seed: int) -> Trial:

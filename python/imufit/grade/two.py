@@ -45,8 +45,7 @@ def _pair(setting: Setting, first: str, second: str, rng: np.random.Generator) -
     pair = {name: parameters_of(study, name, log_uniform(rng, 0.3, 3.0), rng) for name in (first, second)}
     separation = Separation(study, setting.columns)
     for name, other in ((first, second), (second, first)):
-        alone = separation.distances(name, pair[name])
-        beside = separation.distances(name, pair[name], beside=[other])
-        if min(*alone.values(), *beside.values()) < TOLD:
-            raise ImpossibleError(f"{name} cannot be told from others beside {other}")
+        for beside in ([], [other]):
+            if min(separation.distances(name, pair[name], beside).values()) < TOLD:
+                raise ImpossibleError(f"{name} cannot be told from others beside {other}")
     return pair

@@ -89,9 +89,13 @@ class Sensor:
 
 @dataclass
 class Rows:
-    """The rows of a log: times (n,), s; the first and the last few motions worked out for them are kept."""
+    """The rows of a log: times (n,), s; the first and the last few motions worked out for them are kept.
+
+    ``lag_step`` (s) is that of the grid on which a lag is solved.
+    """
 
     t: Array
+    lag_step: float = LAG_STEP
     _known: dict[tuple[int, float], tuple[Trajectory, Kinematics]] = field(default_factory=dict, repr=False)
     _fine: dict[float, Rows] = field(default_factory=dict, repr=False)
 
@@ -105,9 +109,10 @@ class Rows:
         return self._known[key][1]
 
     def fine(self, before: float) -> Rows:
-        """Return a grid with `LAG_STEP` from `before` (s) ahead of the first row to the last one."""
+        """Return a grid with `lag_step` from `before` (s) ahead of the first row to the last one."""
         if before not in self._fine:
-            self._fine[before] = Rows(np.arange(self.t[0] - before, self.t[-1] + 2 * LAG_STEP, LAG_STEP))
+            grid = np.arange(self.t[0] - before, self.t[-1] + 2 * self.lag_step, self.lag_step)
+            self._fine[before] = Rows(grid)
         return self._fine[before]
 
 
@@ -180,8 +185,8 @@ class Setup:
         lag, delay = self.sensors[name].lag, self.sensors[name].delay
         grid = rows.fine(float(np.ceil(min(12.0 * lag, LAG_HISTORY) + delay)))
         x = self.input(name, self.felt(grid.kinematics(self.trajectory, 0.0)), grid.t)
-        keep = float(np.exp(-LAG_STEP / lag))
-        slope = 1.0 - lag / LAG_STEP * (1.0 - keep)
+        keep = float(np.exp(-rows.lag_step / lag))
+        slope = 1.0 - lag / rows.lag_step * (1.0 - keep)
         y, _ = lfilter([slope, 1.0 - keep - slope], [1.0, -keep], x, axis=0, zi=(1.0 - slope) * x[:1])
         return np.asarray(CubicSpline(grid.t, y)(rows.t - delay), dtype=np.float64)
 

@@ -91,6 +91,7 @@ class Separation:
     def __init__(self, study: Study, columns: Sequence[str]) -> None:
         self.scale, _ = study.coarse()
         self.columns = [name for name in columns if name in self.scale.environment.covariates]
+        self._known: dict[tuple[object, ...], Array] = {}
         self._length = study.run.stop - study.run.start
         self._filters = {
             name: self._filter(study, name, study.scale.sampled[name])
@@ -120,8 +121,12 @@ class Separation:
     def columns_of(self, effect: str, inner: Parameters | None = None) -> Array:
         """Return the change (m, k) for each parameter of an effect, at a tenth of its typical size."""
         entry = injection(effect)
-        units = _units(entry, self._inner(entry)[0] if inner is None else inner)
-        return np.stack([self.signal(effect, p) for p in units], axis=1)
+        chosen = self._inner(entry)[0] if inner is None else inner
+        key = (effect, *map(float, chosen.values()))
+        if key not in self._known:
+            units = [self.signal(effect, p) for p in _units(entry, chosen)]
+            self._known[key] = np.stack(units, axis=1)
+        return self._known[key]
 
     @cached_property
     def _catalogue(self) -> list[str]:

@@ -25,6 +25,9 @@ from imufit.simulate.size import SIZES, Scale
 
 AXES = ("x", "y", "z")
 
+COARSE_LAG_STEP = 4e-3
+"""Step (s) on which a lag is solved where effects are only held against each other."""
+
 
 class Study:
     """What effects are tried out on, or injected into; arguments as in `simulate`, effects by name.
@@ -84,7 +87,7 @@ class Study:
             self.trajectory,
             self.environment,
             self.run,
-            Rows(self.rows.t[::step]),
+            Rows(self.rows.t[::step], COARSE_LAG_STEP),
             sampled=sampled,
             white=whole.white,
         )

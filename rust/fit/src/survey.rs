@@ -49,6 +49,7 @@ pub struct Survey {
     attitude_width: Bandwidth,
     position_width: Bandwidth,
     has_position: bool,
+    origin: Option<Vector3<f64>>,
     width_rows: SampledRows,
     samples: Vec<Vec<f64>>,
     travel: Option<Travel>,
@@ -91,6 +92,7 @@ impl Survey {
             attitude_width: Bandwidth::of_attitude(),
             position_width: Bandwidth::of_position(),
             has_position: false,
+            origin: None,
             width_rows: SampledRows::new(),
             samples: vec![Vec::new(); axes],
             travel: given.rig.clone().map(Travel::new),
@@ -198,6 +200,14 @@ impl Survey {
         }
         self.attitude_width.add(window, rows.iter().copied());
         if let Some(p) = window.position {
+            let known = |i: &usize| p[3 * i..3 * i + 3].iter().all(|v| v.is_finite());
+            let first = || {
+                rows.iter()
+                    .copied()
+                    .find(known)
+                    .map(|i| Vector3::new(p[3 * i], p[3 * i + 1], p[3 * i + 2]))
+            };
+            self.origin = self.origin.or_else(first);
             self.has_position |= rows.iter().any(|i| p[3 * i].is_finite());
             self.position_width.add(window, rows.into_iter());
         }
@@ -247,6 +257,7 @@ impl Survey {
             attitude_smoothing,
             position_smoothing,
             silent_axes: self.silent_axes(attitude_smoothing, field),
+            position_origin: self.origin.unwrap_or_default(),
             attitude_columns: self.attitude_width.for_columns(attitude_smoothing),
             position_columns: position_smoothing.map(|s| self.position_width.for_columns(s)),
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),

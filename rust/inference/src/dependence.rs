@@ -7,10 +7,12 @@ use rayon::prelude::*;
 
 use crate::held_out::{self, HeldOut};
 use crate::problem::{Problem, Question};
-use crate::screening;
+use crate::{screening, selection};
 
 /// Contrasts over the bins: polynomials of the bin's rank up to this degree.
 pub const CONTRASTS: usize = 5;
+
+const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The covariate that every log has for itself.
 const TIME: &str = "t";
@@ -28,8 +30,8 @@ pub struct Dependence {
     pub p_value: f64,
     /// Held-out gain in units of the noise variance.
     pub gain: f64,
-    /// Fitted contrasts, degree 0 (the constant) left out of the shape.
-    pub shape: Vec<f64>,
+    /// A word for how.
+    pub shape: String,
 }
 
 /// Orthonormal polynomials over bin ranks, constant included; at most as many as bins.
@@ -226,7 +228,7 @@ fn found(q: &Question, base: &HeldOut, asked: &Asked) -> Option<Dependence> {
         return None;
     }
     let p_value = screening::p_value(q);
-    let shape = q.solve(&q.total()).map_or_else(Vec::new, |b| {
+    let shape: Vec<f64> = q.solve(&q.total()).map_or_else(Vec::new, |b| {
         let first = q.model + 1;
         b.rows(first, b.len() - first).iter().copied().collect()
     });
@@ -236,12 +238,54 @@ fn found(q: &Question, base: &HeldOut, asked: &Asked) -> Option<Dependence> {
         log: asked.log,
         p_value,
         gain,
-        shape,
+        shape: shape_name(&shape).to_string(),
     })
 }
 
+/// Dependences that only columns of their own show (`probes`), on top of the slots `stack`.
+pub fn test_probes(problem: &Problem, stack: &[usize], probes: &[usize]) -> (Vec<Dependence>, usize) {
+    let slots = problem.slots.as_slice();
+    let (weighed, tried) = selection::weigh_all(problem, slots, stack, probes);
+    let fitted = selection::indices(slots, stack);
+    let found = weighed
+        .into_par_iter()
+        .filter(|w| selection::promising(w.so_far()))
+        .filter_map(|w| {
+            let judged = selection::judge(problem, slots, &fitted, w);
+            let slot = &slots[judged.slot];
+            let sensor = slot.effect.sensors().first()?;
+            let certain = |(value, error): &(f64, f64)| (value / error.max(f64::MIN_POSITIVE)).abs();
+            let parameters = judged.parameters.iter().map(certain).enumerate();
+            let (largest, _) = parameters.max_by(|a, b| a.1.total_cmp(&b.1))?;
+            // Parameters of vectors belong to an axis each, those of a gradient to all.
+            let axis = if slot.parameters.len().is_multiple_of(3) {
+                largest % 3
+            } else {
+                0
+            };
+            let card = slot.effect.card();
+            // What the axis itself causes is called as its own bins are.
+            let own = matches!(card.name.as_str(), "f" | "omega");
+            let covariate = if own {
+                format!("{}_{}", card.name, AXES[axis])
+            } else {
+                card.name.clone()
+            };
+            Some(Dependence {
+                channel: 3 * sensor.index() + axis,
+                covariate,
+                log: None,
+                p_value: judged.p_value,
+                gain: judged.gain,
+                shape: card.signature.clone(),
+            })
+        })
+        .collect();
+    (found, tried as usize)
+}
+
 /// A word for a shape from its contrasts (degree 1 first).
-pub fn shape_name(shape: &[f64]) -> &'static str {
+fn shape_name(shape: &[f64]) -> &'static str {
     let total: f64 = shape.iter().map(|c| c * c).sum();
     let share = |k: usize| shape.get(k).map_or(0.0, |c| c * c) / total.max(f64::MIN_POSITIVE);
     if share(0) > 0.9 {

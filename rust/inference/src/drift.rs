@@ -128,6 +128,16 @@ pub fn channel_sums(
     out
 }
 
+/// Block means explained by columns.
+pub struct Profiled {
+    /// Minus twice the log likelihood, less a constant.
+    pub deviance: f64,
+    /// Sum of squares that is left if the zero does not wander, in units of the noise.
+    pub white: f64,
+    /// Block means that the columns leave.
+    pub residual: DVector<f64>,
+}
+
 impl ChannelSums {
     /// The same for the parameters `kept`, then for directions in the parameters `others`.
     #[must_use]
@@ -158,8 +168,9 @@ impl ChannelSums {
         self.sums.select_columns(chosen)
     }
 
-    /// Restricted log likelihoods of every strength, whatever the question's parameters.
-    fn likelihoods(&self) -> Vec<f64> {
+    /// Block means of the residual in units of the noise of one sample, and an orthonormal basis of those of the columns, `extra` (blocks)
+    /// among them.
+    fn means(&self, extra: Option<&DVector<f64>>) -> (DVector<f64>, DMatrix<f64>) {
         let blocks = self.count.len();
         let mean = |sum: f64, b: usize| if self.count[b] > 0.0 { sum / self.count[b] } else { 0.0 };
         let residual = DVector::from_fn(blocks, |b, _| mean(self.right[b], b) * self.weight.sqrt());
@@ -167,11 +178,16 @@ impl ChannelSums {
             .filter(|k| self.sums.column(*k).iter().any(|v| *v != 0.0))
             .collect();
         let mut columns = DMatrix::from_fn(blocks, used.len(), |b, k| mean(self.sums[(b, used[k])], b));
+        if let Some(extra) = extra {
+            let at = columns.ncols();
+            columns = columns.insert_column(at, 0.0);
+            columns.set_column(at, extra);
+        }
         for mut column in columns.column_iter_mut() {
             let norm = column.norm();
             column /= norm.max(f64::MIN_POSITIVE);
         }
-        let basis = if used.is_empty() {
+        let basis = if columns.ncols() == 0 {
             columns
         } else {
             let svd = columns.svd(true, false);
@@ -181,21 +197,45 @@ impl ChannelSums {
             svd.u
                 .map_or_else(|| DMatrix::zeros(blocks, 0), |u| u.select_columns(&kept))
         };
-        self.strengths
-            .iter()
-            .map(|s| {
-                let plain = s.log_determinant + residual.dot(&s.covariance.solve(&residual));
-                if basis.ncols() == 0 {
-                    return -0.5 * plain;
-                }
-                let x = s.covariance.solve(&basis);
-                let Some(inner) = Cholesky::new(basis.tr_mul(&x)) else {
-                    return f64::NEG_INFINITY;
-                };
-                let right = x.tr_mul(&residual);
-                -0.5 * (plain + log_determinant(&inner) - right.dot(&inner.solve(&right)))
+        (residual, basis)
+    }
+
+    /// Sum of squares of the residual that the basis leaves, for one strength, and the determinant of the basis' information.
+    fn left(strength: &Strength, residual: &DVector<f64>, basis: &DMatrix<f64>) -> Option<(f64, f64)> {
+        let plain = residual.dot(&strength.covariance.solve(residual));
+        if basis.ncols() == 0 {
+            return Some((plain, 0.0));
+        }
+        let x = strength.covariance.solve(basis);
+        let inner = Cholesky::new(basis.tr_mul(&x))?;
+        let right = x.tr_mul(residual);
+        Some((plain - right.dot(&inner.solve(&right)), log_determinant(&inner)))
+    }
+
+    /// Restricted log likelihoods of every strength, whatever the question's parameters.
+    fn likelihoods(&self) -> Vec<f64> {
+        let (residual, basis) = self.means(None);
+        let of = |s: &Strength| {
+            Self::left(s, &residual, &basis).map_or(f64::NEG_INFINITY, |(square, information)| {
+                -0.5 * (s.log_determinant + square + information)
             })
-            .collect()
+        };
+        self.strengths.iter().map(of).collect()
+    }
+
+    /// How well the columns, and `extra` (blocks) among them, explain the block means, at the strength of the walk that suits
+    /// them best; `None` where there are too few blocks for a walk.
+    pub fn profile(&self, extra: Option<&DVector<f64>>) -> Option<Profiled> {
+        let (residual, basis) = self.means(extra);
+        let of = |s: &Strength| Some(s.log_determinant + Self::left(s, &residual, &basis)?.0);
+        let deviance = self.strengths.iter().filter_map(of).min_by(f64::total_cmp)?;
+        let (white, _) = Self::left(self.strengths.first()?, &residual, &basis)?;
+        let left = &residual - &basis * basis.tr_mul(&residual);
+        Some(Profiled {
+            deviance,
+            white,
+            residual: left,
+        })
     }
 
     /// Covariance that a walk of one strength, from zero at the start, gives to the sums over the parameters' columns.

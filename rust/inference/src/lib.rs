@@ -15,5 +15,6 @@ pub mod residual;
 pub mod saturated;
 pub mod screening;
 pub mod selection;
+pub mod steps;
 pub mod together;
 pub mod verdict;

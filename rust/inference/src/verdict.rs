@@ -11,7 +11,7 @@ use crate::held_out;
 use crate::problem::Problem;
 use crate::screening::{self, Screened};
 use crate::selection::{ALPHA, best_of, indices, passes, screen_all, significant};
-use crate::together;
+use crate::{steps, together};
 
 /// A named effect must explain this share of what depends on anything in its sensors, or the answer is "unknown".
 const NAMED_SHARE: f64 = 0.8;
@@ -118,11 +118,12 @@ fn disagreements(
     (found, spoilt)
 }
 
-/// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from.
-pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize]) -> Verdict {
+/// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from. What
+/// nothing of these explains is asked of the slots `probes`, which are never named.
+pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize], probes: &[usize]) -> Verdict {
     let slots = problem.slots.as_slice();
     let (mut screened, mut adjusted) = screen_all(problem, slots, model, candidates);
-    let single = settle(problem, model, candidates, &screened, &adjusted, &[]);
+    let single = settle(problem, model, candidates, probes, &screened, &adjusted, &[]);
     let best_gain = single.best.map_or(0.0, |b| gain_of(&screened, b));
     let hidden = |(s, a): (&Screened, &f64)| significant(s, *a) && s.plausible && !s.stable && s.gain > best_gain;
     let doubtful = single.kind == Kind::Unknown || screened.iter().zip(&adjusted).any(hidden);
@@ -130,7 +131,7 @@ pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize]) -> Verdi
     if doubtful {
         let members = together::find(problem, slots, model, candidates);
         if !members.is_empty() {
-            let several = settle(problem, model, candidates, &screened, &adjusted, &members);
+            let several = settle(problem, model, candidates, probes, &screened, &adjusted, &members);
             if several.kind != Kind::Unknown {
                 settled = several;
                 put_first(&mut screened, &mut adjusted, members);
@@ -197,6 +198,7 @@ fn settle(
     problem: &Problem,
     model: &[usize],
     candidates: &[usize],
+    probes: &[usize],
     screened: &[Screened],
     adjusted: &[f64],
     chosen: &[Screened],
@@ -233,6 +235,13 @@ fn settle(
     let base = screening::base(problem, &fitted);
     let (mut unexplained, tried) = dependence::test(problem, &fitted, &base, &channels);
     unexplained.retain(|d| d.p_value * tried as f64 <= ALPHA);
+    let (mut probed, tried) = dependence::test_probes(problem, &stack, probes);
+    probed.retain(|d| d.p_value * tried as f64 <= ALPHA);
+    unexplained.extend(probed);
+    let (mut stepping, tried) = steps::test(problem, &fitted);
+    stepping.retain(|d| d.p_value * tried as f64 <= ALPHA);
+    unexplained.extend(stepping);
+    unexplained.sort_by(|a, b| b.gain.total_cmp(&a.gain));
 
     let beside: Vec<usize> = model.iter().chain(&others).copied().collect();
     let (rivals, correlations) = best.map_or_else(Default::default, |best| {

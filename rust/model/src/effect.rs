@@ -1,6 +1,6 @@
 //! The trait behind every effect, built in or written by a user, and the contract that fitting relies on.
 
-use nalgebra::UnitQuaternion;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::card::Card;
 use crate::facts::LogFacts;
@@ -25,6 +25,8 @@ pub struct Rows<'a> {
     pub vibration: Option<&'a [f64]>,
     /// Covariates in the order of `facts.covariates` (n each); NaN where not known.
     pub covariates: &'a [Vec<f64>],
+    /// Reference position, m (n), NaN where not known; empty without one.
+    pub position: &'a [Vector3<f64>],
 }
 
 impl Rows<'_> {

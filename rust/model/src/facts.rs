@@ -45,6 +45,8 @@ pub struct LogFacts {
     pub attitude_smoothing: Smoothing,
     /// How the reference position is differentiated; `None` without position.
     pub position_smoothing: Option<Smoothing>,
+    /// First reference position, m, from which others are counted; zero without one.
+    pub position_origin: Vector3<f64>,
     /// How the attitude is differentiated where a derivative above the first only enters columns.
     pub attitude_columns: Smoothing,
     /// The same for derivatives of the position above the second.
@@ -106,6 +108,7 @@ impl LogFacts {
             has_temperature,
             attitude_smoothing: NARROWEST,
             position_smoothing: None,
+            position_origin: Vector3::zeros(),
             attitude_columns: NARROWEST,
             position_columns: None,
             silent_axes: [[false; 3]; 3],

@@ -205,6 +205,7 @@ impl SensorModel {
                 temperature: Some(&ones),
                 vibration: Some(&ones),
                 covariates: &covariates,
+                position: &[],
             };
             for slot in self.slots.iter().filter(|s| s.effect.sensors().contains(&sensor)) {
                 columns.reset(4, slot.parameters.len());
@@ -244,6 +245,10 @@ impl SensorModel {
             .iter()
             .map(|c| core.clone().map(|i| held(c, i)).collect())
             .collect();
+        let position: Vec<Vector3<f64>> = window.position.map_or_else(Vec::new, |p| {
+            let at = |i: usize| Vector3::new(p[3 * i], p[3 * i + 1], p[3 * i + 2]);
+            core.clone().map(at).collect()
+        });
         let vibration = window.reading(Sensor::Acc).map(|_| vibration::power(window, facts.dt));
         // Readings are modelled from the quantities as they are; columns of silent axes would be noise.
         let [acc, gyr, mag] = facts.silent_axes;
@@ -278,6 +283,7 @@ impl SensorModel {
                 temperature: temperature.as_deref(),
                 vibration: vibration.as_deref(),
                 covariates: &covariates,
+                position: &position,
             };
             let reading_of = match sensor {
                 Sensor::Acc => &ideal.f,

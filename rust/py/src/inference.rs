@@ -1,6 +1,5 @@
 //! Questions asked of the evidence.
 
-use imufit_inference::dependence::shape_name;
 use imufit_inference::part::Part;
 use imufit_inference::problem::Problem;
 use imufit_inference::screening::parameters_of;
@@ -128,14 +127,17 @@ impl PyProblem {
         Ok(out)
     }
 
-    /// Which effect is missing from the model of slots `model`, among the slots `candidates`.
+    /// Which effect is missing from the model of slots `model`, among the slots `candidates`; what none of them explains is
+    /// asked of the slots `probes`.
+    #[pyo3(signature = (model, candidates, probes=Vec::new()))]
     fn diagnose<'py>(
         &self,
         py: Python<'py>,
         model: Vec<usize>,
         candidates: Vec<usize>,
+        probes: Vec<usize>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let v = py.detach(|| verdict::decide(&self.0, &model, &candidates));
+        let v = py.detach(|| verdict::decide(&self.0, &model, &candidates, &probes));
         let out = PyDict::new(py);
         out.set_item("verdict", v.kind.word())?;
         out.set_item("best", v.best)?;
@@ -169,7 +171,7 @@ impl PyProblem {
             item.set_item("log", d.log)?;
             item.set_item("gain", d.gain)?;
             item.set_item("p_value", d.p_value)?;
-            item.set_item("shape", shape_name(&d.shape))?;
+            item.set_item("shape", &d.shape)?;
             unexplained.append(item)?;
         }
         out.set_item("unexplained", unexplained)?;

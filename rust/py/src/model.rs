@@ -299,6 +299,15 @@ fn built_in_effects() -> Vec<PyEffect> {
     catalogue::built_in().into_iter().map(PyEffect).collect()
 }
 
+/// Dependences without a name that a log with these facts can be asked about.
+#[pyfunction]
+fn probes(facts: &PyFacts) -> Vec<PyEffect> {
+    imufit_model::probes::probes(&facts.facts)
+        .into_iter()
+        .map(PyEffect)
+        .collect()
+}
+
 /// The built-in effect with this id, `SENSOR.column:NAME` among them; None if there is none.
 #[pyfunction]
 fn find_effect(id: &str) -> Option<PyEffect> {
@@ -363,6 +372,7 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<PyEffect>()?;
     m.add_class::<PyFacts>()?;
     m.add_function(wrap_pyfunction!(built_in_effects, m)?)?;
+    m.add_function(wrap_pyfunction!(probes, m)?)?;
     m.add_function(wrap_pyfunction!(find_effect, m)?)?;
     m.add_function(wrap_pyfunction!(python_effect, m)?)?;
     Ok(())

@@ -106,6 +106,7 @@ pub fn dependence(
             temperature: Some(&trial.temperature),
             vibration: Some(&trial.temperature),
             covariates: &covariates,
+            position: &[],
         };
         effect.columns(&rows, sensor, parameters, &mut columns)?;
         let all = (0..parameters.len()).flat_map(|p| (0..3).map(move |axis| (p, axis)));

@@ -93,6 +93,7 @@ impl Block<'_> {
                     temperature: self.temperature,
                     vibration: self.vibration,
                     covariates: &self.covariates,
+                    position: &[],
                 };
                 if let Some(added) = part.effect.added(&rows, sensor, &part.parameters) {
                     after.add(&added, 1.0);
