@@ -11,7 +11,7 @@ use crate::drift::ChannelSums;
 use crate::problem::Problem;
 
 /// Noise that is coloured more slowly than any filter sees jumps now and then: the chance of a false alarm is kept to this part of the usual.
-pub const CAUTION: f64 = 0.1;
+pub const CAUTION: f64 = 0.01;
 /// Boundaries between blocks that are looked at: those with the largest differences.
 const LOOKED_AT: usize = 4;
 
