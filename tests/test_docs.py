@@ -59,7 +59,7 @@ def test_index_links_every_page():
 @pytest.mark.parametrize(
     ("file", "constant", "words"),
     [
-        ("rust/inference/src/verdict.rs", "ALPHA", "(Bonferroni) is at most {}, and"),
+        ("rust/inference/src/selection.rs", "ALPHA", "(Bonferroni) is at most {}, and"),
         ("rust/inference/src/verdict.rs", "NAMED_SHARE", "takes at least {:.0%} of its gain and"),
         ("rust/inference/src/verdict.rs", "LOOK_AHEAD", "up to {}, re-ranked"),
         ("rust/inference/src/held_out.rs", "FOLDS", "{} folds, each of"),

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from imufit import diagnose as diagnose
     from imufit import errors as errors
     from imufit import export as export
+    from imufit import faults as faults
     from imufit import figures as figures
     from imufit import fit as fit
     from imufit import grade as grade
@@ -42,6 +43,7 @@ else:
         "diagnose",
         "errors",
         "export",
+        "faults",
         "figures",
         "fit",
         "grade",

@@ -229,6 +229,30 @@ def injections() -> list[str]:
     return list(INJECTIONS)
 
 
+def faults() -> list[str]:
+    """Return the faults of the data that can be simulated."""
+    from imufit.simulate.faults import FAULTS  # noqa: PLC0415
+
+    return list(FAULTS)
+
+
+def with_fault(simulation: Simulation, fault: str) -> Simulation:
+    """Put a fault of the data into a simulated log.
+
+    Raises
+    ------
+    InputError
+        The log has not the sensor that the fault needs.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.simulate.faults import with_fault  # noqa: PLC0415
+
+    try:
+        return with_fault(simulation, fault)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+
+
 def simulate(scenario: str, effects: Mapping[str, Mapping[str, float] | None], **settings: Any) -> Simulation:
     """Simulate a log with these effects; None instead of parameters draws them.
 

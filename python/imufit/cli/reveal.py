@@ -100,6 +100,8 @@ def reveal(log: Path, *, answer: Path | None, json_file: Path | None) -> None:
         out.say(f"Put into this log: {', '.join(truth.effects)}.", bold=True)
     else:
         out.say("Nothing was put into this log: only noise.", bold=True)
+    if getattr(truth, "faults", ()):
+        out.say(f"Faults of the data: {', '.join(truth.faults)}.")
     out.table(Table("", ("effect", "parameters", ">size"), truth_rows(truth)))
     if read is not None:
         mark = engine.grade_answer(truth, read)

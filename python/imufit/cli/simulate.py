@@ -61,6 +61,12 @@ def parse_effect(text: str) -> tuple[str, dict[str, float] | None]:
     help="Effect to put in, SI units; without values they are drawn. Repeatable.",
 )
 @click.option("--hidden", type=click.IntRange(min=0), metavar="SEED", help="Let this seed pick the effect, untold.")
+@click.option(
+    "--fault",
+    type=Known("fault", engine.faults),
+    metavar="ID",
+    help="Fault of the data to put in besides, such as stuck or knock.",
+)
 @click.option("--size", type=Known("size", lambda: SIZES), metavar="|".join(SIZES), help="Size of drawn effects.")
 @click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="Length, s.")
 @click.option("--rate", type=click.FloatRange(min=0.0, min_open=True), metavar="HZ", help="Samples per second.")
@@ -75,6 +81,7 @@ def simulate(
     *,
     effects: tuple[str, ...],
     hidden: int | None,
+    fault: str | None,
     size: str | None,
     duration: float | None,
     rate: float | None,
@@ -101,6 +108,8 @@ def simulate(
         simulation = engine.hidden(scenario, hidden, **settings)
     else:
         simulation = engine.simulate(scenario, chosen, **settings, **({} if seed is None else {"seed": seed}))
+    if fault is not None:
+        simulation = engine.with_fault(simulation, fault)
     sealed = engine.save_simulation(simulation, output)
     rows, span = len(simulation.t), float(simulation.t[-1] - simulation.t[0])
     out.say(f"{scenario}: {rows} rows over {span:.1f} s, frame {frame}.", bold=True)
@@ -108,5 +117,7 @@ def simulate(
         out.say(f"What is wrong with the sensor is hidden; `imufit reveal {output}` tells.")
     else:
         out.say(f"Effects: {', '.join(chosen) or 'none'}.")
+    if fault is not None:
+        out.say(f"Fault of the data: {fault}.")
     out.wrote(output)
     out.json({"log": str(output), "sealed": str(sealed), "n": rows, "duration_s": span, "scenario": scenario})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from imufit.fit.analysis import Analysis
@@ -65,7 +65,28 @@ def answers_without(
     diagnose : callable
         Asks the question of a fit.
     """
-    spoiling = sorted({item["log"] for item in found if item["wild"]})
+    return _without(fit, {item["log"] for item in found if item["wild"]}, diagnose)
+
+
+def answers_without_faulty(
+    fit: Fit, files: Collection[str], diagnose: Callable[[Fit], Diagnosis]
+) -> tuple[Without, ...]:
+    """Ask again without the logs whose data are at fault; nothing where all are, or where there is only one.
+
+    Parameters
+    ----------
+    fit : Fit
+        To all logs.
+    files : collection of str
+        What the logs at fault are called.
+    diagnose : callable
+        Asks the question of a fit.
+    """
+    faulty = {k for k, log in enumerate(fit.logs) if name_of(log, k) in files}
+    return _without(fit, faulty, diagnose) if 0 < len(faulty) < len(fit.logs) else ()
+
+
+def _without(fit: Fit, spoiling: Collection[int], diagnose: Callable[[Fit], Diagnosis]) -> tuple[Without, ...]:
     everything = range(len(fit.logs))
     rest = [log for log in everything if log not in spoiling]
     names = [name_of(log, k) for k, log in enumerate(fit.logs)]

@@ -127,6 +127,7 @@ def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
         spectra=_spectra(evidence, analysis.own_step(log, step)),
         segments=tuple(segments[:WORST_SEGMENTS]),
         notes=notes(evidence),
+        data_faults=evidence.faults,
     )
 
 

@@ -12,12 +12,12 @@ from scipy.special import stdtrit
 
 from imufit import _imufit
 from imufit.diagnose import sentences
-from imufit.diagnose.agreement import answers_without, disagreements
+from imufit.diagnose.agreement import answers_without, answers_without_faulty, disagreements
 from imufit.diagnose.compare import notes
 from imufit.fit.analysis import OWN, Analysis, Estimate, pooled
 from imufit.log.several import name_of
 from imufit.model.catalogue import card_of
-from imufit.results import Candidate, Diagnosis, LogParameters, Parameter, Rival, Unexplained
+from imufit.results import Candidate, DataFault, Diagnosis, LogParameters, Parameter, Rival, Unexplained
 
 if TYPE_CHECKING:
     from imufit.fit import Fit
@@ -29,6 +29,8 @@ MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
 CLEARLY_WORSE = 0.1
 """Share of the drop in held-out error by which a fit must stay behind the best one to be out."""
+BESIDE = 10.0
+"""An effect is named beside a fault of the data only if it explains this many times more."""
 POWER = 0.84
 """Standard errors beyond the threshold at which an effect is seen with 80 % power."""
 
@@ -44,6 +46,8 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         Candidates that are not to be considered.
     """
     analysis = fit.analysis
+    if any(fault.spoils for fault in analysis.faults):
+        return _spoilt(fit, analysis.faults)
     ids = analysis.slots
     slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
     result = _decided_by_fits(fit, analysis.problem.diagnose(analysis.fitted_slots, slots, analysis.probe_slots))
@@ -64,6 +68,12 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         )
         for item in result["screened"]
     ]
+    largest = max((c.gain for c in candidates if c.status == "passed"), default=0.0)
+    # A fault is one log's, an effect explains something in all of them.
+    largest /= len(analysis.logs)
+    faults = tuple(replace(fault, spoils=fault.gain * BESIDE > largest) for fault in analysis.faults)
+    if any(fault.spoils for fault in faults):
+        return _spoilt(fit, faults)
     by_id = {candidate.effect: candidate for candidate in candidates}
     cards = {key: card_of(analysis.candidates[key]) for key in by_id}
     best = None if result["best"] is None else ids[result["best"]]
@@ -93,6 +103,26 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         logs=fit.by_log,
         disagrees=disagrees,
         without=without,
+        data_faults=faults,
+    )
+
+
+def _spoilt(fit: Fit, faults: tuple[DataFault, ...]) -> Diagnosis:
+    """Name the faults of the data that explain what is missing, and no effect."""
+    spoiling = [fault for fault in faults if fault.spoils]
+    return Diagnosis(
+        verdict="unknown",
+        best=None,
+        ambiguous_with=(),
+        candidates=(),
+        unexplained=(),
+        model=fit.analysis.model.effects,
+        experiment=None,
+        sentence=sentences.spoilt(spoiling),
+        notes=_notes(fit.analysis),
+        logs=fit.by_log,
+        without=answers_without_faulty(fit, {fault.file for fault in spoiling if fault.file is not None}, diagnose),
+        data_faults=faults,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from imufit.figures import quantity
-from imufit.results import Candidate, Disagreement, EffectCard, Parameter, Unexplained
+from imufit.results import Candidate, DataFault, Disagreement, EffectCard, Parameter, Unexplained
 
 
 def _capital(text: str) -> str:
@@ -76,6 +76,14 @@ def verdict(
         )
     text = f"{best.effect} is missing. {best.explanation}"
     return f"{text} Apart from it, {left}." if left else text
+
+
+def spoilt(faults: Sequence[DataFault]) -> str:
+    """Say which faults of the data have to be put right before any effect can be judged."""
+    said = " ".join(fault.sentence for fault in faults)
+    kinds = ", ".join(dict.fromkeys(fault.fault for fault in faults))
+    logs = ", ".join(dict.fromkeys(fault.file for fault in faults if fault.file is not None))
+    return f"The data{f' of {logs}' if logs else ''} are at fault, not the sensor ({kinds}). {said}"
 
 
 def with_disagreements(text: str, found: Sequence[Disagreement], *, spoilt: bool) -> str:

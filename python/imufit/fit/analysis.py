@@ -15,9 +15,11 @@ from imufit.fit.profile import Found, search
 from imufit.fit.surveyed_log import SurveyedLog, survey
 from imufit.fit.users_effects import check_users_effects
 from imufit.log import LogSource
+from imufit.log.several import name_of
 from imufit.model.catalogue import COLUMN, find_effect
 from imufit.model.sensor_model import SensorModel
 from imufit.progress import Progress
+from imufit.results import DataFault
 
 Array = NDArray[np.float64]
 
@@ -205,6 +207,16 @@ class Analysis:
     def probe_slots(self) -> list[int]:
         """Slots of the probes."""
         return list(range(len(self.slots) - len(self.probes), len(self.slots)))
+
+    @property
+    def faults(self) -> tuple[DataFault, ...]:
+        """What is wrong with the data of the logs; of several each fault tells which of them it is in."""
+        if len(self.logs) == 1:
+            return self.logs[0].faults
+        names = [name_of(each.surveyed.log, k) for k, each in enumerate(self.logs)]
+        return tuple(
+            replace(fault, file=name) for name, each in zip(names, self.logs, strict=True) for fault in each.faults
+        )
 
     def refusal(self, effect: _imufit.Effect) -> str | None:
         """Return why no log can tell of an effect; None if one can."""

@@ -9,11 +9,13 @@ import numpy as np
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.faults import time_faults
 from imufit.fit.passes import CHANNELS, Passes
 from imufit.fit.profile import Found
 from imufit.fit.surveyed_log import SurveyedLog
 from imufit.log import LogSource
 from imufit.model.catalogue import find_effect
+from imufit.results import DataFault
 
 BLOCKS = 48
 Values = Mapping[str, list[float]]
@@ -37,6 +39,8 @@ class LogEvidence:
         Noise floor of each channel.
     filters : list of list of float
         Whitening filter of each channel.
+    faults : tuple of DataFault
+        What is wrong with the data of the log.
     """
 
     surveyed: SurveyedLog
@@ -47,6 +51,7 @@ class LogEvidence:
     variance: list[float]
     floors: list[float]
     filters: list[list[float]]
+    faults: tuple[DataFault, ...] = ()
 
     @property
     def passes(self) -> Passes:
@@ -77,14 +82,17 @@ class LogEvidence:
         passes.evidence(raw, facts, "taking evidence")
         step, raw_variance = _imufit.saturate(raw)
         _check_samples(surveyed.log, fitted, raw_variance)
+        slots = (*fitted, *candidates)
+        faults = surveyed.faults
+        if not any(fault.spoils for fault in faults):
+            faults = (*faults, *time_faults(raw, raw_variance, _places(surveyed, slots), facts))
         filters = passes.autocovariance(raw, facts, step).filters()
         floors = _floors(surveyed.log, raw_variance)
         white, variance = raw, raw_variance
         if any(filters):
             white = passes.evidence(raw.with_filters(filters), facts, "whitening the evidence")
             _, variance = _imufit.saturate(white)
-        slots = (*fitted, *candidates)
-        return cls(surveyed, slots, raw, white, raw_variance, variance, floors, filters)
+        return cls(surveyed, slots, raw, white, raw_variance, variance, floors, filters, faults)
 
     def around(
         self, fitted: Values, candidates: Sequence[str], found: Mapping[str, Found], *, lean: bool = False
@@ -125,6 +133,16 @@ def _empty(
     columns = surveyed.columns
     asked = [(columns[key], _trial(columns[key], found.get(key))) for key in candidates]
     return _imufit.Evidence(surveyed.facts, stack, asked, BLOCKS, filters)
+
+
+def _places(surveyed: SurveyedLog, slots: Sequence[str]) -> dict[str, range]:
+    """Parameters of every effect in the evidence, by its id."""
+    places, first = {}, 0
+    for key in slots:
+        effect = surveyed.effects.get(key) or find_effect(key)
+        places[key] = range(first, first + len(effect.parameters))
+        first += len(effect.parameters)
+    return places
 
 
 def _trial(effect: _imufit.Effect, found: Found | None) -> list[float]:

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.faults import row_faults
 from imufit.fit.range_end import RangeEnd
 from imufit.log import Chunk, LogSource
 from imufit.progress import Progress
@@ -68,12 +69,28 @@ class Passes:
         self.log = log
         self.covariates = covariate_names(log)
         self._progress = progress
+        self.row_faults, self._left_out = row_faults(log)
 
     def chunks(self, margin: int, label: str) -> Iterator[dict[str, Any]]:
         """Chunks of the log as the compiled core takes them, telling the progress."""
         for chunk in self.log.chunks(CHUNK_ROWS, margin):
-            yield chunk_arrays(chunk, self.covariates)
+            arrays = chunk_arrays(chunk, self.covariates)
+            self._leave_out(arrays)
+            yield arrays
             self._progress(chunk.start + chunk.end - chunk.begin, self.log.n, label)
+
+    def _leave_out(self, arrays: dict[str, Any]) -> None:
+        """Blank the samples that are certain to be wrong; the log itself stays as it is."""
+        offset, rows = arrays["offset"], len(arrays["t"])
+        copied: set[str] = set()
+        for sensor, first, stop in self._left_out:
+            low, high = max(first - offset, 0), min(stop - offset, rows)
+            for name in ("ref_q", "ref_p") if sensor == "ref" else (sensor,):
+                if low < high and arrays[name] is not None:
+                    if name not in copied:
+                        arrays[name] = arrays[name].copy()
+                        copied.add(name)
+                    arrays[name][low:high] = np.nan
 
     def survey(self) -> tuple[_imufit.Facts, dict[str, float]]:
         """First pass: facts of the log, and which share of the rows each covariate (``temp`` too) is known in.

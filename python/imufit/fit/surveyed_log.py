@@ -10,11 +10,13 @@ import numpy as np
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.fit.data_faults import data_faults
 from imufit.fit.passes import MIN_COVERAGE, Passes
 from imufit.log import LogSource
 from imufit.model.catalogue import column_effects, effects
 from imufit.model.sensor_model import SensorModel
 from imufit.progress import Progress
+from imufit.results import DataFault
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,8 @@ class SurveyedLog:
         Why it cannot tell of the others.
     probes : dict of str to Effect
         Dependences without a name that it can be asked about, see `rust/model/src/probes.rs`.
+    faults : tuple of DataFault
+        What is wrong with its data, as far as rows, units and frames show.
     """
 
     passes: Passes
@@ -43,14 +47,17 @@ class SurveyedLog:
     effects: dict[str, _imufit.Effect]
     refused: dict[str, str]
     probes: dict[str, _imufit.Effect]
+    faults: tuple[DataFault, ...] = ()
 
     @classmethod
-    def of(cls, passes: Passes, facts: _imufit.Facts, coverage: dict[str, float]) -> SurveyedLog:
+    def of(
+        cls, passes: Passes, facts: _imufit.Facts, coverage: dict[str, float], faults: tuple[DataFault, ...] = ()
+    ) -> SurveyedLog:
         """Ask a log of which effects it can tell.
 
         Parameters
         ----------
-        passes, facts, coverage
+        passes, facts, coverage, faults
             As the attributes.
         """
         own = [name for name in coverage if name != "temp"]
@@ -65,7 +72,7 @@ class SurveyedLog:
         testable = {key: effect for key, effect in offered.items() if reasons[key] is None}
         refused = {key: reason for key, reason in reasons.items() if reason is not None}
         probes = {effect.id: effect for effect in _imufit.probes(facts)}
-        return cls(passes, facts, coverage, testable, refused, probes)
+        return cls(passes, facts, coverage, testable, refused, probes, faults)
 
     @property
     def columns(self) -> dict[str, _imufit.Effect]:
@@ -110,6 +117,7 @@ def survey(
     facts = [found for found, _ in surveys]
     ranges = _ranges(passes)
     facts = [each.with_ranges(**ranges) for each in facts]
+    faults = [data_faults(each, found, ranges) for each, found in zip(passes, facts, strict=True)]
     if keep_constants and model.constants:
         constants = model.constants.get("temperature_mean"), model.constants.get("covariate_means")
         facts = [each.with_means(*constants) for each in facts]
@@ -119,7 +127,8 @@ def survey(
         facts = [each.with_bins_of(facts[:k] + facts[k + 1 :]) for k, each in enumerate(facts)]
     _check_sensors(logs, facts)
     return [
-        SurveyedLog.of(each, found, coverage) for each, found, (_, coverage) in zip(passes, facts, surveys, strict=True)
+        SurveyedLog.of(each, found, coverage, wrong)
+        for each, found, (_, coverage), wrong in zip(passes, facts, surveys, faults, strict=True)
     ]
 
 

@@ -76,6 +76,7 @@ def page(
         ladder=ladder,
         addition=addition,
         fitted=_fitted(ladder, addition),
+        faults=_faults(comparison, last),
         next_step=_next_step(last, ladder),
     )
 
@@ -127,6 +128,15 @@ def _typical(candidate: Candidate) -> Markup:
         quantity.quantity(item.typical, item.unit) for item in candidate.parameters if item.typical is not None
     )
     return Markup.escape(", ".join(sizes) or "-")
+
+
+def _faults(comparison: Comparison | None, diagnosis: Diagnosis | None) -> dict[str, Any] | None:
+    """Return table and sentences of the faults of the data."""
+    from imufit.results.data_fault import fault_table  # noqa: PLC0415
+
+    source = diagnosis or comparison
+    faults = source.data_faults if source is not None else ()
+    return {"table": fault_table(faults), "sentences": [item.sentence for item in faults]} if faults else None
 
 
 def _fitted(ladder: Ladder | None, addition: Addition | None) -> dict[str, Any] | None:

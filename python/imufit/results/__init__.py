@@ -6,6 +6,7 @@ Every ``ratio`` and held-out value is residual RMS over noise floor: 1.0 is at t
 from imufit.results.addition import Addition
 from imufit.results.attitude import AttitudeBins, AttitudeComparison, AttitudeDependence
 from imufit.results.comparison import ChannelResidual, Comparison, Panel, Spectrum, Where
+from imufit.results.data_fault import DataFault
 from imufit.results.diagnosis import Candidate, Diagnosis, Rival, Unexplained
 from imufit.results.disagreement import Disagreement, Without
 from imufit.results.effect_card import EffectCard
@@ -23,6 +24,7 @@ __all__ = [
     "Candidate",
     "ChannelResidual",
     "Comparison",
+    "DataFault",
     "Diagnosis",
     "Disagreement",
     "EffectCard",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.figures import quantity
+from imufit.results.data_fault import DataFault, fault_table
 from imufit.results.json_value import json_value
 from imufit.results.table import Table, html, page
 
@@ -196,6 +197,8 @@ class Comparison:
         (t_start, t_end, channel, ratio), worst first.
     notes : tuple of str
         What the reader should know about these figures.
+    data_faults : tuple of DataFault
+        What is wrong with the data themselves.
     """
 
     n: int
@@ -209,6 +212,7 @@ class Comparison:
     spectra: tuple[Spectrum, ...]
     segments: tuple[tuple[float, float, str, float], ...]
     notes: tuple[str, ...]
+    data_faults: tuple[DataFault, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -226,7 +230,7 @@ class Comparison:
         return text
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of `compare`; worst segments and notes besides."""
+        """JSON of `compare`; worst segments, notes and faults of the data besides."""
         return {
             "n": int(self.n),
             "duration_s": json_value(self.duration_s),
@@ -245,6 +249,7 @@ class Comparison:
                 for t_start, t_end, channel, ratio in self.segments
             ],
             "notes": list(self.notes),
+            "data_faults": [fault.to_dict() for fault in self.data_faults],
         }
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -310,13 +315,13 @@ class Comparison:
 
     def tables(self) -> tuple[Table, ...]:
         """Every table, most important first."""
-        tables = (self.channel_table(), self.where_table(), self.segment_table())
+        tables = (self.channel_table(), self.where_table(), self.segment_table(), fault_table(self.data_faults))
         return tables if self.attitude is None else (*tables, self.attitude.table())
 
     def sentences(self) -> list[str]:
-        """Return the result, what it does to the attitude, and the notes."""
+        """Return the result, what it does to the attitude, faults of the data, and the notes."""
         attitude = [] if self.attitude is None else [self.attitude.sentence]
-        return [self.sentence, *attitude, *self.notes]
+        return [self.sentence, *attitude, *map(str, self.data_faults), *self.notes]
 
     def _repr_html_(self) -> str:
         return html(self.sentences(), self.tables())

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
+from imufit.results.data_fault import DataFault, fault_table
 from imufit.results.disagreement import Disagreement, Without, disagreement_table
 from imufit.results.json_value import json_value
 from imufit.results.log_parameters import LogParameters, log_table, logs_json
@@ -207,7 +208,11 @@ class Diagnosis:
     disagrees : tuple of Disagreement
         Logs that have another value of an effect than the others.
     without : tuple of Without
-        What the answer is without logs that disagree so much that there is none with them.
+        What the answer is without logs that disagree so much, or whose data are so faulty, that there is none with
+        them.
+    data_faults : tuple of DataFault
+        What is wrong with the data themselves. Where one of them spoils the log, the verdict is ``unknown`` and no
+        effect is judged.
     """
 
     verdict: str
@@ -222,6 +227,7 @@ class Diagnosis:
     logs: tuple[LogParameters, ...] = ()
     disagrees: tuple[Disagreement, ...] = ()
     without: tuple[Without, ...] = ()
+    data_faults: tuple[DataFault, ...] = ()
 
     @property
     def best_candidate(self) -> Candidate | None:
@@ -229,7 +235,7 @@ class Diagnosis:
         return next((item for item in self.candidates if item.effect == self.best), None)
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of `diagnose`; model, experiment, sentence and notes besides."""
+        """JSON of `diagnose`; model, experiment, sentence, notes and faults of the data besides."""
         return {
             "verdict": self.verdict,
             "best": self.best,
@@ -240,6 +246,7 @@ class Diagnosis:
             "experiment": self.experiment,
             "sentence": self.sentence,
             "notes": list(self.notes),
+            "data_faults": [fault.to_dict() for fault in self.data_faults],
             **logs_json(self.logs),
             **({"disagrees": [item.to_dict() for item in self.disagrees]} if self.logs else {}),
             **({"without": [item.to_dict() for item in self.without]} if self.without else {}),
@@ -330,13 +337,19 @@ class Diagnosis:
             self.unexplained_table(),
             self.disagreement_table(),
             self.log_table(),
+            fault_table(self.data_faults),
         )
 
     def sentences(self) -> list[str]:
-        """Verdict, result, next experiment and notes."""
+        """Verdict, result, next experiment, faults of the data that only concern some rows, and notes."""
         experiment = f"Next: {self.experiment}" if self.experiment else ""
         verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
-        return [verdict, *(f"{item}. {item.sentence}" for item in self.without), experiment, *self.notes]
+        without = [f"{item}. {item.sentence}" for item in self.without]
+        return [verdict, *without, experiment, *self.local_faults(), *self.notes]
+
+    def local_faults(self) -> list[str]:
+        """Sentences on faults of the data beside which effects can be judged."""
+        return [str(fault) for fault in self.data_faults if not fault.spoils]
 
     def _repr_html_(self) -> str:
         return html(self.sentences(), self.tables())

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from imufit.figures import quantity
 from imufit.results.addition import surprise
 from imufit.results.comparison import Comparison
+from imufit.results.data_fault import fault_table
 from imufit.results.diagnosis import VERDICTS, Diagnosis
 from imufit.results.json_value import json_value
 from imufit.results.log_parameters import logs_json
@@ -94,7 +95,7 @@ class Ladder:
     sentence: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of `ladder`; rivals, what is unexplained, experiment, sentence and parameters besides."""
+        """JSON of `ladder`; rivals, what is unexplained, experiment, faults of the data and parameters besides."""
         return {
             "steps": [step.to_dict() for step in self.steps],
             "model": list(self.model),
@@ -105,6 +106,7 @@ class Ladder:
             "ambiguous_with": list(self.diagnosis.ambiguous_with),
             "unexplained": [item.to_dict() for item in self.diagnosis.unexplained],
             "experiment": self.diagnosis.experiment,
+            "data_faults": [fault.to_dict() for fault in self.diagnosis.data_faults],
             "sentence": self.sentence,
             "parameters": by_effect(getattr(self.fit, "parameters", ()) or ()),
             **logs_json(self.diagnosis.logs),
@@ -159,10 +161,11 @@ class Ladder:
             self.diagnosis.unexplained_table(),
             self.diagnosis.disagreement_table(),
             self.diagnosis.log_table(),
+            fault_table(self.diagnosis.data_faults),
         )
 
     def sentences(self) -> list[str]:
-        """Verdict, result, attitude, warnings, next experiment."""
+        """Verdict, result, attitude, warnings, next experiment, faults of the data that only concern some rows."""
         experiment = f"Next: {self.diagnosis.experiment}" if self.diagnosis.experiment else ""
         result = (
             f"Held-out error {quantity.ratio(self.ratio_start)} -> {quantity.ratio(self.ratio_end)} "
@@ -171,7 +174,8 @@ class Ladder:
         attitude = "" if self.attitude is None else self.attitude.sentence
         verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
         without = [f"{item}. {item.sentence}" for item in self.diagnosis.without]
-        return [verdict, *without, result, attitude, *self.warnings(), experiment]
+        faults = self.diagnosis.local_faults()
+        return [verdict, *without, result, attitude, *self.warnings(), experiment, *faults]
 
     def _repr_html_(self) -> str:
         return html(self.sentences(), self.tables())

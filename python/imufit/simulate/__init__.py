@@ -7,6 +7,7 @@ body. Nothing here uses the model that is fitted to such logs.
 
 from imufit.simulate.courses import Course, Line, Mixture, Wandering
 from imufit.simulate.entry import Injection
+from imufit.simulate.faults import FAULTS, Fault, with_fault
 from imufit.simulate.grade import Grade, ParameterGrade, grade
 from imufit.simulate.hidden import OBSERVABLE, hidden
 from imufit.simulate.injections import INJECTIONS, injection
@@ -20,12 +21,14 @@ from imufit.simulate.size import SIZES
 from imufit.simulate.truth import Kinematics, Trajectory
 
 __all__ = [
+    "FAULTS",
     "INJECTIONS",
     "OBSERVABLE",
     "OUTSIDE",
     "SCENARIOS",
     "SIZES",
     "Course",
+    "Fault",
     "Grade",
     "Injection",
     "Kinematics",
@@ -47,4 +50,5 @@ __all__ = [
     "sealed_path",
     "simulate",
     "unseal",
+    "with_fault",
 ]

@@ -24,6 +24,7 @@ class Truth:
     effects : each injected effect with its parameters, SI units; empty = the sensors are perfect but for noise.
     sizes : for each effect, its root mean square over the white noise of the sensor that it affects most.
     label : the name of the size that was asked for, such as "large"; empty where the parameters were given.
+    faults : faults of the data that were put in.
     """
 
     scenario: str
@@ -31,6 +32,7 @@ class Truth:
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     sizes: Mapping[str, float] = field(default_factory=dict)
     label: str = ""
+    faults: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return a JSON object that `from_json` reads."""
@@ -51,6 +53,7 @@ class Truth:
             effects={e: {n: float(v) for n, v in p.items()} for e, p in data["effects"].items()},
             sizes={e: float(v) for e, v in data["sizes"].items()},
             label=str(data["label"]),
+            faults=tuple(str(fault) for fault in data.get("faults", ())),
         )
 
 

@@ -1,0 +1,13 @@
+"""Faults of the data that are no effects of a sensor: wrong units and frames, turned axes, rows that cannot be.
+
+Faults of rows (`imufit.faults.rows`) concern some samples, which are left out of the evidence where they are certain
+to be wrong. Others (`imufit.faults.frames`) concern the whole log: nothing can be said of effects until they are put
+right.
+"""
+
+from imufit.faults.clipped import ClippedRows
+from imufit.faults.frames import frame_faults
+from imufit.faults.in_time import time_faults
+from imufit.faults.rows import LeftOut, row_faults
+
+__all__ = ["ClippedRows", "LeftOut", "frame_faults", "row_faults", "time_faults"]

@@ -1,0 +1,109 @@
+"""Rows from all over a log with what an ideal sensor would have read there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from imufit import _imufit
+
+Array = NDArray[np.float64]
+
+SENSORS = ("acc", "gyr", "mag")
+WINDOWS = 64
+WINDOW_ROWS = 256
+_NO_FILTERS: list[list[float]] = [[] for _ in range(9)]
+
+
+def windows(chunks: Iterable[Mapping[str, Any]], facts: _imufit.Facts) -> list[dict[str, Any]]:
+    """Cut windows with their margins out of the chunks of a log, evenly over it and copied.
+
+    Parameters
+    ----------
+    chunks : iterable of dict
+        The whole log as the compiled core takes it, with margins of ``facts.margin`` rows.
+    facts : Facts
+        Of the log.
+    """
+    rows = min(WINDOW_ROWS, max(1, facts.n // WINDOWS))
+    firsts = np.unique(np.linspace(0, max(facts.n - rows, 0), WINDOWS).astype(int))
+    found = []
+    for chunk in chunks:
+        start = chunk["offset"] + chunk["begin"]
+        stop = chunk["offset"] + chunk["end"]
+        for first in firsts[(firsts >= start) & (firsts < stop)]:
+            begin = int(first) - chunk["offset"]
+            found.append(_part(chunk, begin, min(begin + rows, chunk["end"]), facts.margin))
+    return found
+
+
+def _part(chunk: Mapping[str, Any], begin: int, end: int, margin: int) -> dict[str, Any]:
+    low, high = max(0, begin - margin), min(end + margin, len(chunk["t"]))
+
+    def cut(column: Array | None) -> Array | None:
+        return None if column is None else column[low:high].copy()
+
+    names = ("t", "acc", "gyr", "mag", "temp", "ref_q", "ref_p", "ref_exact")
+    return {name: cut(chunk[name]) for name in names} | {
+        "covariates": [cut(column) for column in chunk["covariates"]],
+        "offset": chunk["offset"] + low,
+        "begin": begin - low,
+        "end": end - low,
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Readings and ideal readings of the same rows, body frame.
+
+    Attributes
+    ----------
+    readings, ideal : dict of (n, 3) arrays
+        By sensor, SI units (magnetometer uT); NaN where one of the two is not known.
+    attitude : (n, 3, 3) array
+        Reference attitudes, body to reference frame; the identity where there is none.
+    """
+
+    readings: dict[str, Array]
+    ideal: dict[str, Array]
+    attitude: Array
+
+
+def samples(parts: Iterable[Mapping[str, Any]], facts: _imufit.Facts) -> Samples:
+    """Return the readings of some windows of a log beside those of an ideal sensor.
+
+    Parameters
+    ----------
+    parts : iterable of dict
+        From `windows`, the reference perhaps changed.
+    facts : Facts
+        Of the log.
+    """
+    empty = _imufit.Evidence(facts, [], [], 2, _NO_FILTERS)
+    readings: dict[str, list[Array]] = {name: [] for name in facts.sensors}
+    ideal: dict[str, list[Array]] = {name: [] for name in facts.sensors}
+    attitudes = []
+    for part in parts:
+        core = slice(part["begin"], part["end"])
+        residual = _imufit.evaluate(empty, dict(part), [])
+        for name in facts.sensors:
+            first = 3 * SENSORS.index(name)
+            columns = [residual[first + axis] for axis in range(3)]
+            shape = (part["end"] - part["begin"], 3)
+            reading = np.full(shape, np.nan) if part[name] is None else part[name][core]
+            known = [np.full(shape[0], np.nan) if column is None else column for column in columns]
+            readings[name].append(reading)
+            ideal[name].append(reading - np.stack(known, axis=1))
+        attitudes.append(part["ref_q"][core])
+    q = np.concatenate(attitudes)
+    q = np.where(np.isfinite(q).all(axis=1)[:, None], q, [1.0, 0.0, 0.0, 0.0])
+    return Samples(
+        {name: np.concatenate(values) for name, values in readings.items()},
+        {name: np.concatenate(values) for name, values in ideal.items()},
+        Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_matrix(),
+    )

@@ -1,0 +1,36 @@
+"""Faults of the data of a log, looked for in passes over it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from imufit import _imufit
+from imufit.faults import ClippedRows, frame_faults
+from imufit.faults.samples import windows
+from imufit.fit.passes import Passes
+from imufit.results import DataFault
+
+
+def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float]) -> tuple[DataFault, ...]:
+    """Name what is wrong with the data of a log: what its rows showed, clipped readings, wrong units and frames.
+
+    Parameters
+    ----------
+    passes : Passes
+        Over the log.
+    facts : Facts
+        Of the log as declared.
+    ends : mapping
+        End of the range of each sensor that may have one.
+    """
+    told = passes.log.metadata.extra
+    clipped = ClippedRows(ends, [sensor for sensor in ends if f"{sensor}_range" in told])
+
+    def counted() -> Iterator[dict[str, Any]]:
+        for chunk in passes.chunks(facts.margin, "looking for faults of the data"):
+            clipped.add(chunk)
+            yield chunk
+
+    parts = windows(counted(), facts)
+    return (*frame_faults(parts, facts, passes.log.metadata), *passes.row_faults, *clipped.faults())

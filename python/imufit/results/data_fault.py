@@ -1,0 +1,88 @@
+"""Faults of the data themselves: not the sensor is wrong, but what was written down."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from imufit.figures import quantity
+from imufit.results.json_value import json_value
+from imufit.results.table import Table
+
+
+@dataclass(frozen=True)
+class DataFault:
+    """Something wrong with the data that is no effect of the sensor.
+
+    Attributes
+    ----------
+    fault : str
+        Which kind, for instance ``units`` or ``stuck``.
+    sensor : str or None
+        ``acc``, ``gyr``, ``mag`` or ``ref``; None where every sensor is concerned.
+    channel : str or None
+        For instance ``gyr_x``, where it is a single one.
+    t_start, t_end : float
+        Where in time, s.
+    rows : int
+        Rows concerned.
+    evidence : str
+        What shows it, in a sentence with figures.
+    remedy : str
+        What to do about it, in a sentence.
+    left_out : bool
+        True if the samples concerned were left out of the evidence; what is said of the log rests on the others.
+    spoils : bool
+        True if nothing can be said of effects before it is put right.
+    gain : float
+        Drop of the sum of squares, in units of the noise, that it explains beside every effect; NaN where not asked.
+    file : str or None
+        Of several logs: what the log is called that it is in.
+    """
+
+    fault: str
+    sensor: str | None
+    channel: str | None
+    t_start: float
+    t_end: float
+    rows: int
+    evidence: str
+    remedy: str
+    left_out: bool = False
+    spoils: bool = False
+    gain: float = math.nan
+    file: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of one fault; the key ``file`` only where there are several logs."""
+        names = [name for name in self.__dataclass_fields__ if name != "file" or self.file is not None]
+        return {name: json_value(getattr(self, name)) for name in names}
+
+    @property
+    def sentence(self) -> str:
+        """Evidence, what was done about it, and the remedy."""
+        done = " Those samples are left out here." if self.left_out else ""
+        return f"{'' if self.file is None else f'{self.file}: '}{self.evidence}{done} {self.remedy}"
+
+    def __str__(self) -> str:
+        return f"Data fault ({self.fault}): {self.sentence}"
+
+
+def fault_table(faults: Sequence[DataFault]) -> Table:
+    """Faults with where they lie."""
+    several = any(item.file is not None for item in faults)
+    rows = tuple(
+        (
+            *([item.file or "-"] if several else []),
+            item.fault,
+            item.channel or item.sensor or "all",
+            quantity.span(item.t_start, item.t_end),
+            f"{item.rows}",
+            "left out" if item.left_out else "spoils the log" if item.spoils else "kept",
+        )
+        for item in faults
+    )
+    log = ("log",) if several else ()
+    return Table("Faults of the data", (*log, "fault", "where", ">time", ">rows", "samples"), rows)
