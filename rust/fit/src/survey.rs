@@ -235,6 +235,13 @@ impl Survey {
                 self.given.n,
             )
         });
+        // What columns are made of is smoother than what readings are compared with.
+        let attitude_columns = self.attitude_width.for_columns(attitude_smoothing);
+        let position_columns = position_smoothing.map(|s| self.position_width.for_columns(s));
+        let attitude_noise = self.attitude_width.noise();
+        let rate_noise = self.attitude_width.derivative_noise(attitude_columns);
+        let force_noise = attitude_noise * self.given.gravity.norm()
+            + position_columns.map_or(0.0, |s| self.position_width.derivative_noise(s));
         let facts = LogFacts {
             n: self.given.n,
             t_start: self.t_first,
@@ -256,25 +263,21 @@ impl Survey {
             has_temperature: self.temperature.1 > 0,
             attitude_smoothing,
             position_smoothing,
-            silent_axes: self.silent_axes(attitude_smoothing, field),
+            silent_axes: self.silent_axes(attitude_columns, field),
+            column_noise: [force_noise, rate_noise, attitude_noise * field.norm()],
             position_origin: self.origin.unwrap_or_default(),
-            attitude_columns: self.attitude_width.for_columns(attitude_smoothing),
-            position_columns: position_smoothing.map(|s| self.position_width.for_columns(s)),
+            attitude_columns,
+            position_columns,
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),
             ranges: [None; 3],
             rig: self.travel.take().map(|t| t.finish(self.attitude_width.noise())),
             covariates: self.given.covariates.clone(),
         };
-        let rate = self.attitude_width.derivative_noise(facts.attitude_smoothing);
-        let force = self.attitude_width.noise() * facts.gravity.norm()
-            + facts
-                .position_smoothing
-                .map_or(0.0, |s| self.position_width.derivative_noise(s));
         let samples = CovariateSamples {
             names: Bins::covariate_names(&self.given.covariates),
             values: self.samples,
-            rate_noise: rate,
-            force_noise: force,
+            rate_noise,
+            force_noise,
         };
         (facts, samples)
     }

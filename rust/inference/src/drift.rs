@@ -136,6 +136,8 @@ pub struct Profiled {
     pub white: f64,
     /// Block means that the columns leave.
     pub residual: DVector<f64>,
+    /// Number of independent columns.
+    pub fitted: usize,
 }
 
 impl ChannelSums {
@@ -235,6 +237,7 @@ impl ChannelSums {
             deviance,
             white,
             residual: left,
+            fitted: basis.ncols(),
         })
     }
 

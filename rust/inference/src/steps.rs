@@ -4,12 +4,14 @@
 //! strength of the walk that suits it best, is compared with the likelihood without.
 
 use nalgebra::DVector;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::dependence::Dependence;
 use crate::drift::ChannelSums;
 use crate::problem::Problem;
 
+/// Noise that is coloured more slowly than any filter sees jumps now and then: the chance of a false alarm is kept to this part of the usual.
+pub const CAUTION: f64 = 0.01;
 /// Boundaries between blocks that are looked at: those with the largest differences.
 const LOOKED_AT: usize = 4;
 
@@ -36,7 +38,10 @@ pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
             .max_by(|a, b| b.1.deviance.total_cmp(&a.1.deviance));
         let Some((k, with)) = best else { continue };
         let ratio = without.deviance - with.deviance;
-        let p_value = ChiSquared::new(1.0).map_or(1.0, |d| if ratio.is_finite() { d.sf(ratio.max(0.0)) } else { 1.0 });
+        // The strength of the walk is found from these few blocks as well: F, not chi squared.
+        let freedom = blocks.saturating_sub(with.fitted + 1).max(1) as f64;
+        let f = freedom * (ratio.max(0.0) / blocks as f64).exp_m1();
+        let p_value = FisherSnedecor::new(1.0, freedom).map_or(1.0, |d| if f.is_finite() { d.sf(f) } else { 1.0 });
         let facts = &problem.parts[sums.log].white.layout.facts;
         let t = facts.t_start + (facts.t_end - facts.t_start) * k as f64 / blocks as f64;
         found.push(Dependence {

@@ -239,7 +239,7 @@ fn settle(
     probed.retain(|d| d.p_value * tried as f64 <= ALPHA);
     unexplained.extend(probed);
     let (mut stepping, tried) = steps::test(problem, &fitted);
-    stepping.retain(|d| d.p_value * tried as f64 <= ALPHA);
+    stepping.retain(|d| d.p_value * tried as f64 <= steps::CAUTION * ALPHA);
     unexplained.extend(stepping);
     unexplained.sort_by(|a, b| b.gain.total_cmp(&a.gain));
 

@@ -45,6 +45,8 @@ pub struct LogFacts {
     pub attitude_smoothing: Smoothing,
     /// How the reference position is differentiated; `None` without position.
     pub position_smoothing: Option<Smoothing>,
+    /// Noise of the ideal readings that columns are made of, from the reference; m/s^2, rad/s, uT.
+    pub column_noise: [f64; 3],
     /// First reference position, m, from which others are counted; zero without one.
     pub position_origin: Vector3<f64>,
     /// How the attitude is differentiated where a derivative above the first only enters columns.
@@ -108,6 +110,7 @@ impl LogFacts {
             has_temperature,
             attitude_smoothing: NARROWEST,
             position_smoothing: None,
+            column_noise: [0.0; 3],
             position_origin: Vector3::zeros(),
             attitude_columns: NARROWEST,
             position_columns: None,

@@ -29,6 +29,8 @@ enum Kind {
 
 /// Parts of gravity (m/s^2) and of one rad/s below which a reading may be something else than a smaller reading.
 const SMALL: [f64; 5] = [0.005, 0.01, 0.02, 0.04, 0.08];
+/// Ideal readings count from this many times their noise on.
+const CLEAR: f64 = 5.0;
 /// Parameters of a probe near zero: each part, x, y and z.
 const NEAR_ZERO: [&str; 15] = [
     "x1", "y1", "z1", "x2", "y2", "z2", "x3", "y3", "z3", "x4", "y4", "z4", "x5", "y5", "z5",
@@ -101,7 +103,7 @@ impl Probe {
             Kind::Gradient => (
                 Stage::Offset,
                 &["x", "y", "xy", "xz", "yz"],
-                "position".to_string(),
+                "ref_px*ref_py*ref_pz".to_string(),
                 "the field varies in space",
             ),
         };
@@ -177,9 +179,12 @@ impl Effect for Probe {
                 } else {
                     1.0
                 };
+                // At rest an ideal reading is nothing but the noise of the reference.
+                let least = CLEAR * rows.facts.column_noise[self.sensor[0].index()];
                 for (k, part) in SMALL.iter().enumerate() {
                     for axis in 0..3 {
-                        let small = |x: &f64| if x.abs() < part * full { *x } else { 0.0 * x };
+                        let inside = |x: &f64| x.abs() < part * full && x.abs() > least;
+                        let small = |x: &f64| if inside(x) { *x } else { 0.0 * x };
                         out.set(3 * k + axis, axis, rows.x.axis(axis).iter().map(small));
                     }
                 }

@@ -86,6 +86,7 @@ fn every_built_in_effect_keeps_the_contract() {
         has_temperature: true,
         attitude_smoothing: NARROWEST,
         position_smoothing: Some(NARROWEST),
+        column_noise: [0.0; 3],
         position_origin: nalgebra::Vector3::zeros(),
         attitude_columns: NARROWEST,
         position_columns: Some(NARROWEST),

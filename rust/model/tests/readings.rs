@@ -93,6 +93,7 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
         has_temperature: false,
         attitude_smoothing: NARROWEST,
         position_smoothing: None,
+        column_noise: [0.0; 3],
         position_origin: nalgebra::Vector3::zeros(),
         attitude_columns: NARROWEST,
         position_columns: None,
