@@ -138,8 +138,9 @@ def _empty(
 def _places(surveyed: SurveyedLog, slots: Sequence[str]) -> dict[str, range]:
     """Parameters of every effect in the evidence, by its id."""
     places, first = {}, 0
+    columns = surveyed.columns
     for key in slots:
-        effect = surveyed.effects.get(key) or find_effect(key)
+        effect = columns.get(key) or find_effect(key)
         places[key] = range(first, first + len(effect.parameters))
         first += len(effect.parameters)
     return places
