@@ -139,6 +139,7 @@ def _places(surveyed: SurveyedLog, slots: Sequence[str]) -> dict[str, range]:
     """Parameters of every effect and probe in the evidence, by its id."""
     columns = surveyed.columns
     places, first = {}, 0
+    columns = surveyed.columns
     for key in slots:
         effect = columns.get(key) or find_effect(key)
         places[key] = range(first, first + len(effect.parameters))
