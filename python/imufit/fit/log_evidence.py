@@ -136,8 +136,7 @@ def _empty(
 
 
 def _places(surveyed: SurveyedLog, slots: Sequence[str]) -> dict[str, range]:
-    """Parameters of every effect and probe in the evidence, by its id."""
-    columns = surveyed.columns
+    """Parameters of every effect in the evidence, by its id."""
     places, first = {}, 0
     columns = surveyed.columns
     for key in slots:
