@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
+from imufit.errors import InputError
 from imufit.log import Log
 from imufit.progress import Progress, silent
 from imufit.replay import Replay, replay
@@ -64,7 +65,8 @@ def attitude_comparison(
     Returns
     -------
     AttitudeComparison or None
-        None where the log has no attitude, no sensor that the filter needs, or too few rows.
+        None where the log has no attitude, no sensor that the filter needs, or too few rows, or where the model cannot
+        be undone.
     """
     if not isinstance(log, Log) or log.ref_q is None or log.acc is None or log.gyr is None:
         return None
@@ -75,7 +77,12 @@ def attitude_comparison(
     before = _parts(run, filter_name)
     after = before
     if model.effects:
-        run = replay(corrected(model, log), [filter_name], progress=progress)
+        try:
+            undone = corrected(model, log)
+        except InputError:
+            # A nonlinearity may turn back within the readings: then no input belongs to them, and no attitude either.
+            return None
+        run = replay(undone, [filter_name], progress=progress)
         after = _parts(run, filter_name)
         kept &= _kept(run, filter_name)
         if kept.sum() < MIN_ROWS:

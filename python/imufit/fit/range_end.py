@@ -16,6 +16,8 @@ LEAST = 3
 """Readings that must stand at the largest value."""
 BELOW = 4
 """Steps of the resolution below it that are looked at as well."""
+JUMP = 8.0
+"""Steps of the resolution by which a reading comes to the end or leaves it: one that stands still is not cut off."""
 TALLER = 2.0
 """Readings at the largest value are this many times those at a step below: the tail of a distribution gets thinner."""
 
@@ -32,7 +34,7 @@ class RangeEnd:
 
     largest: float = 0.0
     _step: float = np.inf
-    _near: Array = field(default_factory=lambda: np.empty(0))
+    _near: Array = field(default_factory=lambda: np.empty((0, 2)))
 
     def add(self, column: Array) -> None:
         """Take the readings of a chunk.
@@ -50,17 +52,21 @@ class RangeEnd:
         # A reading at the end has no digits of its own: steps to and from there tell nothing of the resolution.
         self._step = min(self._step, float(np.quantile(steps, 0.01)) if steps.size else np.inf)
         self.largest = max(self.largest, float(values.max()))
-        near = np.concatenate([self._near, values])
-        # More than a thousand of the largest are not needed, unless they stand at the end.
-        self._near = np.sort(near[near >= self._reach(near)])
+        change = np.abs(np.diff(column, axis=0, prepend=column[:1], append=column[-1:]))
+        jump = np.fmax(change[:-1], change[1:])
+        known = np.isfinite(column)
+        near = np.concatenate([self._near, np.stack([np.abs(column[known]), jump[known]], axis=1)])
+        self._near = near[near[:, 0] >= self._reach()]
 
-    def _reach(self, near: Array) -> float:
-        return float(max(self.largest - BELOW * self._step, 0.98 * self.largest)) if near.size else 0.0
+    def _reach(self) -> float:
+        return max(self.largest - BELOW * self._step, 0.98 * self.largest)
 
     def end(self) -> float | None:
         """Return the value at which readings pile up; None where they do not."""
-        near = self._near[self._near >= self._reach(self._near)]
-        at_end = int(np.count_nonzero(near >= self.largest * (1.0 - 1e-12)))
-        if at_end < LEAST or not at_end > TALLER * (near.size - at_end) / BELOW:
+        value, jump = self._near[self._near[:, 0] >= self._reach()].T
+        at_end = value >= self.largest * (1.0 - 1e-12)
+        count = int(np.count_nonzero(at_end))
+        arriving = int(np.count_nonzero(jump[at_end] > JUMP * self._step))
+        if arriving < LEAST or not count > TALLER * (value.size - count) / BELOW:
             return None
         return self.largest

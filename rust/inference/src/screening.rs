@@ -285,6 +285,9 @@ impl Weighed {
             let limit = BEYOND * problem.plausible[*j];
             !problem.typical[*j] || value.abs() - 3.0 * error <= limit
         });
+        let early = problem.slots[out.slot].effect.one_sided()
+            && out.parameters.iter().any(|(value, error)| *value < -3.0 * error);
+        out.plausible &= !early;
         out.expected_ratio = ratio(&question, &fine.estimate);
         out
     }

@@ -89,6 +89,8 @@ const SCATTER: f64 = 3.0;
 const MISSED: f64 = 0.01;
 /// By how much that falls with each narrower one: the sixth power of their ratio, squared.
 const NARROWER: f64 = 36.0;
+/// So many widths must agree before the noise counts as white.
+const AGREEING: usize = 2;
 /// Share of the rows that a width must reach.
 const REACH: f64 = 0.9;
 /// The reference's noise buries the sensor if a wider polynomial lowers the unexplained mean square by this factor.
@@ -279,15 +281,19 @@ impl Bandwidth {
             .collect()
     }
 
-    /// Index of the width that the reference alone allows for a log of so many rows.
+    /// Index of the width that the reference alone allows for a log of so many rows, of which the first `agreeing` agree.
     ///
     /// What the widest that agrees with its neighbour misses of the motion is small beside the noise of one row, but it has the
     /// shape of the motion, so that over many rows it would show as a wrong scale. Each narrower width misses some [`NARROWER`] times less.
-    fn allowed(&self, rows: usize) -> usize {
-        let agreeing = self.excess().iter().take_while(|excess| **excess <= TOLERANCE).count();
+    fn allowed(agreeing: usize, rows: usize) -> usize {
         let missed = MISSED * rows as f64;
         let back = (missed.max(1.0).ln() / NARROWER.ln()).ceil().clamp(1.0, 2.0);
         agreeing.saturating_sub(back as usize)
+    }
+
+    /// Number of widths that agree with the next narrower one, from the narrowest on.
+    fn agreeing(&self) -> usize {
+        self.excess().iter().take_while(|excess| **excess <= TOLERANCE).count()
     }
 
     /// The width to use. Where the noise of the reference is not white (interpolated, quantised, filtered), its neighbours
@@ -296,8 +302,14 @@ impl Bandwidth {
     /// Only where that, less what white noise of the reference makes of it, falls by more than [`BURIED`] is a wider one taken, one
     /// narrower than the best. `rows` is the length of the log.
     pub fn choose(&self, error: &[f64], rows: usize) -> Smoothing {
-        let allowed = self.allowed(rows);
-        let white = 3.0 * self.derivative_noise(WIDTHS[allowed]).powi(2);
+        let agreeing = self.agreeing();
+        let allowed = Self::allowed(agreeing, rows);
+        // What the narrowest fits leave is white noise only if averaging more of it agrees.
+        let white = if agreeing >= AGREEING {
+            3.0 * self.derivative_noise(WIDTHS[allowed]).powi(2)
+        } else {
+            0.0
+        };
         let best = (0..error.len())
             .filter(|k| error[*k].is_finite() && self.reaches(*k))
             .min_by(|a, b| error[*a].total_cmp(&error[*b]));

@@ -174,6 +174,11 @@ pub trait Effect: Send + Sync {
         false
     }
 
+    /// True if its parameters cannot be negative: no sensor shows what will be.
+    fn one_sided(&self) -> bool {
+        false
+    }
+
     /// Trial values for parameters that no linear step finds (a period, a width): at first a grid over all that can be,
     /// then, around what the round before `round` found best, a finer one. Empty: nothing to search, or done.
     fn search(&self, _facts: &LogFacts, _found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {

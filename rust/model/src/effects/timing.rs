@@ -117,6 +117,10 @@ impl Effect for Timing {
         true
     }
 
+    fn one_sided(&self) -> bool {
+        true
+    }
+
     fn reference_change(&self, parameters: &[f64]) -> ReferenceChange {
         let time = match self.kind {
             Kind::Delay => SensorTime {
