@@ -111,7 +111,10 @@ def test_small_tilts_show_that_something_is_missing_but_not_how_it_divides(paper
     found = imufit.SensorModel().fit(paper.small_tilts(SEED)).diagnose()
     assert found.best == "acc.bias"
     best = found.best_candidate
-    assert [(rival.effect, rival.correlation > 0.9) for rival in best.confounded_with] == [("acc.scale", True)]
+    # Near one attitude whatever shifts the reading of a constant force looks the same.
+    rivals = {rival.effect: rival.correlation for rival in best.confounded_with}
+    assert {"acc.scale", "acc.cubic"} <= rivals.keys()
+    assert min(rivals.values()) > 0.9
     (z,) = [p for p in best.parameters if p.name == "z"]
     gain = paper.ACCELEROMETER["acc.scale"]["z"] * 9.80665
     assert z.value == pytest.approx(paper.ACCELEROMETER["acc.bias"]["z"] + gain, abs=0.005)
