@@ -10,6 +10,8 @@ const WEIGHT_WIDTH: f64 = 2.5;
 /// Time to each side of a row over which the power is a mean, s, and how many rows that may be at most.
 const REACH: f64 = 0.25;
 const MOST_ROWS: usize = 200;
+/// Rows further apart than this many usual steps have a gap between them, across which nothing is known.
+const GAP: f64 = 5.0;
 
 /// Weights with which the samples around a row make the value of the parabola through them there.
 fn parabola() -> [f64; 2 * HALF_WIDTH + 1] {
@@ -42,11 +44,22 @@ pub fn power(window: &Window, dt: f64) -> Vec<f64> {
     let reach = ((REACH / dt) as usize).clamp(1, MOST_ROWS);
     let (first, last) = (window.begin.saturating_sub(reach), (window.end + reach).min(n));
     let weights = parabola();
+    let gap = |row: usize| window.t[row] - window.t[row - 1] > GAP * dt;
+    let mut begins: Vec<usize> = (0..n).collect();
+    let mut ends: Vec<usize> = (1..=n).collect();
+    for row in 1..n {
+        begins[row] = if gap(row) { row } else { begins[row - 1] };
+    }
+    begins[0] = 0;
+    for row in (0..n.saturating_sub(1)).rev() {
+        ends[row] = if gap(row + 1) { row + 1 } else { ends[row + 1] };
+    }
     // Sums of squares and counts up to each row.
     let mut sums = vec![(0.0, 0.0)];
     let (mut square, mut count) = (0.0, 0.0);
     for row in first..last {
-        let axes = [0, 1, 2].map(|axis| beside_parabola(y, n, row, axis, &weights));
+        let whole = row >= begins[row] + HALF_WIDTH && row + HALF_WIDTH < ends[row];
+        let axes = [0, 1, 2].map(|axis| beside_parabola(y, n, row, axis, &weights).filter(|_| whole));
         if let [Some(a), Some(b), Some(c)] = axes {
             square += a * a + b * b + c * c;
             count += 1.0;
@@ -55,8 +68,8 @@ pub fn power(window: &Window, dt: f64) -> Vec<f64> {
     }
     (window.begin..window.end)
         .map(|row| {
-            let low = sums[row.saturating_sub(reach).max(first) - first];
-            let high = sums[(row + reach + 1).min(last) - first];
+            let low = sums[row.saturating_sub(reach).max(first).max(begins[row]) - first];
+            let high = sums[(row + reach + 1).min(last).min(ends[row]) - first];
             let samples: f64 = high.1 - low.1;
             if samples > 0.0 { (high.0 - low.0) / samples } else { 0.0 }
         })
