@@ -111,7 +111,8 @@ class LogEvidence:
             Tell the residual only whitened, not as it stands.
         """
         passes, facts = self.passes, self.facts
-        asked = [key for key in candidates if key in self.surveyed.columns]
+        known = self.surveyed.columns
+        asked = [key for key in candidates if key in known]
         white = _empty(self.surveyed, fitted, asked, found, self.filters)
         passes.evidence(white, facts, "taking evidence")
         raw = white

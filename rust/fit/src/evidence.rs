@@ -186,16 +186,11 @@ impl Evidence {
 
     /// Adds the core rows of a window. Rows before them are used as past of the whitening filter.
     pub fn add(&mut self, window: &Window) -> Result<(), EffectError> {
-        let starts: Vec<usize> = (window.begin..window.end).step_by(PART).collect();
         let layout = &self.layout;
-        let parts: Vec<Result<Blocks, EffectError>> = starts
-            .into_par_iter()
-            .map(|begin| {
-                take(
-                    layout,
-                    &window.part(begin, (begin + PART).min(window.end), layout.facts.margin()),
-                )
-            })
+        let parts: Vec<Result<Blocks, EffectError>> = window
+            .parts(PART, 1, layout.facts.margin())
+            .par_iter()
+            .map(|part| take(layout, part))
             .collect();
         // Summed in the order of time, so that the result does not depend on the number of threads.
         for part in parts {

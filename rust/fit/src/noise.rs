@@ -36,16 +36,10 @@ impl Autocovariance {
     /// Adds core rows of a window, of a long log only some parts: the residual less the columns times `step`.
     pub fn add(&mut self, window: &Window, layout: &Layout, step: &[f64]) -> Result<(), EffectError> {
         let every = layout.facts.n.div_ceil(ROWS).max(1);
-        let starts: Vec<usize> = (window.begin..window.end)
-            .step_by(PART)
-            .filter(|begin| ((window.offset + begin) / PART).is_multiple_of(every))
-            .collect();
-        let parts: Vec<Result<Self, EffectError>> = starts
-            .into_par_iter()
-            .map(|begin| {
-                let end = (begin + PART).min(window.end);
-                Self::of(&window.part(begin, end, layout.facts.margin()), layout, step)
-            })
+        let parts: Vec<Result<Self, EffectError>> = window
+            .parts(PART, every, layout.facts.margin())
+            .par_iter()
+            .map(|part| Self::of(part, layout, step))
             .collect();
         // Summed in the order of time, so that the result does not depend on the number of threads.
         for part in parts {

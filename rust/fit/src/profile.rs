@@ -101,13 +101,10 @@ impl Profile {
     /// Adds the core rows of a window.
     pub fn add(&mut self, window: &Window) -> Result<(), EffectError> {
         let every = self.facts.n.div_ceil(ROWS).max(1);
-        let starts: Vec<usize> = (window.begin..window.end)
-            .step_by(PART)
-            .filter(|begin| ((window.offset + begin) / PART).is_multiple_of(every))
-            .collect();
-        let parts: Vec<Result<Vec<Sums>, EffectError>> = starts
-            .into_par_iter()
-            .map(|begin| self.sums(&window.part(begin, (begin + PART).min(window.end), self.facts.margin())))
+        let parts: Vec<Result<Vec<Sums>, EffectError>> = window
+            .parts(PART, every, self.facts.margin())
+            .par_iter()
+            .map(|part| self.sums(part))
             .collect();
         // Summed in the order of time, so that the result does not depend on the number of threads.
         for part in parts {

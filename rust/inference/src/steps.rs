@@ -7,7 +7,6 @@ use nalgebra::DVector;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::dependence::Dependence;
-use crate::drift::ChannelSums;
 use crate::problem::Problem;
 
 /// Noise that is coloured more slowly than any filter sees jumps now and then: the chance of a false alarm is kept to this part of the usual.
@@ -21,7 +20,7 @@ pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
     let mut found = Vec::new();
     for all in &problem.sums {
         let sums = all.with_sums(all.columns(model));
-        let blocks = sums.blocks();
+        let blocks = sums.sums.nrows();
         tried += blocks.saturating_sub(1);
         let Some(without) = sums.profile(None) else { continue };
         let residual = &without.residual;
@@ -54,11 +53,4 @@ pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
         });
     }
     (found, tried.max(1))
-}
-
-impl ChannelSums {
-    /// Number of blocks.
-    pub fn blocks(&self) -> usize {
-        self.sums.nrows()
-    }
 }

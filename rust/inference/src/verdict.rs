@@ -233,14 +233,15 @@ fn settle(
     let fitted = indices(slots, &stack);
     let channels: Vec<usize> = (0..CHANNELS).collect();
     let base = screening::base(problem, &fitted);
-    let (mut unexplained, tried) = dependence::test(problem, &fitted, &base, &channels);
-    unexplained.retain(|d| d.p_value * tried as f64 <= ALPHA);
-    let (mut probed, tried) = dependence::test_probes(problem, &stack, probes);
-    probed.retain(|d| d.p_value * tried as f64 <= ALPHA);
-    unexplained.extend(probed);
-    let (mut stepping, tried) = steps::test(problem, &fitted);
-    stepping.retain(|d| d.p_value * tried as f64 <= steps::CAUTION * ALPHA);
-    unexplained.extend(stepping);
+    let asked = [
+        (dependence::test(problem, &fitted, &base, &channels), ALPHA),
+        (dependence::test_probes(problem, &stack, probes), ALPHA),
+        (steps::test(problem, &fitted), steps::CAUTION * ALPHA),
+    ];
+    let mut unexplained: Vec<Dependence> = asked
+        .into_iter()
+        .flat_map(|((found, tried), alpha)| found.into_iter().filter(move |d| d.p_value * tried as f64 <= alpha))
+        .collect();
     unexplained.sort_by(|a, b| b.gain.total_cmp(&a.gain));
 
     let beside: Vec<usize> = model.iter().chain(&others).copied().collect();

@@ -321,8 +321,7 @@ impl Bandwidth {
         }
     }
 
-    /// Width for the derivatives above the first of the attitude and the second of the position, which only enter columns (a delay, a
-    /// lever arm). Noise in a column shrinks its parameter, so up to two steps more of smoothing are taken wherever the reference is noisy at all.
+    /// Width for the derivatives that enter columns: rates and accelerations, and those above them (a delay, a lever arm). Noise in a column shrinks its parameter, so up to two steps more of smoothing are taken wherever the reference is noisy at all.
     pub fn for_columns(&self, width: Smoothing) -> Smoothing {
         match WIDTHS[..ORDERED].iter().position(|w| *w == width) {
             Some(k) if k > 0 => {

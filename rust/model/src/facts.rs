@@ -49,9 +49,9 @@ pub struct LogFacts {
     pub column_noise: [f64; 3],
     /// First reference position, m, from which others are counted; zero without one.
     pub position_origin: Vector3<f64>,
-    /// How the attitude is differentiated where a derivative above the first only enters columns.
+    /// How the attitude is differentiated for what enters columns, rates included.
     pub attitude_columns: Smoothing,
-    /// The same for derivatives of the position above the second.
+    /// The same for the position, accelerations included.
     pub position_columns: Option<Smoothing>,
     /// For each sensor the body axes along which its ideal reading never exceeds the noise of the reference (a rig that never turns
     /// about an axis, an axis that stays level): those readings are noise, and a column made of noise would give a scale of -1.

@@ -271,7 +271,7 @@ pub fn kinematics(
 ) -> Vec<Option<Kinematics>> {
     let mut rotation = LocalReference::attitude(window, spacing);
     let mut translation = position.and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w.value)));
-    // Derivatives that only enter columns come from a wider polynomial; it needs a cache of its own.
+    // What enters columns comes from a wider polynomial; it needs a cache of its own.
     let wider = |w: Widths| Some(w.columns).filter(|c| *c != w.value);
     let mut smooth_rotation = wider(attitude).and_then(|w| LocalReference::attitude(window, spacing).map(|r| (r, w)));
     let mut smooth_translation = position

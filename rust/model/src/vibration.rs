@@ -50,7 +50,6 @@ pub fn power(window: &Window, dt: f64) -> Vec<f64> {
     for row in 1..n {
         begins[row] = if gap(row) { row } else { begins[row - 1] };
     }
-    begins[0] = 0;
     for row in (0..n.saturating_sub(1)).rev() {
         ends[row] = if gap(row + 1) { row + 1 } else { ends[row + 1] };
     }

@@ -43,6 +43,17 @@ impl<'a> Window<'a> {
         self.readings[sensor.index()]
     }
 
+    /// Parts of `rows` rows to work on each, one after the other, with at most `margin` rows around them; only every so many of a long
+    /// log, evenly spread over it, whatever windows it comes in.
+    #[must_use]
+    pub fn parts(&self, rows: usize, every: usize, margin: usize) -> Vec<Self> {
+        (self.begin..self.end)
+            .step_by(rows)
+            .filter(|begin| ((self.offset + begin) / rows).is_multiple_of(every))
+            .map(|begin| self.part(begin, (begin + rows).min(self.end), margin))
+            .collect()
+    }
+
     /// A part of the window with its own rows to work on and at most `margin` rows around them.
     #[must_use]
     pub fn part(&self, begin: usize, end: usize, margin: usize) -> Self {
