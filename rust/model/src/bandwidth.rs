@@ -321,15 +321,14 @@ impl Bandwidth {
         }
     }
 
-    /// Width for the derivatives that enter columns: rates and accelerations, and those above them (a delay, a lever arm). Noise in a column shrinks its parameter, so up to two steps more of smoothing are taken wherever the reference is noisy at all.
+    /// Width for what enters columns: rates and accelerations, and the derivatives above them (a delay, a lever arm). Noise in a
+    /// column, be it only the steps of an encoder, shrinks its parameter, so up to two steps more of smoothing are taken.
     pub fn for_columns(&self, width: Smoothing) -> Smoothing {
-        match WIDTHS[..ORDERED].iter().position(|w| *w == width) {
-            Some(k) if k > 0 => {
-                let last = (k + 2).min(ORDERED - 1);
-                (k..=last).rev().find(|j| self.reaches(*j)).map_or(width, |j| WIDTHS[j])
-            }
-            _ => width,
-        }
+        let Some(k) = WIDTHS[..ORDERED].iter().position(|w| *w == width) else {
+            return width;
+        };
+        let last = (k + 2).min(ORDERED - 1);
+        (k..=last).rev().find(|j| self.reaches(*j)).map_or(width, |j| WIDTHS[j])
     }
 
     /// True if a width leaves nearly all rows with a reference: in a short log a wide polynomial would lose its ends.
