@@ -40,7 +40,7 @@ def values(result: Ladder, effect: str) -> np.ndarray:
 
 
 def lag(result: Ladder, sensor: str) -> float:
-    """Return by how much a sensor's readings come after the reference, s, whatever part of it all sensors have in common."""
+    """Return by how much a sensor's readings come after the reference, s, with what all sensors have in common."""
     own = sum(
         values(result, f"{sensor}.{kind}")[0] for kind in ("delay", "lowpass") if f"{sensor}.{kind}" in result.model
     )
