@@ -1,10 +1,13 @@
 //! First pass over a log: what has to be known of the whole before evidence is taken.
 
+use std::sync::Arc;
+
 use imufit_model::bandwidth::Bandwidth;
 use imufit_model::facts::{Frame, LogFacts};
 use imufit_model::rig::Rig;
 use imufit_model::sensor::Sensor;
 use imufit_model::smoothing::Smoothing;
+use imufit_model::temperature_course::{Parts, TemperatureCourse};
 use imufit_model::window::Window;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -44,6 +47,7 @@ pub struct Survey {
     sensor_steps: [Vec<f64>; 3],
     counts: [usize; 3],
     temperature: (f64, usize),
+    temperature_parts: Parts,
     covariates: Vec<(f64, usize)>,
     field: (Vector3<f64>, usize),
     attitude_width: Bandwidth,
@@ -87,6 +91,7 @@ impl Survey {
             sensor_steps: Default::default(),
             counts: [0; 3],
             temperature: (0.0, 0),
+            temperature_parts: Parts::new(given.n),
             covariates: vec![(0.0, 0); given.covariates.len()],
             field: (Vector3::zeros(), 0),
             attitude_width: Bandwidth::of_attitude(),
@@ -138,6 +143,7 @@ impl Survey {
             if let Some(v) = window.temperature.map(|t| t[i]).filter(|v| v.is_finite()) {
                 self.temperature.0 += v;
                 self.temperature.1 += 1;
+                self.temperature_parts.add(row, window.t[i], v);
             }
             for (sum, column) in self.covariates.iter_mut().zip(&window.covariates) {
                 if column[i].is_finite() {
@@ -261,6 +267,7 @@ impl Survey {
                 if step.is_finite() { step } else { dt }
             }),
             has_temperature: self.temperature.1 > 0,
+            temperature_course: TemperatureCourse::of(&self.temperature_parts).map(Arc::new),
             attitude_smoothing,
             position_smoothing,
             silent_axes: self.silent_axes(attitude_columns, field),

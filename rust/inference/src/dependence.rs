@@ -1,6 +1,7 @@
 //! What a residual depends on, whatever the shape: a few orthogonal contrasts over the bins of each covariate.
 
 use imufit_fit::normal_equations::NormalEquations;
+use imufit_model::probes::OF;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -266,10 +267,10 @@ pub fn test_probes(problem: &Problem, stack: &[usize], probes: &[usize]) -> (Vec
             let card = slot.effect.card();
             // What the axis itself causes is called as its own bins are.
             let own = matches!(card.name.as_str(), "f" | "omega");
-            let covariate = if own {
-                format!("{}_{}", card.name, AXES[axis])
-            } else {
-                card.name.clone()
+            let covariate = match card.parameters.get(largest).and_then(|p| p.name.split_once(OF)) {
+                Some((product, _)) => product.to_string(),
+                None if own => format!("{}_{}", card.name, AXES[axis]),
+                None => card.name.clone(),
             };
             Some(Dependence {
                 channel: 3 * sensor.index() + axis,

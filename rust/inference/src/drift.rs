@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use imufit_fit::evidence::Evidence;
 use imufit_fit::normal_equations::NormalEquations;
+use imufit_fit::whitening;
 use imufit_model::sensor::{CHANNELS, Sensor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -52,8 +53,8 @@ fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
     factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum()
 }
 
-/// Every strength of the walk for blocks with these sample counts.
-fn strengths(count: &DVector<f64>) -> Vec<Strength> {
+/// Every strength of the walk for blocks with these sample counts, up to the variance of a step `most`.
+fn strengths(count: &DVector<f64>, most: f64) -> Vec<Strength> {
     let blocks = count.len();
     let filled = count.iter().filter(|n| **n > 0.0).count();
     if filled < MIN_BLOCKS {
@@ -61,8 +62,9 @@ fn strengths(count: &DVector<f64>) -> Vec<Strength> {
     }
     let unit = filled as f64 / count.sum();
     GRID.iter()
-        .filter_map(|step| {
-            let kappa = step * unit;
+        .map(|step| step * unit)
+        .filter(|kappa| *kappa <= most)
+        .filter_map(|kappa| {
             // A block without samples has a mean of no weight.
             let noise = |b: usize| if count[b] > 0.0 { 1.0 / count[b] } else { 1e6 * unit };
             let covariance = DMatrix::from_fn(blocks, blocks, |i, j| {
@@ -91,10 +93,12 @@ fn strengths(count: &DVector<f64>) -> Vec<Strength> {
         .collect()
 }
 
-/// Block sums of every channel of a log over all `parameters`, among which its own have their places.
+/// Block sums of every channel of a log over all `parameters`, among which its own have their places. `floors` are the noise floors of
+/// the channels: a zero wanders by no more than that from block to block, and what goes further is a misfit.
 pub fn channel_sums(
     log: usize,
     white: &Evidence,
+    floors: &[f64; CHANNELS],
     weights: &[f64; CHANNELS],
     places: &[usize],
     parameters: usize,
@@ -113,8 +117,18 @@ pub fn channel_sums(
             }
             right[b] = block.sum[active.len()];
         }
-        let same = out.iter().find(|o| o.count == count).map(|o| o.strengths.clone());
-        let strengths = same.unwrap_or_else(|| Arc::new(strengths(&count)));
+        let sensor = channel / 3;
+        // The axes of a sensor wander alike.
+        let same = out.iter().find(|o| o.channel / 3 == sensor && o.count == count);
+        let strengths = if let Some(other) = same {
+            other.strengths.clone()
+        } else {
+            let most = (3 * sensor..3 * sensor + 3)
+                .map(|c| floors[c].powi(2) * weights[c] * whitening::gain(&white.layout.filters[c], 0.0))
+                .filter(|v| v.is_finite() && *v > 0.0)
+                .fold(0.0, f64::max);
+            Arc::new(strengths(&count, most))
+        };
         out.push(ChannelSums {
             log,
             channel,
@@ -170,9 +184,9 @@ impl ChannelSums {
         self.sums.select_columns(chosen)
     }
 
-    /// Block means of the residual in units of the noise of one sample, and an orthonormal basis of those of the columns, `extra` (blocks)
-    /// among them.
-    fn means(&self, extra: Option<&DVector<f64>>) -> (DVector<f64>, DMatrix<f64>) {
+    /// Block means of the residual in units of the noise of one sample, and an orthonormal basis of those of the columns, `extra` (blocks
+    /// x columns) among them.
+    fn means(&self, extra: Option<&DMatrix<f64>>) -> (DVector<f64>, DMatrix<f64>) {
         let blocks = self.count.len();
         let mean = |sum: f64, b: usize| if self.count[b] > 0.0 { sum / self.count[b] } else { 0.0 };
         let residual = DVector::from_fn(blocks, |b, _| mean(self.right[b], b) * self.weight.sqrt());
@@ -182,8 +196,8 @@ impl ChannelSums {
         let mut columns = DMatrix::from_fn(blocks, used.len(), |b, k| mean(self.sums[(b, used[k])], b));
         if let Some(extra) = extra {
             let at = columns.ncols();
-            columns = columns.insert_column(at, 0.0);
-            columns.set_column(at, extra);
+            columns = columns.insert_columns(at, extra.ncols(), 0.0);
+            columns.columns_mut(at, extra.ncols()).copy_from(extra);
         }
         for mut column in columns.column_iter_mut() {
             let norm = column.norm();
@@ -225,9 +239,9 @@ impl ChannelSums {
         self.strengths.iter().map(of).collect()
     }
 
-    /// How well the columns, and `extra` (blocks) among them, explain the block means, at the strength of the walk that suits
+    /// How well the columns, and `extra` (blocks x columns) among them, explain the block means, at the strength of the walk that suits
     /// them best; `None` where there are too few blocks for a walk.
-    pub fn profile(&self, extra: Option<&DVector<f64>>) -> Option<Profiled> {
+    pub fn profile(&self, extra: Option<&DMatrix<f64>>) -> Option<Profiled> {
         let (residual, basis) = self.means(extra);
         let of = |s: &Strength| Some(s.log_determinant + Self::left(s, &residual, &basis)?.0);
         let deviance = self.strengths.iter().filter_map(of).min_by(f64::total_cmp)?;
@@ -392,7 +406,7 @@ mod tests {
             (0..12).map(|_| uniform()).sum::<f64>() - 6.0
         };
         let count = DVector::from_element(48, 100.0);
-        let strengths = Arc::new(strengths(&count));
+        let strengths = Arc::new(strengths(&count, f64::INFINITY));
         let mut sums = |walk: f64| {
             let mut level = 0.0;
             let right = DVector::from_fn(48, |_, _| {

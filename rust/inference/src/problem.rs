@@ -72,7 +72,7 @@ impl Problem {
             logs.push(white_blocks.len()..white_blocks.len() + blocks);
             white_blocks.extend((0..blocks).map(|b| assemble(&part.white, b, &weights).placed(places, p)));
             raw_blocks.extend((0..blocks).map(|b| assemble(&part.raw, b, &raw_weights).placed(places, p)));
-            sums.extend(drift::channel_sums(log, &part.white, &weights, places, p));
+            sums.extend(drift::channel_sums(log, &part.white, &part.floors, &weights, places, p));
         }
         let mut plausible = DVector::zeros(p);
         let mut typical = vec![false; p];

@@ -103,6 +103,8 @@ pub(crate) fn wald(question: &Question, total: &NormalEquations) -> f64 {
 
 /// No sensor has an effect this many times larger than what is plausible: something else looks like it.
 const BEYOND: f64 = 7.0;
+/// No axis reads so much of itself, or of another, too much.
+const LARGEST_GAIN: f64 = 0.3;
 /// Halves may differ by this much of the effect, squared.
 const HALVES: f64 = 0.5;
 /// ... or by this many standard deviations of what chance gives.
@@ -281,8 +283,13 @@ impl Weighed {
         out.parameters = (0..candidate.len())
             .map(|j| (values[j], covariance[(j, j)].max(0.0).sqrt()))
             .collect();
+        let (card, first) = (problem.slots[out.slot].effect.card(), problem.slots[out.slot].first);
         out.plausible = candidate.iter().zip(&out.parameters).all(|(j, (value, error))| {
-            let limit = BEYOND * problem.plausible[*j];
+            let gain = card
+                .parameters
+                .get((*j - first) % card.parameters.len())
+                .is_some_and(|p| p.unit == "1");
+            let limit = (BEYOND * problem.plausible[*j]).min(if gain { LARGEST_GAIN } else { f64::INFINITY });
             !problem.typical[*j] || value.abs() - 3.0 * error <= limit
         });
         let early = problem.slots[out.slot].effect.one_sided()

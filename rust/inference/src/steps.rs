@@ -1,56 +1,112 @@
-//! Steps: a residual whose mean jumps at one instant, as no zero that wanders does.
+//! Steps and swings: a residual whose mean jumps at one instant, or swings at one frequency, as no zero that wanders does.
 //!
-//! A walk strong enough for one large step would have many. So the likelihood of the block means with a step, at the
-//! strength of the walk that suits it best, is compared with the likelihood without.
+//! A walk strong enough for one large step, or for one swing, would have many of all kinds. So the likelihood of the block means
+//! with the step or the swing, at the strength of the walk that suits it best, is compared with the likelihood without.
 
-use nalgebra::DVector;
+use std::f64::consts::TAU;
+
+use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::dependence::Dependence;
+use crate::drift::{ChannelSums, Profiled};
 use crate::problem::Problem;
 
-/// Noise that is coloured more slowly than any filter sees jumps now and then: the chance of a false alarm is kept to this part of the usual.
+/// Noise that is coloured more slowly than any filter sees jumps and swings now and then: the chance of a false alarm is kept to this part of the usual.
 pub const CAUTION: f64 = 0.01;
 /// Boundaries between blocks that are looked at: those with the largest differences.
 const LOOKED_AT: usize = 4;
+/// Whole swings in a log, from these on; fewer are a drift.
+const FEWEST_SWINGS: f64 = 1.5;
+/// Frequencies are tried in steps of this many swings in a log.
+const FINENESS: f64 = 0.25;
+/// Blocks that a swing needs.
+const BLOCKS_PER_SWING: f64 = 3.0;
 
-/// The largest step of each channel beside the parameters of `model`, and how many steps were possible.
+/// The largest step and the largest swing of each channel beside the parameters of `model`, and how many were possible.
 pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
     let mut tried = 0;
     let mut found = Vec::new();
     for all in &problem.sums {
         let sums = all.with_sums(all.columns(model));
         let blocks = sums.sums.nrows();
-        tried += blocks.saturating_sub(1);
+        tried += 2 * blocks.saturating_sub(1);
         let Some(without) = sums.profile(None) else { continue };
-        let residual = &without.residual;
-        let mut places: Vec<usize> = (1..blocks).collect();
-        let jump = |k: usize| (residual[k] - residual[k - 1]).abs();
-        places.sort_by(|a, b| jump(*b).total_cmp(&jump(*a)));
-        let best = places
-            .into_iter()
-            .take(LOOKED_AT)
-            .filter_map(|k| {
-                let step = DVector::from_fn(blocks, |b, _| if b < k { 0.0 } else { 1.0 });
-                Some((k, sums.profile(Some(&step))?))
-            })
-            .max_by(|a, b| b.1.deviance.total_cmp(&a.1.deviance));
-        let Some((k, with)) = best else { continue };
-        let ratio = without.deviance - with.deviance;
-        // The strength of the walk is found from these few blocks as well: F, not chi squared.
-        let freedom = blocks.saturating_sub(with.fitted + 1).max(1) as f64;
-        let f = freedom * (ratio.max(0.0) / blocks as f64).exp_m1();
-        let p_value = FisherSnedecor::new(1.0, freedom).map_or(1.0, |d| if f.is_finite() { d.sf(f) } else { 1.0 });
         let facts = &problem.parts[sums.log].white.layout.facts;
-        let t = facts.t_start + (facts.t_end - facts.t_start) * k as f64 / blocks as f64;
-        found.push(Dependence {
-            channel: sums.channel,
-            covariate: "t".to_string(),
-            log: (problem.parts.len() > 1).then_some(sums.log),
-            p_value,
-            gain: without.white - with.white,
-            shape: format!("a step at {t:.1} s"),
+        let duration = facts.t_end - facts.t_start;
+        let step = step(&sums, &without).map(|(k, with)| {
+            let t = facts.t_start + duration * k as f64 / blocks as f64;
+            (with, format!("a step at {t:.1} s"))
         });
+        let swing =
+            swing(&sums, &without).map(|(swings, with)| (with, format!("a swing every {:.1} s", duration / swings)));
+        for (with, shape) in [step, swing].into_iter().flatten() {
+            found.push(Dependence {
+                channel: sums.channel,
+                covariate: "t".to_string(),
+                log: (problem.parts.len() > 1).then_some(sums.log),
+                p_value: p_value(&without, &with, blocks),
+                gain: without.white - with.white,
+                shape,
+            });
+        }
     }
     (found, tried.max(1))
+}
+
+/// p-value of the columns that `with` has besides. The strength of the walk is found from these few blocks as well: F, not chi squared.
+fn p_value(without: &Profiled, with: &Profiled, blocks: usize) -> f64 {
+    let columns = with.fitted.saturating_sub(without.fitted);
+    if columns == 0 {
+        return 1.0;
+    }
+    let ratio = without.deviance - with.deviance;
+    let freedom = blocks.saturating_sub(with.fitted + 1).max(1) as f64;
+    let f = freedom / columns as f64 * (ratio.max(0.0) / blocks as f64).exp_m1();
+    FisherSnedecor::new(columns as f64, freedom).map_or(1.0, |d| if f.is_finite() { d.sf(f) } else { 1.0 })
+}
+
+/// The block before which the mean jumps most.
+fn step(sums: &ChannelSums, without: &Profiled) -> Option<(usize, Profiled)> {
+    let residual = &without.residual;
+    let blocks = residual.len();
+    let mut places: Vec<usize> = (1..blocks).collect();
+    let jump = |k: usize| (residual[k] - residual[k - 1]).abs();
+    places.sort_by(|a, b| jump(*b).total_cmp(&jump(*a)));
+    places
+        .into_iter()
+        .take(LOOKED_AT)
+        .filter_map(|k| {
+            let step = DMatrix::from_fn(blocks, 1, |b, _| if b < k { 0.0 } else { 1.0 });
+            Some((k, sums.profile(Some(&step))?))
+        })
+        .min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))
+}
+
+/// How often the mean swings during the log, if it swings at all: the frequencies that stand out are looked at, as the residual is and
+/// beside what a walk has at each.
+fn swing(sums: &ChannelSums, without: &Profiled) -> Option<(f64, Profiled)> {
+    let blocks = without.residual.len();
+    let wave = |swings: f64| {
+        DMatrix::from_fn(blocks, 2, |b, k| {
+            let phase = TAU * swings * (b as f64 + 0.5) / blocks as f64;
+            if k == 0 { phase.cos() } else { phase.sin() }
+        })
+    };
+    let most = blocks as f64 / BLOCKS_PER_SWING;
+    let frequencies = ((most - FEWEST_SWINGS) / FINENESS).max(0.0) as u32;
+    let mut powers: Vec<(f64, f64)> = (0..=frequencies)
+        .map(|k| FEWEST_SWINGS + FINENESS * f64::from(k))
+        .map(|f| (f, wave(f).tr_mul(&without.residual).norm()))
+        .collect();
+    let mut asked: Vec<f64> = Vec::new();
+    for steepness in [0.0, 1.0] {
+        let weighed = |p: &(f64, f64)| p.1 * p.0.powf(steepness);
+        powers.sort_by(|a, b| weighed(b).total_cmp(&weighed(a)));
+        asked.extend(powers.iter().take(LOOKED_AT).map(|p| p.0));
+    }
+    asked
+        .into_iter()
+        .filter_map(|swings| Some((swings, sums.profile(Some(&wave(swings)))?)))
+        .min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))
 }

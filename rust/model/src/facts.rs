@@ -1,10 +1,13 @@
 //! What is known of a log as a whole before its evidence is taken.
 
+use std::sync::Arc;
+
 pub use imufit_attitude::Frame;
 use nalgebra::Vector3;
 
 use crate::rig::Rig;
 use crate::smoothing::{NARROWEST, Smoothing};
+use crate::temperature_course::TemperatureCourse;
 use crate::window::Window;
 
 /// Rows before a window that a whitening filter may look back on.
@@ -41,6 +44,8 @@ pub struct LogFacts {
     pub sensor_dt: [f64; 3],
     /// True if the log has a thermometer.
     pub has_temperature: bool,
+    /// How its temperature went; `None` where too little of that is known.
+    pub temperature_course: Option<Arc<TemperatureCourse>>,
     /// How the reference attitude is differentiated.
     pub attitude_smoothing: Smoothing,
     /// How the reference position is differentiated; `None` without position.
@@ -108,6 +113,7 @@ impl LogFacts {
             sensors: window.readings.map(|r| r.is_some()),
             sensor_dt: [dt; 3],
             has_temperature,
+            temperature_course: None,
             attitude_smoothing: NARROWEST,
             position_smoothing: None,
             column_noise: [0.0; 3],

@@ -18,6 +18,7 @@ pub mod rig;
 pub mod sensor;
 pub mod sensor_model;
 pub mod smoothing;
+pub mod temperature_course;
 pub mod triple;
 pub mod vibration;
 pub mod window;

@@ -10,6 +10,8 @@ use crate::card::{Card, Found, Parameter, Stage};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
+use crate::temperature_course::PASTS;
+use crate::triple::Triple;
 
 /// Columns of a log's own that are asked about; a log with more is asked about the first ones.
 const MOST_COLUMNS: usize = 8;
@@ -21,6 +23,12 @@ enum Kind {
     Gain(usize),
     /// k (c - mean) (d - mean).
     Product(Quantity, Quantity),
+    /// k s with s what the past of the temperature amounts to, see [`crate::temperature_course`].
+    TemperaturePast,
+    /// k (t - middle) x / duration.
+    GainInTime,
+    /// k u v of two vectors of the body frame, on every axis; not the squares of the sensor's own.
+    Cross(Motion, Motion),
     /// k x where |x| is below one of [`SMALL`] times the full scale of such a motion.
     NearZero,
     /// R^T G p with G symmetric and without trace, as the gradient of a field without sources is.
@@ -31,10 +39,33 @@ enum Kind {
 const SMALL: [f64; 5] = [0.005, 0.01, 0.02, 0.04, 0.08];
 /// Ideal readings count from this many times their noise on.
 const CLEAR: f64 = 5.0;
-/// Parameters of a probe near zero: each part, x, y and z.
-const NEAR_ZERO: [&str; 15] = [
-    "x1", "y1", "z1", "x2", "y2", "z2", "x3", "y3", "z3", "x4", "y4", "z4", "x5", "y5", "z5",
-];
+/// Names of the body axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// Stands between a product of two quantities and the axis that it acts on, in the name of a parameter.
+pub const OF: char = ':';
+
+/// A vector of the motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Motion {
+    Force,
+    Rate,
+}
+
+impl Motion {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Force => "f",
+            Self::Rate => "omega",
+        }
+    }
+
+    fn of<'a>(self, rows: &Rows<'a>) -> &'a Triple {
+        match self {
+            Self::Force => &rows.ideal.f,
+            Self::Rate => &rows.ideal.omega,
+        }
+    }
+}
 
 /// A quantity beside the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +92,16 @@ pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
     for sensor in Sensor::ALL.into_iter().filter(|s| facts.sensors[s.index()]) {
         if sensor != Sensor::Mag {
             kinds.push((sensor, Kind::NearZero));
+            let pairs = [
+                (Motion::Force, Motion::Force),
+                (Motion::Rate, Motion::Rate),
+                (Motion::Force, Motion::Rate),
+            ];
+            kinds.extend(pairs.map(|(u, v)| (sensor, Kind::Cross(u, v))));
+        }
+        kinds.push((sensor, Kind::GainInTime));
+        if facts.temperature_course.is_some() {
+            kinds.push((sensor, Kind::TemperaturePast));
         }
         kinds.extend((0..columns).map(|c| (sensor, Kind::Gain(c))));
         for (k, first) in quantities.iter().enumerate() {
@@ -81,34 +122,50 @@ impl Probe {
             Quantity::Temperature => "temp".to_string(),
             Quantity::Column(c) => facts.covariates[c].clone(),
         };
-        let (stage, names, on, shape): (_, &[&str], _, _) = match &kind {
-            Kind::Gain(c) => (
-                Stage::Gain,
-                &["x", "y", "z"],
-                name(Quantity::Column(*c)),
-                "its gain follows it",
+        let xyz = || AXES.map(str::to_string).to_vec();
+        let (stage, names, on, shape) = match &kind {
+            Kind::TemperaturePast => (
+                Stage::Offset,
+                (0..PASTS).flat_map(|k| AXES.map(|a| format!("{a}{k}"))).collect(),
+                name(Quantity::Temperature),
+                "its past counts as well",
             ),
+            Kind::GainInTime => (Stage::Gain, xyz(), "t".to_string(), "the gain drifts"),
+            Kind::Cross(u, v) => (
+                Stage::Offset,
+                pairs(*u, *v)
+                    .flat_map(|(i, j)| {
+                        let product = format!("{}_{}*{}_{}", u.name(), AXES[i], v.name(), AXES[j]);
+                        AXES.map(|a| format!("{product}{OF}{a}"))
+                    })
+                    .collect(),
+                format!("{}*{}", u.name(), v.name()),
+                "both act together",
+            ),
+            Kind::Gain(c) => (Stage::Gain, xyz(), name(Quantity::Column(*c)), "its gain follows it"),
             Kind::Product(a, b) => (
                 Stage::Offset,
-                &["x", "y", "z"],
+                xyz(),
                 format!("{}*{}", name(*a), name(*b)),
                 "both act together",
             ),
             Kind::NearZero => (
                 Stage::Gain,
-                &NEAR_ZERO,
+                (1..=SMALL.len())
+                    .flat_map(|k| AXES.map(|a| format!("{a}{k}")))
+                    .collect(),
                 if sensor == Sensor::Acc { "f" } else { "omega" }.to_string(),
                 "another gain about zero",
             ),
             Kind::Gradient => (
                 Stage::Offset,
-                &["x", "y", "xy", "xz", "yz"],
+                ["x", "y", "xy", "xz", "yz"].map(str::to_string).to_vec(),
                 "ref_px*ref_py*ref_pz".to_string(),
                 "the field varies in space",
             ),
         };
-        let parameter = |name: &&str| Parameter {
-            name: (*name).to_string(),
+        let parameter = |name: String| Parameter {
+            name,
             unit: String::new(),
             typical: None,
             found: Found::Steps,
@@ -120,7 +177,7 @@ impl Probe {
                 id: format!("{} {shape}: {on}", sensor.prefix()),
                 name: on,
                 stage,
-                parameters: names.iter().map(parameter).collect(),
+                parameters: names.into_iter().map(parameter).collect(),
                 physics,
                 formula,
                 signature: shape.to_string(),
@@ -131,6 +188,11 @@ impl Probe {
             kind,
         }
     }
+}
+
+/// Axes of two vectors whose products are asked about: all, of a vector with itself those of different axes.
+fn pairs(u: Motion, v: Motion) -> impl Iterator<Item = (usize, usize)> {
+    (0..9).map(|k| (k / 3, k % 3)).filter(move |(i, j)| u != v || i < j)
 }
 
 /// A quantity less its mean; `None` where the log has it not.
@@ -170,6 +232,36 @@ impl Effect for Probe {
                 if let (Some(a), Some(b)) = (deviation(rows, *a), deviation(rows, *b)) {
                     for axis in 0..3 {
                         out.set(axis, axis, a.iter().zip(&b).map(|(a, b)| a * b));
+                    }
+                }
+            }
+            Kind::TemperaturePast => {
+                if let Some(course) = &rows.facts.temperature_course {
+                    for past in 0..PASTS {
+                        let by = course.at(past, rows.t);
+                        for axis in 0..3 {
+                            out.set(3 * past + axis, axis, by.iter().copied());
+                        }
+                    }
+                }
+            }
+            Kind::GainInTime => {
+                let (start, end) = (rows.facts.t_start, rows.facts.t_end);
+                let part = |t: &f64| (t - 0.5 * (start + end)) / (end - start);
+                for axis in 0..3 {
+                    out.set(
+                        axis,
+                        axis,
+                        rows.t.iter().zip(rows.x.axis(axis)).map(|(t, x)| part(t) * x),
+                    );
+                }
+            }
+            Kind::Cross(u, v) => {
+                let (first, second) = (u.of(rows), v.of(rows));
+                for (k, (i, j)) in pairs(*u, *v).enumerate() {
+                    for axis in 0..3 {
+                        let product = first.axis(i).iter().zip(second.axis(j)).map(|(a, b)| a * b);
+                        out.set(3 * k + axis, axis, product);
                     }
                 }
             }
