@@ -93,11 +93,11 @@ def in_words(parameters: tuple[Parameter, ...], limit: int = 3) -> str:
     def weight(p: Parameter) -> float:
         return abs(p.value) / p.standard_error if p.standard_error > 0.0 else 0.0
 
-    chosen = sorted(parameters, key=weight, reverse=True)[:limit]
+    chosen = sorted((p for p in parameters if p.told), key=weight, reverse=True)[:limit]
     shown = [
         f"{p.name} {quantity.with_error(p.value, CHANCE * p.standard_error, p.unit)}" for p in parameters if p in chosen
     ]
-    return ", ".join(shown)
+    return ", ".join(shown) or "not told"
 
 
 def answer(verdict: str, best: str | None, rivals: tuple[str, ...]) -> str:
