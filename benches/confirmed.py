@@ -17,6 +17,7 @@ from pathlib import Path
 import imufit
 import numpy as np
 from imufit import InputError, Ladder, Log, SensorModel
+from imufit.fit import Fit
 from imufit.fit.analysis import OWN
 from imufit.results import Parameter
 
@@ -143,6 +144,13 @@ def ratio(part: str, here: Sequence[Parameter], there: Sequence[Parameter]) -> R
     return Ratio(part, float(np.sum(w * a * b)) / information, information**-0.5)
 
 
+def fitted(model: SensorModel, there: Fit) -> tuple[Parameter, ...]:
+    """Fit a model to the logs of another fit, from the model's values on; empty where they cannot tell of it."""
+    if any(there.analysis.refusal(effect) for effect, _ in model.stack()):
+        return ()
+    return Fit(*there.analysis.solved_for(model, there.own, only=())).parameters
+
+
 def comparable(effect: str, here: Part, there: Part) -> bool:
     """Zeros, mounts and tables are one recording's; all else is the sensor's."""
     own = effect in OWN or any(name in effect for name in OF_A_RECORDING)
@@ -168,19 +176,15 @@ class Climber:
                 continue
             told = f"{', '.join(ladders[title].model)}: {ladders[title].verdict}"
             print(f"{title}: {told} ({time.perf_counter() - before:.0f} s)", file=sys.stderr, flush=True)
-        return Climbed(sensor, ladders, failures, self._found(sensor, logs, ladders))
+        return Climbed(sensor, ladders, failures, self._found(sensor, ladders))
 
-    def _found(self, sensor: Sensor, logs: dict[str, list[Log]], ladders: dict[str, Ladder]) -> tuple[Found, ...]:
+    def _found(self, sensor: Sensor, ladders: dict[str, Ladder]) -> tuple[Found, ...]:
         parts = {part.title: part for part in sensor.parts}
         fits: dict[tuple[str, str], tuple[Parameter, ...]] = {}
 
         def there(best: str, other: str) -> tuple[Parameter, ...]:
             if (best, other) not in fits:
-                try:
-                    fits[best, other] = SensorModel(ladders[best].model).fit(logs[other]).parameters
-                except InputError as error:
-                    print(f"{other}: {error}", file=sys.stderr, flush=True)
-                    fits[best, other] = ()
+                fits[best, other] = fitted(ladders[best].fit.model, ladders[other].fit)
             return fits[best, other]
 
         found = []
