@@ -182,6 +182,20 @@ def measured(folder: Path, names: list[str]) -> dict[str, list[list[str]]]:
     return rows
 
 
+def summary(rows: dict[str, list[list[str]]]) -> list[tuple[str, ...]]:
+    """One row for each sensor: errors of its parts, what other parts confirm of what was found, and what not."""
+    found = []
+    for sensor in dict.fromkeys(row[0] for row in rows["parts"]):
+        effects = [row for row in rows["effects"] if row[0] == sensor]
+        by_answer = [
+            ", ".join(row[1] for row in effects if row[5] == answer) or "-" for answer in ("yes", "no", "not seen")
+        ]
+        named = [f"{row[1]} ({'confirmed' if row[5] == 'yes' else row[5]})" for row in effects if row[6] != "-"]
+        errors = "; ".join(row[3] for row in rows["parts"] if row[0] == sensor)
+        found.append((sensor, errors, ", ".join(named) or "-", *by_answer))
+    return found
+
+
 def markdown(table: Table) -> str:
     rule = "|".join("---:" if right else "---" for right in table.right)
     lines = [" | ".join(table.names), rule, *(" | ".join(row) for row in table.rows)]
@@ -194,7 +208,16 @@ def section(rows: dict[str, list[list[str]]]) -> str:
         "effects": "### What other parts say of each effect",
         "calibrated": "### Without a reference",
     }
-    parts = [
+    heads = (
+        "sensor",
+        "error over floor, part by part",
+        "first answer `missing`",
+        "confirmed",
+        "not confirmed",
+        "not seen elsewhere",
+    )
+    parts = [markdown(Table("", heads, tuple(summary(rows))))] if rows["parts"] else []
+    parts += [
         f"{titles[name]}\n\n{markdown(Table('', HEADERS[name], tuple(map(tuple, rows[name]))))}"
         for name in HEADERS
         if rows[name]
