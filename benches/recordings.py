@@ -62,7 +62,11 @@ SENSORS = {
         ),
     ),
     "broad-beside": Sensor(
-        "BROAD, a magnet stands beside", halves("broad/29_disturbed_stationary_magnet_B.parquet", "29")
+        "BROAD, a magnet stands beside",
+        tuple(
+            Part(f"29, {name} quarter", ("broad/29_disturbed_stationary_magnet_B.parquet",), begin, begin + 0.25)
+            for name, begin in (("2nd", 0.25), ("3rd", 0.5))
+        ),
     ),
     "broad-on": Sensor(
         "BROAD, a magnet 2 cm off moves along", halves("broad/33_disturbed_attached_magnet_2cm.parquet", "33")
