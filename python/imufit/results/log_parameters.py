@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from imufit.figures import quantity
 from imufit.results.parameter import Parameter, by_effect
 from imufit.results.table import Table
 
@@ -46,7 +45,7 @@ def log_table(logs: Sequence[LogParameters]) -> Table:
     for log in logs:
         for item in log.parameters:
             cells = rows.setdefault((item.effect, item.name), {})
-            cells[log.file] = quantity.with_error(item.value, item.standard_error, item.unit)
+            cells[log.file] = item.shown
     header = ("effect", "parameter", *(log.file for log in logs))
     lines = tuple((*key, *(row.get(log.file, "-") for log in logs)) for key, row in rows.items())
     return Table("What each log has for itself", header, lines)

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+UNTOLD = 10.0
+"""A parameter whose standard error is this many typical sizes is one that the log says nothing about."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One parameter of one effect.
@@ -39,6 +43,16 @@ class Parameter:
     unit: str
     typical: float | None = None
 
+    @property
+    def told(self) -> bool:
+        """False if the log leaves it open: no such motion, or one direction of it is another effect's as well."""
+        return not self.typical or not self.standard_error > UNTOLD * self.typical
+
+    @property
+    def shown(self) -> str:
+        """Value and standard error in the shown unit."""
+        return quantity.with_error(self.value, self.standard_error, self.unit) if self.told else "not told"
+
     def to_dict(self) -> dict[str, Any]:
         """JSON of one parameter: value, standard error, unit, typical size."""
         return {
@@ -60,7 +74,7 @@ class Parameter:
         return parameter_table((self,)).html()
 
     def __str__(self) -> str:
-        return f"{self.effect} {self.name} = {quantity.with_error(self.value, self.standard_error, self.unit)}"
+        return f"{self.effect} {self.name} = {self.shown}"
 
 
 def by_name(parameters: Iterable[Parameter]) -> dict[str, dict[str, Any]]:
@@ -87,11 +101,7 @@ def in_lines(parameters: Sequence[Parameter], limit: int = 3) -> list[str]:
         return abs(parameter.value / parameter.standard_error)
 
     chosen = sorted(parameters, key=weight, reverse=True)[:limit]
-    lines = [
-        f"{item.name} {quantity.with_error(item.value, item.standard_error, item.unit)}"
-        for item in parameters
-        if item in chosen
-    ]
+    lines = [f"{item.name} {item.shown}" for item in parameters if item in chosen]
     rest = len(parameters) - len(chosen)
     return [*lines, *([f"and {rest} more"] if rest else [])]
 
@@ -107,7 +117,7 @@ def parameter_table(parameters: Iterable[Parameter], title: str = "") -> Table:
         (
             item.effect,
             item.name,
-            quantity.with_error(item.value, item.standard_error, item.unit),
+            item.shown,
             quantity.quantity(item.typical, item.unit),
         )
         for item in parameters

@@ -1,0 +1,261 @@
+"""What imufit finds in real recordings, and whether other parts of them confirm it; writes docs/recordings.md.
+
+Each sensor of the recordings is asked on several parts (halves of a recording, stretches of a flight, groups of short
+recordings): the ladder climbs each part alone, and every effect it finds is looked up on the others (`confirmed.py`).
+Recordings without a reference attitude are calibrated and confirmed by the poses that had no part in it
+(`halves_of_poses.py`).
+
+Run: ``python benches/recordings.py [FOLDER] [--write] [--sensor NAME]... [--from FILE]... [--json FILE]``. Without
+`--write` the tables go to standard output only; with it they go between the marks of the page. `--from` takes what an
+earlier run wrote with `--json`.
+"""
+
+import argparse
+import itertools
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from confirmed import CHANCE, Climbed, Climber, Found, Part, Sensor, halves
+from halves_of_poses import Calibrated, calibrated
+from imufit.figures import quantity
+from imufit.results import Parameter, Table
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER, PAGE = ROOT / ".." / "shared" / "data", ROOT / "docs" / "recordings.md"
+BEGIN, END = "<!-- measured by benches/recordings.py -->", "<!-- end of what was measured -->"
+
+
+def arm(sensor: str) -> tuple[Part, ...]:
+    """Return the recordings of the robot arm by speed: one alone lasts 10 to 60 s."""
+    speeds = {150: (1, 2, 3), 300: (1, 3, 4), 800: (1, 3, 4)}
+    return tuple(
+        Part(
+            f"{speed} mm/s, {len(paths)} paths", tuple(f"robot_arm/{sensor}_path{n}_{speed}mms.parquet" for n in paths)
+        )
+        for speed, paths in speeds.items()
+    )
+
+
+def rig(*names: str) -> tuple[Part, ...]:
+    """Return a hundred seconds of each half of the recordings of the encoder rig."""
+    return tuple(
+        part for name in names for part in halves(f"encoder_rig/{name}.parquet", name.replace("_", " "), 2 / 15)
+    )
+
+
+def flight(*cuts: float) -> tuple[Part, ...]:
+    file = "uav_motor_current/thor75_part1.parquet"
+    return tuple(
+        Part(f"{340 * begin:.0f} to {340 * end:.0f} s", (file,), begin, end) for begin, end in itertools.pairwise(cuts)
+    )
+
+
+SENSORS = {
+    "broad": Sensor(
+        "BROAD, myon aktos-t",
+        (
+            *halves("broad/07_undisturbed_fast_rotation_B.parquet", "07"),
+            *halves("broad/21_undisturbed_fast_combined.parquet", "21"),
+        ),
+    ),
+    "broad-beside": Sensor(
+        "BROAD, a magnet stands beside",
+        tuple(
+            Part(f"29, {name} quarter", ("broad/29_disturbed_stationary_magnet_B.parquet",), begin, begin + 0.25)
+            for name, begin in (("2nd", 0.25), ("3rd", 0.5))
+        ),
+    ),
+    "broad-on": Sensor(
+        "BROAD, a magnet 2 cm off moves along", halves("broad/33_disturbed_attached_magnet_2cm.parquet", "33")
+    ),
+    "arm-9150": Sensor("robot arm, MPU9150", arm("MPU9150")),
+    "arm-6050": Sensor("robot arm, MPU6050 + RM3100", arm("MPU6050RM3100")),
+    "rig": Sensor("encoder rig, MPU6050", rig("roll_slow", "pitch_medium", "yaw_medium")),
+    "flight": Sensor("aircraft, IMU and magnetometer", flight(0.25, 0.5, 0.75, 1.0)),
+}
+RESTS = tuple(
+    f"mpu6050_hmc5883l/set-2_unmoved-with-{name}.parquet"
+    for name in ("x-pointing-forward-10min", "z-pointing-front-and-x-up", "z-pointing-front-and-y-down")
+)
+CALIBRATED = {
+    "many_positions/mpu6050_poses.parquet": ("many positions, MPU6050", ()),
+    "many_positions/mpu9150_unit0.parquet": ("many positions, MPU9150 unit 0", ()),
+    "many_positions/mpu9150_unit1.parquet": ("many positions, MPU9150 unit 1", ()),
+    "many_positions/mpu9150_unit3.parquet": ("many positions, MPU9150 unit 3", ()),
+    "many_positions/xsens_mti_37_poses.parquet": ("many positions, Xsens MTi", ()),
+    "six_positions/ferraris_session_A.parquet": ("six positions, session A", ()),
+    "mpu6050_hmc5883l/set-2_full-sphere.parquet": ("MPU6050 + HMC5883L, turned freely", RESTS),
+}
+
+
+def in_words(parameters: tuple[Parameter, ...], limit: int = 3) -> str:
+    """Write the parameters that stand out most from their errors, with two standard errors."""
+
+    def weight(p: Parameter) -> float:
+        return abs(p.value) / p.standard_error if p.standard_error > 0.0 else 0.0
+
+    chosen = sorted((p for p in parameters if p.told), key=weight, reverse=True)[:limit]
+    shown = [
+        f"{p.name} {quantity.with_error(p.value, CHANCE * p.standard_error, p.unit)}" for p in parameters if p in chosen
+    ]
+    return ", ".join(shown) or "not told"
+
+
+def answer(verdict: str, best: str | None, rivals: tuple[str, ...]) -> str:
+    named = " or ".join(f"`{each}`" for each in dict.fromkeys([*([best] if best else []), *rivals]))
+    return f"{verdict} {named}".strip()
+
+
+def part_row(climbed: Climbed, part: Part) -> list[str]:
+    if part.title in climbed.failures:
+        return [climbed.sensor.title, part.title, "-", "-", climbed.failures[part.title], "-"]
+    ladder = climbed.ladders[part.title]
+    first = ladder.first
+    steps = ", ".join(f"`{step.effect}` {quantity.ratio(step.after)}" for step in ladder.steps)
+    return [
+        climbed.sensor.title,
+        part.title,
+        "-" if first is None else answer(first.verdict, first.best, first.ambiguous_with),
+        f"{quantity.ratio(ladder.ratio_start)} → {quantity.ratio(ladder.ratio_end)}",
+        steps or "-",
+        answer(ladder.verdict, ladder.diagnosis.best, ladder.diagnosis.ambiguous_with),
+    ]
+
+
+def found_row(climbed: Climbed, found: Found) -> list[str]:
+    ratios = [f"{ratio.part}: {ratio}" for ratio in found.ratios]
+    return [
+        climbed.sensor.title,
+        f"`{found.effect}`",
+        f"{len(found.on)} of {len(climbed.ladders)}",
+        f"{in_words(found.parameters)} ({found.best})",
+        "; ".join(ratios) or "-",
+        found.answer,
+        ", ".join(found.first_answer_of) or "-",
+    ]
+
+
+def calibrated_row(found: Calibrated) -> list[str]:
+    errors = [quantity.quantity(value, found.unit) for value in (found.before, found.held_out)]
+    return [
+        found.recording,
+        f"`{found.effect}`",
+        in_words(found.parameters),
+        f"{errors[0]} → {errors[1]}",
+        found.confirmed_by,
+        "-" if found.ratio is None else str(found.ratio),
+    ]
+
+
+HEADERS = {
+    "parts": ("sensor", "part", "first answer", ">error over floor", "added, error after", "ends as"),
+    "effects": (
+        "sensor",
+        "effect",
+        ">found on",
+        "size ± 2 SE, where it shows best",
+        "ratio elsewhere",
+        "confirmed",
+        "first answer of",
+    ),
+    "calibrated": (
+        "recording",
+        "effect",
+        "size ± 2 SE",
+        ">error before → held out",
+        "held out",
+        ">second half / first",
+    ),
+}
+
+
+def measured(folder: Path, names: list[str]) -> dict[str, list[list[str]]]:
+    rows: dict[str, list[list[str]]] = {name: [] for name in HEADERS}
+    climber = Climber(folder)
+    for name in names:
+        if name == "calibrated":
+            for file, (title, rests) in CALIBRATED.items():
+                rows["calibrated"] += [calibrated_row(each) for each in calibrated(folder, file, title, rests)]
+            continue
+        climbed = climber.climb(SENSORS[name])
+        rows["parts"] += [part_row(climbed, part) for part in climbed.sensor.parts]
+        rows["effects"] += [found_row(climbed, each) for each in climbed.found]
+    return rows
+
+
+def summary(rows: dict[str, list[list[str]]]) -> list[tuple[str, ...]]:
+    """One row for each sensor: errors of its parts, what other parts confirm of what was found, and what not."""
+    found = []
+    for sensor in dict.fromkeys(row[0] for row in rows["parts"]):
+        effects = [row for row in rows["effects"] if row[0] == sensor]
+        by_answer = [
+            ", ".join(row[1] for row in effects if row[5] == answer) or "-" for answer in ("yes", "no", "not seen")
+        ]
+        named = [f"{row[1]} ({'confirmed' if row[5] == 'yes' else row[5]})" for row in effects if row[6] != "-"]
+        errors = "; ".join(row[3] for row in rows["parts"] if row[0] == sensor)
+        found.append((sensor, errors, ", ".join(named) or "-", *by_answer))
+    return found
+
+
+def markdown(table: Table) -> str:
+    rule = "|".join("---:" if right else "---" for right in table.right)
+    lines = [" | ".join(table.names), rule, *(" | ".join(row) for row in table.rows)]
+    return "\n".join(f"| {line} |" if line != rule else f"|{line}|" for line in lines)
+
+
+def section(rows: dict[str, list[list[str]]]) -> str:
+    titles = {
+        "parts": "### What the ladder adds, part by part",
+        "effects": "### What other parts say of each effect",
+        "calibrated": "### Without a reference",
+    }
+    heads = (
+        "sensor",
+        "error over floor, part by part",
+        "first answer `missing`",
+        "confirmed",
+        "not confirmed",
+        "not seen elsewhere",
+    )
+    parts = [markdown(Table("", heads, tuple(summary(rows))))] if rows["parts"] else []
+    parts += [
+        f"{titles[name]}\n\n{markdown(Table('', HEADERS[name], tuple(map(tuple, rows[name]))))}"
+        for name in HEADERS
+        if rows[name]
+    ]
+    return "\n\n".join(parts)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, default=FOLDER)
+    parser.add_argument("--write", action="store_true", help="put what was measured into docs/recordings.md")
+    names = [*SENSORS, "calibrated"]
+    parser.add_argument("--sensor", dest="sensors", action="append", choices=names, help="only these; repeatable")
+    parser.add_argument("--from", dest="files", action="append", type=Path, help="rows of an earlier run; repeatable")
+    parser.add_argument("--json", type=Path, help="write the rows to this file")
+    given = parser.parse_args()
+    before = time.perf_counter()
+    rows: dict[str, list[list[str]]] = {name: [] for name in HEADERS}
+    sources: list[dict[str, Any]] = [json.loads(file.read_text(encoding="utf-8")) for file in given.files or []]
+    if not sources:
+        sources = [measured(given.folder, given.sensors or names)]
+    for source in sources:
+        for name, more in source.items():
+            rows[name] += more
+    text = section(rows)
+    print(text)
+    print(f"{time.perf_counter() - before:.0f} s", file=sys.stderr)
+    if given.json:
+        given.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    if given.write:
+        page = PAGE.read_text(encoding="utf-8")
+        head, _, rest = page.partition(BEGIN)
+        PAGE.write_text(f"{head}{BEGIN}\n\n{text}\n\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
