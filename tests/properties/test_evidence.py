@@ -138,7 +138,7 @@ def test_two_recordings_of_one_sensor_add_up():
         (chunk,) = pieces(piece, names, [], 0)
         parts.append(taken(analysis, NO_FILTERS, [{**chunk, "offset": start}]))
     parts[0].merge(parts[1])
-    # Time counted from another start is rounded elsewhere; a second derivative of the position multiplies that by 1/dt^2.
+    # Time counted from another start is rounded elsewhere; a second derivative multiplies that by 1/dt^2.
     assert_same(both, parts[0], within=1e-8)
 
 

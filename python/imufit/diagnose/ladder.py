@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from imufit.diagnose.add import add
 from imufit.diagnose.attitude import attitude_comparison
 from imufit.diagnose.compare import comparison
@@ -15,6 +17,8 @@ from imufit.results import Candidate, Diagnosis, Ladder, Step
 MAX_STEPS = 12
 MATTERS = 0.002
 """Share of the held-out error that an effect must take away to be added beside something unknown."""
+IRON = frozenset({"mag.hard_iron", "mag.soft_iron"})
+FIELD_VARIES = "the field varies in space"
 
 
 def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | None = None) -> Ladder:
@@ -44,16 +48,20 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
     steps: list[Step] = []
     first: Diagnosis | None = None
     diagnosis = diagnose(fit)
+    futile: set[str] = set()
     while len(steps) < MAX_STEPS:
         first = first or diagnosis
-        effect = next_effect(fit, diagnosis)
+        effect = next_effect(fit, diagnosis, futile)
         if effect is None:
             break
         expected = next(c.held_out_after for c in diagnosis.candidates if c.effect == effect)
         addition = add(fit, effect, expected)
         if not addition.after < addition.before:
-            break
+            # What the evidence promised, the fit did not keep: the next one may.
+            futile.add(effect)
+            continue
         fit = addition.fit
+        futile.clear()
         steps.append(Step(effect, addition.before, expected, addition.after, fit.training_ratio))
         diagnosis = diagnose(fit)
     worst = first_fit.worst
@@ -73,16 +81,30 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
     )
 
 
-def next_effect(fit: Fit, diagnosis: Diagnosis) -> str | None:
-    """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well."""
+def next_effect(fit: Fit, diagnosis: Diagnosis, futile: Collection[str] = ()) -> str | None:
+    """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model so far.
+    diagnosis : Diagnosis
+        What was found on top of it.
+    futile : collection of str
+        Effects that were tried and did not lower the held-out error.
+    """
     if diagnosis.verdict == "adequate" or diagnosis.without:
         return None
     if diagnosis.verdict == "ambiguous":
-        return _beside_the_unsure(fit)
+        effect = _beside_the_unsure(fit)
+        return None if effect in futile else effect
+    passed = [c for c in diagnosis.candidates if c.status == "passed" and c.effect not in futile]
     if diagnosis.verdict == "unknown":
-        # Beside what nothing explains, only effects that matter are taken up.
-        return next((c.effect for c in diagnosis.candidates if c.status == "passed" and _matters(c)), None)
-    return next((c.effect for c in diagnosis.candidates if c.status == "passed"), None)
+        # Beside what nothing explains, only effects that matter are taken up, and no iron of the sensor where the field
+        # itself is another from place to place.
+        varies = any(u.shape == FIELD_VARIES for u in diagnosis.unexplained)
+        passed = [c for c in passed if _matters(c) and not (varies and c.effect in IRON)]
+    return passed[0].effect if passed else None
 
 
 def _beside_the_unsure(fit: Fit) -> str | None:
