@@ -264,7 +264,7 @@ def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item
     having = [log for log in concerned if any(c["channel"] == item["channel"] for c in residuals[log]["channels"])]
     log = max(having, key=share)
     facts = analysis.logs[log].facts
-    edges = np.linspace(facts.t_start, facts.t_end, analysis.logs[log].raw.blocks + 1)
+    edges = analysis.logs[log].passes.edges(facts)
     first, last = next(c["stretch"] for c in residuals[log]["channels"] if c["channel"] == item["channel"])
     return Unexplained(
         item["channel"], item["covariate"], share(log), item["shape"], float(edges[first]), float(edges[last])

@@ -15,6 +15,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
 use crate::bins::Bins;
+use crate::rests::{ChannelRows, Rests};
 use crate::whitening::Filter;
 
 /// Rows worked on at a time: their columns stay in the cache.
@@ -197,6 +198,51 @@ impl Evidence {
             self.absorb(part?);
         }
         Ok(())
+    }
+
+    /// Adds what the rests of a log tell, where they stand in for a reference.
+    pub fn add_rests(&mut self, rests: &Rests) -> Result<(), EffectError> {
+        for rows in rests.rows(&self.layout.model, &self.layout.facts)? {
+            self.add_rows(&rows);
+        }
+        Ok(())
+    }
+
+    /// Adds finished rows of one channel. Rows with a column that is not known are no evidence.
+    fn add_rows(&mut self, rows: &ChannelRows) {
+        let bins = &self.layout.bins;
+        let width = rows.columns.columns.len() + 1;
+        let mut assigned = vec![Vec::new(); bins.names.len()];
+        for (covariate, assigned) in assigned.iter_mut().enumerate() {
+            if !bins.edges[covariate].is_empty() {
+                bins.assign(covariate, &rows.t, &rows.around, assigned);
+            }
+        }
+        for i in 0..rows.t.len() {
+            let columns = rows.columns.columns.iter().chain(std::iter::once(&rows.columns.residual));
+            let row = DVector::from_iterator(width, columns.map(|c| c[i]));
+            if row.iter().any(|v| !v.is_finite()) {
+                continue;
+            }
+            let key = (rows.block[i], rows.channel);
+            let target = self.blocks.entry(key).or_insert_with(|| ChannelBlock::new(width, bins));
+            target.n += 1;
+            target.gram.ger(1.0, &row, &row, 1.0);
+            // A constant has the weight of its row.
+            let weight = rows.weight[i];
+            target.sum.axpy(weight, &row, 1.0);
+            for (covariate, assigned) in assigned.iter().enumerate().filter(|(_, a)| !a.is_empty()) {
+                let bin = assigned[i];
+                if bin == usize::MAX {
+                    continue;
+                }
+                target.bin_count[covariate][bin] += weight * weight;
+                let sums = &mut target.bin_sum[covariate][bin * width..(bin + 1) * width];
+                for (s, v) in sums.iter_mut().zip(row.iter()) {
+                    *s += weight * v;
+                }
+            }
+        }
     }
 
     fn absorb(&mut self, part: Blocks) {

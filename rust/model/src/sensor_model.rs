@@ -8,13 +8,14 @@ use crate::card::Stage;
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::ideal::{Command, Ideal, ReferenceChange};
+use crate::rest_channels;
 use crate::sensor::{CHANNELS, Sensor};
 use crate::triple::Triple;
 use crate::vibration;
 use crate::window::{Window, held};
 
-/// Columns of a sensor's three channels, in the order of their active parameters.
-type AxisColumns = [Vec<Vec<f64>>; 3];
+/// Columns of a sensor's three axes, in the order of the parameters that are active on each.
+pub type AxisColumns = [Vec<Vec<f64>>; 3];
 
 /// An effect with its parameters and its place among all parameters.
 #[derive(Clone)]
@@ -46,8 +47,10 @@ impl Slot {
 pub struct SensorModel {
     slots: Vec<Slot>,
     parameters: usize,
-    /// Parameters whose column can differ from zero, per channel.
+    /// Parameters whose column can differ from zero, per sensor and axis.
     active: Vec<Vec<usize>>,
+    /// The same per channel of the evidence: another list where rests stand in for a reference.
+    channels: Vec<Vec<usize>>,
 }
 
 /// Columns and residual of one channel over the rows of a window.
@@ -141,8 +144,14 @@ impl SensorModel {
             slots,
             parameters: first,
             active: vec![Vec::new(); CHANNELS],
+            channels: Vec::new(),
         };
         model.find_active(facts)?;
+        model.channels = if facts.rests {
+            rest_channels::active(&model.active)
+        } else {
+            model.active.clone()
+        };
         Ok(model)
     }
 
@@ -156,9 +165,25 @@ impl SensorModel {
         self.parameters
     }
 
-    /// Parameters whose column can differ from zero, per channel.
+    /// Parameters whose column can differ from zero, per channel of the evidence.
     pub fn active(&self) -> &[Vec<usize>] {
+        &self.channels
+    }
+
+    /// The same per sensor and axis, as [`SensorModel::modelled`] has its columns.
+    pub fn active_on_axes(&self) -> &[Vec<usize>] {
         &self.active
+    }
+
+    /// Modelled readings of one sensor and the columns of its three axes for ideal readings that are known otherwise than from a
+    /// reference: `rows.x` counts for nothing.
+    pub fn modelled(&self, rows: Rows, sensor: Sensor) -> Result<(Triple, AxisColumns), EffectError> {
+        let ideal = match sensor {
+            Sensor::Acc => &rows.ideal.f,
+            Sensor::Gyr => &rows.ideal.omega,
+            Sensor::Mag => &rows.ideal.m,
+        };
+        self.predict(rows, ideal.clone(), None, sensor)
     }
 
     /// Sets the parameters of the model's effects from a vector over all parameters.

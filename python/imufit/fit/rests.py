@@ -1,0 +1,320 @@
+"""What a log without a reference attitude tells: its rests, the turns between them, the length of the magnetic field."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.calibrate.checks import check_unit
+from imufit.calibrate.gyroscope import find_turns
+from imufit.calibrate.poses import Pose, distinct, find_poses
+
+if TYPE_CHECKING:
+    from imufit.log import Log
+
+Array = NDArray[np.float64]
+
+STRETCH = 1.0
+"""Rests are cut into stretches of at least this time, s, so that what changes within them shows."""
+MOST_STRETCHES = 2000
+BLOCKS = 20
+"""Groups of rests that are left out in turn."""
+FEWEST_RESTS = 8
+"""Fewer rests leave no blocks to judge by."""
+MOST_FIELD_ROWS = 4000
+FEWEST_FIELD_ROWS = 200
+FIELD_BLOCKS = 20
+CLEAR = 8.0
+"""Specific forces of different poses are told apart from this many times their noise on."""
+EDGES = 60
+
+
+@dataclass(frozen=True, eq=False)
+class RestReadings:
+    """What a log tells without a reference.
+
+    Attributes
+    ----------
+    arrays : dict
+        As `_imufit.Evidence.add_rests` takes it.
+    blocks : int
+        Blocks of time: groups of rests, or equal parts of the log where only the field counts.
+    edges : (blocks + 1,) array
+        Times at which blocks begin and end, s.
+    rests, attitudes, turns : int
+        How many were found; attitudes differ by more than 8 degrees.
+    sensors : tuple of str
+        Sensors that something is told of.
+    field : float or None
+        Mean length of the magnetic field, uT.
+    expected : list of float
+        Variance of a row of each of the nine channels that the noise within each rest gives.
+    samples : list of ndarray
+        Values of every covariate, between which bins are cut.
+    notes : tuple of str
+        What could not be used, and why.
+    """
+
+    arrays: dict[str, Any]
+    blocks: int
+    edges: Array
+    rests: int
+    attitudes: int
+    turns: int
+    sensors: tuple[str, ...]
+    field: float | None
+    expected: list[float]
+    samples: list[Array]
+    notes: tuple[str, ...]
+
+
+def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
+    """Find the rests of a log, and take means over them.
+
+    Parameters
+    ----------
+    log : Log
+        Without reference attitude.
+    covariates : sequence of str
+        Names of its columns that can act on sensors.
+    """
+    gravity = float(log.metadata.gravity)
+    notes: list[str] = []
+    poses: list[Pose] = []
+    gyr_noise = np.nan
+    if log.acc is not None:
+        found = find_poses(log, labelled_only=False)
+        poses, gyr_noise = [pose for pose in found.poses if pose.used], found.gyr_noise
+        if poses:
+            check_unit(poses, gravity, log.path or "log")
+    if len(poses) < FEWEST_RESTS:
+        sensors = " and ".join(name for name in ("acc", "gyr") if getattr(log, name) is not None)
+        if sensors:
+            notes.append(
+                f"{len(poses)} rests are too few to judge {sensors} by without a reference: lay the sensor down in at "
+                f"least {FEWEST_RESTS}, better {BLOCKS}, different attitudes for two seconds each."
+            )
+        poses = []
+    field_rows = _field_rows(log)
+    blocks = min(BLOCKS, len(poses)) if poses else FIELD_BLOCKS
+    of_pose = np.arange(len(poses)) * blocks // max(len(poses), 1)
+    edges = _edges(log, poses, of_pose, blocks, field_rows)
+    table = _Table(log, covariates)
+    rest, pieces = _stretches(log, poses)
+    stills = table.means(pieces)
+    expected = np.full(9, np.nan)
+    weight = np.ones(len(pieces))
+    turns: list[tuple[int, int, int, int, float, int]] = []
+    path_rows: list[NDArray[np.intp]] = []
+    if poses:
+        lengths = np.array([rows.size for rows in pieces], dtype=np.float64)
+        weight = np.sqrt(lengths / np.median(lengths))
+        whole = np.array([pose.n for pose in poses], dtype=np.float64)
+        # The variance of a pose's mean holds for a mean over fewer readings in proportion.
+        shorter = (whole / np.median(lengths))[:, None]
+        expected[0] = np.median(np.mean([pose.variance for pose in poses], axis=1)[:, None] * shorter)
+        rates = [(pose.rate_variance, k) for k, pose in enumerate(poses) if pose.rate_variance is not None]
+        if rates and log.gyr is not None:
+            expected[3:6] = np.median([variance * shorter[k] for variance, k in rates], axis=0)
+            turns, path_rows = _turns(log, poses, gyr_noise, gravity, of_pose, notes)
+            expected[1] = 1.0
+    sensors = []
+    if poses:
+        sensors.append("acc")
+        if np.isfinite(stills["gyr"]).any():
+            sensors.append("gyr")
+    field = None
+    if field_rows.size >= FEWEST_FIELD_ROWS and log.mag is not None:
+        sensors.append("mag")
+        field = float(np.mean(np.linalg.norm(log.mag[field_rows], axis=1)))
+    else:
+        field_rows = np.zeros(0, dtype=np.intp)
+    path = np.concatenate(path_rows) if path_rows else np.zeros(0, dtype=np.intp)
+    arrays = {
+        "stills": stills,
+        "poses": table.means([_pose_rows(pose) for pose in poses]),
+        "path": table.rows(path, filled=True),
+        "field": table.rows(field_rows),
+        "rest": rest.tolist(),
+        "block": [int(of_pose[k]) for k in rest],
+        "weight": weight.tolist(),
+        "turns": turns,
+        "field_block": np.clip(np.searchsorted(edges, log.t[field_rows], side="right") - 1, 0, blocks - 1).tolist(),
+    }
+    return RestReadings(
+        arrays=arrays,
+        blocks=blocks,
+        edges=edges,
+        rests=len(poses),
+        attitudes=distinct(np.array([pose.direction for pose in poses])) if poses else 0,
+        turns=len(turns),
+        sensors=tuple(sensors),
+        field=field,
+        expected=expected.tolist(),
+        samples=_samples(stills, arrays["field"], poses, float(expected[0]), len(covariates)),
+        notes=tuple(notes),
+    )
+
+
+class _Table:
+    """Columns of a log as the compiled core takes them: rows of it, or means over rows."""
+
+    def __init__(self, log: Log, covariates: Sequence[str]) -> None:
+        self._log = log
+        self._acc, self._gyr, self._mag = (
+            np.full((log.n, 3), np.nan) if column is None else np.asarray(column, dtype=np.float64)
+            for column in (log.acc, log.gyr, log.mag)
+        )
+        self._temp = None if log.temp is None else _held(log.temp)
+        self._covariates = [_held(log.covariates[name]) for name in covariates]
+
+    def rows(self, rows: NDArray[np.intp], *, filled: bool = False) -> dict[str, Any]:
+        """Return some rows; `filled`: a specific force that was read less often than the rate is drawn in between."""
+        acc = self._acc[rows]
+        if filled and rows.size:
+            acc = np.column_stack([_between(self._log.t, self._acc[:, axis], self._log.t[rows]) for axis in range(3)])
+        return self._chunk(
+            self._log.t[rows], acc, self._gyr[rows], self._mag[rows],
+            None if self._temp is None else self._temp[rows], [column[rows] for column in self._covariates],
+        )  # fmt: skip
+
+    def means(self, pieces: Sequence[NDArray[np.intp]]) -> dict[str, Any]:
+        """Return means over pieces."""
+
+        def mean(column: Array) -> Array:
+            known = [column[rows] for rows in pieces]
+            empty = np.full(column.shape[1:], np.nan)
+            means = [np.nanmean(v, axis=0) if np.isfinite(v).any() else empty for v in known]
+            return np.array(means, dtype=np.float64).reshape(len(pieces), *column.shape[1:])
+
+        return self._chunk(
+            mean(self._log.t), mean(self._acc), mean(self._gyr), mean(self._mag),
+            None if self._temp is None else mean(self._temp), [mean(column) for column in self._covariates],
+        )  # fmt: skip
+
+    @staticmethod
+    def _chunk(t: Array, acc: Array, gyr: Array, mag: Array, temp: Array | None, own: list[Array]) -> dict[str, Any]:
+        arrays = {"t": t, "acc": acc, "gyr": gyr, "mag": mag, "temp": temp}
+        return {
+            **{name: None if a is None else np.ascontiguousarray(a, dtype=np.float64) for name, a in arrays.items()},
+            "ref_q": None,
+            "ref_p": None,
+            "ref_exact": None,
+            "covariates": [np.ascontiguousarray(column, dtype=np.float64) for column in own],
+            "offset": 0,
+            "begin": 0,
+            "end": len(t),
+        }
+
+
+def _held(column: Array) -> Array:
+    """Carry the last known value on, and the first one back."""
+    column = np.asarray(column, dtype=np.float64)
+    known = np.flatnonzero(np.isfinite(column))
+    if known.size == 0:
+        return column
+    last = np.searchsorted(known, np.arange(column.size), side="right") - 1
+    return np.asarray(column[known[np.maximum(last, 0)]])
+
+
+def _between(t: Array, column: Array, at: Array) -> Array:
+    known = np.isfinite(column)
+    return np.interp(at, t[known], column[known]) if known.any() else np.full(at.size, np.nan)
+
+
+def _pose_rows(pose: Pose) -> NDArray[np.intp]:
+    rows = np.arange(pose.rows[0], pose.rows[1] + 1)
+    for first, last in pose.knocks:
+        rows = rows[(rows < first) | (rows > last)]
+    return rows
+
+
+def _stretches(log: Log, poses: Sequence[Pose]) -> tuple[NDArray[np.intp], list[NDArray[np.intp]]]:
+    """Number of its rest and rows of each stretch; all are about as long, a short rest is one."""
+    total = sum(pose.t_end - pose.t_start for pose in poses)
+    length = max(STRETCH, total / MOST_STRETCHES)
+    rest: list[int] = []
+    pieces: list[NDArray[np.intp]] = []
+    for k, pose in enumerate(poses):
+        rows = _pose_rows(pose)
+        parts = max(1, int((pose.t_end - pose.t_start) / length))
+        time = log.t[rows] - pose.t_start
+        number = np.minimum((time / (pose.t_end - pose.t_start) * parts).astype(np.intp), parts - 1)
+        for part in range(parts):
+            chosen = rows[number == part]
+            if chosen.size:
+                rest.append(k)
+                pieces.append(chosen)
+    return np.array(rest, dtype=np.intp), pieces
+
+
+def _turns(
+    log: Log, poses: Sequence[Pose], noise: float, gravity: float, of_pose: NDArray[np.intp], notes: list[str]
+) -> tuple[list[tuple[int, int, int, int, float, int]], list[NDArray[np.intp]]]:
+    """Turns between neighbouring rests as the compiled core takes them, and the rows of each."""
+    assert log.gyr is not None
+    found = find_turns(log, poses, noise, gravity)
+    notes.extend(found.left_out)
+    turns: list[tuple[int, int, int, int, float, int]] = []
+    path: list[NDArray[np.intp]] = []
+    at = 0
+    for k, span in enumerate(found.spans):
+        if span is None:
+            continue
+        first, last, *_, variance = span
+        rows = np.arange(first, last + 1)
+        rows = rows[np.isfinite(log.gyr[rows]).all(axis=1)]
+        if rows.size < 3:
+            continue
+        turns.append((at, at + rows.size, k, k + 1, float(1.0 / np.sqrt(variance)), int(of_pose[k])))
+        path.append(rows)
+        at += rows.size
+    return turns, path
+
+
+def _field_rows(log: Log) -> NDArray[np.intp]:
+    if log.mag is None:
+        return np.zeros(0, dtype=np.intp)
+    rows = np.flatnonzero(np.isfinite(log.mag).all(axis=1) & (np.linalg.norm(log.mag, axis=1) > 0.0))
+    return np.asarray(rows[:: max(1, -(-rows.size // MOST_FIELD_ROWS))])
+
+
+def _edges(
+    log: Log, poses: Sequence[Pose], of_pose: NDArray[np.intp], blocks: int, field_rows: NDArray[np.intp]
+) -> Array:
+    """Times at which blocks begin: between rests of different blocks, or such that each has as many rows of the field."""
+    ends = [float(log.t[0]), float(log.t[-1])]
+    if poses:
+        last = [k for k in range(len(poses) - 1) if of_pose[k] != of_pose[k + 1]]
+        inner = [0.5 * (poses[k].t_end + poses[k + 1].t_start) for k in last]
+    elif field_rows.size:
+        inner = log.t[field_rows[np.arange(1, blocks) * field_rows.size // blocks]].tolist()
+    else:
+        inner = np.linspace(*ends, blocks + 1)[1:-1].tolist()
+    return np.array([ends[0], *inner, ends[1]])
+
+
+def _samples(
+    stills: dict[str, Any], field: dict[str, Any], poses: Sequence[Pose], variance: float, covariates: int
+) -> list[Array]:
+    """Values between which bins are cut; specific forces only between poses, never within the noise of one."""
+    nothing = np.zeros(0)
+    force = []
+    for axis in range(3):
+        values = np.sort([pose.mean[axis] for pose in poses])
+        gaps = np.flatnonzero(np.diff(values) > CLEAR * np.sqrt(variance)) if values.size else nothing.astype(np.intp)
+        middles = 0.5 * (values[gaps] + values[gaps + 1]) if gaps.size else nothing
+        force.append(np.repeat(middles, -(-EDGES // max(middles.size, 1))))
+
+    def both(name: str) -> Array:
+        columns = [table[name] for table in (stills, field) if table[name] is not None]
+        values = np.concatenate(columns) if columns else nothing
+        return np.asarray(values[np.isfinite(values)])
+
+    own = [np.concatenate([stills["covariates"][k], field["covariates"][k]]) for k in range(covariates)]
+    finite = [np.asarray(values[np.isfinite(values)]) for values in own]
+    return [both("t"), both("temp"), *force, nothing, nothing, nothing, nothing, *finite]
