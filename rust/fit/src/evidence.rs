@@ -219,7 +219,11 @@ impl Evidence {
             }
         }
         for i in 0..rows.t.len() {
-            let columns = rows.columns.columns.iter().chain(std::iter::once(&rows.columns.residual));
+            let columns = rows
+                .columns
+                .columns
+                .iter()
+                .chain(std::iter::once(&rows.columns.residual));
             let row = DVector::from_iterator(width, columns.map(|c| c[i]));
             if row.iter().any(|v| !v.is_finite()) {
                 continue;

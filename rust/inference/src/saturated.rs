@@ -73,7 +73,7 @@ pub fn assemble(evidence: &Evidence, block: usize, weights: &[f64; CHANNELS]) ->
 /// are many count every parameter.
 fn freedom(evidence: &Evidence, channel: usize) -> usize {
     let own = evidence.layout.model.active()[channel].len();
-    if !evidence.layout.facts.rests {
+    if own == 0 || !evidence.layout.facts.rests {
         return own;
     }
     let mut gram = DMatrix::zeros(own, own);

@@ -3,7 +3,7 @@
 //! Three of them are those of the gyroscope, at rest. What else is known is no vector: the length of gravity, the length of
 //! the field, and where the gyroscope carries the direction of gravity from one rest to the next.
 
-use crate::sensor::{CHANNELS, Sensor};
+use crate::sensor::{CHANNELS, Sensor, channel_name};
 
 /// Length of the mean specific force of a rest, less gravity, m/s^2.
 pub const FORCE_NORM: usize = 0;
@@ -16,6 +16,15 @@ pub const FIELD_NORM: usize = 6;
 
 /// What the channels are called; empty for those that nothing is known of.
 pub const NAMES: [&str; CHANNELS] = ["acc_norm", "turn", "", "gyr_x", "gyr_y", "gyr_z", "mag_norm", "", ""];
+
+/// Name of a channel of evidence: another one where rests stand in for a reference.
+pub fn name(channel: usize, rests: bool) -> String {
+    if rests {
+        NAMES[channel].to_string()
+    } else {
+        channel_name(channel)
+    }
+}
 
 /// Active parameters of each channel from those of each sensor and axis.
 pub fn active(axes: &[Vec<usize>]) -> Vec<Vec<usize>> {

@@ -53,7 +53,9 @@ impl<'py> RestArrays<'py> {
         let (stills, poses, path, field) = (stills.window()?, poses.window()?, path.window()?, field.window()?);
         let n = stills.len();
         if [self.rest.len(), self.block.len(), self.weight.len()] != [n; 3] || self.field_block.len() != field.len() {
-            return Err(value_error("every still needs a rest, a block and a weight, every row of the field a block"));
+            return Err(value_error(
+                "every still needs a rest, a block and a weight, every row of the field a block",
+            ));
         }
         let within = |block: usize| blocks.is_none_or(|blocks| block < blocks);
         let sound = |t: &TurnNumbers| t.0 + 2 <= t.1 && t.1 <= path.len() && t.2.max(t.3) < poses.len() && within(t.5);
@@ -63,13 +65,16 @@ impl<'py> RestArrays<'py> {
         if !self.block.iter().chain(&self.field_block).all(|b| within(*b)) {
             return Err(value_error("there is no such block"));
         }
-        let turns = self.turns.iter().map(|(first, end, before, after, weight, block)| Turn {
-            rows: *first..*end,
-            before: *before,
-            after: *after,
-            weight: *weight,
-            block: *block,
-        });
+        let turns = self
+            .turns
+            .iter()
+            .map(|(first, end, before, after, weight, block)| Turn {
+                rows: *first..*end,
+                before: *before,
+                after: *after,
+                weight: *weight,
+                block: *block,
+            });
         Ok(Rests {
             stills: Stills {
                 means: stills,
@@ -121,7 +126,16 @@ fn facts_at_rest(
     if samples.len() != names.len() || covariate_means.len() != covariates.len() {
         return Err(value_error("every covariate needs samples and a mean"));
     }
-    let facts = LogFacts::at_rest(rows, frame, gravity, field, sensors, temperature_mean, covariates, covariate_means);
+    let facts = LogFacts::at_rest(
+        rows,
+        frame,
+        gravity,
+        field,
+        sensors,
+        temperature_mean,
+        covariates,
+        covariate_means,
+    );
     let samples = CovariateSamples {
         names,
         values: samples,

@@ -71,7 +71,9 @@ pub fn sized(
         }
         let before = std::mem::replace(&mut vector, ideal);
         vector.add(&residual, 1.0);
-        let moved = (0..n).map(|i| (vector.row(i) - before.row(i)).norm()).filter(|d| d.is_finite());
+        let moved = (0..n)
+            .map(|i| (vector.row(i) - before.row(i)).norm())
+            .filter(|d| d.is_finite());
         done = moved.fold(0.0, f64::max) <= FOUND * length;
         step += 1;
     }
@@ -117,6 +119,14 @@ pub fn norm<'a>(
             };
         }
     };
-    let found = sized(&mut table, model, facts, Sensor::Mag, &measured, facts.field.norm(), &aligned)?;
+    let found = sized(
+        &mut table,
+        model,
+        facts,
+        Sensor::Mag,
+        &measured,
+        facts.field.norm(),
+        &aligned,
+    )?;
     Ok((found.norm(model, Sensor::Mag, &model.active()[FIELD_NORM]), table))
 }

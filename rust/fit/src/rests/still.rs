@@ -46,7 +46,15 @@ impl<'a> Still<'a> {
                 table.ideal.attitude[i] = attitude(facts, &table.ideal.f.row(i), &table.ideal.m.row(i));
             }
         };
-        let force = sized(&mut table, model, facts, Sensor::Acc, &measured, facts.gravity.norm(), &aligned)?;
+        let force = sized(
+            &mut table,
+            model,
+            facts,
+            Sensor::Acc,
+            &measured,
+            facts.gravity.norm(),
+            &aligned,
+        )?;
         Ok(Self { table, force, rates })
     }
 
@@ -67,7 +75,9 @@ impl<'a> Still<'a> {
     pub fn rate(&self, model: &SensorModel, facts: &LogFacts) -> Result<Vec<ChannelColumns>, EffectError> {
         let (residual, columns) = self.rates(model, facts)?;
         let axes = residual.0.into_iter().zip(columns);
-        Ok(axes.map(|(residual, columns)| ChannelColumns { columns, residual }).collect())
+        Ok(axes
+            .map(|(residual, columns)| ChannelColumns { columns, residual })
+            .collect())
     }
 
     /// Up in a row, and its derivative by some of all parameters.

@@ -1,8 +1,8 @@
 //! Ideal readings of rows that have no reference: some are known, the others are not.
 
+use imufit_model::effect::Rows;
 use imufit_model::facts::LogFacts;
 use imufit_model::ideal::Ideal;
-use imufit_model::effect::Rows;
 use imufit_model::sensor::{CHANNELS, Sensor};
 use imufit_model::sensor_model::{AxisColumns, Evaluation};
 use imufit_model::triple::Triple;
@@ -59,7 +59,11 @@ impl<'a> Table<'a> {
             t: window.t,
             ideal,
             temperature: temperature.map(|t| (0..n).map(|i| held(t, i) - facts.temperature_mean).collect()),
-            covariates: window.covariates.iter().map(|c| (0..n).map(|i| held(c, i)).collect()).collect(),
+            covariates: window
+                .covariates
+                .iter()
+                .map(|c| (0..n).map(|i| held(c, i)).collect())
+                .collect(),
             vibration: vec![f64::NAN; n],
         }
     }

@@ -37,7 +37,12 @@ pub struct Turn {
 const STEPS: usize = 12;
 
 /// Rates with the model undone, and the columns there.
-fn undone(table: &mut Table, measured: &Triple, model: &SensorModel, facts: &LogFacts) -> Result<AxisColumns, EffectError> {
+fn undone(
+    table: &mut Table,
+    measured: &Triple,
+    model: &SensorModel,
+    facts: &LogFacts,
+) -> Result<AxisColumns, EffectError> {
     for _ in 0..STEPS {
         let (modelled, columns) = model.modelled(table.rows(facts), Sensor::Gyr)?;
         let mut missing = measured.clone();
