@@ -178,6 +178,10 @@ class Passes:
         """Times at which blocks begin and end, (blocks + 1,), s."""
         return np.linspace(facts.t_start, facts.t_end, self.blocks + 1)
 
+    def lacking(self, effect: _imufit.Effect) -> str | None:
+        """Return why nothing can be told of an effect's sensor, though the log has it; None otherwise."""
+        return None
+
     def told(self, effect: _imufit.Effect, facts: _imufit.Facts) -> str | None:
         """Return why what the log is judged by cannot tell of an effect; None if it can."""
         return None

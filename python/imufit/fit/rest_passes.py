@@ -73,7 +73,7 @@ class RestPasses(Passes):
             )
         columns = {"temp": log.temp, **{name: log.covariates[name] for name in self.covariates}}
         known = {name: 0.0 if c is None else float(np.isfinite(c).any()) for name, c in columns.items()}
-        means = {name: float(np.nanmean(c)) if c is not None and known[name] else np.nan for name, c in columns.items()}
+        temperature_mean, *covariate_means = rests.means
         facts = _imufit.facts_at_rest(
             (log.n, float(log.t[0]), float(log.t[-1]), float(np.median(np.diff(log.t)))),
             log.metadata.frame,
@@ -81,8 +81,8 @@ class RestPasses(Passes):
             rests.field,
             [sensor in rests.sensors for sensor in ("acc", "gyr", "mag")],
             self.covariates,
-            [means[name] for name in self.covariates],
-            means["temp"] if known["temp"] else None,
+            covariate_means,
+            temperature_mean if np.isfinite(temperature_mean) else None,
             rests.samples,
         )
         self._progress(log.n, log.n, "finding the rests")
@@ -96,6 +96,12 @@ class RestPasses(Passes):
     def edges(self, facts: _imufit.Facts) -> NDArray[np.float64]:
         """Times at which blocks begin and end, s."""
         return self.rests.edges
+
+    def lacking(self, effect: _imufit.Effect) -> str | None:
+        """Return why nothing can be told of an effect's sensor, though the log has it; None otherwise."""
+        if any(sensor in self.rests.sensors for sensor in effect.sensors):
+            return None
+        return f"the log has no reference attitude, and too little at rest to tell anything of {' or '.join(effect.sensors)}"
 
     def told(self, effect: _imufit.Effect, facts: _imufit.Facts) -> str | None:
         """Return why rests cannot tell of an effect; None if they can."""

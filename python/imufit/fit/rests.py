@@ -25,6 +25,8 @@ BLOCKS = 20
 """Groups of rests that are left out in turn."""
 FEWEST_RESTS = 8
 """Fewer rests leave no blocks to judge by."""
+LEAST_SPREAD = np.radians(10.0)
+"""A field whose direction in the body varies by less than this (rad, root mean square) shows nothing of the sensor."""
 MOST_FIELD_ROWS = 4000
 FEWEST_FIELD_ROWS = 200
 FIELD_BLOCKS = 20
@@ -55,6 +57,8 @@ class RestReadings:
         Variance of a row of each of the nine channels that the noise within each rest gives.
     samples : list of ndarray
         Values of every covariate, between which bins are cut.
+    means : list of float
+        Mean temperature and mean of each covariate over what is judged; NaN where unknown.
     notes : tuple of str
         What could not be used, and why.
     """
@@ -69,6 +73,7 @@ class RestReadings:
     field: float | None
     expected: list[float]
     samples: list[Array]
+    means: list[float]
     notes: tuple[str, ...]
 
 
@@ -107,12 +112,10 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
     rest, pieces = _stretches(log, poses)
     stills = table.means(pieces)
     expected = np.full(9, np.nan)
-    weight = np.ones(len(pieces))
     turns: list[tuple[int, int, int, int, float, int]] = []
     path_rows: list[NDArray[np.intp]] = []
     if poses:
         lengths = np.array([rows.size for rows in pieces], dtype=np.float64)
-        weight = np.sqrt(lengths / np.median(lengths))
         whole = np.array([pose.n for pose in poses], dtype=np.float64)
         # The variance of a pose's mean holds for a mean over fewer readings in proportion.
         shorter = (whole / np.median(lengths))[:, None]
@@ -128,10 +131,16 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
         if np.isfinite(stills["gyr"]).any():
             sensors.append("gyr")
     field = None
-    if field_rows.size >= FEWEST_FIELD_ROWS and log.mag is not None:
+    spread = _spread(log.mag[field_rows]) if log.mag is not None and field_rows.size else 0.0
+    if field_rows.size >= FEWEST_FIELD_ROWS and log.mag is not None and spread >= LEAST_SPREAD:
         sensors.append("mag")
         field = float(np.mean(np.linalg.norm(log.mag[field_rows], axis=1)))
     else:
+        if log.mag is not None:
+            notes.append(
+                f"The magnetometer was hardly turned: the field's direction in the body varies by "
+                f"{np.degrees(spread):.0f} deg, {np.degrees(LEAST_SPREAD):.0f} are needed for its length to tell anything."
+            )
         field_rows = np.zeros(0, dtype=np.intp)
     path = np.concatenate(path_rows) if path_rows else np.zeros(0, dtype=np.intp)
     arrays = {
@@ -141,7 +150,6 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
         "field": table.rows(field_rows),
         "rest": rest.tolist(),
         "block": [int(of_pose[k]) for k in rest],
-        "weight": weight.tolist(),
         "turns": turns,
         "field_block": np.clip(np.searchsorted(edges, log.t[field_rows], side="right") - 1, 0, blocks - 1).tolist(),
     }
@@ -156,8 +164,19 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
         field=field,
         expected=expected.tolist(),
         samples=_samples(stills, arrays["field"], poses, float(expected[0]), len(covariates)),
+        means=_means(stills, arrays["field"]),
         notes=tuple(notes),
     )
+
+
+def _means(stills: dict[str, Any], field: dict[str, Any]) -> list[float]:
+    """Means over the stretches of all rests, or over the rows of the field where there are none.
+
+    A column that never changes there must not differ from its mean, whatever it does elsewhere.
+    """
+    judged = stills if len(stills["t"]) else field
+    columns = [judged["temp"], *judged["covariates"]]
+    return [float(np.nanmean(c)) if c is not None and np.isfinite(c).any() else np.nan for c in columns]
 
 
 class _Table:
@@ -281,6 +300,14 @@ def _field_rows(log: Log) -> NDArray[np.intp]:
         return np.zeros(0, dtype=np.intp)
     rows = np.flatnonzero(np.isfinite(log.mag).all(axis=1) & (np.linalg.norm(log.mag, axis=1) > 0.0))
     return np.asarray(rows[:: max(1, -(-rows.size // MOST_FIELD_ROWS))])
+
+
+def _spread(readings: Array) -> float:
+    """Root mean square angle (rad) between readings and their mean direction."""
+    units = readings / np.linalg.norm(readings, axis=1, keepdims=True)
+    mean = units.mean(axis=0)
+    cosine = np.clip(units @ mean / max(float(np.linalg.norm(mean)), 1e-12), -1.0, 1.0)
+    return float(np.sqrt(np.mean(np.arccos(cosine) ** 2)))
 
 
 def _edges(

@@ -93,7 +93,7 @@ class SurveyedLog:
 def _refusal(
     effect: _imufit.Effect, passes: Passes, facts: _imufit.Facts, coverage: Mapping[str, float]
 ) -> str | None:
-    reason, column = effect.not_testable(facts), effect.column
+    reason, column = passes.lacking(effect) or effect.not_testable(facts), effect.column
     if reason is not None:
         return reason
     if column is None or coverage.get(column, 0.0) >= MIN_COVERAGE:

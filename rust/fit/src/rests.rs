@@ -15,6 +15,7 @@ use imufit_model::facts::LogFacts;
 use imufit_model::rest_channels::{FIELD_NORM, FORCE_NORM, RATE};
 use imufit_model::sensor::{CHANNELS, Sensor};
 use imufit_model::sensor_model::{ChannelColumns, Evaluation, SensorModel};
+use imufit_model::triple::Triple;
 use imufit_model::window::Window;
 
 pub use self::turn::Turn;
@@ -27,8 +28,6 @@ pub struct Stills<'a> {
     pub rest: Vec<usize>,
     /// Block of each.
     pub block: Vec<usize>,
-    /// Weight of each: the inverse of its noise beside that of the others.
-    pub weight: Vec<f64>,
 }
 
 /// What of a log is known without a reference.
@@ -51,14 +50,14 @@ pub struct Rests<'a> {
 pub struct ChannelRows {
     /// The channel, see [`imufit_model::rest_channels`].
     pub channel: usize,
-    /// Columns and residual, each row times its weight.
+    /// Columns and residual.
     pub columns: ChannelColumns,
     /// Time, s.
     pub t: Vec<f64>,
     /// Block of each row.
     pub block: Vec<usize>,
-    /// Weight of each row.
-    pub weight: Vec<f64>,
+    /// Where the rows are projections of a vector: the directions.
+    pub direction: Option<Triple>,
     /// Rows that belong together have the same number.
     pub group: Vec<usize>,
     /// Ideal readings, temperature and covariates of each row.
@@ -71,7 +70,9 @@ impl Rests<'_> {
         let mut out = Vec::new();
         if facts.sensors[Sensor::Acc.index()] {
             let stills = still::Still::new(&self.stills.means, model, facts)?;
-            out.push(self.still_rows(FORCE_NORM, stills.force_norm(model), &stills));
+            let mut rows = self.still_rows(FORCE_NORM, stills.force_norm(model), &stills);
+            rows.direction = Some(stills.force.direction.clone());
+            out.push(rows);
             if facts.sensors[Sensor::Gyr.index()] {
                 for (axis, columns) in stills.rate(model, facts)?.into_iter().enumerate() {
                     out.push(self.still_rows(RATE + axis, columns, &stills));
@@ -88,7 +89,7 @@ impl Rests<'_> {
                 columns,
                 t: self.field.t.to_vec(),
                 block: self.field_block.clone(),
-                weight: vec![1.0; n],
+                direction: None,
                 group: (0..n).collect(),
                 around: table.evaluation(),
             });
@@ -96,19 +97,14 @@ impl Rests<'_> {
         Ok(out)
     }
 
-    fn still_rows(&self, channel: usize, mut columns: ChannelColumns, still: &still::Still) -> ChannelRows {
+    fn still_rows(&self, channel: usize, columns: ChannelColumns, still: &still::Still) -> ChannelRows {
         let stills = &self.stills;
-        for column in columns.columns.iter_mut().chain(std::iter::once(&mut columns.residual)) {
-            for (value, weight) in column.iter_mut().zip(&stills.weight) {
-                *value *= weight;
-            }
-        }
         ChannelRows {
             channel,
             columns,
             t: stills.means.t.to_vec(),
             block: stills.block.clone(),
-            weight: stills.weight.clone(),
+            direction: None,
             group: stills.rest.clone(),
             around: still.table.evaluation(),
         }

@@ -18,7 +18,7 @@ const LOOKED_AT: usize = 4;
 pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
     let mut tried = 0;
     let mut found = Vec::new();
-    for all in &problem.sums {
+    for all in problem.sums.iter().filter(|s| s.of_blocks()) {
         let sums = all.with_sums(all.columns(model));
         let blocks = sums.sums.nrows();
         tried += blocks.saturating_sub(1);

@@ -133,7 +133,7 @@ impl PyEvidence {
         py.detach(|| self.0.add(&window)).map_err(from_effect)
     }
 
-    /// Adds what the rests of a log tell: `stills`, `poses`, `path` and `field` as chunks; `rest`, `block`, `weight` of each
+    /// Adds what the rests of a log tell: `stills`, `poses`, `path` and `field` as chunks; `rest` and `block` of each
     /// still; `turns` as (first row, one past the last, rest before, rest after, 1/noise, block); `field_block`.
     fn add_rests(&mut self, py: Python<'_>, rests: &Bound<'_, PyDict>) -> PyResult<()> {
         let arrays = RestArrays::new(rests)?;

@@ -17,13 +17,11 @@ use crate::window::ChunkArrays;
 /// First row, one past the last, number of the rest before and after, inverse of the noise (1/rad), block.
 type TurnNumbers = (usize, usize, usize, usize, f64, usize);
 
-/// Borrowed arrays of the rests of a log: the chunks `stills`, `poses`, `path`, `field`; of each still its `rest`, `block` and
-/// `weight`; `turns`; the `field_block` of each row of the field.
+/// Borrowed arrays of the rests of a log: the chunks `stills`, `poses`, `path`, `field`; of each still its `rest` and `block`; `turns`; the `field_block` of each row of the field.
 pub struct RestArrays<'py> {
     chunks: [ChunkArrays<'py>; 4],
     rest: Vec<usize>,
     block: Vec<usize>,
-    weight: Vec<f64>,
     turns: Vec<TurnNumbers>,
     field_block: Vec<usize>,
 }
@@ -41,7 +39,6 @@ impl<'py> RestArrays<'py> {
             chunks: [chunk("stills")?, chunk("poses")?, chunk("path")?, chunk("field")?],
             rest: item("rest")?.extract()?,
             block: item("block")?.extract()?,
-            weight: item("weight")?.extract()?,
             turns: item("turns")?.extract()?,
             field_block: item("field_block")?.extract()?,
         })
@@ -52,9 +49,9 @@ impl<'py> RestArrays<'py> {
         let [stills, poses, path, field] = &self.chunks;
         let (stills, poses, path, field) = (stills.window()?, poses.window()?, path.window()?, field.window()?);
         let n = stills.len();
-        if [self.rest.len(), self.block.len(), self.weight.len()] != [n; 3] || self.field_block.len() != field.len() {
+        if [self.rest.len(), self.block.len()] != [n; 2] || self.field_block.len() != field.len() {
             return Err(value_error(
-                "every still needs a rest, a block and a weight, every row of the field a block",
+                "every still needs a rest and a block, every row of the field a block",
             ));
         }
         let within = |block: usize| blocks.is_none_or(|blocks| block < blocks);
@@ -80,7 +77,6 @@ impl<'py> RestArrays<'py> {
                 means: stills,
                 rest: self.rest.clone(),
                 block: self.block.clone(),
-                weight: self.weight.clone(),
             },
             poses,
             path,

@@ -83,7 +83,7 @@ pub fn rows(
         columns: vec![Vec::new(); wanted.len()],
         residual: Vec::new(),
     };
-    let (mut after, mut block, mut weight, mut group) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut after, mut block, mut group) = (Vec::new(), Vec::new(), Vec::new());
     for turn in turns {
         let rest = |pose: usize| (zeros.row(pose), vectors(&at_rest, axes, pose, wanted));
         let (first, last) = (rest(turn.before), rest(turn.after));
@@ -113,7 +113,6 @@ pub fn rows(
             }
             after.push(turn.after);
             block.push(turn.block);
-            weight.push(1.0);
             group.push(group.len());
         }
     }
@@ -122,7 +121,7 @@ pub fn rows(
         columns: out,
         t: turns.iter().flat_map(|turn| [path.t[turn.rows.end - 1]; 2]).collect(),
         block,
-        weight,
+        direction: None,
         group,
         around: poses.table.evaluation_of(&after),
     })
