@@ -1,4 +1,4 @@
-"""Logs without a reference attitude: what rests, turns between them and the length of the field tell, and what they cannot."""
+"""Logs without a reference attitude: what rests, turns and the length of the field tell, and what they cannot."""
 
 from dataclasses import replace
 

@@ -40,8 +40,8 @@ def diagnose(
     Several LOGs of one sensor are asked together: effects are the same in all of them, each has its own bias and mount,
     and a log that disagrees is named.
 
-    A LOG without reference attitude is judged by its rests, the turns between them and the length of the magnetic field,
-    and the answer says what that cannot tell.
+    A LOG without reference attitude is judged by its rests, the turns between them and the length of the magnetic
+    field, and the answer says what that cannot tell.
     """
     keep_inputs([*logs, model], [json_file, html_file, plot_file])
     output = Output(json_file)

@@ -69,7 +69,8 @@ def notes(evidence: LogEvidence) -> tuple[str, ...]:
     if rests.rests:
         zero = " and the rate is zero" if "gyr" in rests.sensors else ""
         told.append(
-            f"{rests.rests} rests in {rests.attitudes} attitudes, at which the specific force is as long as gravity{zero}"
+            f"{rests.rests} rests in {rests.attitudes} attitudes, at which the specific force is as long as "
+            f"gravity{zero}"
         )
     if rests.turns:
         told.append(f"{rests.turns} turns from rest to rest, along which the rate carries the direction of gravity")
@@ -79,8 +80,8 @@ def notes(evidence: LogEvidence) -> tuple[str, ...]:
     limits = []
     if "acc" in rests.sensors:
         limits.append(
-            "Of acc.misalignment only the change of the angles between the axes shows at rest; how the sensor sits on its "
-            "body does not, nor whether the table is level."
+            "Of acc.misalignment only the change of the angles between the axes shows at rest; how the sensor sits on "
+            "its body does not, nor whether the table is level."
         )
     if rests.rests and "gyr" in rests.sensors and not rests.turns:
         limits.append("Without turns between rests nothing is told of the gyroscope's scale and axes.")

@@ -26,7 +26,7 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
         End of the range of each sensor that may have one.
     """
     if isinstance(passes, RestPasses):
-        return passes.row_faults
+        return tuple(passes.row_faults)
     told = passes.log.metadata.extra
     clipped = ClippedRows(ends, [sensor for sensor in ends if f"{sensor}_range" in told])
 

@@ -175,7 +175,7 @@ class Passes:
         return BLOCKS
 
     def edges(self, facts: _imufit.Facts) -> NDArray[np.float64]:
-        """Times at which blocks begin and end, (blocks + 1,), s."""
+        """Return the times at which blocks begin and end, (blocks + 1,), s."""
         return np.linspace(facts.t_start, facts.t_end, self.blocks + 1)
 
     def lacking(self, effect: _imufit.Effect) -> str | None:

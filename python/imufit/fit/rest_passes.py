@@ -67,8 +67,8 @@ class RestPasses(Passes):
                 "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz), and too few rests to do without",
                 file=log.path,
                 remedy=(
-                    "Add the reference, or ref_angle with the metadata rig_axis; or record the sensor lying still in at "
-                    f"least {FEWEST_RESTS} attitudes, two seconds each, with turns between."
+                    "Add the reference, or ref_angle with the metadata rig_axis; or record the sensor lying still in "
+                    f"at least {FEWEST_RESTS} attitudes, two seconds each, with turns between."
                 ),
             )
         columns = {"temp": log.temp, **{name: log.covariates[name] for name in self.covariates}}
@@ -94,14 +94,15 @@ class RestPasses(Passes):
         return self.rests.blocks
 
     def edges(self, facts: _imufit.Facts) -> NDArray[np.float64]:
-        """Times at which blocks begin and end, s."""
+        """Return the times at which blocks begin and end, s."""
         return self.rests.edges
 
     def lacking(self, effect: _imufit.Effect) -> str | None:
         """Return why nothing can be told of an effect's sensor, though the log has it; None otherwise."""
         if any(sensor in self.rests.sensors for sensor in effect.sensors):
             return None
-        return f"the log has no reference attitude, and too little at rest to tell anything of {' or '.join(effect.sensors)}"
+        sensors = " or ".join(effect.sensors)
+        return f"the log has no reference attitude, and too little at rest to tell anything of {sensors}"
 
     def told(self, effect: _imufit.Effect, facts: _imufit.Facts) -> str | None:
         """Return why rests cannot tell of an effect; None if they can."""

@@ -1,4 +1,4 @@
-"""What a log without a reference attitude tells: its rests, the turns between them, the length of the magnetic field."""
+"""What a log without a reference attitude tells: rests, turns between them, the length of the magnetic field."""
 
 from __future__ import annotations
 
@@ -87,62 +87,25 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
     covariates : sequence of str
         Names of its columns that can act on sensors.
     """
-    gravity = float(log.metadata.gravity)
     notes: list[str] = []
-    poses: list[Pose] = []
-    gyr_noise = np.nan
-    if log.acc is not None:
-        found = find_poses(log, labelled_only=False)
-        poses, gyr_noise = [pose for pose in found.poses if pose.used], found.gyr_noise
-        if poses:
-            check_unit(poses, gravity, log.path or "log")
-    if len(poses) < FEWEST_RESTS:
-        sensors = " and ".join(name for name in ("acc", "gyr") if getattr(log, name) is not None)
-        if sensors:
-            notes.append(
-                f"{len(poses)} rests are too few to judge {sensors} by without a reference: lay the sensor down in at "
-                f"least {FEWEST_RESTS}, better {BLOCKS}, different attitudes for two seconds each."
-            )
-        poses = []
-    field_rows = _field_rows(log)
+    poses, gyr_noise = _poses(log, notes)
+    field_rows = _field_rows(log, notes)
     blocks = min(BLOCKS, len(poses)) if poses else FIELD_BLOCKS
     of_pose = np.arange(len(poses)) * blocks // max(len(poses), 1)
     edges = _edges(log, poses, of_pose, blocks, field_rows)
     table = _Table(log, covariates)
     rest, pieces = _stretches(log, poses)
     stills = table.means(pieces)
-    expected = np.full(9, np.nan)
+    expected = _expected(poses, pieces)
     turns: list[tuple[int, int, int, int, float, int]] = []
-    path_rows: list[NDArray[np.intp]] = []
-    if poses:
-        lengths = np.array([rows.size for rows in pieces], dtype=np.float64)
-        whole = np.array([pose.n for pose in poses], dtype=np.float64)
-        # The variance of a pose's mean holds for a mean over fewer readings in proportion.
-        shorter = (whole / np.median(lengths))[:, None]
-        expected[0] = np.median(np.mean([pose.variance for pose in poses], axis=1)[:, None] * shorter)
-        rates = [(pose.rate_variance, k) for k, pose in enumerate(poses) if pose.rate_variance is not None]
-        if rates and log.gyr is not None:
-            expected[3:6] = np.median([variance * shorter[k] for variance, k in rates], axis=0)
-            turns, path_rows = _turns(log, poses, gyr_noise, gravity, of_pose, notes)
-            expected[1] = 1.0
-    sensors = []
-    if poses:
-        sensors.append("acc")
-        if np.isfinite(stills["gyr"]).any():
-            sensors.append("gyr")
+    path = np.zeros(0, dtype=np.intp)
+    if poses and log.gyr is not None:
+        turns, path = _turns(log, poses, gyr_noise, of_pose, notes)
+    known = (bool(poses), bool(poses) and bool(np.isfinite(stills["gyr"]).any()), field_rows.size > 0)
+    sensors = [sensor for sensor, told in zip(("acc", "gyr", "mag"), known, strict=True) if told]
     field = None
-    spread = _spread(log.mag[field_rows]) if log.mag is not None and field_rows.size else 0.0
-    if field_rows.size >= FEWEST_FIELD_ROWS and log.mag is not None and spread >= LEAST_SPREAD:
-        sensors.append("mag")
+    if log.mag is not None and field_rows.size:
         field = float(np.mean(np.linalg.norm(log.mag[field_rows], axis=1)))
-    else:
-        if log.mag is not None:
-            notes.append(
-                f"The magnetometer was hardly turned: the field's direction in the body varies by "
-                f"{np.degrees(spread):.0f} deg, {np.degrees(LEAST_SPREAD):.0f} are needed for its length to tell anything."
-            )
-        field_rows = np.zeros(0, dtype=np.intp)
-    path = np.concatenate(path_rows) if path_rows else np.zeros(0, dtype=np.intp)
     arrays = {
         "stills": stills,
         "poses": table.means([_pose_rows(pose) for pose in poses]),
@@ -252,8 +215,45 @@ def _pose_rows(pose: Pose) -> NDArray[np.intp]:
     return rows
 
 
+def _poses(log: Log, notes: list[str]) -> tuple[list[Pose], float]:
+    """Return the usable rests, none if they are too few, and the gyroscope's noise at rest, rad/s."""
+    poses: list[Pose] = []
+    noise = np.nan
+    if log.acc is not None and np.isfinite(log.acc).any():
+        found = find_poses(log, labelled_only=False)
+        poses, noise = [pose for pose in found.poses if pose.used], found.gyr_noise
+        if poses:
+            check_unit(poses, float(log.metadata.gravity), log.path or "log")
+    if len(poses) >= FEWEST_RESTS:
+        return poses, noise
+    sensors = " and ".join(name for name in ("acc", "gyr") if getattr(log, name) is not None)
+    if sensors:
+        notes.append(
+            f"{len(poses)} {'rest is' if len(poses) == 1 else 'rests are'} too few to judge {sensors} by without a "
+            f"reference: lay the sensor down in at least {FEWEST_RESTS}, better {BLOCKS}, different attitudes for two "
+            "seconds each."
+        )
+    return [], noise
+
+
+def _expected(poses: Sequence[Pose], pieces: Sequence[NDArray[np.intp]]) -> NDArray[np.float64]:
+    """Return the variance of a row of each channel that the scatter of readings within each rest gives, (9,)."""
+    expected = np.full(9, np.nan)
+    if not poses:
+        return expected
+    usual = np.median([rows.size for rows in pieces])
+    # The variance of a pose's mean holds for a mean over fewer readings in proportion.
+    shorter = np.array([pose.n / usual for pose in poses])
+    expected[0] = np.median(np.mean([pose.variance for pose in poses], axis=1) * shorter)
+    rates = [p.rate_variance * s for p, s in zip(poses, shorter, strict=True) if p.rate_variance is not None]
+    if rates:
+        expected[3:6] = np.median(rates, axis=0)
+        expected[1] = 1.0
+    return expected
+
+
 def _stretches(log: Log, poses: Sequence[Pose]) -> tuple[NDArray[np.intp], list[NDArray[np.intp]]]:
-    """Number of its rest and rows of each stretch; all are about as long, a short rest is one."""
+    """Return the number of its rest and rows of each stretch; all are about as long, a short rest is one."""
     total = sum(pose.t_end - pose.t_start for pose in poses)
     length = max(STRETCH, total / MOST_STRETCHES)
     rest: list[int] = []
@@ -272,11 +272,11 @@ def _stretches(log: Log, poses: Sequence[Pose]) -> tuple[NDArray[np.intp], list[
 
 
 def _turns(
-    log: Log, poses: Sequence[Pose], noise: float, gravity: float, of_pose: NDArray[np.intp], notes: list[str]
-) -> tuple[list[tuple[int, int, int, int, float, int]], list[NDArray[np.intp]]]:
-    """Turns between neighbouring rests as the compiled core takes them, and the rows of each."""
+    log: Log, poses: Sequence[Pose], noise: float, of_pose: NDArray[np.intp], notes: list[str]
+) -> tuple[list[tuple[int, int, int, int, float, int]], NDArray[np.intp]]:
+    """Return turns between neighbouring rests as the compiled core takes them, and the rows of all."""
     assert log.gyr is not None
-    found = find_turns(log, poses, noise, gravity)
+    found = find_turns(log, poses, noise, float(log.metadata.gravity))
     notes.extend(found.left_out)
     turns: list[tuple[int, int, int, int, float, int]] = []
     path: list[NDArray[np.intp]] = []
@@ -292,18 +292,30 @@ def _turns(
         turns.append((at, at + rows.size, k, k + 1, float(1.0 / np.sqrt(variance)), int(of_pose[k])))
         path.append(rows)
         at += rows.size
-    return turns, path
+    return turns, np.concatenate(path) if path else np.zeros(0, dtype=np.intp)
 
 
-def _field_rows(log: Log) -> NDArray[np.intp]:
+def _field_rows(log: Log, notes: list[str]) -> NDArray[np.intp]:
+    """Return rows with a magnetic field, evenly spread over the log; none if they tell nothing."""
+    nothing = np.zeros(0, dtype=np.intp)
     if log.mag is None:
-        return np.zeros(0, dtype=np.intp)
+        return nothing
     rows = np.flatnonzero(np.isfinite(log.mag).all(axis=1) & (np.linalg.norm(log.mag, axis=1) > 0.0))
-    return np.asarray(rows[:: max(1, -(-rows.size // MOST_FIELD_ROWS))])
+    rows = rows[:: max(1, -(-rows.size // MOST_FIELD_ROWS))]
+    if rows.size < FEWEST_FIELD_ROWS:
+        return nothing
+    spread = _spread(log.mag[rows])
+    if spread < LEAST_SPREAD:
+        notes.append(
+            f"The magnetometer was hardly turned: the field's direction in the body varies by {np.degrees(spread):.0f} "
+            f"deg, {np.degrees(LEAST_SPREAD):.0f} are needed for its length to tell anything."
+        )
+        return nothing
+    return np.asarray(rows)
 
 
 def _spread(readings: Array) -> float:
-    """Root mean square angle (rad) between readings and their mean direction."""
+    """Return the root mean square angle (rad) between readings and their mean direction."""
     units = readings / np.linalg.norm(readings, axis=1, keepdims=True)
     mean = units.mean(axis=0)
     cosine = np.clip(units @ mean / max(float(np.linalg.norm(mean)), 1e-12), -1.0, 1.0)
@@ -313,16 +325,16 @@ def _spread(readings: Array) -> float:
 def _edges(
     log: Log, poses: Sequence[Pose], of_pose: NDArray[np.intp], blocks: int, field_rows: NDArray[np.intp]
 ) -> Array:
-    """Times at which blocks begin: between rests of different blocks, or such that each has as many rows of the field."""
-    ends = [float(log.t[0]), float(log.t[-1])]
+    """Return times at which blocks begin: between rests, or such that each has as many rows of the field."""
+    first, last_time = float(log.t[0]), float(log.t[-1])
     if poses:
         last = [k for k in range(len(poses) - 1) if of_pose[k] != of_pose[k + 1]]
         inner = [0.5 * (poses[k].t_end + poses[k + 1].t_start) for k in last]
     elif field_rows.size:
         inner = log.t[field_rows[np.arange(1, blocks) * field_rows.size // blocks]].tolist()
     else:
-        inner = np.linspace(*ends, blocks + 1)[1:-1].tolist()
-    return np.array([ends[0], *inner, ends[1]])
+        inner = np.linspace(first, last_time, blocks + 1)[1:-1].tolist()
+    return np.array([first, *inner, last_time])
 
 
 def _samples(

@@ -90,9 +90,7 @@ class SurveyedLog:
         return _refusal(effect, self.passes, self.facts, self.coverage)
 
 
-def _refusal(
-    effect: _imufit.Effect, passes: Passes, facts: _imufit.Facts, coverage: Mapping[str, float]
-) -> str | None:
+def _refusal(effect: _imufit.Effect, passes: Passes, facts: _imufit.Facts, coverage: Mapping[str, float]) -> str | None:
     reason, column = passes.lacking(effect) or effect.not_testable(facts), effect.column
     if reason is not None:
         return reason

@@ -218,8 +218,8 @@ class Diagnosis:
         What is wrong with the data themselves. Where one of them spoils the log, the verdict is ``unknown`` and no
         effect is judged.
     evidence : str
-        What the logs are judged by: ``reference`` (attitude in every row), ``rests`` (the weaker evidence of rests, turns
-        between them and the length of the field, for logs without a reference) or ``reference and rests``.
+        What the logs are judged by: ``reference`` (attitude in every row), ``rests`` (the weaker evidence of rests,
+        turns between them and the length of the field, for logs without a reference) or ``reference and rests``.
     """
 
     verdict: str

@@ -169,6 +169,7 @@ fn question(problem: &Problem, model: &[usize], fitted: &[NormalEquations], aske
         model: p,
         sums,
         logs: problem.logs.clone(),
+        rests: problem.rests(),
     })
 }
 
