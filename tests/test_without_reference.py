@@ -7,6 +7,7 @@ import pytest
 from cli_stand_in import run, strict_json
 from imufit import Log, SensorModel, effect, ladder, simulate
 from imufit.errors import InputError
+from imufit.model.effect import forget
 
 
 def bare(made) -> Log:
@@ -107,13 +108,22 @@ def test_earth_rate_needs_a_heading():
     assert {c.effect: c.status for c in without.candidates}["gyr.earth_rate"] == "not testable here"
 
 
-def test_users_effect_goes_the_same_way():
+@pytest.fixture
+def cross_product():
+    """An effect that a user wrote, taken out of the catalogue afterwards."""
+
     @effect("acc.cross_product", sensor="acc", parameters={"k": "1/(m/s^2)"}, typical=1e-4)
-    def cross_product(w):
+    def columns(w):
         out = np.zeros((len(w.t), 3, 1))
         out[:, 0, 0] = w.f[:, 1] * w.f[:, 2]
         return out
 
+    yield columns
+    forget("acc.cross_product")
+
+
+@pytest.mark.usefixtures("cross_product")
+def test_users_effect_goes_the_same_way():
     log = poses(seed=8)
     k = 1e-3
     x, y, z = log.acc.T

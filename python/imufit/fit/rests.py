@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,8 @@ LEAST_SPREAD = np.radians(10.0)
 """A field whose direction in the body varies by less than this (rad, root mean square) shows nothing of the sensor."""
 MOST_FIELD_ROWS = 4000
 FEWEST_FIELD_ROWS = 200
+FEWEST_DIFFERENCES = 6
+"""Fewer stretches that follow each other do not tell how much they differ."""
 FIELD_BLOCKS = 20
 CLEAR = 8.0
 """Specific forces of different poses are told apart from this many times their noise on."""
@@ -96,6 +98,7 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
     table = _Table(log, covariates)
     rest, pieces = _stretches(log, poses)
     stills = table.means(pieces)
+    poses, gyr_noise = _as_they_scatter(poses, gyr_noise, rest, pieces, stills)
     expected = _expected(poses, pieces)
     turns: list[tuple[int, int, int, int, float, int]] = []
     path = np.zeros(0, dtype=np.intp)
@@ -234,6 +237,38 @@ def _poses(log: Log, notes: list[str]) -> tuple[list[Pose], float]:
             "seconds each."
         )
     return [], noise
+
+
+def _as_they_scatter(
+    poses: Sequence[Pose],
+    gyr_noise: float,
+    rest: NDArray[np.intp],
+    pieces: Sequence[NDArray[np.intp]],
+    stills: dict[str, Any],
+) -> tuple[list[Pose], float]:
+    """Return rests and the gyroscope's noise, rad/s, no quieter than stretches of one rest that follow each other differ.
+
+    Noise that is coloured does not average out as fast as the readings' own scatter says.
+    """
+    if not poses:
+        return [], gyr_noise
+    same = np.flatnonzero(rest[1:] == rest[:-1])
+    usual = float(np.median([rows.size for rows in pieces]))
+
+    def of_stretch(means: Array) -> float:
+        differences = means[same + 1] - means[same]
+        known = differences[np.isfinite(differences).all(axis=1)]
+        return float(np.mean(known**2) / 2.0) if len(known) >= FEWEST_DIFFERENCES else 0.0
+
+    acc, gyr = of_stretch(stills["acc"]), of_stretch(stills["gyr"])
+    return [
+        replace(
+            pose,
+            variance=np.maximum(pose.variance, acc * usual / pose.n),
+            rate_variance=None if pose.rate_variance is None else np.maximum(pose.rate_variance, gyr * usual / pose.n),
+        )
+        for pose in poses
+    ], float(np.sqrt(np.fmax(gyr_noise**2, gyr * usual)))
 
 
 def _expected(poses: Sequence[Pose], pieces: Sequence[NDArray[np.intp]]) -> NDArray[np.float64]:

@@ -56,7 +56,7 @@ pub struct ChannelRows {
     pub t: Vec<f64>,
     /// Block of each row.
     pub block: Vec<usize>,
-    /// Where the rows are projections of a vector: the directions.
+    /// Where the rows are projections of a vector (the accelerometer's zeros): the directions.
     pub direction: Option<Triple>,
     /// Rows that belong together have the same number.
     pub group: Vec<usize>,

@@ -9,7 +9,6 @@ use std::sync::Arc;
 
 use imufit_fit::evidence::Evidence;
 use imufit_fit::normal_equations::NormalEquations;
-use imufit_model::rest_channels::TURN;
 use imufit_model::sensor::{CHANNELS, Sensor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
@@ -148,10 +147,8 @@ pub fn channel_sums(
     parameters: usize,
 ) -> Vec<ChannelSums> {
     let blocks = white.layout.blocks;
-    let rests = white.layout.facts.rests;
     let mut out: Vec<ChannelSums> = Vec::new();
-    // From rest to rest a gyroscope counts from what it reads there: no zero has a part in that.
-    for channel in (0..CHANNELS).filter(|c| weights[*c] > 0.0 && !(rests && *c == TURN)) {
+    for channel in (0..CHANNELS).filter(|c| weights[*c] > 0.0) {
         if (0..blocks).any(|b| white.get(b, channel).is_some_and(|block| block.axes.is_some())) {
             out.push(vector_sums(log, white, channel, weights[channel], places, parameters));
             continue;

@@ -84,6 +84,8 @@ pub fn rows(
         residual: Vec::new(),
     };
     let (mut after, mut block, mut group) = (Vec::new(), Vec::new(), Vec::new());
+    // What a zero of the accelerometer does to a row.
+    let mut zero = Triple::default();
     for turn in turns {
         let rest = |pose: usize| (zeros.row(pose), vectors(&at_rest, axes, pose, wanted));
         let (first, last) = (rest(turn.before), rest(turn.after));
@@ -105,7 +107,9 @@ pub fn rows(
         // Two directions across the one that was found.
         let least = Vector3::ith(found.iamin(), 1.0);
         let across = found.cross(&least).normalize();
+        let turned_zero = back.matrix() * across_of(&up) - across_of(&found);
         for direction in [across, found.cross(&across)] {
+            zero.push(&(turned_zero.tr_mul(&direction) * (turn.weight / poses.force.length)));
             out.residual.push(turn.weight * direction.dot(&error));
             for (k, column) in out.columns.iter_mut().enumerate() {
                 let change = predicted.cross(&carried.further[k]) + back * moved[k] - found_moved[k];
@@ -121,10 +125,15 @@ pub fn rows(
         columns: out,
         t: turns.iter().flat_map(|turn| [path.t[turn.rows.end - 1]; 2]).collect(),
         block,
-        direction: None,
+        direction: Some(zero),
         group,
         around: poses.table.evaluation_of(&after),
     })
+}
+
+/// Takes from a vector its part across a direction.
+fn across_of(direction: &Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::identity() - direction * direction.transpose()
 }
 
 /// Attitudes along the turns, from those of the rests before.
