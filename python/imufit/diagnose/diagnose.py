@@ -53,6 +53,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     ids = analysis.slots
     slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
     result = _decided_by_fits(fit, analysis.problem.diagnose(analysis.fitted_slots, slots, analysis.probe_slots))
+    result = without_reference.with_better_explained(analysis, result)
     confounded: dict[str, list[Rival]] = {}
     for first, second, correlation in result["correlations"]:
         if correlation < MIN_CORRELATION:

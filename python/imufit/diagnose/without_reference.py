@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from imufit.errors import InputError
 from imufit.fit.rest_passes import NEEDS_REFERENCE, RestPasses
@@ -27,6 +27,37 @@ def evidence_of(analysis: Analysis) -> str:
     """
     kinds = {"rests" if isinstance(each.passes, RestPasses) else "reference" for each in analysis.logs}
     return " and ".join(sorted(kinds))
+
+
+def with_better_explained(analysis: Analysis, result: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Name beside the best candidate those that explain more than it, though not for certain: rests are few.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Evidence of the logs.
+    result : mapping
+        What `_imufit.Problem.diagnose` found.
+    """
+    best = result["best"]
+    if best is None or result["verdict"] not in ("missing", "ambiguous") or evidence_of(analysis) == "reference":
+        return result
+    items = {item["slot"]: item for item in result["screened"]}
+
+    def sensors(slot: int) -> set[str]:
+        return set(analysis.candidates[analysis.slots[slot]].sensors)
+
+    def better(slot: int) -> bool:
+        item = items[slot]
+        unsure = item["testable"] and item["plausible"] and not item["passed"]
+        if not unsure or item["gain"] <= items[best]["gain"] or not sensors(slot) & sensors(best):
+            return False
+        return analysis.problem.diagnose([*analysis.fitted_slots, slot], [best])["best"] is None
+
+    more = [slot for slot in items if slot != best and better(slot)]
+    if not more:
+        return result
+    return {**result, "rivals": [*result["rivals"], *more], "verdict": "ambiguous"}
 
 
 def refuse_rests(analysis: Analysis, what: str) -> None:

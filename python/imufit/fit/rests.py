@@ -246,7 +246,7 @@ def _as_they_scatter(
     pieces: Sequence[NDArray[np.intp]],
     stills: dict[str, Any],
 ) -> tuple[list[Pose], float]:
-    """Return rests and the gyroscope's noise, rad/s, no quieter than stretches of one rest that follow each other differ.
+    """Return rests and the gyroscope's noise, rad/s, no quieter than successive stretches of one rest differ.
 
     Noise that is coloured does not average out as fast as the readings' own scatter says.
     """
@@ -265,7 +265,9 @@ def _as_they_scatter(
         replace(
             pose,
             variance=np.maximum(pose.variance, acc * usual / pose.n),
-            rate_variance=None if pose.rate_variance is None else np.maximum(pose.rate_variance, gyr * usual / pose.n),
+            rate_variance=pose.rate_variance
+            if pose.rate_variance is None
+            else np.maximum(pose.rate_variance, gyr * usual / pose.n),
         )
         for pose in poses
     ], float(np.sqrt(np.fmax(gyr_noise**2, gyr * usual)))

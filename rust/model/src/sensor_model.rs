@@ -48,9 +48,9 @@ pub struct SensorModel {
     slots: Vec<Slot>,
     parameters: usize,
     /// Parameters whose column can differ from zero, per sensor and axis.
-    active: Vec<Vec<usize>>,
+    on_axes: Vec<Vec<usize>>,
     /// The same per channel of the evidence: another list where rests stand in for a reference.
-    channels: Vec<Vec<usize>>,
+    active: Vec<Vec<usize>>,
 }
 
 /// Columns and residual of one channel over the rows of a window.
@@ -143,14 +143,14 @@ impl SensorModel {
         let mut model = Self {
             slots,
             parameters: first,
-            active: vec![Vec::new(); CHANNELS],
-            channels: Vec::new(),
+            on_axes: vec![Vec::new(); CHANNELS],
+            active: Vec::new(),
         };
         model.find_active(facts)?;
-        model.channels = if facts.rests {
-            rest_channels::active(&model.active)
+        model.active = if facts.rests {
+            rest_channels::active(&model.on_axes)
         } else {
-            model.active.clone()
+            model.on_axes.clone()
         };
         Ok(model)
     }
@@ -167,12 +167,12 @@ impl SensorModel {
 
     /// Parameters whose column can differ from zero, per channel of the evidence.
     pub fn active(&self) -> &[Vec<usize>] {
-        &self.channels
+        &self.active
     }
 
     /// The same per sensor and axis, as [`SensorModel::modelled`] has its columns.
     pub fn active_on_axes(&self) -> &[Vec<usize>] {
-        &self.active
+        &self.on_axes
     }
 
     /// Modelled readings of one sensor and the columns of its three axes for ideal readings that are known otherwise than from a
@@ -236,7 +236,7 @@ impl SensorModel {
                 columns.reset(4, slot.parameters.len());
                 slot.columns(&rows, sensor, &mut columns)?;
                 for axis in 0..3 {
-                    let list = &mut self.active[3 * sensor.index() + axis];
+                    let list = &mut self.on_axes[3 * sensor.index() + axis];
                     list.extend(
                         (0..slot.parameters.len())
                             .filter(|p| columns.get(*p, axis).is_some())
@@ -344,7 +344,7 @@ impl SensorModel {
         Ok(evaluation
             .channels
             .into_iter()
-            .zip(&self.active)
+            .zip(&self.on_axes)
             .map(|(channel, active)| channel.map(|c| c.residual_after(active, step)))
             .collect())
     }
@@ -361,7 +361,7 @@ impl SensorModel {
         let n = rows.len();
         let silent = rows.facts.silent_axes[sensor.index()];
         let mut out: AxisColumns =
-            std::array::from_fn(|axis| vec![Vec::new(); self.active[3 * sensor.index() + axis].len()]);
+            std::array::from_fn(|axis| vec![Vec::new(); self.on_axes[3 * sensor.index() + axis].len()]);
         let mut columns = Columns::default();
         for stage in [
             Stage::Reference,
@@ -397,7 +397,7 @@ impl SensorModel {
                     after.get_or_insert_with(|| x.clone()).add(added, 1.0);
                 }
                 for axis in 0..3 {
-                    let list = &self.active[3 * sensor.index() + axis];
+                    let list = &self.on_axes[3 * sensor.index() + axis];
                     let from = list.partition_point(|p| *p < slot.first);
                     for (k, p) in list
                         .iter()
