@@ -26,7 +26,7 @@ fn attitude(facts: &LogFacts, force: &Vector3<f64>, field: &Vector3<f64>) -> Uni
     let columns = |up: Vector3<f64>, north: Vector3<f64>| Matrix3::from_columns(&[north, up.cross(&north), up]);
     let up = force.normalize();
     let north = field - up * up.dot(field);
-    if !(north.norm() > 0.0) {
+    if north.norm() <= 0.0 || north.iter().any(|v| v.is_nan()) {
         return no_attitude();
     }
     let body = columns(up, north.normalize());
