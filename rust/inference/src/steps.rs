@@ -7,6 +7,7 @@ use nalgebra::DVector;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::dependence::Dependence;
+use crate::drift::ChannelSums;
 use crate::problem::Problem;
 
 /// Noise that is coloured more slowly than any filter sees jumps now and then: the chance of a false alarm is kept to this part of the usual.
@@ -18,7 +19,9 @@ const LOOKED_AT: usize = 4;
 pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
     let mut tried = 0;
     let mut found = Vec::new();
-    for all in problem.sums.iter().filter(|s| s.of_blocks()) {
+    // A few rests in a block tell no step from a zero that wanders.
+    let told = |s: &ChannelSums| s.of_blocks() && !problem.parts[s.log].white.layout.facts.rests;
+    for all in problem.sums.iter().filter(|s| told(s)) {
         let sums = all.with_sums(all.columns(model));
         let blocks = sums.sums.nrows();
         tried += blocks.saturating_sub(1);
