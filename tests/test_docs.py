@@ -68,7 +68,7 @@ def test_index_links_every_page():
         ("rust/fit/src/bins.rs", "BINS", "up to {} bins"),
         ("rust/fit/src/whitening.rs", "MAX_ORDER", "filter** of order 0 to {}"),
         ("rust/model/src/bandwidth.rs", "TOLERANCE", "{}\\,\\sigma_{{\\text{{ref}}}}"),
-        ("python/imufit/fit/log_evidence.py", "BLOCKS", "B = {} blocks"),
+        ("python/imufit/fit/passes.py", "BLOCKS", "B = {} blocks"),
         ("python/imufit/diagnose/ladder.py", "MATTERS", "at least {:.1%} off the held-out error"),
     ],
 )

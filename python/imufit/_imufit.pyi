@@ -33,6 +33,7 @@ __all__ = [
     "correct_readings",
     "euler_from_quaternion",
     "evaluate",
+    "facts_at_rest",
     "filter_descriptions",
     "filter_trials",
     "find_effect",
@@ -50,6 +51,8 @@ __all__ = [
     "quaternion_from_rotation_vector",
     "quaternion_product",
     "replay_rules",
+    "rest_channels",
+    "rests_tell",
     "rotate",
     "rotate_back",
     "rotation_vector_from_quaternion",
@@ -309,6 +312,7 @@ class Profile:
         trials: Sequence[Sequence[float]],
     ) -> Profile: ...
     def add(self, chunk: _Chunk) -> None: ...
+    def add_rests(self, rests: dict[str, Any]) -> None: ...
 
 def best_trial(profiles: Sequence[Profile]) -> tuple[int, list[float], float] | None: ...
 
@@ -323,6 +327,8 @@ class Evidence:
         filters: Sequence[Sequence[float]],
     ) -> Evidence: ...
     def add(self, chunk: _Chunk) -> None: ...
+    def add_rests(self, rests: dict[str, Any]) -> None: ...
+    def rest_scatter(self, rests: dict[str, Any]) -> list[float]: ...
     def merge(self, other: Evidence) -> None: ...
     def with_filters(self, filters: Sequence[Sequence[float]]) -> Evidence: ...
     @property
@@ -339,6 +345,19 @@ class Autocovariance:
     def of_channel(self, channel: int) -> list[float]: ...
 
 def evaluate(evidence: Evidence, chunk: _Chunk, step: _Numbers) -> list[_Array | None]: ...
+def rests_tell(effect: Effect, facts: Facts, rests: dict[str, Any]) -> bool: ...
+def facts_at_rest(
+    rows: tuple[int, float, float, float],
+    frame: str,
+    gravity: float,
+    field: float | None,
+    sensors: Sequence[bool],
+    covariates: Sequence[str],
+    covariate_means: Sequence[float],
+    temperature_mean: float | None,
+    samples: Sequence[_Numbers],
+) -> Facts: ...
+def rest_channels() -> list[str]: ...
 
 # --- inference: slots are effects in the order of the evidence; p-values are adjusted for all candidates tried
 

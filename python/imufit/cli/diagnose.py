@@ -39,6 +39,9 @@ def diagnose(
 
     Several LOGs of one sensor are asked together: effects are the same in all of them, each has its own bias and mount,
     and a log that disagrees is named.
+
+    A LOG without reference attitude is judged by its rests, the turns between them and the length of the magnetic
+    field, and the answer says what that cannot tell.
     """
     keep_inputs([*logs, model], [json_file, html_file, plot_file])
     output = Output(json_file)
@@ -46,7 +49,8 @@ def diagnose(
         opened = engine.open_logs(logs, mapping)
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
         diagnosis = fit.diagnose(progress=progress)
-        comparison = fit.compare(progress=progress) if html_file is not None else None
+        compared = html_file is not None and diagnosis.evidence == "reference"
+        comparison = fit.compare(progress=progress) if compared else None
     verdict, *rest = diagnosis.sentences()
     output.say(verdict, bold=True)
     output.say(*rest)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.diagnose.attitude import attitude_comparison
+from imufit.diagnose.without_reference import refuse_rests
 from imufit.fit.analysis import Analysis
 from imufit.fit.log_evidence import LogEvidence
 from imufit.fit.passes import CHANNELS, UNITS
@@ -47,6 +48,7 @@ def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
     """
     if log is not None and not any(log is known for known in fit.logs):
         return compare_model(fit.model, log, progress)
+    refuse_rests(fit.analysis, "a comparison")
     own = fit.worst if log is None else next(k for k, known in enumerate(fit.logs) if known is log)
     found = comparison(fit.analysis, fit.estimate.step, own)
     return _with_attitude(found, fit.model_of(own), fit.logs[own], progress)
@@ -65,6 +67,7 @@ def compare_model(model: SensorModel, log: LogSource, progress: Progress) -> Com
         Called with (rows done, rows in all, what is being done).
     """
     analysis = Analysis.of(model, (log,), progress, keep_constants=True)
+    refuse_rests(analysis, "a comparison")
     found = comparison(analysis, analysis.estimate_unnamed().step)
     return _with_attitude(found, model, log, progress)
 

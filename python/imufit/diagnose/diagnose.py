@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from imufit import _imufit
-from imufit.diagnose import sentences
+from imufit.diagnose import sentences, without_reference
 from imufit.diagnose.agreement import answers_without, answers_without_faulty, disagreements
 from imufit.diagnose.compare import notes
 from imufit.fit.analysis import OWN, Analysis, Estimate, pooled
+from imufit.fit.rest_passes import RestPasses
 from imufit.log.several import name_of
 from imufit.model.catalogue import card_of
 from imufit.results import Candidate, DataFault, Diagnosis, LogParameters, Parameter, Rival, Unexplained
+from imufit.results.diagnosis import NOT_TESTABLE
 
 if TYPE_CHECKING:
     from imufit.fit import Fit
@@ -51,6 +53,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     ids = analysis.slots
     slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
     result = _decided_by_fits(fit, analysis.problem.diagnose(analysis.fitted_slots, slots, analysis.probe_slots))
+    result = without_reference.with_better_explained(analysis, result)
     confounded: dict[str, list[Rival]] = {}
     for first, second, correlation in result["correlations"]:
         if correlation < MIN_CORRELATION:
@@ -86,6 +89,9 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     sentence = sentences.verdict(
         word, by_id[best] if best else None, cards[best] if best else None, rivals, unexplained
     )
+    unshown = without_reference.untold(fit)
+    if word == "adequate" and "rests" in without_reference.evidence_of(analysis):
+        sentence = without_reference.adequate(fit.ratio, [candidate.effect for candidate in unshown])
     sentence = sentences.with_disagreements(sentence, disagrees, spoilt=result["spoilt"])
     experiment = None
     if word == "ambiguous" and best is not None:
@@ -94,7 +100,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         verdict=word,
         best=named,
         ambiguous_with=rivals if word == "ambiguous" else (),
-        candidates=tuple(candidates),
+        candidates=(*candidates, *unshown),
         unexplained=unexplained,
         model=analysis.model.effects,
         experiment=experiment,
@@ -104,6 +110,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         disagrees=disagrees,
         without=without,
         data_faults=faults,
+        evidence=without_reference.evidence_of(analysis),
     )
 
 
@@ -123,6 +130,7 @@ def _spoilt(fit: Fit, faults: tuple[DataFault, ...]) -> Diagnosis:
         logs=fit.by_log,
         without=answers_without_faulty(fit, {fault.file for fault in spoiling if fault.file is not None}, diagnose),
         data_faults=faults,
+        evidence=without_reference.evidence_of(fit.analysis),
     )
 
 
@@ -234,7 +242,7 @@ def _own_parameters(
 
 def _status(item: Mapping[str, Any]) -> str:
     if not item["testable"]:
-        return "not testable here"
+        return NOT_TESTABLE
     if item["passed"]:
         return "passed"
     if not item["agreed"]:
@@ -264,7 +272,7 @@ def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item
     having = [log for log in concerned if any(c["channel"] == item["channel"] for c in residuals[log]["channels"])]
     log = max(having, key=share)
     facts = analysis.logs[log].facts
-    edges = np.linspace(facts.t_start, facts.t_end, analysis.logs[log].raw.blocks + 1)
+    edges = analysis.logs[log].passes.edges(facts)
     first, last = next(c["stretch"] for c in residuals[log]["channels"] if c["channel"] == item["channel"])
     return Unexplained(
         item["channel"], item["covariate"], share(log), item["shape"], float(edges[first]), float(edges[last])
@@ -273,7 +281,10 @@ def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item
 
 def _notes(analysis: Analysis) -> tuple[str, ...]:
     """Return what the reader should know of the logs; of several each note tells which of them it is about."""
-    found = [(each.surveyed.log, notes(each)) for each in analysis.logs]
+    found = [
+        (each.surveyed.log, without_reference.notes(each) if isinstance(each.passes, RestPasses) else notes(each))
+        for each in analysis.logs
+    ]
     if len(found) == 1:
         return found[0][1]
     return tuple(f"{name_of(log, k)}: {note}" for k, (log, own) in enumerate(found) for note in own)

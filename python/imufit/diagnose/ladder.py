@@ -8,6 +8,7 @@ from imufit.diagnose.add import add
 from imufit.diagnose.attitude import attitude_comparison
 from imufit.diagnose.compare import comparison
 from imufit.diagnose.diagnose import diagnose
+from imufit.diagnose.without_reference import refuse_rests
 from imufit.fit import Fit
 from imufit.log.several import Logs
 from imufit.model import SensorModel
@@ -44,6 +45,7 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
         The log has no usable reference, or an effect of the model cannot be tested on it.
     """
     fit = Fit.of(model or SensorModel(), log, progress)
+    refuse_rests(fit.analysis, "the ladder")
     start, first_fit = fit.ratio, fit
     steps: list[Step] = []
     first: Diagnosis | None = None

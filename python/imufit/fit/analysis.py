@@ -12,6 +12,7 @@ from imufit import _imufit
 from imufit.errors import InputError
 from imufit.fit.log_evidence import LogEvidence, Values
 from imufit.fit.profile import Found, search
+from imufit.fit.rest_passes import RestPasses
 from imufit.fit.surveyed_log import SurveyedLog, survey
 from imufit.fit.users_effects import check_users_effects
 from imufit.log import LogSource
@@ -314,6 +315,8 @@ class Analysis:
     @property
     def linear(self) -> bool:
         """True if the reading is proportional to the fitted parameters, so that one solution is exact."""
+        if self.fitted_slots and any(isinstance(each.passes, RestPasses) for each in self.logs):
+            return False
         stages = {effect.stage for effect, _ in self.model.stack()}
         stages |= {find_effect(key).stage for key in self.unnamed} if "gain" in stages else set()
         return not any(effect.nonlinear for effect, _ in self.model.stack()) and not {"input", "gain"} <= stages

@@ -9,6 +9,7 @@ from imufit import _imufit
 from imufit.faults import ClippedRows, frame_faults
 from imufit.faults.samples import windows
 from imufit.fit.passes import Passes
+from imufit.fit.rest_passes import RestPasses
 from imufit.results import DataFault
 
 
@@ -24,6 +25,8 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
     ends : mapping
         End of the range of each sensor that may have one.
     """
+    if isinstance(passes, RestPasses):
+        return tuple(passes.row_faults)
     told = passes.log.metadata.extra
     clipped = ClippedRows(ends, [sensor for sensor in ends if f"{sensor}_range" in told])
 

@@ -12,12 +12,12 @@ from imufit.errors import InputError
 from imufit.faults import time_faults
 from imufit.fit.passes import CHANNELS, Passes
 from imufit.fit.profile import Found
+from imufit.fit.rest_passes import RestPasses
 from imufit.fit.surveyed_log import SurveyedLog
 from imufit.log import LogSource
 from imufit.model.catalogue import find_effect
 from imufit.results import DataFault
 
-BLOCKS = 48
 Values = Mapping[str, list[float]]
 
 
@@ -81,9 +81,15 @@ class LogEvidence:
         raw = _empty(surveyed, fitted, candidates, found, [[] for _ in CHANNELS])
         passes.evidence(raw, facts, "taking evidence")
         step, raw_variance = _imufit.saturate(raw)
-        _check_samples(surveyed.log, fitted, raw_variance)
         slots = (*fitted, *candidates)
         faults = surveyed.faults
+        if isinstance(passes, RestPasses):
+            noise = passes.noise(raw, raw_variance)
+            # The noise that metadata state is that of a reading, not of a mean.
+            floors = [float(np.sqrt(v)) for v in noise]
+            _check_samples(surveyed.log, fitted, noise)
+            return cls(surveyed, slots, raw, raw, noise, noise, floors, [[] for _ in CHANNELS], faults)
+        _check_samples(surveyed.log, fitted, raw_variance)
         if not any(fault.spoils for fault in faults):
             faults = (*faults, *time_faults(raw, raw_variance, _places(surveyed, slots), facts))
         filters = passes.autocovariance(raw, facts, step).filters()
@@ -133,7 +139,7 @@ def _empty(
     stack = [(find_effect(key), values) for key, values in fitted.items()]
     columns = surveyed.columns
     asked = [(columns[key], _trial(columns[key], found.get(key))) for key in candidates]
-    return _imufit.Evidence(surveyed.facts, stack, asked, BLOCKS, filters)
+    return _imufit.Evidence(surveyed.facts, stack, asked, surveyed.passes.blocks, filters)
 
 
 def _places(surveyed: SurveyedLog, slots: Sequence[str]) -> dict[str, range]:

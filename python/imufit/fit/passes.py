@@ -25,6 +25,7 @@ MASKS = ("ref_exact", "movement")
 CHANNELS = tuple(f"{sensor}_{axis}" for sensor in ("acc", "gyr", "mag") for axis in "xyz")
 UNITS = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
 
+BLOCKS = 48
 MIN_ROWS = 200
 MIN_COVERAGE = 0.98
 
@@ -168,11 +169,34 @@ class Passes:
                 return number, zero.as_quat()[[3, 0, 1, 2]].tolist()
         return number, [1.0, 0.0, 0.0, 0.0]
 
+    @property
+    def blocks(self) -> int:
+        """Blocks of time that the evidence is kept in."""
+        return BLOCKS
+
+    def edges(self, facts: _imufit.Facts) -> NDArray[np.float64]:
+        """Return the times at which blocks begin and end, (blocks + 1,), s."""
+        return np.linspace(facts.t_start, facts.t_end, self.blocks + 1)
+
+    def lacking(self, effect: _imufit.Effect) -> str | None:
+        """Return why nothing can be told of an effect's sensor, though the log has it; None otherwise."""
+        return None
+
+    def told(self, effect: _imufit.Effect, facts: _imufit.Facts) -> str | None:
+        """Return why what the log is judged by cannot tell of an effect; None if it can."""
+        return None
+
     def evidence(self, evidence: _imufit.Evidence, facts: _imufit.Facts, label: str) -> _imufit.Evidence:
         """Fill empty evidence with the whole log."""
         for arrays in self.chunks(facts.margin, label):
             evidence.add(arrays)
         return evidence
+
+    def fill(self, profiles: Sequence[_imufit.Profile], facts: _imufit.Facts) -> None:
+        """Fill empty searches with the whole log."""
+        for arrays in self.chunks(facts.margin, "searching periods and widths") if profiles else ():
+            for profile in profiles:
+                profile.add(arrays)
 
     def autocovariance(
         self, evidence: _imufit.Evidence, facts: _imufit.Facts, step: NDArray[np.float64]

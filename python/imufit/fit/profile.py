@@ -63,9 +63,7 @@ def search(
             stack = [(find_effect(key), at) for key, at in values.items()]
             asked = [key for key in grids if k in tellers[key]]
             own = [_imufit.Profile(each.facts, stack, candidates[key], grids[key]) for key in asked]
-            for arrays in each.passes.chunks(each.facts.margin, "searching periods and widths") if own else ():
-                for profile in own:
-                    profile.add(arrays)
+            each.passes.fill(own, each.facts)
             for key, profile in zip(asked, own, strict=True):
                 profiles[key].append(profile)
         for key, searches in profiles.items():

@@ -12,6 +12,7 @@ from imufit import _imufit
 from imufit.errors import InputError
 from imufit.fit.data_faults import data_faults
 from imufit.fit.passes import MIN_COVERAGE, Passes
+from imufit.fit.rest_passes import passes_of
 from imufit.log import LogSource
 from imufit.model.catalogue import column_effects, effects
 from imufit.model.sensor_model import SensorModel
@@ -68,7 +69,7 @@ class SurveyedLog:
             if (effect.sensors[0], effect.column) not in named
         }
         offered: dict[str, Any] = {**effects(), **columns}
-        reasons = {key: _refusal(effect, facts, coverage) for key, effect in offered.items()}
+        reasons = {key: _refusal(effect, passes, facts, coverage) for key, effect in offered.items()}
         testable = {key: effect for key, effect in offered.items() if reasons[key] is None}
         refused = {key: reason for key, reason in reasons.items() if reason is not None}
         probes = {effect.id: effect for effect in _imufit.probes(facts)}
@@ -86,13 +87,15 @@ class SurveyedLog:
 
     def refusal(self, effect: _imufit.Effect) -> str | None:
         """Return why the log cannot tell of an effect; None if it can."""
-        return _refusal(effect, self.facts, self.coverage)
+        return _refusal(effect, self.passes, self.facts, self.coverage)
 
 
-def _refusal(effect: _imufit.Effect, facts: _imufit.Facts, coverage: Mapping[str, float]) -> str | None:
-    reason, column = effect.not_testable(facts), effect.column
-    if reason is not None or column is None or coverage.get(column, 0.0) >= MIN_COVERAGE:
+def _refusal(effect: _imufit.Effect, passes: Passes, facts: _imufit.Facts, coverage: Mapping[str, float]) -> str | None:
+    reason, column = passes.lacking(effect) or effect.not_testable(facts), effect.column
+    if reason is not None:
         return reason
+    if column is None or coverage.get(column, 0.0) >= MIN_COVERAGE:
+        return passes.told(effect, facts)
     return f"column {column} is known in only {100 * coverage.get(column, 0.0):.0f} % of the rows"
 
 
@@ -112,7 +115,7 @@ def survey(
     keep_constants : bool
         Temperatures and covariates count from the means that the model was fitted with, not from these logs'.
     """
-    passes = [Passes(log, progress) for log in logs]
+    passes = [passes_of(log, progress) for log in logs]
     surveys = [each.survey() for each in passes]
     facts = [found for found, _ in surveys]
     ranges = _ranges(passes)

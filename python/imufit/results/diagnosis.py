@@ -26,6 +26,10 @@ VERDICTS = {
 }
 
 
+NOT_TESTABLE = "not testable here"
+"""Status of an effect that a log cannot show."""
+
+
 @dataclass(frozen=True)
 class Rival:
     """An effect that looks much the same in this log.
@@ -213,6 +217,9 @@ class Diagnosis:
     data_faults : tuple of DataFault
         What is wrong with the data themselves. Where one of them spoils the log, the verdict is ``unknown`` and no
         effect is judged.
+    evidence : str
+        What the logs are judged by: ``reference`` (attitude in every row), ``rests`` (the weaker evidence of rests,
+        turns between them and the length of the field, for logs without a reference) or ``reference and rests``.
     """
 
     verdict: str
@@ -228,6 +235,7 @@ class Diagnosis:
     disagrees: tuple[Disagreement, ...] = ()
     without: tuple[Without, ...] = ()
     data_faults: tuple[DataFault, ...] = ()
+    evidence: str = "reference"
 
     @property
     def best_candidate(self) -> Candidate | None:
@@ -235,7 +243,7 @@ class Diagnosis:
         return next((item for item in self.candidates if item.effect == self.best), None)
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of `diagnose`; model, experiment, sentence, notes and faults of the data besides."""
+        """JSON of `diagnose`; model, experiment, sentence, notes, faults of the data and evidence besides."""
         return {
             "verdict": self.verdict,
             "best": self.best,
@@ -247,6 +255,7 @@ class Diagnosis:
             "sentence": self.sentence,
             "notes": list(self.notes),
             "data_faults": [fault.to_dict() for fault in self.data_faults],
+            "evidence": self.evidence,
             **logs_json(self.logs),
             **({"disagrees": [item.to_dict() for item in self.disagrees]} if self.logs else {}),
             **({"without": [item.to_dict() for item in self.without]} if self.without else {}),

@@ -11,10 +11,11 @@ use imufit_model::facts::{LOOKBACK, LogFacts};
 use imufit_model::sensor::Sensor;
 use imufit_model::sensor_model::{Evaluation, SensorModel};
 use imufit_model::window::Window;
-use nalgebra::{DMatrix, DMatrixView, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::bins::Bins;
+use crate::rests::{ChannelRows, Rests};
 use crate::whitening::Filter;
 
 /// Rows worked on at a time: their columns stay in the cache.
@@ -78,6 +79,38 @@ pub struct ChannelBlock {
     pub bin_count: Vec<Vec<f64>>,
     /// Sums of columns and residual in each bin (bins x w, row by row) of each covariate.
     pub bin_sum: Vec<Vec<f64>>,
+    /// What a zero of the three axes does, where rows are projections of a vector.
+    pub axes: Option<AxisSums>,
+}
+
+/// Sums of rows that are each the projection of a vector on a direction of its own.
+#[derive(Clone, Debug)]
+pub struct AxisSums {
+    /// Sum of the directions' outer products.
+    pub square: Matrix3<f64>,
+    /// Sums of directions times columns and residual (3 x w).
+    pub sum: DMatrix<f64>,
+    /// Sums of the directions in each bin of each covariate.
+    pub bin_sum: Vec<Vec<Vector3<f64>>>,
+}
+
+impl AxisSums {
+    fn new(width: usize, bins: &Bins) -> Self {
+        let of = |e: &Vec<f64>| vec![Vector3::zeros(); if e.is_empty() { 0 } else { e.len() + 1 }];
+        Self {
+            square: Matrix3::zeros(),
+            sum: DMatrix::zeros(3, width),
+            bin_sum: bins.edges.iter().map(of).collect(),
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.square += other.square;
+        self.sum += &other.sum;
+        for (a, b) in self.bin_sum.iter_mut().flatten().zip(other.bin_sum.iter().flatten()) {
+            *a += b;
+        }
+    }
 }
 
 impl ChannelBlock {
@@ -96,6 +129,7 @@ impl ChannelBlock {
                 .iter()
                 .map(|e| vec![0.0; if e.is_empty() { 0 } else { (e.len() + 1) * width }])
                 .collect(),
+            axes: None,
         }
     }
 
@@ -103,6 +137,11 @@ impl ChannelBlock {
         self.n += other.n;
         self.gram += &other.gram;
         self.sum += &other.sum;
+        match (&mut self.axes, &other.axes) {
+            (Some(own), Some(other)) => own.add(other),
+            (own @ None, Some(other)) => *own = Some(other.clone()),
+            (_, None) => {}
+        }
         for (a, b) in self
             .bin_count
             .iter_mut()
@@ -197,6 +236,62 @@ impl Evidence {
             self.absorb(part?);
         }
         Ok(())
+    }
+
+    /// Adds what the rests of a log tell, where they stand in for a reference.
+    pub fn add_rests(&mut self, rests: &Rests) -> Result<(), EffectError> {
+        for rows in rests.rows(&self.layout.model, &self.layout.facts)? {
+            self.add_rows(&rows);
+        }
+        Ok(())
+    }
+
+    /// Adds finished rows of one channel. Rows with a column that is not known are no evidence.
+    fn add_rows(&mut self, rows: &ChannelRows) {
+        let bins = &self.layout.bins;
+        let width = rows.columns.columns.len() + 1;
+        let mut assigned = vec![Vec::new(); bins.names.len()];
+        for (covariate, assigned) in assigned.iter_mut().enumerate() {
+            if !bins.edges[covariate].is_empty() {
+                bins.assign(covariate, &rows.t, &rows.around, assigned);
+            }
+        }
+        for i in 0..rows.t.len() {
+            let columns = rows
+                .columns
+                .columns
+                .iter()
+                .chain(std::iter::once(&rows.columns.residual));
+            let row = DVector::from_iterator(width, columns.map(|c| c[i]));
+            if row.iter().any(|v| !v.is_finite()) {
+                continue;
+            }
+            let key = (rows.block[i], rows.channel);
+            let target = self.blocks.entry(key).or_insert_with(|| ChannelBlock::new(width, bins));
+            target.n += 1;
+            target.gram.ger(1.0, &row, &row, 1.0);
+            target.sum += &row;
+            let direction = rows.direction.as_ref().map(|d| d.row(i));
+            if let Some(direction) = direction {
+                let axes = target.axes.get_or_insert_with(|| AxisSums::new(width, bins));
+                axes.square += direction * direction.transpose();
+                axes.sum.ger(1.0, &direction, &row, 1.0);
+            }
+            for (covariate, assigned) in assigned.iter().enumerate().filter(|(_, a)| !a.is_empty()) {
+                let bin = assigned[i];
+                if bin == usize::MAX {
+                    continue;
+                }
+                target.bin_count[covariate][bin] += 1.0;
+                if let (Some(direction), Some(axes)) = (direction, &mut target.axes) {
+                    axes.bin_sum[covariate][bin] += direction;
+                }
+                let sums = &mut target.bin_sum[covariate][bin * width..(bin + 1) * width];
+                for (s, v) in sums.iter_mut().zip(row.iter()) {
+                    *s += v;
+                }
+            }
+        }
     }
 
     fn absorb(&mut self, part: Blocks) {

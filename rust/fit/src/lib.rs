@@ -9,6 +9,7 @@ pub mod noise;
 pub mod normal_equations;
 pub mod profile;
 pub mod reference_width;
+pub mod rests;
 pub mod survey;
 pub mod travel;
 pub mod whitening;

@@ -6,12 +6,13 @@
 use imufit_model::effect::EffectError;
 use imufit_model::facts::LogFacts;
 use imufit_model::sensor::CHANNELS;
-use imufit_model::sensor_model::SensorModel;
+use imufit_model::sensor_model::{ChannelColumns, SensorModel};
 use imufit_model::window::Window;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::normal_equations::NormalEquations;
+use crate::rests::Rests;
 
 /// Rows worked on at a time.
 const PART: usize = 2048;
@@ -117,8 +118,25 @@ impl Profile {
 
     fn sums(&self, window: &Window) -> Result<Vec<Sums>, EffectError> {
         let evaluation = self.model.evaluate(window, &self.facts)?;
+        Ok(self.sums_of(&evaluation.channels))
+    }
+
+    /// Adds what the rests of a log tell, where they stand in for a reference.
+    pub fn add_rests(&mut self, rests: &Rests) -> Result<(), EffectError> {
+        let mut channels = vec![None; CHANNELS];
+        for rows in rests.rows(&self.model, &self.facts)? {
+            channels[rows.channel] = Some(rows.columns);
+        }
+        let more = self.sums_of(&channels);
+        for (sums, more) in self.channels.iter_mut().zip(more) {
+            sums.add(more);
+        }
+        Ok(())
+    }
+
+    fn sums_of(&self, channels: &[Option<ChannelColumns>]) -> Vec<Sums> {
         let of_channel = |channel: usize| {
-            let Some(found) = &evaluation.channels[channel] else {
+            let Some(found) = &channels[channel] else {
                 return Sums::default();
             };
             let rows: Vec<usize> = (0..found.residual.len())
@@ -143,7 +161,7 @@ impl Profile {
             }
             sums
         };
-        Ok((0..CHANNELS).map(of_channel).collect())
+        (0..CHANNELS).map(of_channel).collect()
     }
 
     /// Equations of one log's model and one trial over all channels.

@@ -279,6 +279,7 @@ impl Survey {
             ranges: [None; 3],
             rig: self.travel.take().map(|t| t.finish(self.attitude_width.noise())),
             covariates: self.given.covariates.clone(),
+            rests: false,
         };
         let samples = CovariateSamples {
             names: Bins::covariate_names(&self.given.covariates),

@@ -154,15 +154,11 @@ fn question(problem: &Problem, model: &[usize], fitted: &[NormalEquations], aske
         .sums
         .iter()
         .map(|s| {
-            let mut own = DMatrix::zeros(problem.logs[s.log].len(), p + m);
+            let mut own = DMatrix::zeros(s.sums.nrows(), p + m);
             own.columns_mut(0, p).copy_from(&s.columns(model));
             if let (true, Some(covariate)) = (s.channel == channel, asked.index[s.log]) {
-                for b in 0..problem.logs[s.log].len() {
-                    if let Some(block) = problem.parts[s.log].white.get(b, channel) {
-                        let counts = DVector::from_column_slice(&block.bin_count[covariate]);
-                        own.view_mut((b, p), (1, m)).copy_from(&q.tr_mul(&counts).transpose());
-                    }
-                }
+                let sums = s.binned(&problem.parts[s.log].white, covariate, &q);
+                own.columns_mut(p, m).copy_from(&sums);
             }
             s.with_sums(own)
         })
@@ -174,6 +170,7 @@ fn question(problem: &Problem, model: &[usize], fitted: &[NormalEquations], aske
         model: p,
         sums,
         logs: problem.logs.clone(),
+        rests: problem.rests(),
     })
 }
 

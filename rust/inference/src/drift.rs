@@ -11,7 +11,7 @@ use imufit_fit::evidence::Evidence;
 use imufit_fit::normal_equations::NormalEquations;
 use imufit_fit::whitening;
 use imufit_model::sensor::{CHANNELS, Sensor};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
 /// Walk variances per block tried, in units of a block mean's variance.
 const GRID: [f64; 18] = [
@@ -30,6 +30,29 @@ struct Strength {
     smoother: DMatrix<f64>,
 }
 
+/// What the sums of a channel stand for.
+#[derive(Clone)]
+enum Walk {
+    /// The sum of a block, whose zero makes a step from block to block.
+    Zero,
+    /// Sums along directions within a block, whose rows are projections of a vector: its three zeros each make steps. Block
+    /// and direction of each sum.
+    Vector(Arc<Vec<(usize, Vector3<f64>)>>),
+}
+
+impl Walk {
+    /// Covariance of the zeros behind the sums after unit steps from zero before the first block.
+    fn covariance(&self, sums: usize) -> DMatrix<f64> {
+        match self {
+            Self::Zero => DMatrix::from_fn(sums, sums, |i, j| (i.min(j) + 1) as f64),
+            Self::Vector(directions) => DMatrix::from_fn(sums, sums, |i, j| {
+                let ((a, u), (b, v)) = (&directions[i], &directions[j]);
+                (a.min(b) + 1) as f64 * u.dot(v)
+            }),
+        }
+    }
+}
+
 /// Block sums of one channel of one log over the parameters of a question.
 #[derive(Clone)]
 pub struct ChannelSums {
@@ -45,12 +68,36 @@ pub struct ChannelSums {
     right: DVector<f64>,
     /// Number of samples in each block.
     count: DVector<f64>,
+    walk: Walk,
     strengths: Arc<Vec<Strength>>,
 }
 
 /// ln det of a factorised matrix.
 fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
     factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum()
+}
+
+/// Every strength of the walk of a vector for sums with these counts.
+fn vector_strengths(count: &DVector<f64>, directions: &[(usize, Vector3<f64>)], walk: &Walk) -> Vec<Strength> {
+    let mut blocks: Vec<usize> = directions.iter().map(|d| d.0).collect();
+    blocks.dedup();
+    if blocks.len() < MIN_BLOCKS {
+        return Vec::new();
+    }
+    let unit = count.len() as f64 / count.sum();
+    let steps = walk.covariance(count.len());
+    let of = |step: &f64| {
+        let kappa = step * unit;
+        let prior = &steps * kappa;
+        let covariance = Cholesky::new(&prior + DMatrix::from_diagonal(&count.map(|n| 1.0 / n)))?;
+        Some(Strength {
+            kappa,
+            smoother: &prior - &prior * covariance.solve(&prior),
+            log_determinant: log_determinant(&covariance),
+            covariance,
+        })
+    };
+    GRID.iter().filter_map(of).collect()
 }
 
 /// Every strength of the walk for blocks with these sample counts, up to the variance of a step `most`.
@@ -106,6 +153,10 @@ pub fn channel_sums(
     let blocks = white.layout.blocks;
     let mut out: Vec<ChannelSums> = Vec::new();
     for channel in (0..CHANNELS).filter(|c| weights[*c] > 0.0) {
+        if (0..blocks).any(|b| white.get(b, channel).is_some_and(|block| block.axes.is_some())) {
+            out.push(vector_sums(log, white, channel, weights[channel], places, parameters));
+            continue;
+        }
         let mut sums = DMatrix::zeros(blocks, parameters);
         let (mut right, mut count) = (DVector::zeros(blocks), DVector::zeros(blocks));
         let active = &white.layout.model.active()[channel];
@@ -122,6 +173,9 @@ pub fn channel_sums(
         let same = out.iter().find(|o| o.channel / 3 == sensor && o.count == count);
         let strengths = if let Some(other) = same {
             other.strengths.clone()
+        } else if white.layout.facts.rests {
+            // A row stands for a whole rest: its noise says nothing of how far a zero goes until the next.
+            Arc::new(strengths(&count, f64::INFINITY))
         } else {
             let most = (3 * sensor..3 * sensor + 3)
                 .map(|c| floors[c].powi(2) * weights[c] * whitening::gain(&white.layout.filters[c], 0.0))
@@ -136,11 +190,64 @@ pub fn channel_sums(
             sums,
             right,
             count,
+            walk: Walk::Zero,
             strengths,
         });
     }
     out
 }
+
+/// The same for a channel whose rows are projections of a vector: sums along the directions that each block tells of.
+fn vector_sums(
+    log: usize,
+    white: &Evidence,
+    channel: usize,
+    weight: f64,
+    places: &[usize],
+    parameters: usize,
+) -> ChannelSums {
+    let active = &white.layout.model.active()[channel];
+    let (mut directions, mut count, mut rows, mut right) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for b in 0..white.layout.blocks {
+        let Some(axes) = white.get(b, channel).and_then(|block| block.axes.as_ref()) else {
+            continue;
+        };
+        let eigen = axes.square.symmetric_eigen();
+        let least = SEEN * eigen.eigenvalues.max();
+        for (k, value) in eigen.eigenvalues.iter().enumerate().filter(|(_, v)| **v > least) {
+            let direction: Vector3<f64> = eigen.eigenvectors.column(k).into_owned();
+            let sums = axes.sum.tr_mul(&direction);
+            let mut row = DVector::zeros(parameters);
+            for (k, p) in active.iter().enumerate() {
+                row[places[*p]] = sums[k];
+            }
+            rows.push(row.transpose());
+            right.push(sums[active.len()]);
+            count.push(*value);
+            directions.push((b, direction));
+        }
+    }
+    let sums = if rows.is_empty() {
+        DMatrix::zeros(0, parameters)
+    } else {
+        DMatrix::from_rows(&rows)
+    };
+    let count = DVector::from_vec(count);
+    let walk = Walk::Vector(Arc::new(directions.clone()));
+    ChannelSums {
+        log,
+        channel,
+        weight,
+        sums,
+        right: DVector::from_vec(right),
+        strengths: Arc::new(vector_strengths(&count, &directions, &walk)),
+        count,
+        walk,
+    }
+}
+
+/// Part of the best seen direction of a block from which on another one is seen.
+const SEEN: f64 = 1e-4;
 
 /// Block means explained by columns.
 pub struct Profiled {
@@ -175,8 +282,36 @@ impl ChannelSums {
             sums,
             right: self.right.clone(),
             count: self.count.clone(),
+            walk: self.walk.clone(),
             strengths: self.strengths.clone(),
         }
+    }
+
+    /// True if the sums are those of blocks.
+    pub const fn of_blocks(&self) -> bool {
+        matches!(self.walk, Walk::Zero)
+    }
+
+    /// Sums of a column that is constant within each bin of a covariate, over the rows of this channel: `values` has a column
+    /// for each of several such columns (bins x columns).
+    pub fn binned(&self, evidence: &Evidence, covariate: usize, values: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(self.sums.nrows(), values.ncols());
+        let of_block = |b: usize| evidence.get(b, self.channel);
+        for k in 0..out.nrows() {
+            let counts: Option<Vec<f64>> = match &self.walk {
+                Walk::Zero => of_block(k).map(|block| block.bin_count[covariate].clone()),
+                Walk::Vector(directions) => {
+                    let (b, direction) = &directions[k];
+                    let axes = of_block(*b).and_then(|block| block.axes.as_ref());
+                    axes.map(|axes| axes.bin_sum[covariate].iter().map(|v| v.dot(direction)).collect())
+                }
+            };
+            if let Some(counts) = counts {
+                let sums = values.tr_mul(&DVector::from_vec(counts));
+                out.row_mut(k).copy_from(&sums.transpose());
+            }
+        }
+        out
     }
 
     /// Sums of some of the parameters already in these sums.
@@ -257,6 +392,11 @@ impl ChannelSums {
 
     /// Covariance that a walk of one strength, from zero at the start, gives to the sums over the parameters' columns.
     fn spread(&self, strength: usize) -> DMatrix<f64> {
+        let kappa = self.weight * self.strengths[strength].kappa;
+        if let Walk::Vector(_) = self.walk {
+            let steps = self.walk.covariance(self.sums.nrows());
+            return self.sums.tr_mul(&(steps * &self.sums)) * kappa;
+        }
         // A walk is the sum of its steps, and a step is seen by all blocks from its own on.
         let mut later = self.sums.clone();
         for b in (0..later.nrows().saturating_sub(1)).rev() {
@@ -264,7 +404,7 @@ impl ChannelSums {
             let mut row = later.row_mut(b);
             row += next;
         }
-        later.tr_mul(&later) * (self.weight * self.strengths[strength].kappa)
+        later.tr_mul(&later) * kappa
     }
 
     /// Takes the wandering mean of one strength out of equations over the same parameters.
@@ -421,6 +561,7 @@ mod tests {
                 sums,
                 right,
                 count: count.clone(),
+                walk: Walk::Zero,
                 strengths,
             }
         };

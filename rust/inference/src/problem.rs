@@ -52,6 +52,9 @@ pub struct Question {
     pub sums: Vec<ChannelSums>,
     /// Blocks of each log: those of different logs are no neighbours.
     pub logs: Arc<[Range<usize>]>,
+    /// True where rests stand in for a reference: some blocks then tell far more of a parameter than others, and how estimates
+    /// scatter if one of them is left out says too little.
+    pub rests: bool,
 }
 
 /// Plausible sizes are this many times the typical ones.
@@ -212,7 +215,13 @@ impl Problem {
             model: p,
             sums,
             logs: self.logs.clone(),
+            rests: self.rests(),
         }
+    }
+
+    /// True if a log has rests instead of a reference.
+    pub fn rests(&self) -> bool {
+        self.parts.iter().any(|part| part.white.layout.facts.rests)
     }
 }
 
@@ -228,6 +237,7 @@ impl Question {
             model: self.model,
             sums: self.sums.iter().map(|s| s.with_sums(s.columns(&kept))).collect(),
             logs: self.logs.clone(),
+            rests: self.rests,
         }
     }
 
@@ -258,6 +268,7 @@ impl Question {
             model: p,
             sums: sums.collect(),
             logs: self.logs.clone(),
+            rests: self.rests,
         }
     }
 

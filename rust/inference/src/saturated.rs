@@ -5,7 +5,7 @@
 use imufit_fit::evidence::{Evidence, Layout};
 use imufit_fit::normal_equations::NormalEquations;
 use imufit_model::sensor::CHANNELS;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// All effects fitted at once.
 #[derive(Clone, Debug)]
@@ -69,6 +69,29 @@ pub fn assemble(evidence: &Evidence, block: usize, weights: &[f64; CHANNELS]) ->
     out
 }
 
+/// Number of parameters that a channel can tell apart. The rests of a log are too few for most of what they are asked; rows that
+/// are many count every parameter.
+fn freedom(evidence: &Evidence, channel: usize) -> usize {
+    let own = evidence.layout.model.active()[channel].len();
+    if own == 0 || !evidence.layout.facts.rests {
+        return own;
+    }
+    let mut gram = DMatrix::zeros(own, own);
+    for block in (0..evidence.layout.blocks).filter_map(|b| evidence.get(b, channel)) {
+        gram += block.gram.view((0, 0), (own, own));
+    }
+    let size: Vec<f64> = (0..own).map(|j| gram[(j, j)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(own, own, |i, j| {
+        let size = size[i] * size[j];
+        if size > 0.0 { gram[(i, j)] / size } else { 0.0 }
+    });
+    let values = scaled.symmetric_eigenvalues();
+    values.iter().filter(|v| **v > TOLD).count()
+}
+
+/// Eigenvalue of a Gram matrix with ones on its diagonal from which on a direction is told.
+const TOLD: f64 = 1e-9;
+
 /// Fits everything, with weights from its own residual.
 pub fn fit_all(evidence: &Evidence) -> Option<Saturated> {
     let p = evidence.layout.model.parameters();
@@ -77,7 +100,7 @@ pub fn fit_all(evidence: &Evidence) -> Option<Saturated> {
     for _ in 0..3 {
         for (channel, v) in variance.iter_mut().enumerate() {
             let (sum, n) = channel_square(evidence, channel, &step);
-            let own = evidence.layout.model.active()[channel].len();
+            let own = freedom(evidence, channel);
             *v = if n > own + 10 { sum / (n - own) as f64 } else { f64::NAN };
         }
         let largest = variance.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
@@ -97,7 +120,7 @@ pub fn fit_all(evidence: &Evidence) -> Option<Saturated> {
     }
     for (channel, v) in variance.iter_mut().enumerate() {
         let (sum, n) = channel_square(evidence, channel, &step);
-        let own = evidence.layout.model.active()[channel].len();
+        let own = freedom(evidence, channel);
         *v = if n > own + 10 { sum / (n - own) as f64 } else { f64::NAN };
     }
     Some(Saturated { step, variance })

@@ -58,7 +58,7 @@ pub fn parameters_of<'a>(slots: impl IntoIterator<Item = &'a Slot>) -> Vec<usize
 const CLEARLY_CHANCE: f64 = 0.01;
 
 /// The p-value of a question: the largest of two block lengths, in case correlation reaches beyond the shorter, and of
-/// a test that lets zeros wander.
+/// a test that lets zeros wander; where rests stand in for a reference, of a test by the noise within them as well.
 pub fn p_value(question: &Question) -> f64 {
     p_value_beside(question, jackknife::jackknife(question, 1).map_or(0.0, |j| j.p_value))
 }
@@ -68,6 +68,9 @@ fn p_value_beside(question: &Question, shorter: f64) -> f64 {
     let p = jackknife::jackknife(question, 2).map_or(shorter, |j| j.p_value.max(shorter));
     if p > CLEARLY_CHANCE {
         p
+    } else if question.rests {
+        p.max(wald(question, &question.total()))
+            .max(p_value_with_drift(question))
     } else {
         p.max(p_value_with_drift(question))
     }

@@ -1,6 +1,7 @@
 //! Adequate, missing, ambiguous or unknown: the only place where this is decided.
 
-use imufit_model::sensor::CHANNELS;
+use imufit_model::rest_channels;
+use imufit_model::sensor::{CHANNELS, Sensor};
 use imufit_model::sensor_model::Slot;
 use rayon::prelude::*;
 
@@ -260,7 +261,7 @@ fn settle(
             let sensors = slots[first].effect.sensors();
             let left = unexplained
                 .iter()
-                .filter(|d| sensors.iter().any(|s| s.index() == d.channel / 3))
+                .filter(|d| told_of(problem, d).iter().any(|s| sensors.contains(s)))
                 .map(|d| d.gain)
                 .fold(0.0, f64::max);
             let gain = if chosen.is_empty() {
@@ -287,6 +288,16 @@ fn settle(
         path,
         disagreements,
         spoilt,
+    }
+}
+
+/// Sensors that the channel of a dependence tells of.
+fn told_of(problem: &Problem, found: &Dependence) -> Vec<Sensor> {
+    let part = problem.parts.get(found.log.unwrap_or(0));
+    if part.is_some_and(|part| part.white.layout.facts.rests) {
+        rest_channels::sensors(found.channel).to_vec()
+    } else {
+        vec![Sensor::ALL[found.channel / 3]]
     }
 }
 

@@ -67,6 +67,8 @@ pub struct LogFacts {
     pub ranges: [Option<f64>; 3],
     /// The one-axis rig that moves the sensor; `None` where the log names no rig axis.
     pub rig: Option<Rig>,
+    /// True where rests stand in for a reference attitude that the log does not have.
+    pub rests: bool,
 }
 
 /// Mean of the finite values; NaN without any.
@@ -124,6 +126,51 @@ impl LogFacts {
             reference_dt: dt,
             ranges: [None; 3],
             rig: None,
+            rests: false,
+        }
+    }
+
+    /// Facts of a log whose rests stand in for a reference: gravity (m/s^2) and the field (uT) are known by their length, and nothing of
+    /// its reference by its noise. `rows`: number, first and last time, time between them, s.
+    #[allow(clippy::too_many_arguments)]
+    pub fn at_rest(
+        rows: (usize, f64, f64, f64),
+        frame: Frame,
+        gravity: f64,
+        field: Option<f64>,
+        sensors: [bool; 3],
+        temperature_mean: Option<f64>,
+        covariates: Vec<String>,
+        covariate_means: Vec<f64>,
+    ) -> Self {
+        let (n, t_start, t_end, dt) = rows;
+        Self {
+            n,
+            t_start,
+            t_end,
+            dt,
+            frame,
+            gravity: -frame.up() * gravity,
+            field: Vector3::z() * field.unwrap_or_default(),
+            field_estimated: field.is_some(),
+            temperature_mean: temperature_mean.unwrap_or(f64::NAN),
+            covariates,
+            covariate_means,
+            sensors,
+            sensor_dt: [dt; 3],
+            has_temperature: temperature_mean.is_some(),
+            temperature_course: None,
+            attitude_smoothing: NARROWEST,
+            position_smoothing: None,
+            column_noise: [f64::INFINITY; 3],
+            position_origin: Vector3::zeros(),
+            attitude_columns: NARROWEST,
+            position_columns: None,
+            silent_axes: [[false; 3]; 3],
+            reference_dt: dt,
+            ranges: [None; 3],
+            rig: None,
+            rests: true,
         }
     }
 

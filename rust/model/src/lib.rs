@@ -14,6 +14,7 @@ pub mod facts;
 pub mod ideal;
 pub mod probes;
 pub mod reference;
+pub mod rest_channels;
 pub mod rig;
 pub mod sensor;
 pub mod sensor_model;

@@ -96,10 +96,14 @@ pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
                 (Motion::Force, Motion::Force),
                 (Motion::Rate, Motion::Rate),
                 (Motion::Force, Motion::Rate),
-            ];
-            kinds.extend(pairs.map(|(u, v)| (sensor, Kind::Cross(u, v))));
+            ]
+            .into_iter();
+            // A few poses show no products, nor how a gain went.
+            kinds.extend(pairs.filter(|_| !facts.rests).map(|(u, v)| (sensor, Kind::Cross(u, v))));
         }
-        kinds.push((sensor, Kind::GainInTime));
+        if !facts.rests {
+            kinds.push((sensor, Kind::GainInTime));
+        }
         if facts.temperature_course.is_some() {
             kinds.push((sensor, Kind::TemperaturePast));
         }

@@ -8,13 +8,14 @@ use crate::card::Stage;
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::ideal::{Command, Ideal, ReferenceChange};
+use crate::rest_channels;
 use crate::sensor::{CHANNELS, Sensor};
 use crate::triple::Triple;
 use crate::vibration;
 use crate::window::{Window, held};
 
-/// Columns of a sensor's three channels, in the order of their active parameters.
-type AxisColumns = [Vec<Vec<f64>>; 3];
+/// Columns of a sensor's three axes, in the order of the parameters that are active on each.
+pub type AxisColumns = [Vec<Vec<f64>>; 3];
 
 /// An effect with its parameters and its place among all parameters.
 #[derive(Clone)]
@@ -46,7 +47,9 @@ impl Slot {
 pub struct SensorModel {
     slots: Vec<Slot>,
     parameters: usize,
-    /// Parameters whose column can differ from zero, per channel.
+    /// Parameters whose column can differ from zero, per sensor and axis.
+    on_axes: Vec<Vec<usize>>,
+    /// The same per channel of the evidence: another list where rests stand in for a reference.
     active: Vec<Vec<usize>>,
 }
 
@@ -140,9 +143,15 @@ impl SensorModel {
         let mut model = Self {
             slots,
             parameters: first,
-            active: vec![Vec::new(); CHANNELS],
+            on_axes: vec![Vec::new(); CHANNELS],
+            active: Vec::new(),
         };
         model.find_active(facts)?;
+        model.active = if facts.rests {
+            rest_channels::active(&model.on_axes)
+        } else {
+            model.on_axes.clone()
+        };
         Ok(model)
     }
 
@@ -156,9 +165,25 @@ impl SensorModel {
         self.parameters
     }
 
-    /// Parameters whose column can differ from zero, per channel.
+    /// Parameters whose column can differ from zero, per channel of the evidence.
     pub fn active(&self) -> &[Vec<usize>] {
         &self.active
+    }
+
+    /// The same per sensor and axis, as [`SensorModel::modelled`] has its columns.
+    pub fn active_on_axes(&self) -> &[Vec<usize>] {
+        &self.on_axes
+    }
+
+    /// Modelled readings of one sensor and the columns of its three axes for ideal readings that are known otherwise than from a
+    /// reference: `rows.x` counts for nothing.
+    pub fn modelled(&self, rows: Rows, sensor: Sensor) -> Result<(Triple, AxisColumns), EffectError> {
+        let ideal = match sensor {
+            Sensor::Acc => &rows.ideal.f,
+            Sensor::Gyr => &rows.ideal.omega,
+            Sensor::Mag => &rows.ideal.m,
+        };
+        self.predict(rows, ideal.clone(), None, sensor)
     }
 
     /// Sets the parameters of the model's effects from a vector over all parameters.
@@ -211,7 +236,7 @@ impl SensorModel {
                 columns.reset(4, slot.parameters.len());
                 slot.columns(&rows, sensor, &mut columns)?;
                 for axis in 0..3 {
-                    let list = &mut self.active[3 * sensor.index() + axis];
+                    let list = &mut self.on_axes[3 * sensor.index() + axis];
                     list.extend(
                         (0..slot.parameters.len())
                             .filter(|p| columns.get(*p, axis).is_some())
@@ -319,7 +344,7 @@ impl SensorModel {
         Ok(evaluation
             .channels
             .into_iter()
-            .zip(&self.active)
+            .zip(&self.on_axes)
             .map(|(channel, active)| channel.map(|c| c.residual_after(active, step)))
             .collect())
     }
@@ -336,7 +361,7 @@ impl SensorModel {
         let n = rows.len();
         let silent = rows.facts.silent_axes[sensor.index()];
         let mut out: AxisColumns =
-            std::array::from_fn(|axis| vec![Vec::new(); self.active[3 * sensor.index() + axis].len()]);
+            std::array::from_fn(|axis| vec![Vec::new(); self.on_axes[3 * sensor.index() + axis].len()]);
         let mut columns = Columns::default();
         for stage in [
             Stage::Reference,
@@ -372,7 +397,7 @@ impl SensorModel {
                     after.get_or_insert_with(|| x.clone()).add(added, 1.0);
                 }
                 for axis in 0..3 {
-                    let list = &self.active[3 * sensor.index() + axis];
+                    let list = &self.on_axes[3 * sensor.index() + axis];
                     let from = list.partition_point(|p| *p < slot.first);
                     for (k, p) in list
                         .iter()

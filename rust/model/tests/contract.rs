@@ -95,6 +95,7 @@ fn every_built_in_effect_keeps_the_contract() {
         reference_dt: 0.01,
         ranges: [None; 3],
         rig: Some(rig(&t, &attitude)),
+        rests: false,
     };
     let mut effects = catalogue::built_in();
     for sensor in ["acc", "gyr", "mag"] {

@@ -102,6 +102,7 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
         reference_dt: 0.01,
         ranges: [None; 3],
         rig: None,
+        rests: false,
     };
     let of = |effects| -> Vec<f64> {
         let model = SensorModel::new(effects, vec![], &facts);

@@ -19,6 +19,7 @@ use pyo3::types::PyDict;
 
 use crate::errors::{from_effect, value_error};
 use crate::model::{PyEffect, PyFacts};
+use crate::rests::RestArrays;
 use crate::window::ChunkArrays;
 
 /// The rig of a log from the number of its axis and the attitude at the angle zero.
@@ -132,6 +133,23 @@ impl PyEvidence {
         py.detach(|| self.0.add(&window)).map_err(from_effect)
     }
 
+    /// Adds what the rests of a log tell: `stills`, `poses`, `path` and `field` as chunks; `rest` and `block` of each
+    /// still; `turns` as (first row, one past the last, rest before, rest after, 1/noise, block); `field_block`.
+    fn add_rests(&mut self, py: Python<'_>, rests: &Bound<'_, PyDict>) -> PyResult<()> {
+        let arrays = RestArrays::new(rests)?;
+        let rests = arrays.rests(Some(self.0.layout.blocks))?;
+        py.detach(|| self.0.add_rests(&rests)).map_err(from_effect)
+    }
+
+    /// Variance of a row of each of the nine channels, from stretches of rests that follow each other; NaN where too few do.
+    fn rest_scatter(&self, py: Python<'_>, rests: &Bound<'_, PyDict>) -> PyResult<Vec<f64>> {
+        let arrays = RestArrays::new(rests)?;
+        let rests = arrays.rests(None)?;
+        let layout = &self.0.layout;
+        let scatter = py.detach(|| rests.scatter(&layout.model, &layout.facts));
+        scatter.map(|v| v.to_vec()).map_err(from_effect)
+    }
+
     /// Adds evidence of other rows, taken for the same layout.
     fn merge(&mut self, other: &Self) -> PyResult<()> {
         if !self.0.layout.same(&other.0.layout) {
@@ -185,7 +203,7 @@ impl PyEvidence {
 
 /// Search for a parameter inside a candidate effect: each trial's columns against the residual of a model.
 #[pyclass(name = "Profile", module = "imufit._imufit")]
-pub struct PyProfile(Profile);
+pub struct PyProfile(pub Profile);
 
 #[pymethods]
 impl PyProfile {
@@ -208,6 +226,13 @@ impl PyProfile {
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
         py.detach(|| self.0.add(&window)).map_err(from_effect)
+    }
+
+    /// Adds what the rests of a log tell, see `Evidence.add_rests`.
+    fn add_rests(&mut self, py: Python<'_>, rests: &Bound<'_, PyDict>) -> PyResult<()> {
+        let arrays = RestArrays::new(rests)?;
+        let rests = arrays.rests(None)?;
+        py.detach(|| self.0.add_rests(&rests)).map_err(from_effect)
     }
 }
 

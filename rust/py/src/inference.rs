@@ -4,7 +4,8 @@ use imufit_inference::part::Part;
 use imufit_inference::problem::Problem;
 use imufit_inference::screening::parameters_of;
 use imufit_inference::{estimate, residual, saturated, screening, selection, verdict};
-use imufit_model::sensor::{CHANNELS, channel_name};
+use imufit_model::rest_channels;
+use imufit_model::sensor::CHANNELS;
 use nalgebra::DVector;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -166,7 +167,8 @@ impl PyProblem {
         let unexplained = PyList::empty(py);
         for d in &v.unexplained {
             let item = PyDict::new(py);
-            item.set_item("channel", channel_name(d.channel))?;
+            let rests = self.part(d.log.unwrap_or(0))?.0.raw.layout.facts.rests;
+            item.set_item("channel", rest_channels::name(d.channel, rests))?;
             item.set_item("covariate", &d.covariate)?;
             item.set_item("log", d.log)?;
             item.set_item("gain", d.gain)?;
@@ -207,7 +209,7 @@ impl PyProblem {
         for c in &channels {
             let floor = part.floors[c.channel];
             let item = PyDict::new(py);
-            item.set_item("channel", channel_name(c.channel))?;
+            item.set_item("channel", rest_channels::name(c.channel, raw.layout.facts.rests))?;
             item.set_item("index", c.channel)?;
             item.set_item("n", c.n)?;
             item.set_item("rms", c.rms)?;
@@ -217,7 +219,7 @@ impl PyProblem {
             list.append(item)?;
             for p in residual::panels(raw, &step, c.channel, floor) {
                 let item = PyDict::new(py);
-                item.set_item("channel", channel_name(p.channel))?;
+                item.set_item("channel", rest_channels::name(p.channel, raw.layout.facts.rests))?;
                 item.set_item("covariate", &raw.layout.bins.names[p.covariate])?;
                 item.set_item(
                     "unit",

@@ -14,6 +14,7 @@ mod inference;
 mod model;
 mod python_effect;
 mod replay_arguments;
+mod rests;
 mod trials;
 mod window;
 
@@ -31,6 +32,7 @@ fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     model::register(m)?;
     correction::register(m)?;
     fit::register(m)?;
+    rests::register(m)?;
     inference::register(m)?;
     Ok(())
 }

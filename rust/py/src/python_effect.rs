@@ -61,8 +61,10 @@ impl PythonEffect {
         let array: PyReadonlyArray3<f64> = result.extract()?;
         let view = array.as_array();
         let known = |i: usize| {
-            let ideal = [&rows.ideal.omega, &rows.ideal.f, &rows.ideal.m, rows.x];
-            ideal.iter().all(|triple| triple.row(i).iter().all(|v| v.is_finite()))
+            let ideal = &rows.ideal;
+            let ideal = [&ideal.omega, &ideal.alpha, &ideal.f, &ideal.m, rows.x];
+            rows.attitude(i).coords.iter().all(|v| v.is_finite())
+                && ideal.iter().all(|triple| triple.row(i).iter().all(|v| v.is_finite()))
                 && rows.temperature.is_none_or(|t| t[i].is_finite())
                 && rows.covariates.iter().all(|c| c[i].is_finite())
         };
