@@ -17,6 +17,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 const GRID: [f64; 18] = [
     0.0, 3e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016, 0.032, 0.064, 0.128, 0.256, 0.5, 1.0, 2.0, 4.0, 10.0, 40.0, 200.0,
 ];
+/// The zero of a magnetometer wanders by no more than so many noise floors from block to block.
+const FARTHEST: f64 = 1.0;
 /// Fewer blocks than this cannot show a walk.
 const MIN_BLOCKS: usize = 8;
 
@@ -141,7 +143,7 @@ fn strengths(count: &DVector<f64>, most: f64) -> Vec<Strength> {
 }
 
 /// Block sums of every channel of a log over all `parameters`, among which its own have their places. `floors` are the noise floors of
-/// the channels: a zero wanders by no more than that from block to block, and what goes further is a misfit.
+/// the channels: a magnetometer has no zero that wanders far, and what does is a misfit, which the walk would hide.
 pub fn channel_sums(
     log: usize,
     white: &Evidence,
@@ -173,12 +175,11 @@ pub fn channel_sums(
         let same = out.iter().find(|o| o.channel / 3 == sensor && o.count == count);
         let strengths = if let Some(other) = same {
             other.strengths.clone()
-        } else if white.layout.facts.rests {
-            // A row stands for a whole rest: its noise says nothing of how far a zero goes until the next.
+        } else if sensor != Sensor::Mag.index() || white.layout.facts.rests {
             Arc::new(strengths(&count, f64::INFINITY))
         } else {
             let most = (3 * sensor..3 * sensor + 3)
-                .map(|c| floors[c].powi(2) * weights[c] * whitening::gain(&white.layout.filters[c], 0.0))
+                .map(|c| (FARTHEST * floors[c]).powi(2) * weights[c] * whitening::gain(&white.layout.filters[c], 0.0))
                 .filter(|v| v.is_finite() && *v > 0.0)
                 .fold(0.0, f64::max);
             Arc::new(strengths(&count, most))

@@ -7,6 +7,8 @@ use imufit_fit::normal_equations::NormalEquations;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::{DMatrix, DVector};
 
+use crate::screening::parameters_of;
+
 /// All effects fitted at once.
 #[derive(Clone, Debug)]
 pub struct Saturated {
@@ -72,13 +74,16 @@ pub fn assemble(evidence: &Evidence, block: usize, weights: &[f64; CHANNELS]) ->
 /// Number of parameters that a channel can tell apart. The rests of a log are too few for most of what they are asked; rows that
 /// are many count every parameter.
 fn freedom(evidence: &Evidence, channel: usize) -> usize {
-    let own = evidence.layout.model.active()[channel].len();
+    let active = &evidence.layout.model.active()[channel];
+    let fitted = fitted(evidence);
+    let used: Vec<usize> = (0..active.len()).filter(|k| fitted.contains(&active[*k])).collect();
+    let own = used.len();
     if own == 0 || !evidence.layout.facts.rests {
         return own;
     }
     let mut gram = DMatrix::zeros(own, own);
     for block in (0..evidence.layout.blocks).filter_map(|b| evidence.get(b, channel)) {
-        gram += block.gram.view((0, 0), (own, own));
+        gram += block.gram.select_rows(&used).select_columns(&used);
     }
     let size: Vec<f64> = (0..own).map(|j| gram[(j, j)].sqrt()).collect();
     let scaled = DMatrix::from_fn(own, own, |i, j| {
@@ -92,9 +97,15 @@ fn freedom(evidence: &Evidence, channel: usize) -> usize {
 /// Eigenvalue of a Gram matrix with ones on its diagonal from which on a direction is told.
 const TOLD: f64 = 1e-9;
 
+/// Parameters of all effects. Probes are left out: there are so many of them that they would explain the noise of a few poses.
+fn fitted(evidence: &Evidence) -> Vec<usize> {
+    parameters_of(evidence.layout.model.slots().iter().filter(|s| !s.effect.is_probe()))
+}
+
 /// Fits everything, with weights from its own residual.
 pub fn fit_all(evidence: &Evidence) -> Option<Saturated> {
     let p = evidence.layout.model.parameters();
+    let fitted = fitted(evidence);
     let mut step = DVector::zeros(p);
     let mut variance = [f64::NAN; CHANNELS];
     for _ in 0..3 {
@@ -116,7 +127,10 @@ pub fn fit_all(evidence: &Evidence) -> Option<Saturated> {
         for block in 0..evidence.layout.blocks {
             total.add(&assemble(evidence, block, &weights), 1.0);
         }
-        step = total.solve(&DVector::zeros(p))?.solution;
+        let solved = total.selected(&fitted).solve(&DVector::zeros(fitted.len()))?.solution;
+        for (j, value) in fitted.iter().zip(solved.iter()) {
+            step[*j] = *value;
+        }
     }
     for (channel, v) in variance.iter_mut().enumerate() {
         let (sum, n) = channel_square(evidence, channel, &step);

@@ -95,6 +95,8 @@ const AGREEING: usize = 2;
 const REACH: f64 = 0.9;
 /// The reference's noise buries the sensor if a wider polynomial lowers the unexplained mean square by this factor.
 const BURIED: f64 = 2.0;
+/// Part of the mean square of a derivative from which on it shrinks what is fitted to it.
+const NOISY: f64 = 1e-3;
 /// The width whose second derivative tells how lively a row is.
 const LIVELY: usize = 4;
 
@@ -105,6 +107,7 @@ struct Sample {
     difference: [f64; WIDTHS.len()],
     gain: [f64; WIDTHS.len()],
     own_gain: [f64; WIDTHS.len()],
+    gain_above: [f64; WIDTHS.len()],
     /// The derivative and the one above it, per width.
     values: [[f64; 3]; WIDTHS.len()],
     above: [[f64; 3]; WIDTHS.len()],
@@ -175,6 +178,7 @@ impl Bandwidth {
                 difference: zero,
                 gain: zero,
                 own_gain: zero,
+                gain_above: zero,
                 values: none,
                 above: none,
                 row: window.offset + row,
@@ -200,6 +204,7 @@ impl Bandwidth {
                 sample.own_gain[k] = weights.iter().map(|w| w * w).sum();
                 sample.values[k] = value;
                 sample.above[k] = combine(&all[self.order + 1]);
+                sample.gain_above[k] = all[self.order + 1].iter().map(|w| w * w).sum();
                 if k <= LIVELY {
                     sample.lively = sample.above[k].iter().map(|v| v * v).sum();
                 }
@@ -322,13 +327,25 @@ impl Bandwidth {
     }
 
     /// Width for what enters columns: rates and accelerations, and the derivatives above them (a delay, a lever arm). Noise in a
-    /// column, be it only the steps of an encoder, shrinks its parameter, so up to two steps more of smoothing are taken.
+    /// column, be it only the steps of an encoder, shrinks its parameter, so up to two steps more of smoothing are taken wherever the
+    /// reference is noisy at all.
     pub fn for_columns(&self, width: Smoothing) -> Smoothing {
         let Some(k) = WIDTHS[..ORDERED].iter().position(|w| *w == width) else {
             return width;
         };
+        if k == 0 && !self.noisy(k) {
+            return width;
+        }
         let last = (k + 2).min(ORDERED - 1);
         (k..=last).rev().find(|j| self.reaches(*j)).map_or(width, |j| WIDTHS[j])
+    }
+
+    /// True if noise of the reference makes more than [`NOISY`] of the highest derivative that enters columns.
+    fn noisy(&self, k: usize) -> bool {
+        let rows = || self.samples.iter().filter(|s| s.reached[k]);
+        let noise: f64 = rows().map(|s| 3.0 * s.gain_above[k]).sum::<f64>() * self.noise().powi(2);
+        let all: f64 = rows().flat_map(|s| s.above[k]).map(|v| v * v).sum();
+        noise > NOISY * all
     }
 
     /// True if a width leaves nearly all rows with a reference: in a short log a wide polynomial would lose its ends.

@@ -179,6 +179,11 @@ pub trait Effect: Send + Sync {
         false
     }
 
+    /// True if it stands for no physical cause: then it is never named, nor is it among what the noise is found beside.
+    fn is_probe(&self) -> bool {
+        false
+    }
+
     /// Trial values for parameters that no linear step finds (a period, a width): at first a grid over all that can be,
     /// then, around what the round before `round` found best, a finer one. Empty: nothing to search, or done.
     fn search(&self, _facts: &LogFacts, _found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {

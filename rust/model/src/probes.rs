@@ -219,6 +219,10 @@ impl Effect for Probe {
         &self.sensor
     }
 
+    fn is_probe(&self) -> bool {
+        true
+    }
+
     fn not_testable(&self, _: &LogFacts) -> Option<String> {
         None
     }
