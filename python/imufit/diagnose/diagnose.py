@@ -31,6 +31,8 @@ MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
 CLEARLY_WORSE = 0.1
 """Share of the drop in held-out error by which a fit must stay behind the best one to be out."""
+NEAR = 0.5
+"""Share of the best one's gain from which on a fit may show that another candidate explains more."""
 BESIDE = 10.0
 """An effect is named beside a fault of the data only if it explains this many times more."""
 POWER = 0.84
@@ -140,7 +142,7 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     A drive with play and a late reference look alike while a rig goes back and forth at one speed, and their columns
     say little of how well they do at their full size. A late sensor and a sluggish one have the same column. One of
     them is out if its fit stays clearly behind, or leaves something that the best one explains. What the columns tell
-    apart already needs no fit, unless they depend on a search.
+    apart by far needs no fit, unless they depend on a search: of a delay as long as a turn takes they show only a part.
     """
     analysis = fit.analysis
     ids = analysis.slots
@@ -148,12 +150,13 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     if best is None or not analysis.candidates[ids[best]].strongly_curved:
         return result
     items = {item["slot"]: dict(item) for item in result["screened"]}
+    near = [slot for slot, item in items.items() if item["passed"] and item["gain"] >= NEAR * items[best]["gain"]]
     close = [
         slot
         for slot, item in items.items()
         if item["testable"]
         and analysis.candidates[ids[slot]].strongly_curved
-        and (slot == best or slot in result["rivals"] or ids[slot] in analysis.found)
+        and (slot == best or slot in result["rivals"] or slot in near or ids[slot] in analysis.found)
     ]
     if len(close) < 2:
         return result

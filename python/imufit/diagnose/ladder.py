@@ -13,11 +13,13 @@ from imufit.fit import Fit
 from imufit.log.several import Logs
 from imufit.model import SensorModel
 from imufit.progress import Progress, silent
-from imufit.results import Candidate, Diagnosis, Ladder, Step
+from imufit.results import Addition, Candidate, Diagnosis, Ladder, Step
 
 MAX_STEPS = 12
 MATTERS = 0.002
 """Share of the held-out error that an effect must take away to be added beside something unknown."""
+TOLD = 2.0
+"""Standard errors that at least one parameter of an addition must be away from zero."""
 IRON = frozenset({"mag.hard_iron", "mag.soft_iron"})
 FIELD_VARIES = "the field varies in space"
 
@@ -58,7 +60,7 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
             break
         expected = next(c.held_out_after for c in diagnosis.candidates if c.effect == effect)
         addition = add(fit, effect, expected)
-        if not addition.after < addition.before:
+        if not (addition.after < addition.before and _told(addition)):
             # What the evidence promised, the fit did not keep: the next one may.
             futile.add(effect)
             continue
@@ -120,6 +122,11 @@ def _beside_the_unsure(fit: Fit) -> str | None:
             return None if best is None else analysis.slots[best]
         model.append(best)
         candidates = [slot for slot in candidates if slot != best and slot not in rivals]
+
+
+def _told(addition: Addition) -> bool:
+    """Return whether the fit tells any parameter of what was added from zero."""
+    return any(not abs(p.value) <= TOLD * p.standard_error for p in addition.parameters)
 
 
 def _matters(candidate: Candidate) -> bool:
