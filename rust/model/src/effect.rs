@@ -179,7 +179,7 @@ pub trait Effect: Send + Sync {
         false
     }
 
-    /// True if it stands for no physical cause: then it is never named, nor is it among what the noise is found beside.
+    /// True if it stands for no physical cause and has so many columns that the noise is not found beside it.
     fn is_probe(&self) -> bool {
         false
     }

@@ -220,7 +220,7 @@ impl Effect for Probe {
     }
 
     fn is_probe(&self) -> bool {
-        true
+        matches!(self.kind, Kind::Cross(..))
     }
 
     fn not_testable(&self, _: &LogFacts) -> Option<String> {
