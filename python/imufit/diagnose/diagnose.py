@@ -150,7 +150,12 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     if best is None or not analysis.candidates[ids[best]].strongly_curved:
         return result
     items = {item["slot"]: dict(item) for item in result["screened"]}
-    near = [slot for slot, item in items.items() if item["passed"] and item["gain"] >= NEAR * items[best]["gain"]]
+    alike = {
+        first if second == best else second
+        for first, second, correlation in result["correlations"]
+        if best in (first, second) and correlation >= MIN_CORRELATION
+    }
+    near = [slot for slot in alike if items[slot]["passed"] and items[slot]["gain"] >= NEAR * items[best]["gain"]]
     close = [
         slot
         for slot, item in items.items()

@@ -13,11 +13,11 @@ from imufit.fit import Fit
 from imufit.log.several import Logs
 from imufit.model import SensorModel
 from imufit.progress import Progress, silent
-from imufit.results import Addition, Candidate, Diagnosis, Ladder, Step
+from imufit.results import Addition, Diagnosis, Ladder, Step
 
 MAX_STEPS = 12
 MATTERS = 0.002
-"""Share of the held-out error that an effect must take away to be added beside something unknown."""
+"""Share of the held-out error that an effect must take away to be added beside something unknown, or untold."""
 TOLD = 2.0
 """Standard errors that at least one parameter of an addition must be away from zero."""
 IRON = frozenset({"mag.hard_iron", "mag.soft_iron"})
@@ -60,7 +60,7 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
             break
         expected = next(c.held_out_after for c in diagnosis.candidates if c.effect == effect)
         addition = add(fit, effect, expected)
-        if not (addition.after < addition.before and _told(addition)):
+        if not (addition.after < addition.before and (_told(addition) or _matters(addition.before, addition.after))):
             # What the evidence promised, the fit did not keep: the next one may.
             futile.add(effect)
             continue
@@ -107,7 +107,9 @@ def next_effect(fit: Fit, diagnosis: Diagnosis, futile: Collection[str] = ()) ->
         # Beside what nothing explains, only effects that matter are taken up, and no iron of the sensor where the field
         # itself is another from place to place.
         varies = any(u.shape == FIELD_VARIES for u in diagnosis.unexplained)
-        passed = [c for c in passed if _matters(c) and not (varies and c.effect in IRON)]
+        passed = [
+            c for c in passed if _matters(c.held_out_before, c.held_out_after) and not (varies and c.effect in IRON)
+        ]
     return passed[0].effect if passed else None
 
 
@@ -129,8 +131,7 @@ def _told(addition: Addition) -> bool:
     return any(not abs(p.value) <= TOLD * p.standard_error for p in addition.parameters)
 
 
-def _matters(candidate: Candidate) -> bool:
-    before, after = candidate.held_out_before, candidate.held_out_after
+def _matters(before: float, after: float) -> bool:
     return before - after >= MATTERS * before
 
 
