@@ -6,6 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from imufit import SensorModel, ladder, simulate
+from imufit.diagnose.ladder import Climb
+from imufit.diagnose.revise import revise
+from imufit.results import Revision
 from imufit.simulate import OBSERVABLE, Noise
 from scipy.spatial.transform import Rotation
 from test_diagnose import static
@@ -116,3 +119,43 @@ def test_json_of_a_ladder_has_the_promised_keys():
         assert step.keys() >= {"effect", "before", "expected", "after"}
     if found["attitude"] is not None:
         assert found["attitude"].keys() >= {"before_deg", "after_deg"}
+
+
+def test_what_stands_in_for_an_effect_gives_way_to_it():
+    sim = simulate.simulate("handheld", dict.fromkeys(["acc.scale", "gyr.bias"]), 3, 120.0, size="large")
+    fit = SensorModel(["gyr.bias", "acc.cubic"]).fit(sim.to_log())
+    tried = set()
+    swap = revise(fit, ["acc.cubic", "gyr.bias"], tried)
+    assert (swap.removed, swap.by) == ("acc.cubic", "acc.scale")
+    assert swap.after < swap.before == fit.ratio
+    assert ("acc.cubic", "acc.scale") in tried
+    assert "acc.scale took the place of acc.cubic" in str(swap)
+    # What the user began with stays, whatever it is.
+    assert revise(fit, ["gyr.bias"], set()) is None
+
+
+def test_what_others_explain_is_taken_out_again():
+    log = simulate.simulate("handheld", {"acc.scale": None}, 3, 120.0, size="large").to_log()
+    fit = SensorModel(["acc.scale", "acc.cubic"]).fit(log)
+    drop = revise(fit, ["acc.scale", "acc.cubic"], set())
+    assert (drop.removed, drop.by) == ("acc.cubic", None)
+    assert drop.after == pytest.approx(drop.before, rel=0.002)
+    assert "acc.cubic was taken out again" in str(drop)
+    assert drop.to_dict() == {"removed": "acc.cubic", "by": None, "before": drop.before, "after": drop.after}
+
+
+def test_a_model_with_all_that_is_there_is_not_revised():
+    sim = simulate.simulate("handheld", dict.fromkeys(["acc.scale", "gyr.bias"]), 3, 120.0, size="large")
+    fit = SensorModel(["acc.scale", "gyr.bias"]).fit(sim.to_log())
+    assert revise(fit, ["acc.scale", "gyr.bias"], set()) is None
+
+
+def test_the_way_is_told_without_what_was_taken_out_again():
+    log = simulate.simulate("handheld", {"acc.scale": None, "gyr.bias": None}, 3, 120.0, size="large").to_log()
+    climb = Climb(SensorModel().fit(log))
+    climb.up()
+    fit = climb.fit
+    again = climb.again(Revision("gyr.bias", None, fit.ratio, fit.ratio))
+    assert [step.effect for step in again.steps] == ["acc.scale"] == list(again.fit.model.effects)
+    assert again.steps[0].before == climb.start.ratio
+    assert again.diagnosis.best == "gyr.bias"

@@ -1,4 +1,4 @@
-"""Diagnose and add, again and again, until nothing is missing."""
+"""Diagnose and add, again and again, until nothing is missing; then swap and drop what later effects made needless."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from imufit.diagnose.add import add
 from imufit.diagnose.attitude import attitude_comparison
 from imufit.diagnose.compare import comparison
 from imufit.diagnose.diagnose import diagnose
+from imufit.diagnose.revise import Swap, matters, revise
 from imufit.diagnose.without_reference import refuse_rests
 from imufit.fit import Fit
 from imufit.log.several import Logs
 from imufit.model import SensorModel
 from imufit.progress import Progress, silent
-from imufit.results import Addition, Diagnosis, Ladder, Step
+from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
 
 MAX_STEPS = 12
-MATTERS = 0.002
-"""Share of the held-out error that an effect must take away to be added beside something unknown, or untold."""
 TOLD = 2.0
 """Standard errors that at least one parameter of an addition must be away from zero."""
 IRON = frozenset({"mag.hard_iron", "mag.soft_iron"})
@@ -46,43 +45,94 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
     InputError
         The log has no usable reference, or an effect of the model cannot be tested on it.
     """
-    fit = Fit.of(model or SensorModel(), log, progress)
-    refuse_rests(fit.analysis, "the ladder")
-    start, first_fit = fit.ratio, fit
-    steps: list[Step] = []
-    first: Diagnosis | None = None
-    diagnosis = diagnose(fit)
-    futile: set[str] = set()
-    while len(steps) < MAX_STEPS:
-        first = first or diagnosis
-        effect = next_effect(fit, diagnosis, futile)
-        if effect is None:
-            break
-        expected = next(c.held_out_after for c in diagnosis.candidates if c.effect == effect)
-        addition = add(fit, effect, expected)
-        if not (addition.after < addition.before and (_told(addition) or _matters(addition.before, addition.after))):
-            # What the evidence promised, the fit did not keep: the next one may.
-            futile.add(effect)
-            continue
-        fit = addition.fit
-        futile.clear()
-        steps.append(Step(effect, addition.before, expected, addition.after, fit.training_ratio))
-        diagnosis = diagnose(fit)
-    worst = first_fit.worst
+    start = Fit.of(model or SensorModel(), log, progress)
+    refuse_rests(start.analysis, "the ladder")
+    climb = Climb(start)
+    climb.up()
+    tried: set[Swap] = set()
+    revisions: list[Revision] = []
+    while (revision := revise(climb.fit, [step.effect for step in climb.steps], tried)) is not None:
+        revisions.append(revision)
+        climb = climb.again(revision)
+        climb.up()
+    fit, diagnosis, worst = climb.fit, climb.diagnosis, start.worst
     return Ladder(
-        steps=tuple(steps),
+        steps=tuple(climb.steps),
         model=fit.model.effects,
         verdict=diagnosis.verdict,
-        ratio_start=start,
+        ratio_start=start.ratio,
         ratio_end=fit.ratio,
         attitude=attitude_comparison(fit.model_of(worst), fit.logs[worst], progress=progress or silent),
         diagnosis=diagnosis,
-        comparison_start=comparison(first_fit.analysis, first_fit.estimate.step, worst),
+        comparison_start=comparison(start.analysis, start.estimate.step, worst),
         comparison_end=comparison(fit.analysis, fit.estimate.step, worst),
-        first=first,
+        first=climb.first,
         fit=fit,
-        sentence=_sentence(start, fit.ratio, steps, diagnosis),
+        sentence=_sentence(start.ratio, fit.ratio, climb.steps, diagnosis),
+        revisions=tuple(revisions),
     )
+
+
+class Climb:
+    """A model on its way up, an effect at a time.
+
+    Parameters
+    ----------
+    start : Fit
+        Where it starts from.
+    first : Diagnosis, optional
+        What is missing there, if that is known.
+
+    Attributes
+    ----------
+    fit : Fit
+        The model so far.
+    steps : list of Step
+        Effects added so far.
+    diagnosis : Diagnosis
+        What is missing from it.
+    first : Diagnosis
+        What was missing at the start.
+    """
+
+    def __init__(self, start: Fit, first: Diagnosis | None = None) -> None:
+        self.start = self.fit = start
+        self.steps: list[Step] = []
+        self.first = self.diagnosis = first or diagnose(start)
+
+    def up(self) -> None:
+        """Add what is missing, until nothing is or the log cannot tell what."""
+        futile: set[str] = set()
+        while len(self.steps) < MAX_STEPS:
+            effect = next_effect(self.fit, self.diagnosis, futile)
+            if effect is None:
+                break
+            expected = next(c.held_out_after for c in self.diagnosis.candidates if c.effect == effect)
+            addition = add(self.fit, effect, expected)
+            lower = addition.after < addition.before
+            if not (lower and (_told(addition) or matters(addition.before, addition.after))):
+                # What the evidence promised, the fit did not keep: the next one may.
+                futile.add(effect)
+                continue
+            futile.clear()
+            self._take(addition)
+            self.diagnosis = diagnose(self.fit)
+
+    def again(self, revision: Revision) -> Climb:
+        """Return the same way from the same start with one effect replaced or left out."""
+        effects = [step.effect for step in self.steps]
+        at = effects.index(revision.removed)
+        effects[at : at + 1] = [] if revision.by is None else [revision.by]
+        other = Climb(self.start, self.first)
+        for effect in effects:
+            other._take(add(other.fit, effect))
+        other.diagnosis = diagnose(other.fit)
+        return other
+
+    def _take(self, addition: Addition) -> None:
+        self.fit = addition.fit
+        step = Step(addition.effect, addition.before, addition.expected, addition.after, self.fit.training_ratio)
+        self.steps.append(step)
 
 
 def next_effect(fit: Fit, diagnosis: Diagnosis, futile: Collection[str] = ()) -> str | None:
@@ -108,7 +158,7 @@ def next_effect(fit: Fit, diagnosis: Diagnosis, futile: Collection[str] = ()) ->
         # itself is another from place to place.
         varies = any(u.shape == FIELD_VARIES for u in diagnosis.unexplained)
         passed = [
-            c for c in passed if _matters(c.held_out_before, c.held_out_after) and not (varies and c.effect in IRON)
+            c for c in passed if matters(c.held_out_before, c.held_out_after) and not (varies and c.effect in IRON)
         ]
     return passed[0].effect if passed else None
 
@@ -129,10 +179,6 @@ def _beside_the_unsure(fit: Fit) -> str | None:
 def _told(addition: Addition) -> bool:
     """Return whether the fit tells any parameter of what was added from zero."""
     return any(not abs(p.value) <= TOLD * p.standard_error for p in addition.parameters)
-
-
-def _matters(before: float, after: float) -> bool:
-    return before - after >= MATTERS * before
 
 
 def _sentence(start: float, end: float, steps: list[Step], diagnosis: Diagnosis) -> str:

@@ -110,6 +110,18 @@ class SensorModel:
             raise InputError(f"effect {effect_id} is in the model already", remedy="Nothing needs to be added.")
         return SensorModel([*self.effects, effect_id], self.parameters, constants=self.constants)
 
+    def without_effect(self, effect_id: str) -> SensorModel:
+        """Return the same model with one effect less, the others with their values.
+
+        Parameters
+        ----------
+        effect_id : str
+            An effect of the model.
+        """
+        kept = [key for key in self.effects if key != effect_id]
+        parameters = {key: values for key, values in self.parameters.items() if key != effect_id}
+        return SensorModel(kept, parameters, constants=self.constants)
+
     def starting_at(self, values: Mapping[str, list[float]]) -> SensorModel:
         """Return the same model with other values of some effects, to start a fit from.
 

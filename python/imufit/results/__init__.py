@@ -10,7 +10,7 @@ from imufit.results.data_fault import DataFault
 from imufit.results.diagnosis import Candidate, Diagnosis, Rival, Unexplained
 from imufit.results.disagreement import Disagreement, Without
 from imufit.results.effect_card import EffectCard
-from imufit.results.ladder import Ladder, Step
+from imufit.results.ladder import Ladder, Revision, Step
 from imufit.results.log_parameters import LogParameters
 from imufit.results.parameter import Parameter
 from imufit.results.table import Table
@@ -33,6 +33,7 @@ __all__ = [
     "Mark",
     "Panel",
     "Parameter",
+    "Revision",
     "Rival",
     "Spectrum",
     "Step",

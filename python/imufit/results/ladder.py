@@ -53,6 +53,36 @@ class Step:
         )
 
 
+@dataclass(frozen=True)
+class Revision:
+    """An effect taken out again, because later ones made it needless or another does better in its place.
+
+    Attributes
+    ----------
+    removed : str
+        Its id.
+    by : str or None
+        The effect that stands in its place, if any.
+    before, after : float
+        Held-out residual over noise floor with it and without.
+    """
+
+    removed: str
+    by: str | None
+    before: float
+    after: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of one revision."""
+        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+
+    def __str__(self) -> str:
+        errors = f"{quantity.ratio(self.before)} -> {quantity.ratio(self.after)}"
+        if self.by is None:
+            return f"{self.removed} was taken out again: the effects added later explain what it did ({errors})."
+        return f"{self.by} took the place of {self.removed}: it explains more beside the others ({errors})."
+
+
 @dataclass(frozen=True, eq=False)
 class Ladder:
     """The whole loop on one log.
@@ -79,6 +109,8 @@ class Ladder:
         The final fit.
     sentence : str
         The result in words.
+    revisions : tuple of Revision
+        Effects that were added on the way and taken out again; `steps` is the way without them.
     """
 
     steps: tuple[Step, ...]
@@ -93,9 +125,10 @@ class Ladder:
     first: Diagnosis | None = None
     fit: Any = field(default=None, repr=False)
     sentence: str = ""
+    revisions: tuple[Revision, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of `ladder`; rivals, what is unexplained, experiment, faults of the data and parameters besides."""
+        """JSON of `ladder`; besides: revisions, rivals, what is unexplained, experiment, faults, parameters."""
         return {
             "steps": [step.to_dict() for step in self.steps],
             "model": list(self.model),
@@ -103,6 +136,7 @@ class Ladder:
             "ratio_start": json_value(self.ratio_start),
             "ratio_end": json_value(self.ratio_end),
             "attitude": None if self.attitude is None else self.attitude.to_dict(),
+            "revisions": [revision.to_dict() for revision in self.revisions],
             "ambiguous_with": list(self.diagnosis.ambiguous_with),
             "unexplained": [item.to_dict() for item in self.diagnosis.unexplained],
             "experiment": self.diagnosis.experiment,
@@ -175,7 +209,7 @@ class Ladder:
         verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
         without = [f"{item}. {item.sentence}" for item in self.diagnosis.without]
         faults = self.diagnosis.local_faults()
-        return [verdict, *without, result, attitude, *self.warnings(), experiment, *faults]
+        return [verdict, *without, result, *map(str, self.revisions), attitude, *self.warnings(), experiment, *faults]
 
     def _repr_html_(self) -> str:
         return html(self.sentences(), self.tables())

@@ -4,6 +4,7 @@
 //! come fits, standard errors, held-out errors and the rank of every candidate, without another look at the log.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use imufit_model::effect::EffectError;
@@ -18,8 +19,8 @@ use crate::bins::Bins;
 use crate::rests::{ChannelRows, Rests};
 use crate::whitening::Filter;
 
-/// Rows worked on at a time: their columns stay in the cache.
-const PART: usize = 2048;
+/// Rows worked on at a time: their columns stay in the cache. The same in every pass, so that kinematics are worked out once.
+pub(crate) const PART: usize = 2048;
 /// Consecutive samples further apart than this many sample intervals are a gap, which no filter reaches across.
 const GAP: f64 = 1.75;
 
@@ -324,15 +325,23 @@ impl Evidence {
     }
 }
 
+/// Ranges of numbers that follow one another.
+fn consecutive(numbers: &[usize]) -> Vec<Range<usize>> {
+    let mut out: Vec<Range<usize>> = Vec::new();
+    for k in numbers {
+        match out.last_mut() {
+            Some(run) if run.end == *k => run.end += 1,
+            _ => out.push(*k..*k + 1),
+        }
+    }
+    out
+}
+
 /// Evidence of one part of a window.
 fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
-    let back = if layout.filters.iter().any(|f| !f.is_empty()) {
-        LOOKBACK
-    } else {
-        0
-    };
     let core = window.begin;
-    let window = window.with_core(core.saturating_sub(back), window.end);
+    // As far back as a filter may look, whether there is one or not: kinematics of the same rows are kept from pass to pass.
+    let window = window.with_core(core.saturating_sub(LOOKBACK), window.end);
     let evaluation = layout.model.evaluate(&window, &layout.facts)?;
     let t = &window.t[window.begin..window.end];
     let mut assigned = vec![Vec::new(); layout.bins.names.len()];
@@ -342,7 +351,7 @@ fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
         }
     }
     let mut out = Blocks::new();
-    let (mut by_column, mut by_row) = (Vec::new(), Vec::new());
+    let (mut by_column, mut by_row, mut compact) = (Vec::new(), Vec::new(), Vec::new());
     for sensor in Sensor::ALL {
         let order = (0..3)
             .map(|a| layout.filters[3 * sensor.index() + a].len())
@@ -353,6 +362,7 @@ fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
         if kept.is_empty() {
             continue;
         }
+        let runs = consecutive(&kept);
         let row_of = |k: usize| window.offset + window.begin + samples.rows[k];
         for channel in 3 * sensor.index()..3 * sensor.index() + 3 {
             let Some(columns) = &evaluation.channels[channel] else {
@@ -363,11 +373,18 @@ fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
             by_column.clear();
             let filter = &layout.filters[channel];
             for column in columns.columns.iter().chain(std::iter::once(&columns.residual)) {
-                by_column.extend(kept.iter().map(|&k| {
-                    filter.iter().enumerate().fold(column[samples.rows[k]], |v, (j, a)| {
-                        v - a * column[samples.rows[k - 1 - j]]
-                    })
-                }));
+                compact.clear();
+                compact.extend(samples.rows.iter().map(|row| column[*row]));
+                for run in &runs {
+                    let first = by_column.len();
+                    by_column.extend_from_slice(&compact[run.clone()]);
+                    for (j, a) in filter.iter().enumerate() {
+                        let past = &compact[run.start - 1 - j..run.end - 1 - j];
+                        for (v, x) in by_column[first..].iter_mut().zip(past) {
+                            *v -= a * x;
+                        }
+                    }
+                }
             }
             by_row.clear();
             by_row.resize(n * width, 0.0);

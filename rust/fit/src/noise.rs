@@ -6,11 +6,9 @@ use imufit_model::sensor::{CHANNELS, Sensor};
 use imufit_model::window::Window;
 use rayon::prelude::*;
 
-use crate::evidence::{Layout, Samples};
+use crate::evidence::{Layout, PART, Samples};
 use crate::whitening::MAX_ORDER;
 
-/// Rows worked on at a time.
-const PART: usize = 4096;
 /// Rows looked at, at most about: parts spread evenly over the log tell the noise as well as all of it.
 const ROWS: usize = 1 << 17;
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use imufit_model::bandwidth::Bandwidth;
 use imufit_model::facts::{Frame, LogFacts};
+use imufit_model::kinematics_memory::KinematicsMemory;
 use imufit_model::rig::Rig;
 use imufit_model::sensor::Sensor;
 use imufit_model::smoothing::Smoothing;
@@ -280,6 +281,7 @@ impl Survey {
             rig: self.travel.take().map(|t| t.finish(self.attitude_width.noise())),
             covariates: self.given.covariates.clone(),
             rests: false,
+            kinematics: KinematicsMemory::default(),
         };
         let samples = CovariateSamples {
             names: Bins::covariate_names(&self.given.covariates),

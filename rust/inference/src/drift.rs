@@ -288,6 +288,14 @@ impl ChannelSums {
         }
     }
 
+    /// The same where the residual holds besides what the parameters explain at the values given.
+    #[must_use]
+    pub fn restored(&self, values: &DVector<f64>) -> Self {
+        let mut out = self.with_sums(self.sums.clone());
+        out.right += &self.sums * values;
+        out
+    }
+
     /// True if the sums are those of blocks.
     pub const fn of_blocks(&self) -> bool {
         matches!(self.walk, Walk::Zero)

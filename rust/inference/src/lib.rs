@@ -12,6 +12,7 @@ pub mod jackknife;
 pub mod part;
 pub mod problem;
 pub mod residual;
+pub mod revision;
 pub mod saturated;
 pub mod screening;
 pub mod selection;

@@ -13,6 +13,7 @@ use crate::part::{self, Part};
 use crate::saturated::assemble;
 
 /// Evidence in the form that every question is asked of: the blocks of all logs, one log after the other.
+#[derive(Clone)]
 pub struct Problem {
     /// The logs.
     pub parts: Vec<Part>,
@@ -107,6 +108,28 @@ impl Problem {
             typical,
             known,
             sums,
+        }
+    }
+
+    /// The same problem with an effect of the model taken out again, to first order: what its present values explain stands in the
+    /// observations once more. The parts, which hold the evidence as it was taken, stay as they are.
+    #[must_use]
+    pub fn taken_out(&self, slot: usize) -> Self {
+        let slot = &self.slots[slot];
+        let card = slot.effect.card();
+        let mut values = DVector::zeros(self.plausible.len());
+        for (k, parameter) in card.parameters.iter().cycle().take(slot.parameters.len()).enumerate() {
+            // What a search started is how the others act, and nothing by itself; unless there is nothing else.
+            if parameter.found == Found::Steps || card.parameters.iter().all(|p| p.found != Found::Steps) {
+                values[slot.first + k] = slot.parameters[k];
+            }
+        }
+        let restored = |blocks: &[NormalEquations]| blocks.iter().map(|b| b.restored(&values)).collect();
+        Self {
+            white: restored(&self.white),
+            raw: restored(&self.raw),
+            sums: self.sums.iter().map(|s| s.restored(&values)).collect(),
+            ..self.clone()
         }
     }
 

@@ -155,6 +155,8 @@ fn halves_agree(question: &Question, whole: &Jackknife) -> bool {
 pub struct Weighed {
     question: Question,
     answer: Screened,
+    /// Held-out error with it.
+    with: HeldOut,
     known: bool,
 }
 
@@ -179,14 +181,16 @@ pub fn weigh(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, ca
         differing: None,
         directions,
     };
+    let mut with = base.clone();
     if answer.testable {
-        let with = held_out::held_out(&question);
+        with = held_out::held_out(&question);
         (answer.gain, answer.gain_error) = held_out::gain(base, &with);
         answer.held_out.1 = with.ratio;
     }
     Weighed {
         question,
         answer,
+        with,
         known: false,
     }
 }
@@ -225,6 +229,7 @@ fn weigh_known(
     Weighed {
         question,
         answer,
+        with,
         known: true,
     }
 }
@@ -254,12 +259,18 @@ impl Weighed {
         &self.answer
     }
 
+    /// Held-out error with it.
+    pub const fn held_out(&self) -> &HeldOut {
+        &self.with
+    }
+
     /// Asks whether it can be chance, whether both halves agree, and what its parameters are.
     pub fn judged(self, problem: &Problem, model: &[usize], candidate: &[usize]) -> Screened {
         let Self {
             question,
             answer: mut out,
             known,
+            ..
         } = self;
         if !out.testable {
             return out;

@@ -199,12 +199,13 @@ impl Bandwidth {
                     }
                     value
                 };
-                let weights = all[self.order].clone();
+                let [weights, above] =
+                    [self.order, self.order + 1].map(|order| all.iter().map(|w| w[order]).collect::<Vec<f64>>());
                 let value = combine(&weights);
                 sample.own_gain[k] = weights.iter().map(|w| w * w).sum();
                 sample.values[k] = value;
-                sample.above[k] = combine(&all[self.order + 1]);
-                sample.gain_above[k] = all[self.order + 1].iter().map(|w| w * w).sum();
+                sample.above[k] = combine(&above);
+                sample.gain_above[k] = above.iter().map(|w| w * w).sum();
                 if k <= LIVELY {
                     sample.lively = sample.above[k].iter().map(|v| v * v).sum();
                 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 pub use imufit_attitude::Frame;
 use nalgebra::Vector3;
 
+use crate::kinematics_memory::KinematicsMemory;
 use crate::rig::Rig;
 use crate::smoothing::{NARROWEST, Smoothing};
 use crate::temperature_course::TemperatureCourse;
@@ -69,6 +70,8 @@ pub struct LogFacts {
     pub rig: Option<Rig>,
     /// True where rests stand in for a reference attitude that the log does not have.
     pub rests: bool,
+    /// Kinematics worked out in earlier passes.
+    pub kinematics: KinematicsMemory,
 }
 
 /// Mean of the finite values; NaN without any.
@@ -127,6 +130,7 @@ impl LogFacts {
             ranges: [None; 3],
             rig: None,
             rests: false,
+            kinematics: KinematicsMemory::default(),
         }
     }
 
@@ -171,6 +175,7 @@ impl LogFacts {
             ranges: [None; 3],
             rig: None,
             rests: true,
+            kinematics: KinematicsMemory::default(),
         }
     }
 

@@ -5,6 +5,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::facts::LogFacts;
+use crate::kinematics_memory::{Differentiation, KinematicsRows};
 use crate::reference::{self, Kinematics, Widths};
 use crate::rig::{Play, RigError, Slack};
 use crate::sensor::Sensor;
@@ -112,30 +113,35 @@ pub struct Command {
     pub rate: f64,
 }
 
+/// Kinematics of the core rows of a window, worked out once for all passes over a log.
+fn kinematics(window: &Window, facts: &LogFacts, shift: f64) -> KinematicsRows {
+    let how = Differentiation {
+        attitude: Widths {
+            value: facts.attitude_smoothing,
+            columns: facts.attitude_columns,
+        },
+        position: facts.position_smoothing.map(|value| Widths {
+            value,
+            columns: facts.position_columns.unwrap_or(value),
+        }),
+        shift,
+    };
+    facts.kinematics.of(window, window.begin..window.end, facts.n, how, || {
+        reference::kinematics(window, how.attitude, how.position, Some(facts.reference_dt), shift)
+    })
+}
+
 impl Ideal {
     /// Ideal readings of the window's core rows.
     pub fn new(window: &Window, facts: &LogFacts, change: &ReferenceChange) -> Self {
-        let spacing = Some(facts.reference_dt);
-        let rows = reference::kinematics(
-            window,
-            Widths {
-                value: facts.attitude_smoothing,
-                columns: facts.attitude_columns,
-            },
-            facts.position_smoothing.map(|value| Widths {
-                value,
-                columns: facts.position_columns.unwrap_or(value),
-            }),
-            spacing,
-            change.delay,
-        );
+        let rows = kinematics(window, facts, change.delay);
         let mut ideal = Self::default();
         let mut rig = facts.rig.as_ref().map(|rig| {
             ideal.rig_axis = change.alignment.inverse_transform_vector(&rig.axis);
             let first = window.t.get(window.begin).copied().unwrap_or_default() + change.delay;
             (rig, Play::new(rig, change.rig.width, first))
         });
-        for (k, t) in rows.into_iter().zip(&window.t[window.begin..window.end]) {
+        for (k, t) in rows.iter().copied().zip(&window.t[window.begin..window.end]) {
             let moved = k.map(|k| match rig.as_mut() {
                 None => k,
                 Some((rig, play)) => ideal.moved_by_rig(k, t + change.delay, rig, play, change),

@@ -12,6 +12,7 @@ pub mod effect;
 pub mod effects;
 pub mod facts;
 pub mod ideal;
+pub mod kinematics_memory;
 pub mod probes;
 pub mod reference;
 pub mod rest_channels;

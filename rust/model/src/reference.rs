@@ -5,7 +5,7 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::smoothing::{self, Derivatives, LocalFit, Smoothing};
+use crate::smoothing::{self, Derivatives, LocalFit, Smoothing, Weights};
 use crate::window::Window;
 
 /// State of the body at one time.
@@ -93,24 +93,42 @@ fn median_step(t: &[f64]) -> f64 {
 /// A gap in the reference is a step of more than this many median steps.
 const MAX_GAP: f64 = 4.5;
 
-/// Weights of the last fit, kept while the knots have the same spacing.
+/// Weights of the last fit, kept while the knots have the same spacing. Where they never have, weights are not worth having.
 #[derive(Default)]
 struct WeightCache {
     offsets: Vec<f64>,
-    weights: [Vec<f64>; 4],
+    fit: LocalFit,
+    weights: Weights,
+    /// Fits since the spacing was last the same.
+    uneven: usize,
 }
 
+/// After so many fits with a spacing of their own the next ones are expected to have one too.
+const UNEVEN: usize = 4;
+
 impl WeightCache {
-    fn get(&mut self, t: &[f64], at: f64, degree: usize) -> Option<&[Vec<f64>; 4]> {
+    /// Value and derivatives around `at` of the polynomial through values at times `t`.
+    fn derivatives(&mut self, t: &[f64], at: f64, degree: usize, values: &[[f64; 3]]) -> Option<Derivatives> {
         let tolerance = 1e-9 * (t[t.len() - 1] - t[0]);
         let same =
             self.offsets.len() == t.len() && self.offsets.iter().zip(t).all(|(o, v)| (v - at - o).abs() <= tolerance);
-        if !same {
-            self.offsets.clear();
-            self.weights = LocalFit::new(t, at, degree)?.weights();
-            self.offsets.extend(t.iter().map(|v| v - at));
+        if same && !self.weights.is_empty() {
+            self.uneven = 0;
+            return Some(smoothing::apply(&self.weights, values));
         }
-        Some(&self.weights)
+        self.uneven = if same { 0 } else { self.uneven + 1 };
+        self.offsets.clear();
+        self.weights.clear();
+        if self.uneven > UNEVEN {
+            self.offsets.extend(t.iter().map(|v| v - at));
+            return smoothing::derivatives(t, at, degree, values);
+        }
+        if !self.fit.prepare(t, at, degree) {
+            return None;
+        }
+        self.fit.weights_into(&mut self.weights);
+        self.offsets.extend(t.iter().map(|v| v - at));
+        Some(smoothing::apply(&self.weights, values))
     }
 }
 
@@ -121,11 +139,46 @@ pub struct LocalReference<'a> {
     hint: usize,
     cache: WeightCache,
     values: Vec<[f64; 3]>,
+    /// Attitude at each knot; empty for positions.
+    attitudes: Vec<UnitQuaternion<f64>>,
 }
 
 fn quaternion_at(column: &[f64], row: usize) -> UnitQuaternion<f64> {
     let q = &column[4 * row..4 * row + 4];
     UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]))
+}
+
+/// Up to this square of x the series of [`ARC_SINE`] is exact to rounding.
+const SMALL: f64 = 0.04;
+/// asin(x) / x in powers of x squared.
+const ARC_SINE: [f64; 12] = {
+    let mut out = [1.0; 12];
+    // (2 k)! / (4^k k!^2), which the coefficients are over 2 k + 1.
+    let mut ratio = 1.0;
+    let mut k = 1;
+    while k < 12 {
+        let kf = k as f64;
+        ratio *= (2.0 * kf - 1.0) / (2.0 * kf);
+        out[k] = ratio / (2.0 * kf + 1.0);
+        k += 1;
+    }
+    out
+};
+
+/// Rotation vector of a turn; neighbouring knots are a small one apart, and a series is quicker than an arc tangent.
+fn rotation_vector(turn: &UnitQuaternion<f64>) -> Vector3<f64> {
+    let series = |square: f64| ARC_SINE.iter().rev().fold(0.0, |sum, c| sum * square + c);
+    let sine = turn.imag();
+    let square = sine.norm_squared();
+    if turn.w > 0.0 && square <= SMALL {
+        return sine * (2.0 * series(square));
+    }
+    // The same of a quarter of the angle.
+    let quarter = 0.5 * (1.0 - turn.w);
+    if turn.w > 0.0 && quarter <= SMALL {
+        return sine * (4.0 * (quarter / square).sqrt() * series(quarter));
+    }
+    turn.scaled_axis()
 }
 
 impl<'a> LocalReference<'a> {
@@ -134,14 +187,16 @@ impl<'a> LocalReference<'a> {
     pub fn attitude(window: &'a Window<'a>, spacing: Option<f64>) -> Option<Self> {
         let q = window.attitude?;
         let known = |i: usize| q[4 * i..4 * i + 4].iter().all(|v| v.is_finite());
-        Some(Self::new(window, Knots::new(window, known, spacing)))
+        let knots = Knots::new(window, known, spacing);
+        let attitudes = knots.row.iter().map(|row| quaternion_at(q, *row)).collect();
+        Some(Self::new(window, knots, attitudes))
     }
 
     /// Position knots of a window; `None` without a reference position.
     pub fn position(window: &'a Window<'a>, spacing: Option<f64>) -> Option<Self> {
         let p = window.position?;
         let known = |i: usize| p[3 * i..3 * i + 3].iter().all(|v| v.is_finite());
-        Some(Self::new(window, Knots::new(window, known, spacing)))
+        Some(Self::new(window, Knots::new(window, known, spacing), Vec::new()))
     }
 
     /// Median time between the knots.
@@ -149,25 +204,25 @@ impl<'a> LocalReference<'a> {
         median_step(&self.knots.t)
     }
 
-    fn new(window: &'a Window<'a>, knots: Knots) -> Self {
+    fn new(window: &'a Window<'a>, knots: Knots, attitudes: Vec<UnitQuaternion<f64>>) -> Self {
         Self {
             window,
             knots,
             hint: 0,
             cache: WeightCache::default(),
             values: Vec::new(),
+            attitudes,
         }
     }
 
     /// Collects the attitudes around `at` as rotation vectors from the nearest knot; the nearest knot's attitude, the times.
     fn rotations(&mut self, at: f64, half_width: usize) -> Option<(UnitQuaternion<f64>, usize, usize)> {
-        let column = self.window.attitude?;
         let (k, first, last) = self.knots.around(at, half_width, &mut self.hint)?;
-        let centre = quaternion_at(column, self.knots.row[k]);
+        let centre = *self.attitudes.get(k)?;
         let back = centre.inverse();
         self.values.clear();
-        for j in first..last {
-            let phi = (back * quaternion_at(column, self.knots.row[j])).scaled_axis();
+        for attitude in &self.attitudes[first..last] {
+            let phi = rotation_vector(&(back * attitude));
             // Past this angle the rotation vector is about to wrap around.
             if phi.norm_squared() > 2.8 * 2.8 {
                 return None;
@@ -197,28 +252,17 @@ impl<'a> LocalReference<'a> {
     /// Derivatives of the rotation vector around `at`, and the attitude it starts from.
     pub fn rotation_derivatives(&mut self, at: f64, s: Smoothing) -> Option<(UnitQuaternion<f64>, Derivatives)> {
         let (centre, first, last) = self.rotations(at, s.half_width)?;
-        let weights = self.cache.get(&self.knots.t[first..last], at, s.degree)?;
-        Some((centre, smoothing::apply(weights, &self.values)))
+        let d = self
+            .cache
+            .derivatives(&self.knots.t[first..last], at, s.degree, &self.values)?;
+        Some((centre, d))
     }
 
     /// Derivatives of the position around `at`; the value itself is relative to an arbitrary origin.
     pub fn position_derivatives(&mut self, at: f64, s: Smoothing) -> Option<Derivatives> {
         let (first, last) = self.positions(at, s.half_width)?;
-        let weights = self.cache.get(&self.knots.t[first..last], at, s.degree)?;
-        Some(smoothing::apply(weights, &self.values))
-    }
-
-    /// First derivative of the position around `at`, the others not being worked out.
-    pub fn position_rate(&mut self, at: f64, s: Smoothing) -> Option<[f64; 3]> {
-        let (first, last) = self.positions(at, s.half_width)?;
-        let weights = self.cache.get(&self.knots.t[first..last], at, s.degree)?;
-        let mut rate = [0.0; 3];
-        for (w, v) in weights[1].iter().zip(&self.values) {
-            for axis in 0..3 {
-                rate[axis] += w * v[axis];
-            }
-        }
-        Some(rate)
+        self.cache
+            .derivatives(&self.knots.t[first..last], at, s.degree, &self.values)
     }
 
     /// A fit around `at` with its values, for judging how wide the polynomial may be.
@@ -253,7 +297,7 @@ fn rates(phi: Vector3<f64>, d: Vector3<f64>, dd: Vector3<f64>) -> (Vector3<f64>,
 }
 
 /// Polynomials for one reference quantity.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Widths {
     /// For the ideal readings that measured ones are compared with: nothing of the motion may be lost.
     pub value: Smoothing,
@@ -401,6 +445,19 @@ mod tests {
             )[3]
             .is_none()
         );
+    }
+
+    #[test]
+    fn rotation_vectors_are_those_of_the_arc_tangent() {
+        let axis = Vector3::new(0.3, -0.8, 0.5).normalize();
+        for k in 0..200 {
+            let vector = axis * (1e-9 + 0.0157 * f64::from(k));
+            let turn = UnitQuaternion::from_scaled_axis(vector);
+            for turn in [turn, UnitQuaternion::new_unchecked(-turn.into_inner())] {
+                let error = (rotation_vector(&turn) - vector).norm();
+                assert!(error < 1e-14 * (1.0 + f64::from(k)), "{k} {error}");
+            }
+        }
     }
 
     #[test]

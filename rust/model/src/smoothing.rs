@@ -5,6 +5,8 @@
 //! knots around it (the local regression of Cleveland 1979, of high order as Savitzky and Golay 1964, but at real time stamps).
 //! How wide and of which degree is chosen from the reference alone, see [`crate::bandwidth`].
 
+use std::array::from_fn;
+
 /// Degree and half width of the local polynomial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Smoothing {
@@ -25,6 +27,7 @@ pub const NARROWEST: Smoothing = Smoothing {
 };
 
 /// Normal equations of one local polynomial in Legendre polynomials of u = (t - t_at) / scale, which keeps them well conditioned.
+#[derive(Default)]
 pub struct LocalFit {
     terms: usize,
     scale: f64,
@@ -35,18 +38,20 @@ pub struct LocalFit {
 /// Value and first three derivatives with respect to time.
 pub type Derivatives = [[f64; 3]; 4];
 
-fn legendre(u: f64, terms: usize) -> [f64; TERMS] {
-    let mut p = [0.0; TERMS];
-    p[0] = 1.0;
-    if terms > 1 {
-        p[1] = u;
-    }
-    for k in 2..terms {
+/// What each knot's value counts for in the value and the first three derivatives.
+pub type Weights = Vec<[f64; 4]>;
+
+/// (2 k - 1) / k and (k - 1) / k of the recurrence of the Legendre polynomials.
+const RECURRENCE: [(f64, f64); PRODUCTS] = {
+    let mut out = [(0.0, 0.0); PRODUCTS];
+    let mut k = 1;
+    while k < PRODUCTS {
         let kf = k as f64;
-        p[k] = ((2.0 * kf - 1.0) * u * p[k - 1] - (kf - 1.0) * p[k - 2]) / kf;
+        out[k] = ((2.0 * kf - 1.0) / kf, (kf - 1.0) / kf);
+        k += 1;
     }
-    p
-}
+    out
+};
 
 /// Derivatives of order 0 to 3 of the Legendre polynomials at u = 0.
 const AT_ZERO: [[f64; TERMS]; 4] = [
@@ -56,81 +61,275 @@ const AT_ZERO: [[f64; TERMS]; 4] = [
     [0.0, 0.0, 0.0, 15.0, 0.0, -52.5, 0.0, 118.125, 0.0],
 ];
 
+/// Runs a function with the number of terms as a constant: the loops over terms, where all the time goes at uneven time stamps, are
+/// then unrolled.
+macro_rules! with_terms {
+    ($terms:expr, $function:ident($($argument:expr),*)) => {
+        match $terms {
+            1 => $function::<1>($($argument),*),
+            2 => $function::<2>($($argument),*),
+            3 => $function::<3>($($argument),*),
+            4 => $function::<4>($($argument),*),
+            5 => $function::<5>($($argument),*),
+            6 => $function::<6>($($argument),*),
+            7 => $function::<7>($($argument),*),
+            8 => $function::<8>($($argument),*),
+            _ => $function::<TERMS>($($argument),*),
+        }
+    };
+}
+
+/// Products reach twice the highest degree.
+const PRODUCTS: usize = 2 * TERMS - 1;
+/// Knots worked on side by side.
+const LANES: usize = 4;
+
+/// `LINEAR[i][j][r]`, the share of the polynomial of degree i + j - 2 r in the product of those of degrees i and j (Adams 1878).
+const LINEAR: [[[f64; TERMS]; TERMS]; TERMS] = {
+    let mut a = [1.0; PRODUCTS];
+    let mut r = 1;
+    while r < PRODUCTS {
+        a[r] = a[r - 1] * (2.0 * r as f64 - 1.0) / r as f64;
+        r += 1;
+    }
+    let mut out = [[[0.0; TERMS]; TERMS]; TERMS];
+    let mut i = 0;
+    while i < TERMS {
+        let mut j = 0;
+        while j <= i {
+            let mut r = 0;
+            while r <= j {
+                let (sum, rf) = ((i + j) as f64, r as f64);
+                out[i][j][r] = a[r] * a[i - r] * a[j - r] / a[i + j - r] * (2.0 * sum - 4.0 * rf + 1.0)
+                    / (2.0 * sum - 2.0 * rf + 1.0);
+                r += 1;
+            }
+            j += 1;
+        }
+        i += 1;
+    }
+    out
+};
+
+/// Numbers of some knots side by side.
+type Lanes = [f64; LANES];
+
+/// The Legendre polynomial of degree k at u from the two before, the earlier one first; all of them count `one` times.
+#[inline]
+fn next(k: usize, u: &Lanes, one: &Lanes, before: &[Lanes; 2]) -> Lanes {
+    match k {
+        0 => *one,
+        1 => from_fn(|lane| u[lane] * one[lane]),
+        _ => {
+            let (a, b) = RECURRENCE[k];
+            from_fn(|lane| a * u[lane] * before[1][lane] - b * before[0][lane])
+        }
+    }
+}
+
+#[inline]
+fn add(sum: &mut Lanes, a: &Lanes, b: &Lanes) {
+    *sum = from_fn(|lane| sum[lane] + a[lane] * b[lane]);
+}
+
+/// Times of some knots on the scale of the polynomials, and what each counts: a lane without a knot nothing.
+#[inline]
+fn scaled(knots: &[f64], at: f64, per_scale: f64) -> (Lanes, Lanes) {
+    if let Ok(knots) = <&Lanes>::try_from(knots) {
+        return (knots.map(|t| (t - at) * per_scale), [1.0; LANES]);
+    }
+    let known = |lane: usize| knots.get(lane);
+    let u = from_fn(|lane| known(lane).map_or(0.0, |t| (t - at) * per_scale));
+    (u, from_fn(|lane| f64::from(u8::from(known(lane).is_some()))))
+}
+
+/// Legendre polynomials at each knot, and the sums of their products (lower triangle): since a product is a sum of such polynomials
+/// again, the sums of each of them over the knots are enough.
+fn gram<const T: usize>(t: &[f64], at: f64, scale: f64, basis: &mut Vec<[f64; TERMS]>) -> [[f64; TERMS]; TERMS] {
+    let mut sums = [[0.0; LANES]; PRODUCTS];
+    basis.clear();
+    for knots in t.chunks(LANES) {
+        let (u, one) = scaled(knots, at, scale.recip());
+        let mut before = [[0.0; LANES]; 2];
+        let mut terms = [[0.0; TERMS]; LANES];
+        for k in 0..2 * T - 1 {
+            let p = next(k, &u, &one, &before);
+            add(&mut sums[k], &p, &[1.0; LANES]);
+            if k < T {
+                for lane in 0..LANES {
+                    terms[lane][k] = p[lane];
+                }
+            }
+            before = [before[1], p];
+        }
+        basis.extend_from_slice(&terms[..knots.len()]);
+    }
+    products::<T>(&sums)
+}
+
+/// Sums of the products of two polynomials (lower triangle) from those of each polynomial.
+fn products<const T: usize>(sums: &[[f64; LANES]; PRODUCTS]) -> [[f64; TERMS]; TERMS] {
+    let total = sums.map(|lanes| lanes.iter().sum::<f64>());
+    let mut out = [[0.0; TERMS]; TERMS];
+    for i in 0..T {
+        for j in 0..=i {
+            out[i][j] = (0..=j).map(|r| LINEAR[i][j][r] * total[i + j - 2 * r]).sum();
+        }
+    }
+    out
+}
+
+/// Value and derivatives of the polynomial through values at knots, in one go: nothing is kept for other values.
+fn fitted<const T: usize>(t: &[f64], at: f64, scale: f64, values: &[[f64; 3]]) -> Option<Derivatives> {
+    let mut sums = [[0.0; LANES]; PRODUCTS];
+    let mut right = [[[0.0; LANES]; 3]; T];
+    let per_scale = scale.recip();
+    for (knots, values) in t.chunks(LANES).zip(values.chunks(LANES)) {
+        let (u, one) = scaled(knots, at, per_scale);
+        let value = |axis: usize| from_fn(|lane| values.get(lane).map_or(0.0, |v| v[axis]));
+        let values: [Lanes; 3] = from_fn(value);
+        let mut before = [[0.0; LANES]; 2];
+        for k in 0..2 * T - 1 {
+            let p = next(k, &u, &one, &before);
+            add(&mut sums[k], &p, &[1.0; LANES]);
+            if k < T {
+                for (sum, value) in right[k].iter_mut().zip(&values) {
+                    add(sum, &p, value);
+                }
+            }
+            before = [before[1], p];
+        }
+    }
+    let mut factor = products::<T>(&sums);
+    if !factorise::<T>(&mut factor, DETERMINED * t.len() as f64) {
+        return None;
+    }
+    let mut out = [[0.0; 3]; 4];
+    for axis in 0..3 {
+        let mut c = [0.0; TERMS];
+        for k in 0..T {
+            c[k] = right[k][axis].iter().sum();
+        }
+        solve::<T>(&factor, &mut c);
+        let mut unit = 1.0;
+        for order in 0..4 {
+            let value: f64 = (0..T).map(|k| AT_ZERO[order][k] * c[k]).sum();
+            out[order][axis] = value * unit;
+            unit *= per_scale;
+        }
+    }
+    Some(out)
+}
+
+/// Value and derivatives around `at` of the polynomial through values at times `t`; `None` if these do not determine it.
+pub fn derivatives(t: &[f64], at: f64, degree: usize, values: &[[f64; 3]]) -> Option<Derivatives> {
+    let (terms, scale) = terms_and_scale(t, at, degree)?;
+    with_terms!(terms, fitted(t, at, scale, values))
+}
+
+/// Number of terms, and the scale of time; `None` where there are too few knots.
+fn terms_and_scale(t: &[f64], at: f64, degree: usize) -> Option<(usize, f64)> {
+    let terms = degree.min(MAX_DEGREE) + 1;
+    let (first, last) = (t.first()?, t.last()?);
+    let scale = (first - at).abs().max((last - at).abs());
+    (t.len() >= terms && scale > 0.0 && scale.is_finite()).then_some((terms, scale))
+}
+
+/// Knots determine a polynomial if no pivot is smaller than this, by knot.
+const DETERMINED: f64 = 1e-11;
+
+/// Cholesky factor in place; false where the knots do not determine the polynomial.
+fn factorise<const T: usize>(factor: &mut [[f64; TERMS]; TERMS], least: f64) -> bool {
+    for i in 0..T {
+        for j in 0..=i {
+            let mut s = factor[i][j];
+            for k in 0..j {
+                s -= factor[i][k] * factor[j][k];
+            }
+            if i == j {
+                if s <= least {
+                    return false;
+                }
+                factor[i][i] = s.sqrt();
+            } else {
+                factor[i][j] = s / factor[j][j];
+            }
+        }
+    }
+    true
+}
+
+fn solve<const T: usize>(factor: &[[f64; TERMS]; TERMS], b: &mut [f64; TERMS]) {
+    for i in 0..T {
+        for k in 0..i {
+            b[i] -= factor[i][k] * b[k];
+        }
+        b[i] /= factor[i][i];
+    }
+    for i in (0..T).rev() {
+        for k in i + 1..T {
+            b[i] -= factor[k][i] * b[k];
+        }
+        b[i] /= factor[i][i];
+    }
+}
+
+/// Linear combinations of the polynomials at each knot, four at a time.
+fn combined<const T: usize>(basis: &[[f64; TERMS]], coefficients: &[[f64; 4]; TERMS], out: &mut Weights) {
+    out.clear();
+    out.extend(basis.iter().map(|b| {
+        let mut sum = [0.0; 4];
+        for k in 0..T {
+            for (s, c) in sum.iter_mut().zip(coefficients[k]) {
+                *s += b[k] * c;
+            }
+        }
+        sum
+    }));
+}
+
 impl LocalFit {
     /// Prepares the fit around `at` through knots at times `t`; `None` if the knots do not determine the polynomial.
     pub fn new(t: &[f64], at: f64, degree: usize) -> Option<Self> {
-        let terms = degree.min(MAX_DEGREE) + 1;
-        if t.len() < terms {
-            return None;
-        }
-        let scale = t.iter().fold(0.0_f64, |m, v| m.max((v - at).abs()));
-        if scale <= 0.0 || !scale.is_finite() {
-            return None;
-        }
-        let basis: Vec<_> = t.iter().map(|v| legendre((v - at) / scale, terms)).collect();
-        let mut factor = [[0.0; TERMS]; TERMS];
-        for b in &basis {
-            for i in 0..terms {
-                for j in 0..=i {
-                    factor[i][j] += b[i] * b[j];
-                }
-            }
-        }
-        // Cholesky factor in place.
-        for i in 0..terms {
-            for j in 0..=i {
-                let mut s = factor[i][j];
-                for k in 0..j {
-                    s -= factor[i][k] * factor[j][k];
-                }
-                if i == j {
-                    if s <= 1e-11 * t.len() as f64 {
-                        return None;
-                    }
-                    factor[i][i] = s.sqrt();
-                } else {
-                    factor[i][j] = s / factor[j][j];
-                }
-            }
-        }
-        Some(Self {
-            terms,
-            scale,
-            factor,
-            basis,
-        })
+        let mut fit = Self::default();
+        fit.prepare(t, at, degree).then_some(fit)
+    }
+
+    /// The same in place; false if the knots do not determine the polynomial.
+    pub fn prepare(&mut self, t: &[f64], at: f64, degree: usize) -> bool {
+        let Some((terms, scale)) = terms_and_scale(t, at, degree) else {
+            return false;
+        };
+        (self.terms, self.scale) = (terms, scale);
+        self.factor = with_terms!(terms, gram(t, at, scale, &mut self.basis));
+        let least = DETERMINED * t.len() as f64;
+        with_terms!(terms, factorise(&mut self.factor, least))
     }
 
     fn solve(&self, b: &mut [f64; TERMS]) {
-        for i in 0..self.terms {
-            for k in 0..i {
-                b[i] -= self.factor[i][k] * b[k];
-            }
-            b[i] /= self.factor[i][i];
-        }
-        for i in (0..self.terms).rev() {
-            for k in i + 1..self.terms {
-                b[i] -= self.factor[k][i] * b[k];
-            }
-            b[i] /= self.factor[i][i];
-        }
+        with_terms!(self.terms, solve(&self.factor, b));
     }
 
-    /// Weights `w[order][knot]` with which the knots' values enter the derivatives, so that knots of equal spacing share one solution.
-    pub fn weights(&self) -> [Vec<f64>; 4] {
-        let mut weights: [Vec<f64>; 4] = Default::default();
+    /// Weights of the knots' values, so that knots of equal spacing share one solution.
+    pub fn weights(&self) -> Weights {
+        let mut weights = Weights::new();
+        self.weights_into(&mut weights);
+        weights
+    }
+
+    /// The same in place.
+    pub fn weights_into(&self, weights: &mut Weights) {
+        let mut coefficients = [[0.0; 4]; TERMS];
         let mut unit = 1.0;
-        for (order, w) in weights.iter_mut().enumerate() {
+        for order in 0..4 {
             let mut c = AT_ZERO[order];
             self.solve(&mut c);
-            *w = self
-                .basis
-                .iter()
-                .map(|b| (0..self.terms).map(|k| c[k] * b[k]).sum::<f64>() / unit)
-                .collect();
+            for (k, c) in c.iter().enumerate().take(self.terms) {
+                coefficients[k][order] = c / unit;
+            }
             unit *= self.scale;
         }
-        weights
+        with_terms!(self.terms, combined(&self.basis, &coefficients, weights));
     }
 
     /// Sum of squared residuals of the fit to `values`, and its degrees of freedom.
@@ -154,16 +353,16 @@ impl LocalFit {
 }
 
 /// Applies weights to values: value and derivatives, each with three components.
-pub fn apply(weights: &[Vec<f64>; 4], values: &[[f64; 3]]) -> Derivatives {
-    let mut out = [[0.0; 3]; 4];
-    for (order, w) in weights.iter().enumerate() {
-        for (a, v) in w.iter().zip(values) {
-            for axis in 0..3 {
-                out[order][axis] += a * v[axis];
+pub fn apply(weights: &[[f64; 4]], values: &[[f64; 3]]) -> Derivatives {
+    let mut out = [[0.0; 4]; 3];
+    for (w, v) in weights.iter().zip(values) {
+        for (sums, v) in out.iter_mut().zip(v) {
+            for (s, w) in sums.iter_mut().zip(w) {
+                *s += w * v;
             }
         }
     }
-    out
+    [0, 1, 2, 3].map(|order| out.map(|axis| axis[order]))
 }
 
 #[cfg(test)]
@@ -195,6 +394,23 @@ mod tests {
             assert!((got - want).abs() < 1e-7, "{got} {want}");
         }
         assert!(fit.residual(&values).0 < 1e-24);
+        let at_once = derivatives(&t, at, 6, &values).expect("determined");
+        for (a, b) in d.as_flattened().iter().zip(at_once.as_flattened()) {
+            assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn sums_of_products_come_from_sums_of_polynomials() {
+        let t: Vec<f64> = (0..22).map(|i| f64::from(i) + 0.3 * f64::from(i * 5 % 7)).collect();
+        let mut basis = Vec::new();
+        let sums = gram::<TERMS>(&t, 11.0, 13.0, &mut basis);
+        for i in 0..TERMS {
+            for j in 0..=i {
+                let direct: f64 = basis.iter().map(|b| b[i] * b[j]).sum();
+                assert!((sums[i][j] - direct).abs() < 1e-12, "{i} {j}: {} {direct}", sums[i][j]);
+            }
+        }
     }
 
     #[test]

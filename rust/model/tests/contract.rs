@@ -6,6 +6,7 @@ use imufit_model::card::Found;
 use imufit_model::catalogue;
 use imufit_model::contract::check;
 use imufit_model::facts::LogFacts;
+use imufit_model::kinematics_memory::KinematicsMemory;
 use imufit_model::rig::{Knot, Rig, wrapped};
 use imufit_model::smoothing::NARROWEST;
 use imufit_model::window::Window;
@@ -96,6 +97,7 @@ fn every_built_in_effect_keeps_the_contract() {
         ranges: [None; 3],
         rig: Some(rig(&t, &attitude)),
         rests: false,
+        kinematics: KinematicsMemory::default(),
     };
     let mut effects = catalogue::built_in();
     for sensor in ["acc", "gyr", "mag"] {

@@ -3,6 +3,7 @@
 
 use imufit_model::catalogue;
 use imufit_model::facts::{Frame, LogFacts};
+use imufit_model::kinematics_memory::KinematicsMemory;
 use imufit_model::sensor_model::SensorModel;
 use imufit_model::smoothing::NARROWEST;
 use imufit_model::window::Window;
@@ -103,6 +104,7 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
         ranges: [None; 3],
         rig: None,
         rests: false,
+        kinematics: KinematicsMemory::default(),
     };
     let of = |effects| -> Vec<f64> {
         let model = SensorModel::new(effects, vec![], &facts);

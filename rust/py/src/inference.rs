@@ -3,7 +3,7 @@
 use imufit_inference::part::Part;
 use imufit_inference::problem::Problem;
 use imufit_inference::screening::parameters_of;
-use imufit_inference::{estimate, residual, saturated, screening, selection, verdict};
+use imufit_inference::{estimate, residual, revision, saturated, screening, selection, verdict};
 use imufit_model::rest_channels;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::DVector;
@@ -191,6 +191,27 @@ impl PyProblem {
         out.set_item("disagreements", disagreements)?;
         out.set_item("spoilt", v.spoilt)?;
         Ok(out)
+    }
+
+    /// Slots among `members` of the model that are needless beside its others, or that one of the `candidates` had better
+    /// replace: pairs of a slot and what does better in its place, or None.
+    fn revisions(
+        &self,
+        py: Python<'_>,
+        model: Vec<usize>,
+        members: Vec<usize>,
+        candidates: Vec<usize>,
+    ) -> PyResult<Vec<(usize, Option<usize>)>> {
+        let known = self.0.slots.len();
+        if [&model, &members, &candidates]
+            .into_iter()
+            .flatten()
+            .any(|s| *s >= known)
+        {
+            return Err(value_error("there is no such slot"));
+        }
+        let found = py.detach(|| revision::revisions(&self.0, &model, &members, &candidates));
+        Ok(found.iter().map(|r| (r.slot, r.by)).collect())
     }
 
     /// Residual of one log at a step (p,) of all parameters: RMS and mean by channel and block, and binned panels, in the

@@ -1,0 +1,59 @@
+"""Swaps and drops: effects that later ones made needless, or less apt than another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from imufit.results import Revision
+
+if TYPE_CHECKING:
+    from imufit.fit import Fit
+
+MATTERS = 0.002
+"""Share of the held-out error that counts: less is no reason to add beside something unknown, to swap, or to keep."""
+Swap = tuple[str | None, str | None]
+"""An effect and what takes its place, if anything."""
+
+
+def revise(fit: Fit, added: Sequence[str], tried: set[Swap]) -> Revision | None:
+    """Return the first swap or drop that a fit confirms.
+
+    The evidence proposes, to first order; the fit of the other stack decides: a swap must lower the held-out error, a
+    drop must not raise it.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model with all that was added.
+    added : sequence of str
+        Effects that may be taken out again: what the user began with stays.
+    tried : set of tuple
+        What was proposed before; what is proposed now is put in.
+    """
+    analysis = fit.analysis
+    ids = analysis.slots
+    members = [slot for slot in analysis.fitted_slots if ids[slot] in added]
+    if len(members) < 2:
+        return None
+    for slot, better in analysis.problem.revisions(analysis.fitted_slots, members, analysis.candidate_slots):
+        removed, by = ids[slot], None if better is None else ids[better]
+        if (removed, by) in tried:
+            continue
+        tried |= {(removed, by), (by, removed)}
+        model = fit.model.without_effect(removed)
+        other = fit.moved(model if by is None else model.with_effect(by))
+        if matters(fit.ratio, other.ratio) if by else not matters(other.ratio, fit.ratio):
+            return Revision(removed, by, fit.ratio, other.ratio)
+    return None
+
+
+def matters(before: float, after: float) -> bool:
+    """Return whether a held-out error falls by enough to count.
+
+    Parameters
+    ----------
+    before, after : float
+        Held-out errors.
+    """
+    return before - after >= MATTERS * before

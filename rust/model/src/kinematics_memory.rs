@@ -1,0 +1,188 @@
+//! Kinematics of a log, kept from one pass over it to the next.
+//!
+//! At uneven time stamps the local polynomials are most of the work of a pass, and every pass over a log, whatever effects it is taken
+//! for, asks for the same ones again.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::{Arc, Mutex};
+
+use crate::reference::{Kinematics, Widths};
+use crate::window::Window;
+
+/// Kinematics of some rows; `None` where the reference does not tell.
+pub type KinematicsRows = Arc<Vec<Option<Kinematics>>>;
+
+/// Rows kept at most, about 200 bytes each; of a log with more nothing is kept.
+const MOST_ROWS: usize = 1 << 20;
+/// Rows of a stretch whose reference is looked at to make sure that it is the same.
+const LOOKED_AT: usize = 8;
+
+/// How the reference is differentiated, and at which shift of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Differentiation {
+    /// Polynomials for the attitude.
+    pub attitude: Widths,
+    /// Polynomials for the position.
+    pub position: Option<Widths>,
+    /// Time by which the reference is read later, s.
+    pub shift: f64,
+}
+
+/// A stretch of rows.
+#[derive(Debug)]
+struct Stretch {
+    /// A few values of the reference.
+    sample: Vec<u64>,
+    rows: KinematicsRows,
+}
+
+/// By the rows they begin and end at.
+type Stretches = HashMap<(usize, usize), Stretch>;
+
+#[derive(Debug, Default)]
+struct Kept {
+    rows: usize,
+    /// Those used last come last.
+    kinds: Vec<(Differentiation, Stretches)>,
+}
+
+/// Kinematics of a log, shared by all copies of its facts.
+#[derive(Clone, Debug, Default)]
+pub struct KinematicsMemory(Arc<Mutex<Kept>>);
+
+/// A few values of the reference in a stretch of rows.
+fn sample(window: &Window, rows: &Range<usize>) -> Vec<u64> {
+    let step = (rows.len() / LOOKED_AT).max(1);
+    let mut out = Vec::with_capacity(LOOKED_AT * 8 + 8);
+    for i in rows.clone().step_by(step) {
+        let attitude = window.attitude.map_or(&[][..], |q| &q[4 * i..4 * i + 4]);
+        let position = window.position.map_or(&[][..], |p| &p[3 * i..3 * i + 3]);
+        let values = std::iter::once(&window.t[i]).chain(attitude).chain(position);
+        out.extend(values.map(|v| v.to_bits()));
+    }
+    out
+}
+
+impl KinematicsMemory {
+    /// Kinematics of some rows of a window, from memory where they are known; `n` is the number of rows of the log.
+    pub fn of(
+        &self,
+        window: &Window,
+        rows: Range<usize>,
+        n: usize,
+        how: Differentiation,
+        work_out: impl FnOnce() -> Vec<Option<Kinematics>>,
+    ) -> KinematicsRows {
+        if n > MOST_ROWS || rows.is_empty() {
+            return Arc::new(work_out());
+        }
+        let place = (window.offset + rows.start, window.offset + rows.end);
+        let now = sample(window, &rows);
+        if let Some(known) = self.find(&how, place, &now) {
+            return known;
+        }
+        let found = Arc::new(work_out());
+        let stretch = Stretch {
+            sample: now,
+            rows: found.clone(),
+        };
+        self.keep(how, place, stretch);
+        found
+    }
+
+    fn find(&self, how: &Differentiation, place: (usize, usize), now: &[u64]) -> Option<KinematicsRows> {
+        let mut kept = self.0.lock().ok()?;
+        let at = kept.kinds.iter().position(|(kind, _)| kind == how)?;
+        let kind = kept.kinds.remove(at);
+        let known = kind.1.get(&place).filter(|s| s.sample == now).map(|s| s.rows.clone());
+        kept.kinds.push(kind);
+        known
+    }
+
+    fn keep(&self, how: Differentiation, place: (usize, usize), stretch: Stretch) {
+        let Ok(mut kept) = self.0.lock() else { return };
+        let new = stretch.rows.len();
+        // Other shifts are given up first, the one used longest ago before the others.
+        while kept.rows + new > MOST_ROWS {
+            let Some(at) = kept.kinds.iter().position(|(kind, _)| *kind != how) else {
+                return;
+            };
+            let (_, gone) = kept.kinds.remove(at);
+            kept.rows -= gone.values().map(|s| s.rows.len()).sum::<usize>();
+        }
+        let at = kept.kinds.iter().position(|(kind, _)| *kind == how).unwrap_or_else(|| {
+            kept.kinds.push((how, Stretches::new()));
+            kept.kinds.len() - 1
+        });
+        let old = kept.kinds[at].1.insert(place, stretch);
+        kept.rows = kept.rows + new - old.map_or(0, |s| s.rows.len());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::smoothing::NARROWEST;
+
+    fn window<'a>(t: &'a [f64], q: &'a [f64]) -> Window<'a> {
+        Window {
+            t,
+            readings: [None; 3],
+            temperature: None,
+            attitude: Some(q),
+            position: None,
+            reference_exact: None,
+            covariates: vec![],
+            offset: 0,
+            begin: 0,
+            end: t.len(),
+        }
+    }
+
+    const HOW: Differentiation = Differentiation {
+        attitude: Widths {
+            value: NARROWEST,
+            columns: NARROWEST,
+        },
+        position: None,
+        shift: 0.0,
+    };
+
+    #[test]
+    fn what_is_known_is_not_worked_out_again_unless_the_reference_is_another() {
+        let t: Vec<f64> = (0..50).map(|i| 0.01 * f64::from(i)).collect();
+        let q: Vec<f64> = t.iter().flat_map(|_| [1.0, 0.0, 0.0, 0.0]).collect();
+        let other: Vec<f64> = t.iter().flat_map(|_| [0.0, 1.0, 0.0, 0.0]).collect();
+        let memory = KinematicsMemory::default();
+        let asked = |q: &[f64], how: Differentiation, copy: &KinematicsMemory| {
+            let mut count = 0;
+            copy.of(&window(&t, q), 0..50, 50, how, || {
+                count += 1;
+                vec![None; 50]
+            });
+            count
+        };
+        assert_eq!(asked(&q, HOW, &memory), 1);
+        assert_eq!(asked(&q, HOW, &memory.clone()), 0);
+        assert_eq!(asked(&q, Differentiation { shift: 0.01, ..HOW }, &memory), 1);
+        assert_eq!(asked(&q, HOW, &memory), 0);
+        assert_eq!(asked(&other, HOW, &memory), 1);
+    }
+
+    #[test]
+    fn no_more_is_kept_than_there_is_room_for() {
+        let t: Vec<f64> = (0..50).map(|i| 0.01 * f64::from(i)).collect();
+        let q: Vec<f64> = t.iter().flat_map(|_| [1.0, 0.0, 0.0, 0.0]).collect();
+        let memory = KinematicsMemory::default();
+        let n = MOST_ROWS / 3;
+        for k in 0..6 {
+            let how = Differentiation {
+                shift: f64::from(k),
+                ..HOW
+            };
+            memory.of(&window(&t, &q), 0..50, n, how, || vec![None; n]);
+            assert!(memory.0.lock().expect("free").rows <= MOST_ROWS);
+        }
+    }
+}
