@@ -15,8 +15,6 @@ pub type KinematicsRows = Arc<Vec<Option<Kinematics>>>;
 
 /// Rows kept at most, about 200 bytes each; of a log with more nothing is kept.
 const MOST_ROWS: usize = 1 << 20;
-/// Rows of a stretch whose reference is looked at to make sure that it is the same.
-const LOOKED_AT: usize = 8;
 
 /// How the reference is differentiated, and at which shift of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,8 +30,8 @@ pub struct Differentiation {
 /// A stretch of rows.
 #[derive(Debug)]
 struct Stretch {
-    /// A few values of the reference.
-    sample: Vec<u64>,
+    /// Of the reference that they were worked out from.
+    fingerprint: u64,
     rows: KinematicsRows,
 }
 
@@ -51,17 +49,14 @@ struct Kept {
 #[derive(Clone, Debug, Default)]
 pub struct KinematicsMemory(Arc<Mutex<Kept>>);
 
-/// A few values of the reference in a stretch of rows.
-fn sample(window: &Window, rows: &Range<usize>) -> Vec<u64> {
-    let step = (rows.len() / LOOKED_AT).max(1);
-    let mut out = Vec::with_capacity(LOOKED_AT * 8 + 8);
-    for i in rows.clone().step_by(step) {
-        let attitude = window.attitude.map_or(&[][..], |q| &q[4 * i..4 * i + 4]);
-        let position = window.position.map_or(&[][..], |p| &p[3 * i..3 * i + 3]);
-        let values = std::iter::once(&window.t[i]).chain(attitude).chain(position);
-        out.extend(values.map(|v| v.to_bits()));
-    }
-    out
+/// A number that changes with any value of a window's reference.
+fn fingerprint(window: &Window) -> u64 {
+    let columns = [Some(window.t), window.attitude, window.position, window.reference_exact];
+    let values = columns.iter().flat_map(|c| c.unwrap_or_default());
+    // Multiplication by an odd number near 2^64 over the golden ratio spreads the bits (Knuth 1973, 6.4).
+    values.fold(0, |sum: u64, v| {
+        (sum.rotate_left(23) ^ v.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    })
 }
 
 impl KinematicsMemory {
@@ -78,24 +73,28 @@ impl KinematicsMemory {
             return Arc::new(work_out());
         }
         let place = (window.offset + rows.start, window.offset + rows.end);
-        let now = sample(window, &rows);
-        if let Some(known) = self.find(&how, place, &now) {
+        let now = fingerprint(window);
+        if let Some(known) = self.find(&how, place, now) {
             return known;
         }
         let found = Arc::new(work_out());
         let stretch = Stretch {
-            sample: now,
+            fingerprint: now,
             rows: found.clone(),
         };
         self.keep(how, place, stretch);
         found
     }
 
-    fn find(&self, how: &Differentiation, place: (usize, usize), now: &[u64]) -> Option<KinematicsRows> {
+    fn find(&self, how: &Differentiation, place: (usize, usize), now: u64) -> Option<KinematicsRows> {
         let mut kept = self.0.lock().ok()?;
         let at = kept.kinds.iter().position(|(kind, _)| kind == how)?;
         let kind = kept.kinds.remove(at);
-        let known = kind.1.get(&place).filter(|s| s.sample == now).map(|s| s.rows.clone());
+        let known = kind
+            .1
+            .get(&place)
+            .filter(|s| s.fingerprint == now)
+            .map(|s| s.rows.clone());
         kept.kinds.push(kind);
         known
     }
