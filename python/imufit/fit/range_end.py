@@ -18,6 +18,8 @@ BELOW = 4
 """Steps of the resolution below it that are looked at as well."""
 JUMP = 8.0
 """Steps of the resolution by which a reading comes to the end or leaves it: one that stands still is not cut off."""
+CHANCE = 1e-6
+"""Probability of so many equal readings in a row in a sensor that reads the same twice as often as this one."""
 TALLER = 2.0
 """Readings at the largest value are this many times those at a step below: the tail of a distribution gets thinner."""
 
@@ -34,6 +36,8 @@ class RangeEnd:
 
     largest: float = 0.0
     _step: float = np.inf
+    _same: int = 0
+    _pairs: int = 0
     _near: Array = field(default_factory=lambda: np.empty((0, 2)))
 
     def add(self, column: Array) -> None:
@@ -48,7 +52,10 @@ class RangeEnd:
         if values.size == 0:
             return
         steps = np.abs(np.diff(column, axis=0))
-        steps = steps[np.isfinite(steps) & (steps > 0.0)]
+        steps = steps[np.isfinite(steps)]
+        self._pairs += steps.size
+        self._same += int(np.count_nonzero(steps == 0.0))
+        steps = steps[steps > 0.0]
         # A reading at the end has no digits of its own: steps to and from there tell nothing of the resolution.
         self._step = min(self._step, float(np.quantile(steps, 0.01)) if steps.size else np.inf)
         self.largest = max(self.largest, float(values.max()))
@@ -67,6 +74,9 @@ class RangeEnd:
         at_end = value >= self.largest * (1.0 - 1e-12)
         count = int(np.count_nonzero(at_end))
         arriving = int(np.count_nonzero(jump[at_end] > JUMP * self._step))
-        if arriving < LEAST or not count > TALLER * (value.size - count) / BELOW:
+        # One long stay at the end is as good, unless this sensor often reads the same.
+        same = max(self._same - (count - 1), 1) / max(self._pairs, 1)
+        stays = arriving >= 1 and count >= LEAST and same ** (count - 1) < CHANCE
+        if not (arriving >= LEAST or stays) or not count > TALLER * (value.size - count) / BELOW:
             return None
         return self.largest

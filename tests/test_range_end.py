@@ -1,0 +1,53 @@
+"""Where readings are cut off, as far as the readings themselves tell."""
+
+import numpy as np
+import pytest
+from imufit.fit.range_end import RangeEnd
+
+STEP = 1e-3
+
+
+def swinging(seed: int, noise: float = 20 * STEP) -> np.ndarray:
+    """Three axes that swing, with noise, rounded to a step."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(4000) / 100.0
+    x = np.stack([a * np.sin(2 * np.pi * f * t) for a, f in ((3.0, 0.7), (2.0, 1.1), (2.5, 0.4))], axis=1)
+    return np.round((x + noise * rng.normal(size=x.shape)) / STEP) * STEP
+
+
+def end(readings: np.ndarray, chunks: int = 1) -> float | None:
+    found = RangeEnd()
+    for part in np.array_split(readings, chunks):
+        found.add(part)
+    return found.end()
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("chunks", [1, 7])
+def test_readings_that_turn_back_have_no_end(seed, chunks):
+    assert end(swinging(seed), chunks) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("chunks", [1, 7])
+def test_readings_cut_off_at_every_swing_end_there(seed, chunks):
+    assert end(np.clip(swinging(seed), -2.7, 2.7), chunks) == 2.7
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_one_long_stay_at_the_end_is_enough(seed):
+    readings = swinging(seed)
+    readings[1000:1012, 1] = [2.2, 2.8, 3.1, *[3.4567] * 6, 3.0, 2.6, 2.1]
+    assert end(readings) == 3.4567
+
+
+def test_two_equal_readings_may_be_chance():
+    readings = swinging(0)
+    readings[1000:1004, 1] = [3.1, 3.4567, 3.4567, 3.0]
+    assert end(readings) is None
+
+
+def test_a_sensor_that_often_reads_the_same_may_stand_still_at_its_largest_reading():
+    readings = np.repeat(swinging(0), 5, axis=0)
+    readings[1000:1012, 1] = [2.2, 2.8, 3.1, *[3.4567] * 6, 3.0, 2.6, 2.1]
+    assert end(readings) is None
