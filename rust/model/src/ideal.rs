@@ -201,26 +201,28 @@ impl Ideal {
             let delay = change.delay - past;
             Self::new(window, facts, &ReferenceChange { delay, ..*change })
         };
-        let mut now = before(time.delay);
+        let mut now = before(time.delay + time.lag);
         if time.lag == 0.0 {
             return Some(now);
         }
+        // The detail, mostly the reference's noise, is only late: a mean of it would lower the residual of any sensor that is called
+        // sluggish.
         let n = now.len();
         now.settling = Triple::zeros(n);
-        for triple in now.triples() {
+        for triple in now.smooth() {
             *triple = Triple::zeros(n);
         }
         for (node, weight) in PAST {
             let mut then = before(time.delay + time.lag * node);
             now.settling.add(then.rate(sensor), weight * node);
-            for (sum, triple) in now.triples().into_iter().zip(then.triples()) {
+            for (sum, triple) in now.smooth().into_iter().zip(then.smooth()) {
                 sum.add(triple, weight);
             }
         }
         Some(now)
     }
 
-    const fn triples(&mut self) -> [&mut Triple; 8] {
+    const fn smooth(&mut self) -> [&mut Triple; 6] {
         [
             &mut self.omega,
             &mut self.alpha,
@@ -228,8 +230,6 @@ impl Ideal {
             &mut self.f_rate,
             &mut self.m,
             &mut self.m_rate,
-            &mut self.omega_detail,
-            &mut self.f_detail,
         ]
     }
 
@@ -263,7 +263,10 @@ impl Ideal {
     fn push(&mut self, k: Option<&Kinematics>, facts: &LogFacts, change: &ReferenceChange) {
         let Some(k) = k else {
             let nan = Vector3::repeat(f64::NAN);
-            for triple in self.triples() {
+            for triple in [&mut self.omega_detail, &mut self.f_detail] {
+                triple.push(&nan);
+            }
+            for triple in self.smooth() {
                 triple.push(&nan);
             }
             self.attitude.push(UnitQuaternion::identity());
