@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from imufit.figures import quantity
 from imufit.results.data_fault import DataFault, fault_table
-from imufit.results.json_value import json_value
+from imufit.results.json_value import json_fields, json_value
 from imufit.results.table import Table, html, page
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class Panel:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON with the arrays as lists."""
-        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+        return json_fields(self)
 
     def to_dataframe(self) -> pd.DataFrame:
         """One row per bin: centre, mean, band."""
@@ -123,7 +123,7 @@ class Spectrum:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON with the arrays as lists."""
-        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+        return json_fields(self)
 
     def to_dataframe(self) -> pd.DataFrame:
         """One row per frequency: frequency, density."""
@@ -160,7 +160,7 @@ class Where:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one line."""
-        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+        return json_fields(self)
 
     def __str__(self) -> str:
         return (

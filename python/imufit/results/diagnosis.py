@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from imufit.figures import quantity
 from imufit.results.data_fault import DataFault, fault_table
 from imufit.results.disagreement import Disagreement, Without, disagreement_table
-from imufit.results.json_value import json_value
+from imufit.results.json_value import json_fields, json_value
 from imufit.results.log_parameters import LogParameters, log_table, logs_json
 from imufit.results.parameter import Parameter, by_name, in_words
 from imufit.results.table import Table, html, page
@@ -176,7 +176,7 @@ class Unexplained:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one dependence."""
-        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+        return json_fields(self)
 
     def __str__(self) -> str:
         shape = f", {self.shape}" if self.shape else ""

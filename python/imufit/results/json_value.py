@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -33,3 +34,14 @@ def json_value(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value
+
+
+def json_fields(item: Any) -> dict[str, Any]:
+    """Turn a dataclass into JSON, every field under its name.
+
+    Parameters
+    ----------
+    item : Any
+        An instance of a dataclass.
+    """
+    return {field.name: json_value(getattr(item, field.name)) for field in fields(item)}

@@ -10,7 +10,7 @@ from imufit.results.addition import surprise
 from imufit.results.comparison import Comparison
 from imufit.results.data_fault import fault_table
 from imufit.results.diagnosis import VERDICTS, Diagnosis
-from imufit.results.json_value import json_value
+from imufit.results.json_value import json_fields, json_value
 from imufit.results.log_parameters import logs_json
 from imufit.results.parameter import by_effect
 from imufit.results.table import Table, html, page
@@ -44,7 +44,7 @@ class Step:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one step; training error besides."""
-        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+        return json_fields(self)
 
     def __str__(self) -> str:
         return (
@@ -74,7 +74,7 @@ class Revision:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one revision."""
-        return {name: json_value(getattr(self, name)) for name in self.__dataclass_fields__}
+        return json_fields(self)
 
     def __str__(self) -> str:
         errors = f"{quantity.ratio(self.before)} -> {quantity.ratio(self.after)}"
