@@ -99,18 +99,6 @@ impl NormalEquations {
         out
     }
 
-    /// The same equations where the observations hold besides what the parameters explain at the values given.
-    #[must_use]
-    pub fn restored(&self, values: &DVector<f64>) -> Self {
-        let explained = &self.gram * values;
-        Self {
-            gram: self.gram.clone(),
-            square: self.square + 2.0 * self.right.dot(values) + values.dot(&explained),
-            right: &self.right + explained,
-            n: self.n,
-        }
-    }
-
     /// Equations of some of the parameters.
     #[must_use]
     pub fn selected(&self, parameters: &[usize]) -> Self {

@@ -288,11 +288,11 @@ impl ChannelSums {
         }
     }
 
-    /// The same where the residual holds besides what the parameters explain at the values given.
+    /// The same once some parameters have been given values: what these explain is taken off the residual.
     #[must_use]
-    pub fn restored(&self, values: &DVector<f64>) -> Self {
+    pub fn given(&self, parameters: &[usize], values: &[f64]) -> Self {
         let mut out = self.with_sums(self.sums.clone());
-        out.right += &self.sums * values;
+        out.right -= self.columns(parameters) * DVector::from_column_slice(values);
         out
     }
 

@@ -13,10 +13,9 @@ use crate::part::{self, Part};
 use crate::saturated::assemble;
 
 /// Evidence in the form that every question is asked of: the blocks of all logs, one log after the other.
-#[derive(Clone)]
 pub struct Problem {
     /// The logs.
-    pub parts: Vec<Part>,
+    pub parts: Arc<[Part]>,
     /// Effects of all logs, each with its place among the parameters.
     pub slots: Vec<Slot>,
     /// For each of them whether every log has its own parameters of it.
@@ -97,7 +96,7 @@ impl Problem {
             }
         }
         Self {
-            parts,
+            parts: parts.into(),
             slots,
             own: own.to_vec(),
             places,
@@ -116,20 +115,27 @@ impl Problem {
     #[must_use]
     pub fn taken_out(&self, slot: usize) -> Self {
         let slot = &self.slots[slot];
-        let card = slot.effect.card();
-        let mut values = DVector::zeros(self.plausible.len());
-        for (k, parameter) in card.parameters.iter().cycle().take(slot.parameters.len()).enumerate() {
-            // What a search started is how the others act, and nothing by itself; unless there is nothing else.
-            if parameter.found == Found::Steps || card.parameters.iter().all(|p| p.found != Found::Steps) {
-                values[slot.first + k] = slot.parameters[k];
-            }
-        }
-        let restored = |blocks: &[NormalEquations]| blocks.iter().map(|b| b.restored(&values)).collect();
+        let cards = &slot.effect.card().parameters;
+        // What a search started is how the others act, and nothing by itself; unless there is nothing else.
+        let steps = cards.iter().any(|p| p.found == Found::Steps);
+        let counts = |k: &usize| !steps || cards[k % cards.len()].found == Found::Steps;
+        let kept: Vec<usize> = (0..slot.parameters.len()).filter(counts).collect();
+        let places: Vec<usize> = kept.iter().map(|k| slot.first + k).collect();
+        let without: Vec<f64> = kept.iter().map(|k| -slot.parameters[*k]).collect();
+        let all: Vec<usize> = (0..self.plausible.len()).collect();
+        let given = |blocks: &[NormalEquations]| blocks.iter().map(|b| b.given(&all, &places, &without)).collect();
         Self {
-            white: restored(&self.white),
-            raw: restored(&self.raw),
-            sums: self.sums.iter().map(|s| s.restored(&values)).collect(),
-            ..self.clone()
+            parts: self.parts.clone(),
+            slots: self.slots.clone(),
+            own: self.own.clone(),
+            places: self.places.clone(),
+            logs: self.logs.clone(),
+            white: given(&self.white),
+            raw: given(&self.raw),
+            plausible: self.plausible.clone(),
+            typical: self.typical.clone(),
+            known: self.known.clone(),
+            sums: self.sums.iter().map(|s| s.given(&places, &without)).collect(),
         }
     }
 

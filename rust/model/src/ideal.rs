@@ -126,7 +126,7 @@ fn kinematics(window: &Window, facts: &LogFacts, shift: f64) -> KinematicsRows {
         }),
         shift,
     };
-    facts.kinematics.of(window, window.begin..window.end, facts.n, how, || {
+    facts.kinematics.of(window, facts.n, how, || {
         reference::kinematics(window, how.attitude, how.position, Some(facts.reference_dt), shift)
     })
 }

@@ -4,7 +4,6 @@
 //! for, asks for the same ones again.
 
 use std::collections::HashMap;
-use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
 use crate::reference::{Kinematics, Widths};
@@ -60,19 +59,18 @@ fn fingerprint(window: &Window) -> u64 {
 }
 
 impl KinematicsMemory {
-    /// Kinematics of some rows of a window, from memory where they are known; `n` is the number of rows of the log.
+    /// Kinematics of the core rows of a window, from memory where they are known; `n` is the number of rows of the log.
     pub fn of(
         &self,
         window: &Window,
-        rows: Range<usize>,
         n: usize,
         how: Differentiation,
         work_out: impl FnOnce() -> Vec<Option<Kinematics>>,
     ) -> KinematicsRows {
-        if n > MOST_ROWS || rows.is_empty() {
+        if n > MOST_ROWS {
             return Arc::new(work_out());
         }
-        let place = (window.offset + rows.start, window.offset + rows.end);
+        let place = (window.offset + window.begin, window.offset + window.end);
         let now = fingerprint(window);
         if let Some(known) = self.find(&how, place, now) {
             return known;
@@ -126,16 +124,8 @@ mod tests {
 
     fn window<'a>(t: &'a [f64], q: &'a [f64]) -> Window<'a> {
         Window {
-            t,
-            readings: [None; 3],
-            temperature: None,
             attitude: Some(q),
-            position: None,
-            reference_exact: None,
-            covariates: vec![],
-            offset: 0,
-            begin: 0,
-            end: t.len(),
+            ..Window::over(t)
         }
     }
 
@@ -156,7 +146,7 @@ mod tests {
         let memory = KinematicsMemory::default();
         let asked = |q: &[f64], how: Differentiation, copy: &KinematicsMemory| {
             let mut count = 0;
-            copy.of(&window(&t, q), 0..50, 50, how, || {
+            copy.of(&window(&t, q), 50, how, || {
                 count += 1;
                 vec![None; 50]
             });
@@ -180,7 +170,7 @@ mod tests {
                 shift: f64::from(k),
                 ..HOW
             };
-            memory.of(&window(&t, &q), 0..50, n, how, || vec![None; n]);
+            memory.of(&window(&t, &q), n, how, || vec![None; n]);
             assert!(memory.0.lock().expect("free").rows <= MOST_ROWS);
         }
     }

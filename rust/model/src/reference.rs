@@ -118,16 +118,15 @@ impl WeightCache {
         }
         self.uneven = if same { 0 } else { self.uneven + 1 };
         self.offsets.clear();
+        self.offsets.extend(t.iter().map(|v| v - at));
         self.weights.clear();
         if self.uneven > UNEVEN {
-            self.offsets.extend(t.iter().map(|v| v - at));
             return smoothing::derivatives(t, at, degree, values);
         }
         if !self.fit.prepare(t, at, degree) {
             return None;
         }
         self.fit.weights_into(&mut self.weights);
-        self.offsets.extend(t.iter().map(|v| v - at));
         Some(smoothing::apply(&self.weights, values))
     }
 }
@@ -401,16 +400,8 @@ mod tests {
             })
             .collect();
         let window = Window {
-            t: &t,
-            readings: [None; 3],
-            temperature: None,
             attitude: Some(&q),
-            position: None,
-            reference_exact: None,
-            covariates: vec![],
-            offset: 0,
-            begin: 0,
-            end: n as usize,
+            ..Window::over(&t)
         };
         for shift in [0.0, 0.0037] {
             let mut worst = (0.0_f64, 0.0_f64);
@@ -472,16 +463,8 @@ mod tests {
             .collect();
         q[4 * 100..4 * 120].fill(f64::NAN);
         let window = Window {
-            t: &t,
-            readings: [None; 3],
-            temperature: None,
             attitude: Some(&q),
-            position: None,
-            reference_exact: None,
-            covariates: vec![],
-            offset: 0,
-            begin: 0,
-            end: 200,
+            ..Window::over(&t)
         };
         let k = kinematics(
             &window,

@@ -143,25 +143,39 @@ fn scaled(knots: &[f64], at: f64, per_scale: f64) -> (Lanes, Lanes) {
     (u, from_fn(|lane| f64::from(u8::from(known(lane).is_some()))))
 }
 
+/// Adds the Legendre polynomials at some knots to their sums, up to a product's degree, and hands out those of the fit.
+#[inline]
+fn along<const T: usize>(
+    knots: &[f64],
+    at: f64,
+    per_scale: f64,
+    sums: &mut [Lanes; PRODUCTS],
+    mut each: impl FnMut(usize, &Lanes),
+) {
+    let (u, one) = scaled(knots, at, per_scale);
+    let mut before = [[0.0; LANES]; 2];
+    for (k, sum) in sums.iter_mut().enumerate().take(2 * T - 1) {
+        let p = next(k, &u, &one, &before);
+        add(sum, &p, &[1.0; LANES]);
+        if k < T {
+            each(k, &p);
+        }
+        before = [before[1], p];
+    }
+}
+
 /// Legendre polynomials at each knot, and the sums of their products (lower triangle): since a product is a sum of such polynomials
 /// again, the sums of each of them over the knots are enough.
 fn gram<const T: usize>(t: &[f64], at: f64, scale: f64, basis: &mut Vec<[f64; TERMS]>) -> [[f64; TERMS]; TERMS] {
     let mut sums = [[0.0; LANES]; PRODUCTS];
     basis.clear();
     for knots in t.chunks(LANES) {
-        let (u, one) = scaled(knots, at, scale.recip());
-        let mut before = [[0.0; LANES]; 2];
         let mut terms = [[0.0; TERMS]; LANES];
-        for k in 0..2 * T - 1 {
-            let p = next(k, &u, &one, &before);
-            add(&mut sums[k], &p, &[1.0; LANES]);
-            if k < T {
-                for lane in 0..LANES {
-                    terms[lane][k] = p[lane];
-                }
+        along::<T>(knots, at, scale.recip(), &mut sums, |k, p| {
+            for lane in 0..LANES {
+                terms[lane][k] = p[lane];
             }
-            before = [before[1], p];
-        }
+        });
         basis.extend_from_slice(&terms[..knots.len()]);
     }
     products::<T>(&sums)
@@ -185,20 +199,13 @@ fn fitted<const T: usize>(t: &[f64], at: f64, scale: f64, values: &[[f64; 3]]) -
     let mut right = [[[0.0; LANES]; 3]; T];
     let per_scale = scale.recip();
     for (knots, values) in t.chunks(LANES).zip(values.chunks(LANES)) {
-        let (u, one) = scaled(knots, at, per_scale);
         let value = |axis: usize| from_fn(|lane| values.get(lane).map_or(0.0, |v| v[axis]));
         let values: [Lanes; 3] = from_fn(value);
-        let mut before = [[0.0; LANES]; 2];
-        for k in 0..2 * T - 1 {
-            let p = next(k, &u, &one, &before);
-            add(&mut sums[k], &p, &[1.0; LANES]);
-            if k < T {
-                for (sum, value) in right[k].iter_mut().zip(&values) {
-                    add(sum, &p, value);
-                }
+        along::<T>(knots, at, per_scale, &mut sums, |k, p| {
+            for (sum, value) in right[k].iter_mut().zip(&values) {
+                add(sum, p, value);
             }
-            before = [before[1], p];
-        }
+        });
     }
     let mut factor = products::<T>(&sums);
     if !factorise::<T>(&mut factor, DETERMINED * t.len() as f64) {

@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn fast_shaking_counts_and_motion_does_not() {
         let n = 600;
-        let t: Vec<f64> = (0..n).map(|i| i as f64 * 0.01).collect();
+        let t: Vec<f64> = (0..n).map(|i| f64::from(i) * 0.01).collect();
         // Motion at 1.5 Hz all the time; shaking at 28 Hz on two axes in the second half.
         let acc: Vec<f64> = t
             .iter()
@@ -93,16 +93,8 @@ mod tests {
             })
             .collect();
         let window = Window {
-            t: &t,
             readings: [Some(&acc), None, None],
-            temperature: None,
-            attitude: None,
-            position: None,
-            reference_exact: None,
-            covariates: vec![],
-            offset: 0,
-            begin: 0,
-            end: n,
+            ..Window::over(&t)
         };
         let power = power(&window, 0.01);
         assert!(power[100] < 2e-3, "{}", power[100]);

@@ -28,6 +28,22 @@ pub struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
+    /// All rows at some times, of which nothing else is known.
+    pub const fn over(t: &'a [f64]) -> Self {
+        Self {
+            t,
+            readings: [None; 3],
+            temperature: None,
+            attitude: None,
+            position: None,
+            reference_exact: None,
+            covariates: Vec::new(),
+            offset: 0,
+            begin: 0,
+            end: t.len(),
+        }
+    }
+
     /// Number of rows, margins included.
     pub fn len(&self) -> usize {
         self.t.len()

@@ -18,16 +18,8 @@ fn stack(effects: &[(&str, &[f64])]) -> Vec<(Arc<dyn Effect>, Vec<f64>)> {
 
 fn window<'a>(t: &'a [f64], acc: &'a [f64], gyr: Option<&'a [f64]>) -> Window<'a> {
     Window {
-        t,
         readings: [Some(acc), gyr, None],
-        temperature: None,
-        attitude: None,
-        position: None,
-        reference_exact: None,
-        covariates: vec![],
-        offset: 0,
-        begin: 0,
-        end: t.len(),
+        ..Window::over(t)
     }
 }
 

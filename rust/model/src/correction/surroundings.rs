@@ -69,16 +69,8 @@ pub fn interleaved(x: &Triple) -> Vec<f64> {
 /// A window whose position is a sensor's readings, so that the reference's polynomials can be laid through them.
 fn as_position<'a>(t: &'a [f64], readings: &'a [f64]) -> Window<'a> {
     Window {
-        t,
-        readings: [None; 3],
-        temperature: None,
-        attitude: None,
         position: Some(readings),
-        reference_exact: None,
-        covariates: vec![],
-        offset: 0,
-        begin: 0,
-        end: t.len(),
+        ..Window::over(t)
     }
 }
 
