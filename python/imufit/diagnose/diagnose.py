@@ -257,6 +257,8 @@ def _status(item: Mapping[str, Any]) -> str:
         return "logs disagree"
     if not item["stable"]:
         return "differs between halves"
+    if item["other_sign"]:
+        return "negative delay"
     return "not significant" if item["plausible"] else "implausible size"
 
 

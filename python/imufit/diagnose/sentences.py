@@ -37,6 +37,11 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
         text += (
             " But the two halves of the log disagree about it by more than chance, so it is no property of the sensor."
         )
+    elif candidate.status == "negative delay":
+        text += (
+            " It would have to read what is yet to come: that is not the sensor, but rows that are stamped too late,"
+            " or a reference that is late itself."
+        )
     elif candidate.status == "implausible size":
         text += " No sensor of this kind has so much of it: something else looks like it here."
     else:

@@ -58,7 +58,7 @@ fn compared(question: &Question, first: usize, m: usize, log: usize) -> Option<C
     if !jackknife::possible(&question_of_log) {
         return None;
     }
-    let mut p_value = screening::wald(&question_of_log, &question_of_log.total());
+    let mut p_value = screening::wald(&question_of_log, &question_of_log.total(), 1.0);
     if p_value <= CLEARLY_CHANCE {
         let base = held_out::held_out(question);
         let (gain, _) = held_out::gain(&base, &held_out::held_out(&question_of_log));

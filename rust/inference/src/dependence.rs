@@ -170,6 +170,7 @@ fn question(problem: &Problem, model: &[usize], fitted: &[NormalEquations], aske
         model: p,
         sums,
         logs: problem.logs.clone(),
+        squares: problem.squares.clone(),
         rests: problem.rests(),
     })
 }

@@ -383,11 +383,17 @@ impl ChannelSums {
         self.strengths.iter().map(of).collect()
     }
 
-    /// How well the columns, and `extra` (blocks x columns) among them, explain the block means, at the strength of the walk that suits
-    /// them best; `None` where there are too few blocks for a walk.
+    /// How well the columns, and `extra` (blocks x columns) among them, explain the block means, at the strength of the walk and of what
+    /// the means scatter besides that suit them best; `None` where there are too few blocks for a walk.
     pub fn profile(&self, extra: Option<&DMatrix<f64>>) -> Option<Profiled> {
         let (residual, basis) = self.means(extra);
-        let of = |s: &Strength| Some(s.log_determinant + Self::left(s, &residual, &basis)?.0);
+        // Noise that is coloured more slowly than the filters see makes block means scatter more than their samples say.
+        let means = self.count.iter().filter(|n| **n > 0.0).count().max(1) as f64;
+        let of = |s: &Strength| {
+            let (square, _) = Self::left(s, &residual, &basis)?;
+            let excess = (square / means).max(1.0);
+            Some(s.log_determinant + means * excess.ln() + square / excess)
+        };
         let deviance = self.strengths.iter().filter_map(of).min_by(f64::total_cmp)?;
         let (white, _) = Self::left(self.strengths.first()?, &residual, &basis)?;
         let left = &residual - &basis * basis.tr_mul(&residual);

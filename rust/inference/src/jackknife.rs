@@ -13,6 +13,10 @@ pub struct Jackknife {
     pub estimate: DVector<f64>,
     /// Covariance of the candidate's parameters.
     pub covariance: DMatrix<f64>,
+    /// Hotelling's square of the candidate's parameters.
+    pub square: f64,
+    /// Number of blocks.
+    pub blocks: usize,
     /// Hotelling's p-value of "all zero", with (m, blocks - m) degrees of freedom.
     pub p_value: f64,
 }
@@ -82,30 +86,83 @@ pub fn jackknife(question: &Question, group: usize) -> Option<Jackknife> {
         covariance.ger((b - 1.0) / b, &d, &d, 1.0);
     }
     let beta = estimate.rows(question.model, m).into_owned();
-    let p_value = hotelling(&beta, &covariance, count);
+    let square = square(&beta, &covariance);
     Some(Jackknife {
+        p_value: square.map_or(1.0, |square| hotelling(square, m, b)),
+        square: square.unwrap_or(0.0),
+        blocks: count,
         estimate,
         covariance,
-        p_value,
     })
 }
 
-/// p-value of a mean of zero from an estimate and its covariance over `blocks` blocks.
-pub fn hotelling(beta: &DVector<f64>, covariance: &DMatrix<f64>, blocks: usize) -> f64 {
+/// Hotelling's square of an estimate with its covariance over blocks; `None` if they tell nothing.
+fn square(beta: &DVector<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
     let m = beta.len();
     let scale = DVector::from_fn(m, |j, _| covariance[(j, j)].max(f64::MIN_POSITIVE).sqrt());
     let mut correlation = DMatrix::from_fn(m, m, |i, j| covariance[(i, j)] / (scale[i] * scale[j]));
     for j in 0..m {
         correlation[(j, j)] += 1e-9;
     }
-    let Some(factor) = Cholesky::new(correlation) else {
-        return 1.0;
-    };
+    let factor = Cholesky::new(correlation)?;
     let z = beta.component_div(&scale);
-    let square = z.dot(&factor.solve(&z));
-    let (mf, b) = (m as f64, blocks as f64);
-    let f = square * (b - mf) / (mf * (b - 1.0));
-    FisherSnedecor::new(mf, b - mf).map_or(1.0, |d| if f.is_finite() { d.sf(f.max(0.0)) } else { 1.0 })
+    Some(z.dot(&factor.solve(&z)))
+}
+
+/// p-value of Hotelling's square of `m` parameters over as many blocks as say something of them.
+pub fn hotelling(square: f64, m: usize, blocks: f64) -> f64 {
+    let mf = m as f64;
+    if blocks <= mf {
+        return 1.0;
+    }
+    let f = square * (blocks - mf) / (mf * (blocks - 1.0));
+    FisherSnedecor::new(mf, blocks - mf).map_or(1.0, |d| if f.is_finite() { d.sf(f.max(0.0)) } else { 1.0 })
+}
+
+/// Which blocks tell of a candidate's parameters.
+pub struct Telling {
+    /// How many blocks, all of them saying as much, would tell as well how the parameters scatter.
+    pub blocks: f64,
+    /// Mean square of the residual where the parameters are told, at least that of the noise.
+    pub square: f64,
+}
+
+/// Which blocks tell of a candidate: a few turns of a log may say all there is of a parameter, and how these few differ is then all that
+/// the blocks know of its scatter. Matches the total variance of the covariance with that of a Wishart matrix (Pustejovsky and Tipton
+/// 2018, Small-sample methods for cluster-robust variance estimation, sec. 3.2).
+pub fn telling(question: &Question, group: usize) -> Option<Telling> {
+    let p = question.model;
+    let m = question.precision.len() - p;
+    let total = question.total();
+    // The candidate's columns less what the model explains of them.
+    let mut map = DMatrix::zeros(p + m, m);
+    map.view_mut((p, 0), (m, m)).fill_with_identity();
+    if p > 0 {
+        let mut inner = total.gram.view((0, 0), (p, p)).into_owned();
+        for j in 0..p {
+            inner[(j, j)] += question.precision[j] + 1e-10 * inner[(j, j)];
+        }
+        let explained = Cholesky::new(inner)?.solve(&total.gram.view((0, p), (p, m)));
+        map.view_mut((0, 0), (p, m)).copy_from(&-explained);
+    }
+    let told = |gram: &DMatrix<f64>| map.tr_mul(&(gram * &map));
+    let root = Cholesky::new(told(&total.gram))?.l();
+    let (mut variance, mut square) = (0.0, 0.0);
+    for blocks in question.groups(group) {
+        let mut gram = DMatrix::zeros(p + m, p + m);
+        for b in &question.white[blocks.clone()] {
+            gram += &b.gram;
+        }
+        let half = root.solve_lower_triangular(&told(&gram))?;
+        let share = root.solve_lower_triangular(&half.transpose())?;
+        variance += share.trace().powi(2) + share.norm_squared();
+        let largest = question.squares[blocks].iter().copied().fold(1.0, f64::max);
+        square += share.trace() / m as f64 * largest;
+    }
+    Some(Telling {
+        blocks: (m * (m + 1)) as f64 / variance,
+        square,
+    })
 }
 
 #[cfg(test)]
@@ -115,7 +172,8 @@ mod tests {
     #[test]
     fn one_parameter_gives_the_two_sided_t_test() {
         // t = 2.5 with 20 degrees of freedom: p = 0.02123
-        let p = hotelling(&DVector::from_vec(vec![2.5]), &DMatrix::from_element(1, 1, 1.0), 21);
+        let square = square(&DVector::from_vec(vec![2.5]), &DMatrix::from_element(1, 1, 1.0));
+        let p = hotelling(square.unwrap(), 1, 21.0);
         assert!((p - 0.021_23).abs() < 1e-4, "{p}");
     }
 }

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::drift::{self, ChannelSums};
 use crate::part::{self, Part};
-use crate::saturated::assemble;
+use crate::saturated::{assemble, largest_square};
 
 /// Evidence in the form that every question is asked of: the blocks of all logs, one log after the other.
 pub struct Problem {
@@ -36,6 +36,8 @@ pub struct Problem {
     pub known: Vec<Option<f64>>,
     /// Block sums of every channel of every log, for zeros that wander.
     pub sums: Vec<ChannelSums>,
+    /// Mean square of the whitened residual in each block, in the channel where it is largest.
+    pub squares: Arc<[f64]>,
 }
 
 /// Parameters that a question is about: those of the model, then the reduced ones of a candidate.
@@ -52,6 +54,8 @@ pub struct Question {
     pub sums: Vec<ChannelSums>,
     /// Blocks of each log: those of different logs are no neighbours.
     pub logs: Arc<[Range<usize>]>,
+    /// Mean square of the whitened residual in each block, in the channel where it is largest.
+    pub squares: Arc<[f64]>,
     /// True where rests stand in for a reference: some blocks then tell far more of a parameter than others, and how estimates
     /// scatter if one of them is left out says too little.
     pub rests: bool,
@@ -69,12 +73,14 @@ impl Problem {
         let p = slots.last().map_or(0, |s| s.first + s.parameters.len());
         let mut logs: Vec<Range<usize>> = Vec::with_capacity(parts.len());
         let (mut white_blocks, mut raw_blocks, mut sums) = (Vec::new(), Vec::new(), Vec::new());
+        let mut squares = Vec::new();
         for (log, (part, places)) in parts.iter().zip(&places).enumerate() {
             let (weights, raw_weights) = (part.weights(), part.raw_weights());
             let blocks = part.white.layout.blocks;
             logs.push(white_blocks.len()..white_blocks.len() + blocks);
             white_blocks.extend((0..blocks).map(|b| assemble(&part.white, b, &weights).placed(places, p)));
             raw_blocks.extend((0..blocks).map(|b| assemble(&part.raw, b, &raw_weights).placed(places, p)));
+            squares.extend((0..blocks).map(|b| largest_square(&part.white, b, &weights)));
             sums.extend(drift::channel_sums(log, &part.white, &part.floors, &weights, places, p));
         }
         let mut plausible = DVector::zeros(p);
@@ -107,6 +113,7 @@ impl Problem {
             typical,
             known,
             sums,
+            squares: squares.into(),
         }
     }
 
@@ -136,6 +143,7 @@ impl Problem {
             typical: self.typical.clone(),
             known: self.known.clone(),
             sums: self.sums.iter().map(|s| s.given(&places, &without)).collect(),
+            squares: self.squares.clone(),
         }
     }
 
@@ -244,6 +252,7 @@ impl Problem {
             model: p,
             sums,
             logs: self.logs.clone(),
+            squares: self.squares.clone(),
             rests: self.rests(),
         }
     }
@@ -266,6 +275,7 @@ impl Question {
             model: self.model,
             sums: self.sums.iter().map(|s| s.with_sums(s.columns(&kept))).collect(),
             logs: self.logs.clone(),
+            squares: self.squares.clone(),
             rests: self.rests,
         }
     }
@@ -297,6 +307,7 @@ impl Question {
             model: p,
             sums: sums.collect(),
             logs: self.logs.clone(),
+            squares: self.squares.clone(),
             rests: self.rests,
         }
     }

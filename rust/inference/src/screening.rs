@@ -1,6 +1,7 @@
 //! Every candidate asked the same question: how much would it lower the held-out error, and can that be chance?
 
 use imufit_fit::normal_equations::NormalEquations;
+use imufit_model::effect::Sign;
 use imufit_model::sensor_model::Slot;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -9,6 +10,17 @@ use crate::agreement::{self, Differing};
 use crate::held_out::{self, HeldOut};
 use crate::jackknife::{self, Jackknife};
 use crate::problem::{Problem, Question};
+
+/// Whether sensors can have what a candidate's parameters say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Plausible {
+    /// They can.
+    Yes,
+    /// With the other sign: it can be a rival, but does not pass.
+    OtherSign,
+    /// A parameter lies far beyond what such sensors have.
+    No,
+}
 
 /// Answer for one candidate.
 #[derive(Clone, Debug)]
@@ -33,8 +45,8 @@ pub struct Screened {
     pub testable: bool,
     /// False if the two halves of the log disagree about it.
     pub stable: bool,
-    /// False if a parameter lies far beyond what such sensors can have.
-    pub plausible: bool,
+    /// Whether sensors can have such parameters.
+    pub plausible: Plausible,
     /// What logs disagree about; `None` where they agree.
     pub differing: Option<Differing>,
 }
@@ -57,23 +69,43 @@ pub fn parameters_of<'a>(slots: impl IntoIterator<Item = &'a Slot>) -> Vec<usize
 /// Above this p-value nothing more needs to be asked.
 const CLEARLY_CHANCE: f64 = 0.01;
 
+/// Where a few blocks say all there is of a parameter, the rows that say most may have noise of this many times the variance of the
+/// others in their block.
+const NOISIER: f64 = 3.0;
+
 /// The p-value of a question: the largest of two block lengths, in case correlation reaches beyond the shorter, and of
 /// a test that lets zeros wander; where rests stand in for a reference, of a test by the noise within them as well.
 pub fn p_value(question: &Question) -> f64 {
-    p_value_beside(question, jackknife::jackknife(question, 1).map_or(0.0, |j| j.p_value))
+    p_value_beside(question, jackknife::jackknife(question, 1).as_ref())
 }
 
-/// The same where the p-value of the shorter blocks is known already.
-fn p_value_beside(question: &Question, shorter: f64) -> f64 {
-    let p = jackknife::jackknife(question, 2).map_or(shorter, |j| j.p_value.max(shorter));
+/// The same where the shorter blocks have been asked already.
+fn p_value_beside(question: &Question, shorter: Option<&Jackknife>) -> f64 {
+    let longer = jackknife::jackknife(question, 2);
+    let lengths = [(1, shorter), (2, longer.as_ref())];
+    let asked = || lengths.iter().filter_map(|(group, j)| j.map(|j| (*group, j)));
+    let p = asked().map(|(_, j)| j.p_value).fold(0.0, f64::max);
     if p > CLEARLY_CHANCE {
-        p
-    } else if question.rests {
-        p.max(wald(question, &question.total()))
-            .max(p_value_with_drift(question))
-    } else {
-        p.max(p_value_with_drift(question))
+        return p;
     }
+    let beside = if question.rests {
+        wald(question, &question.total(), 1.0)
+    } else {
+        asked()
+            .map(|(group, j)| p_value_of_few(question, group, j))
+            .fold(0.0, f64::max)
+    };
+    p.max(beside).max(p_value_with_drift(question))
+}
+
+/// p-value by no more blocks than tell of the candidate; or by the noise of the rows in these blocks, if that says more.
+fn p_value_of_few(question: &Question, group: usize, found: &Jackknife) -> f64 {
+    let Some(telling) = jackknife::telling(question, group) else {
+        return 1.0;
+    };
+    let m = question.precision.len() - question.model;
+    let by_blocks = jackknife::hotelling(found.square, m, telling.blocks.min(found.blocks as f64));
+    by_blocks.min(wald(question, &question.total(), NOISIER * telling.square))
 }
 
 /// Wald test of the candidate's parameters with wandering zeros, the mean over how strongly they may wander; 0 where no zero
@@ -82,12 +114,12 @@ pub fn p_value_with_drift(question: &Question) -> f64 {
     question
         .totals_without_drift()
         .iter()
-        .map(|(weight, total)| weight * wald(question, total))
+        .map(|(weight, total)| weight * wald(question, total, 1.0))
         .sum()
 }
 
-/// p-value of the candidate's parameters from equations of unit variance.
-pub(crate) fn wald(question: &Question, total: &NormalEquations) -> f64 {
+/// p-value of the candidate's parameters from equations of observations with this variance.
+pub(crate) fn wald(question: &Question, total: &NormalEquations, variance: f64) -> f64 {
     let Some(solved) = total.solve(&question.precision) else {
         return 1.0;
     };
@@ -100,7 +132,7 @@ pub(crate) fn wald(question: &Question, total: &NormalEquations) -> f64 {
     let Some(factor) = Cholesky::new(covariance) else {
         return 1.0;
     };
-    let square = beta.dot(&factor.solve(&beta));
+    let square = beta.dot(&factor.solve(&beta)) / variance;
     ChiSquared::new(m as f64).map_or(1.0, |d| if square.is_finite() { d.sf(square.max(0.0)) } else { 1.0 })
 }
 
@@ -177,7 +209,7 @@ pub fn weigh(problem: &Problem, model: &[usize], base: &HeldOut, slot: usize, ca
         parameters: vec![(0.0, f64::NAN); candidate.len()],
         testable: jackknife::possible(&question),
         stable: true,
-        plausible: true,
+        plausible: Plausible::Yes,
         differing: None,
         directions,
     };
@@ -222,7 +254,7 @@ fn weigh_known(
         parameters: values.iter().map(|v| (*v, 0.0)).collect(),
         testable: seen > 1.0,
         stable: true,
-        plausible: true,
+        plausible: Plausible::Yes,
         differing: None,
         directions: DMatrix::from_iterator(values.len(), 1, values.iter().copied()),
     };
@@ -285,7 +317,7 @@ impl Weighed {
             out.testable = false;
             return out;
         };
-        out.p_value = p_value_beside(&question, fine.p_value);
+        out.p_value = p_value_beside(&question, Some(&fine));
         let m = out.directions.ncols();
         if out.p_value < CLEARLY_CHANCE {
             out.stable = halves_agree(&question, &fine);
@@ -298,7 +330,7 @@ impl Weighed {
             .map(|j| (values[j], covariance[(j, j)].max(0.0).sqrt()))
             .collect();
         let (card, first) = (problem.slots[out.slot].effect.card(), problem.slots[out.slot].first);
-        out.plausible = candidate.iter().zip(&out.parameters).all(|(j, (value, error))| {
+        let small = candidate.iter().zip(&out.parameters).all(|(j, (value, error))| {
             let gain = card
                 .parameters
                 .get((*j - first) % card.parameters.len())
@@ -306,9 +338,14 @@ impl Weighed {
             let limit = (BEYOND * problem.plausible[*j]).min(if gain { LARGEST_GAIN } else { f64::INFINITY });
             !problem.typical[*j] || value.abs() - 3.0 * error <= limit
         });
-        let early = problem.slots[out.slot].effect.one_sided()
-            && out.parameters.iter().any(|(value, error)| *value < -3.0 * error);
-        out.plausible &= !early;
+        let negative = out.parameters.iter().any(|(value, error)| *value < -3.0 * error);
+        let sign = problem.slots[out.slot].effect.sign();
+        out.plausible = match sign {
+            _ if !small => Plausible::No,
+            Sign::Positive if negative => Plausible::No,
+            Sign::RatherPositive if negative => Plausible::OtherSign,
+            _ => Plausible::Yes,
+        };
         out.expected_ratio = ratio(&question, &fine.estimate);
         out
     }

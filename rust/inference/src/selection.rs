@@ -4,7 +4,7 @@ use imufit_model::sensor_model::Slot;
 use rayon::prelude::*;
 
 use crate::problem::Problem;
-use crate::screening::{self, Screened, Weighed, parameters_of};
+use crate::screening::{self, Plausible, Screened, Weighed, parameters_of};
 
 /// Chance of any false alarm over all candidates tried.
 pub const ALPHA: f64 = 0.003;
@@ -80,7 +80,13 @@ pub fn promising(s: &Screened) -> bool {
     s.testable && s.gain > 0.0 && s.held_out.1 < s.held_out.0
 }
 
-/// True if a candidate is significant, of a size that sensors have, and both halves of the log and all logs agree about it.
+/// True if a candidate is significant, of a size that sensors have, and both halves of the log and all logs agree about it, but its
+/// sign may be that of something else.
+pub fn explains(s: &Screened, adjusted: f64) -> bool {
+    significant(s, adjusted) && s.stable && s.plausible != Plausible::No && s.agreed()
+}
+
+/// True if a candidate explains something, and has the sign that it should have.
 pub fn passes(s: &Screened, adjusted: f64) -> bool {
-    significant(s, adjusted) && s.stable && s.plausible && s.agreed()
+    explains(s, adjusted) && s.plausible == Plausible::Yes
 }

@@ -3,6 +3,7 @@
 //! A walk strong enough for one large step, or for one swing, would have many of all kinds. So the likelihood of the block means
 //! with the step or the swing, at the strength of the walk that suits it best, is compared with the likelihood without.
 
+use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
@@ -16,6 +17,8 @@ use crate::problem::Problem;
 pub const CAUTION: f64 = 0.01;
 /// Boundaries between blocks that are looked at: those with the largest differences.
 const LOOKED_AT: usize = 4;
+/// Ways in which a step may lie: at a boundary, or within the block before or after it.
+const LYING: usize = 3;
 /// Whole swings in a log, from these on; fewer are a drift.
 const FEWEST_SWINGS: f64 = 1.5;
 /// Frequencies are tried in steps of this many swings in a log.
@@ -32,12 +35,16 @@ pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
     for all in problem.sums.iter().filter(|s| told(s)) {
         let sums = all.with_sums(all.columns(model));
         let blocks = sums.sums.nrows();
-        tried += 2 * blocks.saturating_sub(1);
-        let Some(without) = sums.profile(None) else { continue };
+        tried += (1 + LYING) * blocks.saturating_sub(1);
+        // Whatever level the mean has is no step.
+        let level = DMatrix::from_element(blocks, 1, 1.0);
+        let Some(without) = sums.profile(Some(&level)) else {
+            continue;
+        };
         let facts = &problem.parts[sums.log].white.layout.facts;
         let duration = facts.t_end - facts.t_start;
-        let step = step(&sums, &without).map(|(k, with)| {
-            let t = facts.t_start + duration * k as f64 / blocks as f64;
+        let step = step(&sums, &without).map(|(at, with)| {
+            let t = facts.t_start + duration * at / blocks as f64;
             (with, format!("a step at {t:.1} s"))
         });
         let swing =
@@ -68,19 +75,37 @@ fn p_value(without: &Profiled, with: &Profiled, blocks: usize) -> f64 {
     FisherSnedecor::new(columns as f64, freedom).map_or(1.0, |d| if f.is_finite() { d.sf(f) } else { 1.0 })
 }
 
-/// The block before which the mean jumps most.
-fn step(sums: &ChannelSums, without: &Profiled) -> Option<(usize, Profiled)> {
+/// Where the mean jumps most, in blocks from the start.
+fn step(sums: &ChannelSums, without: &Profiled) -> Option<(f64, Profiled)> {
     let residual = &without.residual;
     let blocks = residual.len();
     let mut places: Vec<usize> = (1..blocks).collect();
     let jump = |k: usize| (residual[k] - residual[k - 1]).abs();
     places.sort_by(|a, b| jump(*b).total_cmp(&jump(*a)));
+    // A step within a block makes two jumps, one at either end of it, which tell how much of the block it fills.
+    let within = |k: usize| {
+        let (before, after) = (residual[k] - residual[k - 1], residual[k + 1] - residual[k]);
+        (before * after > 0.0).then(|| (k, before / (before + after)))
+    };
+    let inner = |k: &usize| (1..blocks - 1).contains(k);
     places
         .into_iter()
         .take(LOOKED_AT)
-        .filter_map(|k| {
-            let step = DMatrix::from_fn(blocks, 1, |b, _| if b < k { 0.0 } else { 1.0 });
-            Some((k, sums.profile(Some(&step))?))
+        .flat_map(|k| {
+            [k - 1, k]
+                .into_iter()
+                .filter(inner)
+                .filter_map(within)
+                .chain([(k, 1.0)])
+        })
+        .filter_map(|(k, filled)| {
+            let step = DMatrix::from_fn(blocks, 2, |b, level| match b.cmp(&k) {
+                _ if level == 1 => 1.0,
+                Ordering::Less => 0.0,
+                Ordering::Equal => filled,
+                Ordering::Greater => 1.0,
+            });
+            Some((k as f64 + 1.0 - filled, sums.profile(Some(&step))?))
         })
         .min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))
 }
@@ -90,16 +115,16 @@ fn step(sums: &ChannelSums, without: &Profiled) -> Option<(usize, Profiled)> {
 fn swing(sums: &ChannelSums, without: &Profiled) -> Option<(f64, Profiled)> {
     let blocks = without.residual.len();
     let wave = |swings: f64| {
-        DMatrix::from_fn(blocks, 2, |b, k| {
+        DMatrix::from_fn(blocks, 3, |b, k| {
             let phase = TAU * swings * (b as f64 + 0.5) / blocks as f64;
-            if k == 0 { phase.cos() } else { phase.sin() }
+            [phase.cos(), phase.sin(), 1.0][k]
         })
     };
     let most = blocks as f64 / BLOCKS_PER_SWING;
     let frequencies = ((most - FEWEST_SWINGS) / FINENESS).max(0.0) as u32;
     let mut powers: Vec<(f64, f64)> = (0..=frequencies)
         .map(|k| FEWEST_SWINGS + FINENESS * f64::from(k))
-        .map(|f| (f, wave(f).tr_mul(&without.residual).norm()))
+        .map(|f| (f, wave(f).tr_mul(&without.residual).rows(0, 2).norm()))
         .collect();
     let mut asked: Vec<f64> = Vec::new();
     for steepness in [0.0, 1.0] {

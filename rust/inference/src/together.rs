@@ -7,7 +7,7 @@
 use imufit_model::sensor_model::Slot;
 
 use crate::problem::Problem;
-use crate::screening::{self, Screened};
+use crate::screening::{self, Plausible, Screened};
 use crate::selection::{indices, judge, passes, promising, significant, weigh_all};
 
 /// More effects than this are no explanation.
@@ -83,7 +83,7 @@ impl Search<'_> {
             .into_iter()
             .filter(|w| promising(w.so_far()))
             .map(|w| judge(self.problem, self.slots, &fitted, w))
-            .find(|s| s.plausible && significant(s, s.p_value * tried))
+            .find(|s| s.plausible == Plausible::Yes && significant(s, s.p_value * tried))
             .map(|s| s.slot)
     }
 

@@ -10,8 +10,8 @@ use crate::confounding;
 use crate::dependence::{self, Dependence};
 use crate::held_out;
 use crate::problem::Problem;
-use crate::screening::{self, Screened};
-use crate::selection::{ALPHA, best_of, indices, passes, screen_all, significant};
+use crate::screening::{self, Plausible, Screened};
+use crate::selection::{ALPHA, best_of, explains, indices, passes, screen_all, significant};
 use crate::{steps, together};
 
 /// A named effect must explain this share of what depends on anything in its sensors, or the answer is "unknown".
@@ -126,7 +126,9 @@ pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize], probes: 
     let (mut screened, mut adjusted) = screen_all(problem, slots, model, candidates);
     let single = settle(problem, model, candidates, probes, &screened, &adjusted, &[]);
     let best_gain = single.best.map_or(0.0, |b| gain_of(&screened, b));
-    let hidden = |(s, a): (&Screened, &f64)| significant(s, *a) && s.plausible && !s.stable && s.gain > best_gain;
+    let hidden = |(s, a): (&Screened, &f64)| {
+        significant(s, *a) && s.plausible == Plausible::Yes && !s.stable && s.gain > best_gain
+    };
     let doubtful = single.kind == Kind::Unknown || screened.iter().zip(&adjusted).any(hidden);
     let mut settled = single;
     if doubtful {
@@ -247,7 +249,7 @@ fn settle(
 
     let beside: Vec<usize> = model.iter().chain(&others).copied().collect();
     let (rivals, correlations) = best.map_or_else(Default::default, |best| {
-        rivals_of(problem, slots, &beside, candidates, screened, &passing, best)
+        rivals_of(problem, slots, &beside, candidates, screened, adjusted, best)
     });
 
     let (disagreements, spoilt) = disagreements(problem, model, &stack, candidates, first);
@@ -308,22 +310,25 @@ fn rivals_of(
     beside: &[usize],
     candidates: &[usize],
     screened: &[Screened],
-    passing: &[&Screened],
+    adjusted: &[f64],
     best: usize,
 ) -> (Vec<usize>, Vec<(usize, usize, f64)>) {
     let fitted = indices(slots, beside);
     let own = indices(slots, &[best]);
     let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
-    let alone = passing.first().is_some_and(|s| s.slot == best);
+    let explaining = |(s, a): (&Screened, f64)| explains(s, a);
+    let first_passing = screened.iter().zip(adjusted).find(|(s, a)| passes(s, **a));
+    let alone = first_passing.is_some_and(|(s, _)| s.slot == best);
     let others: Vec<Screened>;
     let compared: Vec<&Screened> = if alone {
-        passing.to_vec()
+        let all = screened.iter().zip(adjusted.iter().copied());
+        all.filter(|(s, a)| explaining((s, *a))).map(|(s, _)| s).collect()
     } else {
         // Beside other effects a candidate is worth something else than alone.
         let left: Vec<usize> = candidates.iter().copied().filter(|c| !beside.contains(c)).collect();
         let (all, adjusted) = screen_all(problem, slots, beside, &left);
-        let passing = all.into_iter().zip(adjusted).filter(|(s, a)| passes(s, *a));
-        others = passing.map(|(s, _)| s).collect();
+        let all = all.into_iter().zip(adjusted).filter(|(s, a)| explaining((s, *a)));
+        others = all.map(|(s, _)| s).collect();
         others.iter().collect()
     };
     let Some(first) = compared.iter().find(|s| s.slot == best) else {

@@ -132,6 +132,17 @@ pub enum EffectError {
     },
 }
 
+/// What signs the parameters of an effect can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// Any.
+    Any,
+    /// A negative value is no property of the sensor, but what stands behind it (rows stamped late) is possible: never named first.
+    RatherPositive,
+    /// Not negative: no sensor is settled before its input changes.
+    Positive,
+}
+
 /// One physical cause of readings that differ from the ideal ones.
 pub trait Effect: Send + Sync {
     /// Its description.
@@ -174,9 +185,9 @@ pub trait Effect: Send + Sync {
         false
     }
 
-    /// True if its parameters cannot be negative: no sensor shows what will be.
-    fn one_sided(&self) -> bool {
-        false
+    /// What signs its parameters can have.
+    fn sign(&self) -> Sign {
+        Sign::Any
     }
 
     /// True if it stands for no physical cause and has so many columns that the noise is not found beside it.

@@ -2,7 +2,7 @@
 
 use imufit_inference::part::Part;
 use imufit_inference::problem::Problem;
-use imufit_inference::screening::parameters_of;
+use imufit_inference::screening::{Plausible, parameters_of};
 use imufit_inference::{estimate, residual, revision, saturated, screening, selection, verdict};
 use imufit_model::rest_channels;
 use imufit_model::sensor::CHANNELS;
@@ -157,7 +157,8 @@ impl PyProblem {
             item.set_item("expected_ratio", s.expected_ratio)?;
             item.set_item("testable", s.testable)?;
             item.set_item("stable", s.stable)?;
-            item.set_item("plausible", s.plausible)?;
+            item.set_item("plausible", s.plausible != Plausible::No)?;
+            item.set_item("other_sign", s.plausible == Plausible::OtherSign)?;
             item.set_item("agreed", s.agreed())?;
             item.set_item("passed", selection::passes(s, *p))?;
             item.set_item("parameters", s.parameters.clone())?;

@@ -2,7 +2,7 @@
 
 use super::Words;
 use crate::card::{Card, Stage, parameters};
-use crate::effect::{Columns, Effect, EffectError, Rows};
+use crate::effect::{Columns, Effect, EffectError, Rows, Sign};
 use crate::facts::LogFacts;
 use crate::ideal::{ReferenceChange, SensorTime};
 use crate::sensor::Sensor;
@@ -117,8 +117,11 @@ impl Effect for Timing {
         true
     }
 
-    fn one_sided(&self) -> bool {
-        true
+    fn sign(&self) -> Sign {
+        match self.kind {
+            Kind::Delay => Sign::RatherPositive,
+            Kind::Lag => Sign::Positive,
+        }
     }
 
     fn reference_change(&self, parameters: &[f64]) -> ReferenceChange {
