@@ -179,6 +179,26 @@ def test_something_without_a_name_is_unknown(name):
     assert "motor_current" in answer.sentence
 
 
+@pytest.mark.parametrize("at", [52.5, 53.1, 54.0])
+def test_a_step_is_found_wherever_it_lies_and_is_no_zero_that_wanders(at):
+    sim = simulate.simulate("handheld", {}, 8, 120.0)
+    sim.acc[:] += np.where(sim.t[:, None] < at, -0.05, 0.06) * np.array([1.0, 0.0, -0.8])
+    answer = SensorModel().fit(sim.to_log()).diagnose()
+    assert answer.verdict == "unknown"
+    steps = {item.channel: item.shape for item in answer.unexplained if item.shape.startswith("a step at")}
+    assert set(steps) == {"acc_x", "acc_z"}
+    for shape in steps.values():  # to half a block
+        assert float(shape.split()[3]) == pytest.approx(at, abs=1.25)
+
+
+def test_noise_that_grows_with_the_rate_is_no_effect_of_the_few_fast_turns():
+    grown = Noise(gyr=SensorNoise(8.7e-4, growth_with_rate=1.0), acc=SensorNoise(0.02), mag=SensorNoise(0.3))
+    for seed in range(12):
+        log = simulate.simulate("poses", {}, seed, 90.0, noise=grown).to_log()
+        answer = SensorModel().fit(log).diagnose()
+        assert answer.verdict == "adequate", (seed, answer.best, answer.unexplained)
+
+
 @pytest.mark.parametrize("name", SHAPES)
 def test_diagnosis_and_comparison_give_a_dependence_the_same_share(name):
     fit = SensorModel(["gyr.bias"]).fit(bent_by_current(SHAPES[name]))

@@ -367,6 +367,7 @@ class _Estimate(TypedDict):
     standard_error: _Array
     full_step: _Array
     held_out: float
+    folds: _Array
     training: float
 
 class _Screened(TypedDict):

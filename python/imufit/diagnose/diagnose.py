@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
+from scipy.stats import ttest_rel
 
 from imufit import _imufit
 from imufit.diagnose import sentences, without_reference
@@ -31,6 +32,10 @@ MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
 CLEARLY_WORSE = 0.1
 """Share of the drop in held-out error by which a fit must stay behind the best one to be out."""
+SURELY_WORSE = 1e-4
+"""... or chance that it stays behind in all parts of the log by chance, if that is what the best one leaves."""
+LEFT = 3.0
+"""Times what the best fit leaves above the noise floor that a fit must be behind, for that chance to count."""
 NEAR = 0.5
 """Share of the best one's gain from which on a fit may show that another candidate explains more."""
 BESIDE = 10.0
@@ -168,13 +173,17 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     fits = {slot: _with(fit, ids[slot], [ids[other] for other in close if other != slot]) for slot in close}
     for slot in close:
         items[slot]["held_out_after"] = fits[slot][1].held_out
-    after = {slot: items[slot]["held_out_after"] for slot in close}
-    won = min(close, key=after.__getitem__)
+    won = min(close, key=lambda slot: fits[slot][1].held_out)
+    best_fit = fits[won][1]
     lost = [
         slot
-        for slot in close
+        for slot, (fitted, estimate) in fits.items()
         if slot != won
-        and (after[slot] > after[won] + CLEARLY_WORSE * (fit.ratio - after[won]) or _leaves(fits[slot][0], ids[won]))
+        and (
+            estimate.held_out - best_fit.held_out > CLEARLY_WORSE * (fit.ratio - best_fit.held_out)
+            or _surely_worse(estimate, best_fit)
+            or _leaves(fitted, ids[won])
+        )
     ]
     if best not in lost:
         won = best
@@ -189,6 +198,13 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
 def _with(fit: Fit, effect: str, others: Sequence[str]) -> tuple[Analysis, Estimate]:
     """Fit one candidate, with the columns of some others around it."""
     return fit.analysis.solved_for(fit.model.with_effect(effect), fit.own, only=others)
+
+
+def _surely_worse(estimate: Estimate, best: Estimate) -> bool:
+    """Return whether a fit is behind in all parts of the log, by much more than the best one leaves."""
+    if estimate.held_out - best.held_out < LEFT * (best.held_out - 1.0):
+        return False
+    return float(ttest_rel(estimate.folds, best.folds, alternative="greater").pvalue) < SURELY_WORSE
 
 
 def _leaves(analysis: Analysis, other: str) -> bool:

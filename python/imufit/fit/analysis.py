@@ -48,6 +48,8 @@ class Estimate:
         (p,) step of every parameter of the evidence.
     held_out, training : float
         Residual RMS over noise floor on data not used for the fit, and on all data.
+    folds : ndarray
+        (folds,) whitened sum of squares on data not used for the fit, of each part of the log that was left out.
     """
 
     values: dict[int, Array]
@@ -55,6 +57,7 @@ class Estimate:
     step: Array
     held_out: float
     training: float
+    folds: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +256,7 @@ class Analysis:
             values[slot] = self._within_reach(slot, present + result["step"][at : at + count])
             errors[slot] = result["standard_error"][at : at + count]
             at += count
-        return Estimate(values, errors, result["full_step"], result["held_out"], result["training"])
+        return Estimate(values, errors, result["full_step"], result["held_out"], result["training"], result["folds"])
 
     def _within_reach(self, slot: int, values: Array) -> Array:
         """Keep what a search started (a time constant) within half and twice its present value in one step."""

@@ -107,10 +107,10 @@ def drawn(
     except ValueError as error:
         raise ImpossibleError(str(error)) from None
     found = parameters_of(study, effect, size, rng, only)
-    distances = Separation(study, setting.columns).distances(effect, found, beside)
-    if distances[""] < TOLD:
+    separation = Separation(study, setting.columns)
+    if separation.distance(effect, found, beside) < TOLD:
         raise ImpossibleError(f"{effect} is too small to be seen in this log")
-    return Drawn(effect, found, distances)
+    return Drawn(effect, found, separation.distances(effect, found, beside))
 
 
 def effects() -> tuple[str, ...]:

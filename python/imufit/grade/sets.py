@@ -38,7 +38,7 @@ class BlindSet:
     demands: Mapping[str, float] = field(default_factory=dict)
 
 
-ATTEMPTS, STRIDE = 8, 1_000_003
+ATTEMPTS, STRIDE = 32, 1_000_003
 """Where a seed makes no log that can be asked about, that many seeds further on may."""
 
 LARGE, SMALL = (0.3, 3.0), (0.1, 0.1)

@@ -158,6 +158,16 @@ class Separation:
             return [{"N": float(order)} for order in range(4, 26)]
         return [{}]
 
+    def distance(self, effect: str, parameters: Parameters, beside: Sequence[str] = ()) -> float:
+        """Return how far (squared, in standard errors) nothing at all stays, in the effect's place.
+
+        Parameters
+        ----------
+        effect, parameters, beside :
+            As in `distances`.
+        """
+        return _left(self.signal(effect, parameters), [self.columns_of(name) for name in beside])
+
     def distances(self, effect: str, parameters: Parameters, beside: Sequence[str] = ()) -> dict[str, float]:
         """Return how far (squared, in standard errors) each rival stays; "" = nothing at all in the effect's place.
 

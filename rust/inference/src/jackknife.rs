@@ -146,8 +146,13 @@ pub fn telling(question: &Question, group: usize) -> Option<Telling> {
         map.view_mut((0, 0), (p, m)).copy_from(&-explained);
     }
     let told = |gram: &DMatrix<f64>| map.tr_mul(&(gram * &map));
-    let root = Cholesky::new(told(&total.gram))?.l();
-    let (mut variance, mut square) = (0.0, 0.0);
+    let mut all = told(&total.gram);
+    for j in 0..m {
+        // What the model explains as well is told by nothing.
+        all[(j, j)] += question.precision[p + j] + 1e-10 * total.gram[(p + j, p + j)];
+    }
+    let root = Cholesky::new(all)?.l();
+    let (mut sum, mut variance, mut square) = (DMatrix::zeros(m, m), 0.0, 0.0);
     for blocks in question.groups(group) {
         let mut gram = DMatrix::zeros(p + m, p + m);
         for b in &question.white[blocks.clone()] {
@@ -157,17 +162,58 @@ pub fn telling(question: &Question, group: usize) -> Option<Telling> {
         let share = root.solve_lower_triangular(&half.transpose())?;
         variance += share.trace().powi(2) + share.norm_squared();
         let largest = question.squares[blocks].iter().copied().fold(1.0, f64::max);
-        square += share.trace() / m as f64 * largest;
+        square += share.trace() * largest;
+        sum += share;
     }
     Some(Telling {
-        blocks: (m * (m + 1)) as f64 / variance,
-        square,
+        blocks: (sum.trace().powi(2) + sum.norm_squared()) / variance,
+        square: square / sum.trace(),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use imufit_fit::normal_equations::NormalEquations;
+
+    /// One parameter of the model and `m` of a candidate, told by blocks with these Gram matrices.
+    fn question(blocks: Vec<DMatrix<f64>>) -> Question {
+        let p = blocks[0].nrows();
+        let of = |gram: DMatrix<f64>| NormalEquations {
+            gram,
+            n: 10.0,
+            ..NormalEquations::zeros(p)
+        };
+        let squares = (1..=blocks.len()).map(|b| b as f64).collect();
+        let white: Vec<NormalEquations> = blocks.into_iter().map(of).collect();
+        Question {
+            raw: white.clone(),
+            precision: DVector::from_element(p, 1e-9),
+            model: 1,
+            sums: Vec::new(),
+            logs: [0..white.len()].into(),
+            white,
+            squares,
+            rests: false,
+        }
+    }
+
+    #[test]
+    fn blocks_that_say_the_same_all_count() {
+        let same = DMatrix::from_row_slice(3, 3, &[1.0, 0.5, 0.0, 0.5, 2.0, 0.3, 0.0, 0.3, 1.0]);
+        let told = telling(&question(vec![same; 20]), 1).unwrap();
+        assert!((told.blocks - 20.0).abs() < 1e-6, "{}", told.blocks);
+        assert!((told.square - 10.5).abs() < 1e-6, "{}", told.square);
+    }
+
+    #[test]
+    fn blocks_that_say_nothing_of_the_candidate_do_not_count() {
+        let with = |told: f64| DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, told]);
+        let blocks = (0..20).map(|b| with(if b < 4 { 1.0 } else { 0.0 })).collect();
+        let told = telling(&question(blocks), 1).unwrap();
+        assert!((told.blocks - 4.0).abs() < 1e-6, "{}", told.blocks);
+        assert!((told.square - 2.5).abs() < 1e-6, "{}", told.square);
+    }
 
     #[test]
     fn one_parameter_gives_the_two_sided_t_test() {

@@ -97,7 +97,7 @@ impl PyProblem {
     }
 
     /// Fits the slots given: step and standard error (k,) of each of their k parameters, SI units; full step (p,) of
-    /// all; held-out and training residual RMS over noise floor.
+    /// all; held-out and training residual RMS over noise floor; whitened held-out sum of squares of each fold.
     fn estimate<'py>(&self, py: Python<'py>, slots: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
         let all = &self.0.slots;
         if slots.iter().any(|s| *s >= all.len()) {
@@ -124,6 +124,7 @@ impl PyProblem {
         out.set_item("standard_error", PyArray1::from_vec(py, errors))?;
         out.set_item("full_step", PyArray1::from_slice(py, step.as_slice()))?;
         out.set_item("held_out", base.ratio)?;
+        out.set_item("folds", PyArray1::from_vec(py, base.white))?;
         out.set_item("training", (square / n.max(1.0)).sqrt())?;
         Ok(out)
     }
