@@ -15,6 +15,7 @@ from imufit import _imufit
 from imufit.diagnose import sentences, without_reference
 from imufit.diagnose.agreement import answers_without, answers_without_faulty, disagreements
 from imufit.diagnose.compare import notes
+from imufit.diagnose.measured_columns import with_measured_columns
 from imufit.fit.analysis import OWN, Analysis, Estimate, pooled
 from imufit.fit.rest_passes import RestPasses
 from imufit.log.several import name_of
@@ -60,6 +61,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     ids = analysis.slots
     slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
     result = _decided_by_fits(fit, analysis.problem.diagnose(analysis.fitted_slots, slots, analysis.probe_slots))
+    result = with_measured_columns(analysis, result)
     result = without_reference.with_better_explained(analysis, result)
     confounded: dict[str, list[Rival]] = {}
     for first, second, correlation in result["correlations"]:

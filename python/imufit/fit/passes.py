@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.faults import row_faults
+from imufit.fit.column_noise import ColumnNoise
 from imufit.fit.range_end import RangeEnd
 from imufit.log import Chunk, LogSource
 from imufit.progress import Progress
@@ -69,6 +70,8 @@ class Passes:
     def __init__(self, log: LogSource, progress: Progress) -> None:
         self.log = log
         self.covariates = covariate_names(log)
+        self.column_noise: dict[str, float] = {}
+        """Share of noise in each covariate's variance (``temp`` too), once the log has been surveyed."""
         self._progress = progress
         self.row_faults, self._left_out = row_faults(log)
 
@@ -115,7 +118,9 @@ class Passes:
             self._rig(),
         )
         reference = 0
-        known = np.zeros(len(self.covariates) + 1)
+        names = ["temp", *self.covariates]
+        known = np.zeros(len(names))
+        noise = [ColumnNoise() for _ in names]
         for arrays in self.chunks(SURVEY_MARGIN, "surveying"):
             core = slice(arrays["begin"], arrays["end"])
             if arrays["ref_q"] is not None:
@@ -123,6 +128,7 @@ class Passes:
             for k, column in enumerate([arrays["temp"], *arrays["covariates"]]):
                 if column is not None:
                     known[k] += _held_count(column[core])
+                    noise[k].add(column[core])
             survey.add(arrays)
         if reference == 0:
             raise InputError(
@@ -130,10 +136,11 @@ class Passes:
                 file=log.path,
                 remedy="Add the reference, or ref_angle with the metadata rig_axis.",
             )
+        self.column_noise = {name: each.share for name, each in zip(names, noise, strict=True)}
         facts = survey.finish()
         if not facts.sensors:
             raise InputError("no sensor of the log has a sample", file=log.path)
-        return facts, dict(zip(["temp", *self.covariates], known / log.n, strict=True))
+        return facts, dict(zip(names, known / log.n, strict=True))
 
     def ranges(self) -> tuple[dict[str, float], dict[str, float]]:
         """Where readings of accelerometer and gyroscope may be cut off, and their largest readings, m/s^2 and rad/s."""

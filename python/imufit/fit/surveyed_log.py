@@ -85,6 +85,10 @@ class SurveyedLog:
         """The log."""
         return self.passes.log
 
+    def column_noise(self, column: str | None) -> float:
+        """Return the share of noise in a column's variance; 0 for none and for one that the log does not have."""
+        return 0.0 if column is None else self.passes.column_noise.get(column, 0.0)
+
     def refusal(self, effect: _imufit.Effect) -> str | None:
         """Return why the log cannot tell of an effect; None if it can."""
         return _refusal(effect, self.passes, self.facts, self.coverage)

@@ -1,0 +1,52 @@
+"""Columns that differ by no more than the noise of their own measurement: no log tells which of them is the cause."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from imufit.fit.analysis import Analysis
+
+ALIKE = 0.99
+"""Correlation of two effects' signals from which on the noise of their columns may be all that sets them apart."""
+NOISE = 2.0
+"""Times the noise of the columns that two signals may differ by and still count as the same."""
+
+
+def with_measured_columns(analysis: Analysis, result: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Name beside the best candidate those that differ from it by no more than their columns' noise.
+
+    A current that follows the temperature explains a drift of the zero better than the temperature itself, if its
+    sensor has less noise than the thermometer: that tells of the thermometer, not of what moves the zero. So does the
+    time of a steady warm-up.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Evidence of the logs.
+    result : mapping
+        What `_imufit.Problem.diagnose` found.
+    """
+    best = result["best"]
+    if best is None or result["verdict"] not in ("missing", "ambiguous"):
+        return result
+    items = {item["slot"]: item for item in result["screened"]}
+
+    def column(slot: int) -> str | None:
+        return analysis.candidates[analysis.slots[slot]].column
+
+    def same(slot: int, correlation: float) -> bool:
+        if not items[slot]["passed"] or correlation < ALIKE or column(slot) == column(best):
+            return False
+        noise = max(sum(each.surveyed.column_noise(column(s)) for s in (best, slot)) for each in analysis.logs)
+        return bool(1.0 - correlation**2 <= NOISE * noise)
+
+    more = [
+        first if second == best else second
+        for first, second, correlation in result["correlations"]
+        if best in (first, second) and same(first if second == best else second, correlation)
+    ]
+    more = [slot for slot in more if slot not in result["rivals"]]
+    if not more:
+        return result
+    return {**result, "rivals": [*result["rivals"], *more], "verdict": "ambiguous"}
