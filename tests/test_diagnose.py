@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from engine import swaying
-from imufit import InputError, Log, SensorModel, simulate
+from imufit import InputError, Log, SensorModel, grade, simulate
 from imufit.simulate import OBSERVABLE, Noise, SensorNoise
 from scipy.spatial.transform import Rotation
 from test_fit import FIRST_EFFECTS
@@ -191,12 +191,27 @@ def test_a_step_is_found_wherever_it_lies_and_is_no_zero_that_wanders(at):
         assert float(shape.split()[3]) == pytest.approx(at, abs=1.25)
 
 
-def test_noise_that_grows_with_the_rate_is_no_effect_of_the_few_fast_turns():
-    grown = Noise(gyr=SensorNoise(8.7e-4, growth_with_rate=1.0), acc=SensorNoise(0.02), mag=SensorNoise(0.3))
-    for seed in range(12):
-        log = simulate.simulate("poses", {}, seed, 90.0, noise=grown).to_log()
-        answer = SensorModel().fit(log).diagnose()
-        assert answer.verdict == "adequate", (seed, answer.best, answer.unexplained)
+@pytest.mark.parametrize(("sensor", "size"), [("acc", 0.06), ("gyr", 2.6e-3), ("mag", 1.0)])
+@pytest.mark.parametrize("spans", [[(50.3, 53.3)], [(50.3, 70.3)], [(30.2, 36.1), (80.1, 91.0)]])
+def test_another_level_for_a_while_is_unknown_and_is_dated(sensor, size, spans):
+    sim = simulate.simulate("arm", {}, 3, 120.0)
+    inside = np.any([(begin < sim.t) & (sim.t < end) for begin, end in spans], axis=0)
+    getattr(sim, sensor)[:, 2] += size * inside
+    answer = SensorModel().fit(sim.to_log()).diagnose()
+    assert answer.verdict == "unknown"
+    found = answer.unexplained[0]
+    assert (found.channel, found.covariate) == (f"{sensor}_z", "t")
+    times = [float(word) for word in found.shape.split() if word[0].isdigit()]
+    # To a block.
+    assert times == pytest.approx([at for span in spans for at in span], abs=2.5)
+
+
+@pytest.mark.parametrize("seed", [710026, 710040])
+def test_noise_that_grows_with_the_rate_is_no_effect_of_the_few_fast_turns(seed):
+    puzzle = grade.draw("nothing", seed)
+    assert puzzle.kind == "growing with rate"
+    answer = SensorModel().fit(puzzle.simulation.to_log()).diagnose()
+    assert (answer.verdict, answer.best, answer.unexplained) == ("adequate", None, ())
 
 
 @pytest.mark.parametrize("name", SHAPES)

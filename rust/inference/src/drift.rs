@@ -19,6 +19,8 @@ const GRID: [f64; 18] = [
 ];
 /// The zero of a magnetometer wanders by no more than so many noise floors from block to block.
 const FARTHEST: f64 = 1.0;
+/// Block means scatter by no less than this part of what their samples say (variance).
+const LEAST_SCATTER: f64 = 1e-3;
 /// Fewer blocks than this cannot show a walk.
 const MIN_BLOCKS: usize = 8;
 
@@ -387,11 +389,12 @@ impl ChannelSums {
     /// the means scatter besides that suit them best; `None` where there are too few blocks for a walk.
     pub fn profile(&self, extra: Option<&DMatrix<f64>>) -> Option<Profiled> {
         let (residual, basis) = self.means(extra);
-        // Noise that is coloured more slowly than the filters see makes block means scatter more than their samples say.
+        // Noise that is coloured more slowly than the filters see makes block means scatter more than their samples say; a filter
+        // that has seen a jump makes them scatter less.
         let means = self.count.iter().filter(|n| **n > 0.0).count().max(1) as f64;
         let of = |s: &Strength| {
             let (square, _) = Self::left(s, &residual, &basis)?;
-            let excess = (square / means).max(1.0);
+            let excess = (square / means).max(LEAST_SCATTER);
             Some(s.log_determinant + means * excess.ln() + square / excess)
         };
         let deviance = self.strengths.iter().filter_map(of).min_by(f64::total_cmp)?;

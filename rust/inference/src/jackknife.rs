@@ -191,7 +191,7 @@ mod tests {
             precision: DVector::from_element(p, 1e-9),
             model: 1,
             sums: Vec::new(),
-            logs: [0..white.len()].into(),
+            logs: std::iter::once(0..white.len()).collect(),
             white,
             squares,
             rests: false,

@@ -16,6 +16,7 @@ pub mod revision;
 pub mod saturated;
 pub mod screening;
 pub mod selection;
+pub mod stays;
 pub mod steps;
 pub mod together;
 pub mod verdict;

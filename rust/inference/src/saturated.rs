@@ -74,11 +74,8 @@ pub fn assemble(evidence: &Evidence, block: usize, weights: &[f64; CHANNELS]) ->
 /// Mean square of the residual of a block in the channel where it is largest.
 pub fn largest_square(evidence: &Evidence, block: usize, weights: &[f64; CHANNELS]) -> f64 {
     let of_channel = |channel: usize| {
-        let b = evidence
-            .get(block, channel)
-            .filter(|b| b.n > 0 && weights[channel] > 0.0)?;
-        let last = evidence.layout.model.active()[channel].len();
-        Some(weights[channel] * b.gram[(last, last)] / b.n as f64)
+        let square = evidence.mean_square(block, channel)?;
+        (weights[channel] > 0.0).then(|| weights[channel] * square)
     };
     (0..CHANNELS).filter_map(of_channel).fold(0.0, f64::max)
 }

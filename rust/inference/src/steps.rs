@@ -1,17 +1,20 @@
-//! Steps and swings: a residual whose mean jumps at one instant, or swings at one frequency, as no zero that wanders does.
+//! Steps, swings and stays: a residual whose mean jumps at one instant, swings at one frequency, or lies elsewhere for a while, as no
+//! zero that wanders does.
 //!
 //! A walk strong enough for one large step, or for one swing, would have many of all kinds. So the likelihood of the block means
-//! with the step or the swing, at the strength of the walk that suits it best, is compared with the likelihood without.
+//! with the step, the swing or the stay, at the strength of the walk that suits it best, is compared with the likelihood without.
 
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::dependence::Dependence;
 use crate::drift::{ChannelSums, Profiled};
 use crate::problem::Problem;
+use crate::stays;
 
 /// Noise that is coloured more slowly than any filter sees jumps and swings now and then: the chance of a false alarm is kept to this part of the usual.
 pub const CAUTION: f64 = 0.01;
@@ -26,52 +29,94 @@ const FINENESS: f64 = 0.25;
 /// Blocks that a swing needs.
 const BLOCKS_PER_SWING: f64 = 3.0;
 
-/// The largest step and the largest swing of each channel beside the parameters of `model`, and how many were possible.
+/// Steps, swings and stays are three questions.
+const QUESTIONS: usize = 3;
+
+/// The largest step, swing and stay of each channel beside the parameters of `model`, their p-values adjusted for all that were possible
+/// of each; and how many questions were asked.
 pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
-    let mut tried = 0;
-    let mut found = Vec::new();
     // A few rests in a block tell no step from a zero that wanders.
-    let told = |s: &ChannelSums| s.of_blocks() && !problem.parts[s.log].white.layout.facts.rests;
-    for all in problem.sums.iter().filter(|s| told(s)) {
-        let sums = all.with_sums(all.columns(model));
-        let blocks = sums.sums.nrows();
-        tried += (1 + LYING) * blocks.saturating_sub(1);
-        // Whatever level the mean has is no step.
-        let level = DMatrix::from_element(blocks, 1, 1.0);
-        let Some(without) = sums.profile(Some(&level)) else {
-            continue;
-        };
-        let facts = &problem.parts[sums.log].white.layout.facts;
-        let duration = facts.t_end - facts.t_start;
-        let step = step(&sums, &without).map(|(at, with)| {
-            let t = facts.t_start + duration * at / blocks as f64;
-            (with, format!("a step at {t:.1} s"))
-        });
-        let swing =
-            swing(&sums, &without).map(|(swings, with)| (with, format!("a swing every {:.1} s", duration / swings)));
-        for (with, shape) in [step, swing].into_iter().flatten() {
-            found.push(Dependence {
-                channel: sums.channel,
-                covariate: "t".to_string(),
-                log: (problem.parts.len() > 1).then_some(sums.log),
-                p_value: p_value(&without, &with, blocks),
-                gain: without.white - with.white,
-                shape,
-            });
-        }
-    }
-    (found, tried.max(1))
+    let told = |s: &&ChannelSums| s.of_blocks() && !problem.parts[s.log].white.layout.facts.rests;
+    let asked: Vec<&ChannelSums> = problem.sums.iter().filter(told).collect();
+    let found: Vec<Dependence> = asked
+        .par_iter()
+        .flat_map_iter(|sums| of_channel(problem, model, sums))
+        .collect();
+    (found, (QUESTIONS * asked.len()).max(1))
 }
 
-/// p-value of the columns that `with` has besides. The strength of the walk is found from these few blocks as well: F, not chi squared.
-fn p_value(without: &Profiled, with: &Profiled, blocks: usize) -> f64 {
+/// The largest step, swing and stay of one channel.
+fn of_channel(problem: &Problem, model: &[usize], all: &ChannelSums) -> Vec<Dependence> {
+    let sums = all.with_sums(all.columns(model));
+    let blocks = sums.sums.nrows();
+    // Whatever level the mean has is no step.
+    let level = DMatrix::from_element(blocks, 1, 1.0);
+    let Some(without) = sums.profile(Some(&level)) else {
+        return Vec::new();
+    };
+    let facts = &problem.parts[sums.log].white.layout.facts;
+    let block = (facts.t_end - facts.t_start) / blocks as f64;
+    let time = |at: f64| facts.t_start + block * at;
+    let mut found = Vec::new();
+    if let Some((at, with)) = step(&sums, &without) {
+        let p = p_value(&without, &with, blocks, 1.0) * (LYING * blocks) as f64;
+        found.push((with, p, format!("a step at {:.1} s", time(at))));
+    }
+    if let Some((swings, with)) = swing(&sums, &without) {
+        let p = p_value(&without, &with, blocks, 1.0) * frequencies(blocks).count() as f64;
+        found.push((
+            with,
+            p,
+            format!("a swing every {:.1} s", block * blocks as f64 / swings),
+        ));
+    }
+    let several = stays::stays(&sums, &without).into_iter().map(|(stays, with)| {
+        let loudest = |squares: &[f64]| stays.iter().map(|stay| stay.largest(squares)).fold(0.0, f64::max);
+        let louder = louder(problem, &sums, loudest);
+        let places = vec![stays::possible(blocks) as f64; stays.len()];
+        let p = p_value(&without, &with, blocks, louder) * places.iter().product::<f64>();
+        (p, stays, with)
+    });
+    if let Some((p, stays, with)) = several.min_by(|a, b| a.0.total_cmp(&b.0)) {
+        let times: Vec<String> = stays::spans(&stays)
+            .into_iter()
+            .map(|(begin, end)| format!("from {:.1} s to {:.1} s", time(begin), time(end)))
+            .collect();
+        found.push((with, p, format!("another level {}", times.join(" and "))));
+    }
+    let dependence = |(with, p_value, shape): (Profiled, f64, String)| Dependence {
+        channel: sums.channel,
+        covariate: "t".to_string(),
+        log: (problem.parts.len() > 1).then_some(sums.log),
+        p_value,
+        gain: without.white - with.white,
+        shape,
+    };
+    found.into_iter().map(dependence).collect()
+}
+
+/// How much louder a channel is in some blocks than in the middle one: noise that grows there shifts their means, too.
+fn louder(problem: &Problem, sums: &ChannelSums, largest: impl Fn(&[f64]) -> f64) -> f64 {
+    let evidence = &problem.parts[sums.log].white;
+    let squares: Vec<f64> = (0..evidence.layout.blocks)
+        .map(|b| evidence.mean_square(b, sums.channel).unwrap_or(0.0))
+        .collect();
+    let mut sorted: Vec<f64> = squares.iter().copied().filter(|s| *s > 0.0).collect();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
+    (largest(&squares) / middle).max(1.0)
+}
+
+/// p-value of the columns that `with` has besides, where the noise has `louder` times the usual variance. The strength of the walk is
+/// found from these few blocks as well: F, not chi squared.
+fn p_value(without: &Profiled, with: &Profiled, blocks: usize, louder: f64) -> f64 {
     let columns = with.fitted.saturating_sub(without.fitted);
     if columns == 0 {
         return 1.0;
     }
     let ratio = without.deviance - with.deviance;
     let freedom = blocks.saturating_sub(with.fitted + 1).max(1) as f64;
-    let f = freedom / columns as f64 * (ratio.max(0.0) / blocks as f64).exp_m1();
+    let f = freedom / columns as f64 * (ratio.max(0.0) / blocks as f64).exp_m1() / louder;
     FisherSnedecor::new(columns as f64, freedom).map_or(1.0, |d| if f.is_finite() { d.sf(f) } else { 1.0 })
 }
 
@@ -110,6 +155,13 @@ fn step(sums: &ChannelSums, without: &Profiled) -> Option<(f64, Profiled)> {
         .min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))
 }
 
+/// How many swings there can be in a log.
+fn frequencies(blocks: usize) -> impl Iterator<Item = f64> {
+    let most = blocks as f64 / BLOCKS_PER_SWING;
+    let steps = ((most - FEWEST_SWINGS) / FINENESS).max(0.0) as u32;
+    (0..=steps).map(|k| FEWEST_SWINGS + FINENESS * f64::from(k))
+}
+
 /// How often the mean swings during the log, if it swings at all: the frequencies that stand out are looked at, as the residual is and
 /// beside what a walk has at each.
 fn swing(sums: &ChannelSums, without: &Profiled) -> Option<(f64, Profiled)> {
@@ -120,10 +172,7 @@ fn swing(sums: &ChannelSums, without: &Profiled) -> Option<(f64, Profiled)> {
             [phase.cos(), phase.sin(), 1.0][k]
         })
     };
-    let most = blocks as f64 / BLOCKS_PER_SWING;
-    let frequencies = ((most - FEWEST_SWINGS) / FINENESS).max(0.0) as u32;
-    let mut powers: Vec<(f64, f64)> = (0..=frequencies)
-        .map(|k| FEWEST_SWINGS + FINENESS * f64::from(k))
+    let mut powers: Vec<(f64, f64)> = frequencies(blocks)
         .map(|f| (f, wave(f).tr_mul(&without.residual).rows(0, 2).norm()))
         .collect();
     let mut asked: Vec<f64> = Vec::new();
