@@ -98,6 +98,21 @@ def test_step_of_the_bias_happens_once():
     np.testing.assert_allclose(apart[-1] - apart[0], [0.3, -0.2, 0.1])
 
 
+def test_another_level_lasts_as_long_as_it_says():
+    log, apart = change("gyr.other_level", three(5e-3, 0.0, -2e-3, at=0.3, length=0.1))
+    inside = (log.t > 0.3 * log.t[-1]) & (log.t < 0.4 * log.t[-1])
+    np.testing.assert_allclose(apart[inside].mean(axis=0) - apart[~inside].mean(axis=0), [5e-3, 0.0, -2e-3], rtol=0.02)
+    assert np.ptp(apart[inside][5:-5], axis=0).max() < 1e-12
+
+
+def test_field_of_a_passing_magnet_falls_with_the_cube_of_its_distance():
+    log, apart = change("mag.passing_magnet", three(3.0, 0.0, 0.0, at=0.5, width=0.02))
+    field, away = apart[:, 0] - apart[:, 0].min(), np.abs(log.t - 0.5 * log.t[-1]) / (0.02 * log.t[-1])
+    assert np.ptp(field) == pytest.approx(3.0, rel=0.01)
+    near, far = (field[np.argmin(np.abs(away - distance))] for distance in (5.0, 10.0))
+    assert near / far == pytest.approx(8.0, rel=0.1)
+
+
 def test_hum_is_fast_in_nature_and_slow_in_the_log():
     log, apart = change("mag.mains_hum", three(1.0, 0.0, 0.0, frequency=100.05, phase=0.3))
     np.testing.assert_allclose(apart[:, 0], np.sin(2 * np.pi * 0.05 * (log.t - log.t[0]) + 0.3), atol=1e-9)

@@ -85,6 +85,18 @@ def _step(s: Situation, p: Parameters) -> Array:
     return times(centred((s.since > p["at"] * s.since[-1]).astype(np.float64)), p)
 
 
+def _while(s: Situation, p: Parameters) -> Array:
+    """Add another level for a while."""
+    begin, length = p["at"] * s.since[-1], p["length"] * s.since[-1]
+    return times(centred(((s.since > begin) & (s.since < begin + length)).astype(np.float64)), p)
+
+
+def _passing_by(s: Situation, p: Parameters) -> Array:
+    """Add the field of a magnet that passes at constant speed: it falls with the cube of the distance."""
+    away = (s.since - p["at"] * s.since[-1]) / (p["width"] * s.since[-1])
+    return times(centred((1.0 + away**2) ** -1.5), p)
+
+
 def _gradient(s: Situation, p: Parameters) -> Array:
     """Let the field vary in space as a field without sources may: its gradient is symmetric and has no trace."""
     g = np.array([[p["x"], p["xy"], p["xz"]], [p["xy"], p["y"], p["yz"]], [p["xz"], p["yz"], -p["x"] - p["y"]]])
@@ -139,6 +151,11 @@ def _beat(rng: np.random.Generator, run: Run) -> dict[str, float]:
 
 def _somewhere(low: float, high: float, name: str) -> Inner:
     return lambda rng, _run: {name: float(rng.uniform(low, high))}
+
+
+def _some_time(length: str) -> Inner:
+    """Draw when something happens and, under the name `length`, how long it lasts, in parts of the log."""
+    return lambda rng, _run: {"at": float(rng.uniform(0.2, 0.7)), length: float(rng.uniform(0.03, 0.15))}
 
 
 _GRADIENT = {"x": 3.0, "y": 3.0, "xy": 3.0, "xz": 3.0, "yz": 3.0}
@@ -283,6 +300,9 @@ OUTSIDE: Mapping[str, Outside] = {
             ["ref_px", "ref_py", "ref_pz"],
             scenarios=("arm",),
         ),
+        _outside("mag.passing_magnet", "a magnet passes by", 3.0, _passing_by, ["t"], inner=_some_time("width")),
+        _outside("acc.other_level", "another level for a while", 0.05, _while, ["t"], inner=_some_time("length")),
+        _outside("gyr.other_level", "another level for a while", 5e-3, _while, ["t"], inner=_some_time("length")),
     )
 }
 """Every effect outside the catalogue by its name."""

@@ -8,6 +8,7 @@ pub mod dependence;
 pub mod drift;
 pub mod estimate;
 pub mod held_out;
+pub mod humps;
 pub mod jackknife;
 pub mod part;
 pub mod problem;

@@ -1,8 +1,8 @@
-//! Steps, swings and stays: a residual whose mean jumps at one instant, swings at one frequency, or lies elsewhere for a while, as no
-//! zero that wanders does.
+//! Steps, swings, stays and humps: a residual whose mean jumps at one instant, swings at one frequency, lies elsewhere for a while, or
+//! rises and falls once, as no zero that wanders does.
 //!
 //! A walk strong enough for one large step, or for one swing, would have many of all kinds. So the likelihood of the block means
-//! with the step, the swing or the stay, at the strength of the walk that suits it best, is compared with the likelihood without.
+//! with the step (or what it is), at the strength of the walk that suits it best, is compared with the likelihood without.
 
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
@@ -13,6 +13,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::dependence::Dependence;
 use crate::drift::{ChannelSums, Profiled};
+use crate::humps;
 use crate::problem::Problem;
 use crate::stays;
 
@@ -29,10 +30,10 @@ const FINENESS: f64 = 0.25;
 /// Blocks that a swing needs.
 const BLOCKS_PER_SWING: f64 = 3.0;
 
-/// Steps, swings and stays are three questions.
-const QUESTIONS: usize = 3;
+/// Steps, swings, stays and humps are four questions.
+const QUESTIONS: usize = 4;
 
-/// The largest step, swing and stay of each channel beside the parameters of `model`, their p-values adjusted for all that were possible
+/// The largest step, swing, stay and hump of each channel beside the parameters of `model`, their p-values adjusted for all that were possible
 /// of each; and how many questions were asked.
 pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
     // A few rests in a block tell no step from a zero that wanders.
@@ -45,7 +46,7 @@ pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
     (found, (QUESTIONS * asked.len()).max(1))
 }
 
-/// The largest step, swing and stay of one channel.
+/// The largest step, swing, stay and hump of one channel.
 fn of_channel(problem: &Problem, model: &[usize], all: &ChannelSums) -> Vec<Dependence> {
     let sums = all.with_sums(all.columns(model));
     let blocks = sums.sums.nrows();
@@ -83,6 +84,12 @@ fn of_channel(problem: &Problem, model: &[usize], all: &ChannelSums) -> Vec<Depe
             .map(|(begin, end)| format!("from {:.1} s to {:.1} s", time(begin), time(end)))
             .collect();
         found.push((with, p, format!("another level {}", times.join(" and "))));
+    }
+    if let Some((hump, with)) = humps::hump(&sums, &without) {
+        let louder = louder(problem, &sums, |squares| hump.largest(squares));
+        let p = p_value(&without, &with, blocks, louder) * humps::possible(blocks) as f64;
+        let (middle, width) = (time(hump.middle), 2.0 * block * hump.width);
+        found.push((with, p, format!("a hump at {middle:.1} s, {width:.1} s wide")));
     }
     let dependence = |(with, p_value, shape): (Profiled, f64, String)| Dependence {
         channel: sums.channel,
