@@ -15,7 +15,7 @@ use crate::dependence::Dependence;
 use crate::drift::{ChannelSums, Profiled};
 use crate::humps;
 use crate::problem::Problem;
-use crate::stays;
+use crate::stays::{self, Stay};
 
 /// Noise that is coloured more slowly than any filter sees jumps and swings now and then: the chance of a false alarm is kept to this part of the usual.
 pub const CAUTION: f64 = 0.01;
@@ -23,6 +23,8 @@ pub const CAUTION: f64 = 0.01;
 const LOOKED_AT: usize = 4;
 /// Ways in which a step may lie: at a boundary, or within the block before or after it.
 const LYING: usize = 3;
+/// p-value from which on no further stay is asked for.
+const SURE: f64 = 1e-7;
 /// Whole swings in a log, from these on; fewer are a drift.
 const FEWEST_SWINGS: f64 = 1.5;
 /// Frequencies are tried in steps of this many swings in a log.
@@ -71,14 +73,18 @@ fn of_channel(problem: &Problem, model: &[usize], all: &ChannelSums) -> Vec<Depe
             format!("a swing every {:.1} s", block * blocks as f64 / swings),
         ));
     }
-    let several = stays::stays(&sums, &without).into_iter().map(|(stays, with)| {
+    let stays = stays::stays(&sums, &without).into_iter().map(|(stays, with)| {
         let loudest = |squares: &[f64]| stays.iter().map(|stay| stay.largest(squares)).fold(0.0, f64::max);
         let louder = louder(problem, &sums, loudest);
         let places = vec![stays::possible(blocks) as f64; stays.len()];
         let p = p_value(&without, &with, blocks, louder) * places.iter().product::<f64>();
         (p, stays, with)
     });
-    if let Some((p, stays, with)) = several.min_by(|a, b| a.0.total_cmp(&b.0)) {
+    let mut several: Vec<(f64, Vec<Stay>, Profiled)> = stays.collect();
+    // As few as suffice: what comes and goes thrice mostly has a cause that another column tells.
+    let fewest = several.iter().position(|(p, _, _)| *p <= SURE);
+    let best = fewest.or_else(|| (0..several.len()).min_by(|a, b| several[*a].0.total_cmp(&several[*b].0)));
+    if let Some((p, stays, with)) = best.map(|k| several.swap_remove(k)) {
         let times: Vec<String> = stays::spans(&stays)
             .into_iter()
             .map(|(begin, end)| format!("from {:.1} s to {:.1} s", time(begin), time(end)))
