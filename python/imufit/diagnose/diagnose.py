@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
-from scipy.stats import ttest_rel
+from scipy.special import stdtr, stdtrit
 
 from imufit import _imufit
 from imufit.diagnose import sentences, without_reference
 from imufit.diagnose.agreement import answers_without, answers_without_faulty, disagreements
 from imufit.diagnose.compare import notes
 from imufit.diagnose.measured_columns import with_measured_columns
+from imufit.diagnose.rivals import correlations_with_best
 from imufit.fit.analysis import OWN, Analysis, Estimate, pooled
 from imufit.fit.rest_passes import RestPasses
 from imufit.log.several import name_of
@@ -157,11 +157,7 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     if best is None or not analysis.candidates[ids[best]].strongly_curved:
         return result
     items = {item["slot"]: dict(item) for item in result["screened"]}
-    alike = {
-        first if second == best else second
-        for first, second, correlation in result["correlations"]
-        if best in (first, second) and correlation >= MIN_CORRELATION
-    }
+    alike = [slot for slot, correlation in correlations_with_best(result).items() if correlation >= MIN_CORRELATION]
     near = [slot for slot in alike if items[slot]["passed"] and items[slot]["gain"] >= NEAR * items[best]["gain"]]
     close = [
         slot
@@ -206,7 +202,9 @@ def _surely_worse(estimate: Estimate, best: Estimate) -> bool:
     """Return whether a fit is behind in all parts of the log, by much more than the best one leaves."""
     if estimate.held_out - best.held_out < LEFT * (best.held_out - 1.0):
         return False
-    return float(ttest_rel(estimate.folds, best.folds, alternative="greater").pvalue) < SURELY_WORSE
+    behind = estimate.folds - best.folds
+    error = np.std(behind, ddof=1) / np.sqrt(behind.size)
+    return bool(error > 0.0 and stdtr(behind.size - 1, -np.mean(behind) / error) < SURELY_WORSE)
 
 
 def _leaves(analysis: Analysis, other: str) -> bool:

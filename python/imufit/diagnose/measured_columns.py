@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from imufit.diagnose.rivals import correlations_with_best, is_named, with_rivals
 from imufit.fit.analysis import Analysis
 
 ALIKE = 0.99
@@ -27,9 +28,9 @@ def with_measured_columns(analysis: Analysis, result: Mapping[str, Any]) -> Mapp
     result : mapping
         What `_imufit.Problem.diagnose` found.
     """
-    best = result["best"]
-    if best is None or result["verdict"] not in ("missing", "ambiguous"):
+    if not is_named(result):
         return result
+    best = result["best"]
     items = {item["slot"]: item for item in result["screened"]}
 
     def column(slot: int) -> str | None:
@@ -41,12 +42,5 @@ def with_measured_columns(analysis: Analysis, result: Mapping[str, Any]) -> Mapp
         noise = max(sum(each.surveyed.column_noise(column(s)) for s in (best, slot)) for each in analysis.logs)
         return bool(1.0 - correlation**2 <= NOISE * noise)
 
-    more = [
-        first if second == best else second
-        for first, second, correlation in result["correlations"]
-        if best in (first, second) and same(first if second == best else second, correlation)
-    ]
-    more = [slot for slot in more if slot not in result["rivals"]]
-    if not more:
-        return result
-    return {**result, "rivals": [*result["rivals"], *more], "verdict": "ambiguous"}
+    alike = correlations_with_best(result).items()
+    return with_rivals(result, [slot for slot, correlation in alike if same(slot, correlation)])

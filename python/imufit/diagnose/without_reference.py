@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from imufit.diagnose.rivals import is_named, with_rivals
 from imufit.errors import InputError
 from imufit.fit.rest_passes import NEEDS_REFERENCE, RestPasses
 from imufit.model.catalogue import effects
@@ -39,9 +40,9 @@ def with_better_explained(analysis: Analysis, result: Mapping[str, Any]) -> Mapp
     result : mapping
         What `_imufit.Problem.diagnose` found.
     """
-    best = result["best"]
-    if best is None or result["verdict"] not in ("missing", "ambiguous") or evidence_of(analysis) == "reference":
+    if not is_named(result) or evidence_of(analysis) == "reference":
         return result
+    best = result["best"]
     items = {item["slot"]: item for item in result["screened"]}
 
     def sensors(slot: int) -> set[str]:
@@ -54,10 +55,7 @@ def with_better_explained(analysis: Analysis, result: Mapping[str, Any]) -> Mapp
             return False
         return analysis.problem.diagnose([*analysis.fitted_slots, slot], [best])["best"] is None
 
-    more = [slot for slot in items if slot != best and better(slot)]
-    if not more:
-        return result
-    return {**result, "rivals": [*result["rivals"], *more], "verdict": "ambiguous"}
+    return with_rivals(result, [slot for slot in items if slot != best and better(slot)])
 
 
 def refuse_rests(analysis: Analysis, what: str) -> None:

@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from imufit import _imufit
 from imufit.figures import quantity
@@ -272,7 +272,7 @@ def _hotelling(values: Array, covariance: Array, rank: int, count: int) -> float
     kept = np.argsort(spread)[::-1][:rank]
     z = vectors[:, kept].T @ (values * scale)
     square = float(np.sum(z**2 / np.maximum(spread[kept], 1e-12)))
-    return float(fisher.sf(square * (count - rank) / (rank * (count - 1.0)), rank, count - rank))
+    return float(fdtrc(rank, count - rank, square * (count - rank) / (rank * (count - 1.0))))
 
 
 def _left(equations: Array, basis: Array) -> float:

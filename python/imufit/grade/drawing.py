@@ -107,10 +107,10 @@ def drawn(
     except ValueError as error:
         raise ImpossibleError(str(error)) from None
     found = parameters_of(study, effect, size, rng, only)
-    separation = Separation(study, setting.columns)
-    if separation.distance(effect, found, beside) < TOLD:
+    distances = Separation(study, setting.columns).distances(effect, found, beside, least=TOLD)
+    if distances[""] < TOLD:
         raise ImpossibleError(f"{effect} is too small to be seen in this log")
-    return Drawn(effect, found, separation.distances(effect, found, beside))
+    return Drawn(effect, found, distances)
 
 
 def effects() -> tuple[str, ...]:

@@ -158,17 +158,9 @@ class Separation:
             return [{"N": float(order)} for order in range(4, 26)]
         return [{}]
 
-    def distance(self, effect: str, parameters: Parameters, beside: Sequence[str] = ()) -> float:
-        """Return how far (squared, in standard errors) nothing at all stays, in the effect's place.
-
-        Parameters
-        ----------
-        effect, parameters, beside :
-            As in `distances`.
-        """
-        return _left(self.signal(effect, parameters), [self.columns_of(name) for name in beside])
-
-    def distances(self, effect: str, parameters: Parameters, beside: Sequence[str] = ()) -> dict[str, float]:
+    def distances(
+        self, effect: str, parameters: Parameters, beside: Sequence[str] = (), least: float = 0.0
+    ) -> dict[str, float]:
         """Return how far (squared, in standard errors) each rival stays; "" = nothing at all in the effect's place.
 
         Parameters
@@ -177,10 +169,14 @@ class Separation:
             What is drawn.
         beside : sequence of str
             Effects that are fitted along with every rival.
+        least : float
+            Rivals are looked at only if nothing at all stays at least this far.
         """
         signal = self.signal(effect, parameters)
         along = [self.columns_of(name) for name in beside]
         found = {"": _left(signal, along)}
+        if found[""] < least:
+            return found
         for rival, design in self.rivals(effect):
             if rival not in beside:
                 found[rival] = min(found.get(rival, np.inf), _left(signal, [design, *along]))

@@ -19,17 +19,16 @@ const GRID: [f64; 18] = [
 ];
 /// The zero of a magnetometer wanders by no more than so many noise floors from block to block.
 const FARTHEST: f64 = 1.0;
-/// Block means scatter by no less than this part of what their samples say (variance).
-const LEAST_SCATTER: f64 = 1e-3;
 /// Fewer blocks than this cannot show a walk.
 const MIN_BLOCKS: usize = 8;
 
 /// One strength of the walk for blocks of given sample counts.
-struct Strength {
+pub struct Strength {
     kappa: f64,
-    /// Covariance of block means in units of the noise of one sample, factorised.
-    covariance: Cholesky<f64, Dyn>,
-    log_determinant: f64,
+    /// Inverse of the covariance of block means in units of the noise of one sample.
+    pub precision: DMatrix<f64>,
+    /// ln det of that covariance.
+    pub log_determinant: f64,
     /// (R^-1 / kappa + D)^-1 with R the covariance of a unit random walk and D the samples of each block.
     smoother: DMatrix<f64>,
 }
@@ -98,7 +97,7 @@ fn vector_strengths(count: &DVector<f64>, directions: &[(usize, Vector3<f64>)], 
             kappa,
             smoother: &prior - &prior * covariance.solve(&prior),
             log_determinant: log_determinant(&covariance),
-            covariance,
+            precision: covariance.inverse(),
         })
     };
     GRID.iter().filter_map(of).collect()
@@ -137,7 +136,7 @@ fn strengths(count: &DVector<f64>, most: f64) -> Vec<Strength> {
             Some(Strength {
                 kappa,
                 log_determinant: log_determinant(&covariance),
-                covariance,
+                precision: covariance.inverse(),
                 smoother,
             })
         })
@@ -252,18 +251,6 @@ fn vector_sums(
 /// Part of the best seen direction of a block from which on another one is seen.
 const SEEN: f64 = 1e-4;
 
-/// Block means explained by columns.
-pub struct Profiled {
-    /// Minus twice the log likelihood, less a constant.
-    pub deviance: f64,
-    /// Sum of squares that is left if the zero does not wander, in units of the noise.
-    pub white: f64,
-    /// Block means that the columns leave.
-    pub residual: DVector<f64>,
-    /// Number of independent columns.
-    pub fitted: usize,
-}
-
 impl ChannelSums {
     /// The same for the parameters `kept`, then for directions in the parameters `others`.
     #[must_use]
@@ -332,7 +319,7 @@ impl ChannelSums {
 
     /// Block means of the residual in units of the noise of one sample, and an orthonormal basis of those of the columns, `extra` (blocks
     /// x columns) among them.
-    fn means(&self, extra: Option<&DMatrix<f64>>) -> (DVector<f64>, DMatrix<f64>) {
+    pub fn means(&self, extra: Option<&DMatrix<f64>>) -> (DVector<f64>, DMatrix<f64>) {
         let blocks = self.count.len();
         let mean = |sum: f64, b: usize| if self.count[b] > 0.0 { sum / self.count[b] } else { 0.0 };
         let residual = DVector::from_fn(blocks, |b, _| mean(self.right[b], b) * self.weight.sqrt());
@@ -362,13 +349,23 @@ impl ChannelSums {
         (residual, basis)
     }
 
+    /// Every strength of the walk; none where there are too few blocks for a walk.
+    pub fn strengths(&self) -> &[Strength] {
+        &self.strengths
+    }
+
+    /// Number of sums that have samples.
+    pub fn filled(&self) -> f64 {
+        self.count.iter().filter(|n| **n > 0.0).count().max(1) as f64
+    }
+
     /// Sum of squares of the residual that the basis leaves, for one strength, and the determinant of the basis' information.
     fn left(strength: &Strength, residual: &DVector<f64>, basis: &DMatrix<f64>) -> Option<(f64, f64)> {
-        let plain = residual.dot(&strength.covariance.solve(residual));
+        let plain = residual.dot(&(&strength.precision * residual));
         if basis.ncols() == 0 {
             return Some((plain, 0.0));
         }
-        let x = strength.covariance.solve(basis);
+        let x = &strength.precision * basis;
         let inner = Cholesky::new(basis.tr_mul(&x))?;
         let right = x.tr_mul(residual);
         Some((plain - right.dot(&inner.solve(&right)), log_determinant(&inner)))
@@ -383,29 +380,6 @@ impl ChannelSums {
             })
         };
         self.strengths.iter().map(of).collect()
-    }
-
-    /// How well the columns, and `extra` (blocks x columns) among them, explain the block means, at the strength of the walk and of what
-    /// the means scatter besides that suit them best; `None` where there are too few blocks for a walk.
-    pub fn profile(&self, extra: Option<&DMatrix<f64>>) -> Option<Profiled> {
-        let (residual, basis) = self.means(extra);
-        // Noise that is coloured more slowly than the filters see makes block means scatter more than their samples say; a filter
-        // that has seen a jump makes them scatter less.
-        let means = self.count.iter().filter(|n| **n > 0.0).count().max(1) as f64;
-        let of = |s: &Strength| {
-            let (square, _) = Self::left(s, &residual, &basis)?;
-            let excess = (square / means).max(LEAST_SCATTER);
-            Some(s.log_determinant + means * excess.ln() + square / excess)
-        };
-        let deviance = self.strengths.iter().filter_map(of).min_by(f64::total_cmp)?;
-        let (white, _) = Self::left(self.strengths.first()?, &residual, &basis)?;
-        let left = &residual - &basis * basis.tr_mul(&residual);
-        Some(Profiled {
-            deviance,
-            white,
-            residual: left,
-            fitted: basis.ncols(),
-        })
     }
 
     /// Covariance that a walk of one strength, from zero at the start, gives to the sums over the parameters' columns.

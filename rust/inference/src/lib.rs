@@ -3,12 +3,12 @@
 //! All of it works on [`imufit_fit::evidence::Evidence`]; no function here sees a row of the log.
 
 pub mod agreement;
+pub mod changes;
 pub mod confounding;
 pub mod dependence;
 pub mod drift;
 pub mod estimate;
 pub mod held_out;
-pub mod humps;
 pub mod jackknife;
 pub mod part;
 pub mod problem;
@@ -17,7 +17,5 @@ pub mod revision;
 pub mod saturated;
 pub mod screening;
 pub mod selection;
-pub mod stays;
-pub mod steps;
 pub mod together;
 pub mod verdict;

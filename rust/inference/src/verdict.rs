@@ -12,7 +12,7 @@ use crate::held_out;
 use crate::problem::Problem;
 use crate::screening::{self, Plausible, Screened};
 use crate::selection::{ALPHA, best_of, explains, indices, passes, screen_all, significant};
-use crate::{steps, together};
+use crate::{changes, together};
 
 /// A named effect must explain this share of what depends on anything in its sensors, or the answer is "unknown".
 const NAMED_SHARE: f64 = 0.8;
@@ -239,7 +239,7 @@ fn settle(
     let asked = [
         (dependence::test(problem, &fitted, &base, &channels), ALPHA),
         (dependence::test_probes(problem, &stack, probes), ALPHA),
-        (steps::test(problem, &fitted), steps::CAUTION * ALPHA),
+        (changes::test(problem, &fitted), changes::CAUTION * ALPHA),
     ];
     let mut unexplained: Vec<Dependence> = asked
         .into_iter()
@@ -316,18 +316,17 @@ fn rivals_of(
     let fitted = indices(slots, beside);
     let own = indices(slots, &[best]);
     let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
-    let explaining = |(s, a): (&Screened, f64)| explains(s, a);
-    let first_passing = screened.iter().zip(adjusted).find(|(s, a)| passes(s, **a));
-    let alone = first_passing.is_some_and(|(s, _)| s.slot == best);
+    let passing = |(s, a): &(&Screened, &f64)| passes(s, **a);
+    let alone = (screened.iter().zip(adjusted).find(passing)).is_some_and(|(s, _)| s.slot == best);
     let others: Vec<Screened>;
     let compared: Vec<&Screened> = if alone {
-        let all = screened.iter().zip(adjusted.iter().copied());
-        all.filter(|(s, a)| explaining((s, *a))).map(|(s, _)| s).collect()
+        let all = screened.iter().zip(adjusted);
+        all.filter(|(s, a)| explains(s, **a)).map(|(s, _)| s).collect()
     } else {
         // Beside other effects a candidate is worth something else than alone.
         let left: Vec<usize> = candidates.iter().copied().filter(|c| !beside.contains(c)).collect();
         let (all, adjusted) = screen_all(problem, slots, beside, &left);
-        let all = all.into_iter().zip(adjusted).filter(|(s, a)| explaining((s, *a)));
+        let all = all.into_iter().zip(adjusted).filter(|(s, a)| explains(s, *a));
         others = all.map(|(s, _)| s).collect();
         others.iter().collect()
     };

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::drift::{ChannelSums, Profiled};
+use super::block_means::{BlockMeans, Explained, standing_out};
 
 /// Stays that are looked at of those that stand out: as the means are, and by the jumps at their ends.
 const LOOKED_AT: usize = 6;
@@ -62,29 +62,31 @@ pub fn possible(blocks: usize) -> usize {
 }
 
 /// Stays at other levels that explain the means of a channel, each the best one beside those before it: from one to `MOST` of them.
-pub fn stays(sums: &ChannelSums, without: &Profiled) -> Vec<(Vec<Stay>, Profiled)> {
-    let blocks = without.residual.len();
-    let mut columns = DMatrix::from_element(blocks, 1, 1.0);
-    let mut chosen: Vec<Stay> = Vec::new();
-    let mut found: Vec<(Vec<Stay>, Profiled)> = Vec::new();
-    while chosen.len() < MOST {
-        let residual = found.last().map_or(&without.residual, |(_, with)| &with.residual);
-        let Some((stay, with)) = next(sums, residual, &columns) else {
+pub fn stays(means: &BlockMeans) -> Vec<(Vec<Stay>, Explained)> {
+    let blocks = means.blocks();
+    let mut found: Vec<(Vec<Stay>, Explained)> = Vec::new();
+    while found.len() < MOST {
+        let (chosen, residual) = found.last().map_or_else(
+            || (Vec::new(), &means.without.residual),
+            |(stays, with)| (stays.clone(), &with.residual),
+        );
+        let beside = |stay: &Stay| [chosen.as_slice(), &[*stay]].concat();
+        let columns = |stay: &Stay| {
+            let all: Vec<DVector<f64>> = beside(stay).iter().map(|s| s.column(blocks)).collect();
+            DMatrix::from_columns(&all)
+        };
+        let Some((stay, with)) = means.best(likely(residual), columns) else {
             break;
         };
-        let at = columns.ncols();
-        columns = columns.insert_column(at, 0.0);
-        columns.set_column(at, &stay.column(blocks));
-        chosen.push(stay);
-        found.push((chosen.clone(), with));
+        found.push((beside(&stay), with));
     }
     found
 }
 
-/// The stay that explains best what is left of the means beside some columns.
-fn next(sums: &ChannelSums, residual: &DVector<f64>, columns: &DMatrix<f64>) -> Option<(Stay, Profiled)> {
+/// Stays that stand out of what is left of the means.
+fn likely(residual: &DVector<f64>) -> Vec<Stay> {
     let blocks = residual.len();
-    let mut found: Vec<(usize, usize, [f64; 2])> = Vec::new();
+    let mut found: Vec<((usize, usize), [f64; 2])> = Vec::new();
     for first in 1..blocks.saturating_sub(1) {
         let mut sum = 0.0;
         for last in first..(first + blocks / 2).min(blocks - 1) {
@@ -93,28 +95,13 @@ fn next(sums: &ChannelSums, residual: &DVector<f64>, columns: &DMatrix<f64>) -> 
             // The residual has no mean of its own: what the stay has more, the rest has less.
             let level = sum * sum / (n * (1.0 - n / blocks as f64));
             let jumps = (residual[first] - residual[first - 1]) - (residual[last + 1] - residual[last]);
-            found.push((first, last, [level, jumps.abs()]));
+            found.push(((first, last), [level, jumps.abs()]));
         }
     }
-    let mut asked: Vec<Stay> = Vec::new();
-    for kind in 0..2 {
-        found.sort_by(|a, b| b.2[kind].total_cmp(&a.2[kind]));
-        asked.extend(
-            found
-                .iter()
-                .take(LOOKED_AT)
-                .map(|(first, last, _)| filled(residual, *first, *last)),
-        );
-    }
-    let at = columns.ncols();
-    asked
+    standing_out(found, LOOKED_AT)
         .into_iter()
-        .filter_map(|stay| {
-            let mut with = columns.clone().insert_column(at, 0.0);
-            with.set_column(at, &stay.column(blocks));
-            Some((stay, sums.profile(Some(&with))?))
-        })
-        .min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))
+        .map(|(first, last)| filled(residual, first, last))
+        .collect()
 }
 
 /// A stay that fills some blocks, and of those beside them as much as their means say.

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::drift::{ChannelSums, Profiled};
+use super::block_means::{BlockMeans, Explained, standing_out};
 
 /// Humps that are looked at of those that stand out: as the means are, and as they change from block to block.
 const LOOKED_AT: usize = 6;
@@ -64,33 +64,18 @@ fn changes(course: &DVector<f64>) -> DVector<f64> {
 }
 
 /// The hump that explains the means of a channel best.
-pub fn hump(sums: &ChannelSums, without: &Profiled) -> Option<(Hump, Profiled)> {
-    let residual = &without.residual;
-    let blocks = residual.len();
+pub fn hump(means: &BlockMeans) -> Option<(Hump, Explained)> {
+    let residual = &means.without.residual;
+    let blocks = means.blocks();
     let jumps = changes(residual);
-    let mut tried: Vec<(Hump, [f64; 2])> = all(blocks)
-        .map(|hump| {
-            let column = hump.column(blocks);
-            let level = column.add_scalar(-column.mean());
-            (
-                hump,
-                [explained(&level, residual), explained(&changes(&column), &jumps)],
-            )
-        })
-        .collect();
-    let mut asked: Vec<Hump> = Vec::new();
-    for kind in 0..2 {
-        tried.sort_by(|a, b| b.1[kind].total_cmp(&a.1[kind]));
-        asked.extend(tried.iter().take(LOOKED_AT).map(|(hump, _)| *hump));
-    }
-    asked
-        .into_iter()
-        .filter_map(|hump| {
-            let mut columns = DMatrix::from_element(blocks, 2, 1.0);
-            columns.set_column(0, &hump.column(blocks));
-            Some((hump, sums.profile(Some(&columns))?))
-        })
-        .min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))
+    let scored = |hump: Hump| {
+        let column = hump.column(blocks);
+        let level = column.add_scalar(-column.mean());
+        let scores = [explained(&level, residual), explained(&changes(&column), &jumps)];
+        (hump, scores)
+    };
+    let asked = standing_out(all(blocks).map(scored).collect(), LOOKED_AT);
+    means.best(asked, |hump| DMatrix::from_columns(&[hump.column(blocks)]))
 }
 
 #[cfg(test)]
