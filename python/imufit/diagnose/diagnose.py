@@ -13,6 +13,7 @@ from scipy.special import stdtr, stdtrit
 from imufit import _imufit
 from imufit.diagnose import sentences, without_reference
 from imufit.diagnose.agreement import answers_without, answers_without_faulty, disagreements
+from imufit.diagnose.better_explained import with_better_explained
 from imufit.diagnose.compare import notes
 from imufit.diagnose.measured_columns import with_measured_columns
 from imufit.diagnose.rivals import correlations_with_best
@@ -33,6 +34,8 @@ MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
 CLEARLY_WORSE = 0.1
 """Share of the drop in held-out error by which a fit must stay behind the best one to be out."""
+TOLD = 12.0
+"""... and sum of squares, in units of the noise. If the other one is true, a fit gains that much once in 3000 times."""
 SURELY_WORSE = 1e-4
 """... or chance that it stays behind in all parts of the log by chance, if that is what the best one leaves."""
 LEFT = 3.0
@@ -62,7 +65,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
     result = _decided_by_fits(fit, analysis.problem.diagnose(analysis.fitted_slots, slots, analysis.probe_slots))
     result = with_measured_columns(analysis, result)
-    result = without_reference.with_better_explained(analysis, result)
+    result = with_better_explained(analysis, result)
     confounded: dict[str, list[Rival]] = {}
     for first, second, correlation in result["correlations"]:
         if correlation < MIN_CORRELATION:
@@ -176,12 +179,7 @@ def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
     lost = [
         slot
         for slot, (fitted, estimate) in fits.items()
-        if slot != won
-        and (
-            estimate.held_out - best_fit.held_out > CLEARLY_WORSE * (fit.ratio - best_fit.held_out)
-            or _surely_worse(estimate, best_fit)
-            or _leaves(fitted, ids[won])
-        )
+        if slot != won and (_stays_behind(estimate, best_fit, fit.ratio) or _leaves(fitted, ids[won]))
     ]
     if best not in lost:
         won = best
@@ -198,13 +196,17 @@ def _with(fit: Fit, effect: str, others: Sequence[str]) -> tuple[Analysis, Estim
     return fit.analysis.solved_for(fit.model.with_effect(effect), fit.own, only=others)
 
 
-def _surely_worse(estimate: Estimate, best: Estimate) -> bool:
-    """Return whether a fit is behind in all parts of the log, by much more than the best one leaves."""
-    if estimate.held_out - best.held_out < LEFT * (best.held_out - 1.0):
-        return False
+def _stays_behind(estimate: Estimate, best: Estimate, before: float) -> bool:
+    """Return whether a fit is behind by more than chance, and clearly or surely: see the constants above."""
     behind = estimate.folds - best.folds
+    if np.sum(behind) < TOLD:
+        return False
+    worse = estimate.held_out - best.held_out
+    if worse > CLEARLY_WORSE * (before - best.held_out):
+        return True
     error = np.std(behind, ddof=1) / np.sqrt(behind.size)
-    return bool(error > 0.0 and stdtr(behind.size - 1, -np.mean(behind) / error) < SURELY_WORSE)
+    surely = error > 0.0 and stdtr(behind.size - 1, -np.mean(behind) / error) < SURELY_WORSE
+    return bool(surely and worse >= LEFT * (best.held_out - 1.0))
 
 
 def _leaves(analysis: Analysis, other: str) -> bool:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from imufit.diagnose.rivals import is_named, with_rivals
 from imufit.errors import InputError
 from imufit.fit.rest_passes import NEEDS_REFERENCE, RestPasses
 from imufit.model.catalogue import effects
@@ -28,34 +27,6 @@ def evidence_of(analysis: Analysis) -> str:
     """
     kinds = {"rests" if isinstance(each.passes, RestPasses) else "reference" for each in analysis.logs}
     return " and ".join(sorted(kinds))
-
-
-def with_better_explained(analysis: Analysis, result: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Name beside the best candidate those that explain more than it, though not for certain: rests are few.
-
-    Parameters
-    ----------
-    analysis : Analysis
-        Evidence of the logs.
-    result : mapping
-        What `_imufit.Problem.diagnose` found.
-    """
-    if not is_named(result) or evidence_of(analysis) == "reference":
-        return result
-    best = result["best"]
-    items = {item["slot"]: item for item in result["screened"]}
-
-    def sensors(slot: int) -> set[str]:
-        return set(analysis.candidates[analysis.slots[slot]].sensors)
-
-    def better(slot: int) -> bool:
-        item = items[slot]
-        unsure = item["testable"] and item["plausible"] and not item["passed"]
-        if not unsure or item["gain"] <= items[best]["gain"] or not sensors(slot) & sensors(best):
-            return False
-        return analysis.problem.diagnose([*analysis.fitted_slots, slot], [best])["best"] is None
-
-    return with_rivals(result, [slot for slot in items if slot != best and better(slot)])
 
 
 def refuse_rests(analysis: Analysis, what: str) -> None:
