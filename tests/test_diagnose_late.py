@@ -35,3 +35,10 @@ def test_all_sensors_tell_a_late_reference_from_one_late_sensor():
 def test_a_large_lateness_tells_late_from_sluggish_by_what_the_fits_leave(truth):
     answer = answered({truth: {"tau": 0.014}})
     assert (answer.verdict, answer.best) == ("missing", truth)
+
+
+@pytest.mark.parametrize("truth", ["acc.delay", "acc.lowpass"])
+def test_a_small_lateness_is_not_told_from_sluggishness_by_chance(truth):
+    answer = answered({truth: {"tau": 0.0006}})
+    assert answer.verdict == "ambiguous"
+    assert {answer.best, *answer.ambiguous_with} == {"acc.delay", "acc.lowpass"}

@@ -51,3 +51,12 @@ def test_a_sensor_that_often_reads_the_same_may_stand_still_at_its_largest_readi
     readings = np.repeat(swinging(0), 5, axis=0)
     readings[1000:1012, 1] = [2.2, 2.8, 3.1, *[3.4567] * 6, 3.0, 2.6, 2.1]
     assert end(readings) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_plateau_reached_slowly_is_an_end_if_the_noise_is_gone_there(seed):
+    rng = np.random.default_rng(seed)
+    course = np.concatenate([np.linspace(0.0, 3.5, 2000), np.full(500, 3.5), np.linspace(3.5, 0.0, 2000)])
+    readings = np.round((course[:, None] * [1.0, 0.5, -0.4] + 3 * STEP * rng.normal(size=(4500, 3))) / STEP) * STEP
+    assert end(readings) is None
+    assert end(np.minimum(readings, 3.2)) == 3.2

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr, stdtrit
+from scipy.special import stdtrit
 
 from imufit import _imufit
 from imufit.diagnose import sentences, without_reference
@@ -36,10 +36,8 @@ CLEARLY_WORSE = 0.1
 """Share of the drop in held-out error by which a fit must stay behind the best one to be out."""
 TOLD = 12.0
 """... and sum of squares, in units of the noise. If the other one is true, a fit gains that much once in 3000 times."""
-SURELY_WORSE = 1e-4
-"""... or chance that it stays behind in all parts of the log by chance, if that is what the best one leaves."""
-LEFT = 3.0
-"""Times what the best fit leaves above the noise floor that a fit must be behind, for that chance to count."""
+LEFT = 1.0
+"""... or, if it stays behind in every part of the log, times what the best one leaves above the noise floor."""
 NEAR = 0.5
 """Share of the best one's gain from which on a fit may show that another candidate explains more."""
 BESIDE = 10.0
@@ -197,16 +195,13 @@ def _with(fit: Fit, effect: str, others: Sequence[str]) -> tuple[Analysis, Estim
 
 
 def _stays_behind(estimate: Estimate, best: Estimate, before: float) -> bool:
-    """Return whether a fit is behind by more than chance, and clearly or surely: see the constants above."""
+    """Return whether a fit is behind by more than chance, and clearly or everywhere: see the constants above."""
     behind = estimate.folds - best.folds
     if np.sum(behind) < TOLD:
         return False
     worse = estimate.held_out - best.held_out
-    if worse > CLEARLY_WORSE * (before - best.held_out):
-        return True
-    error = np.std(behind, ddof=1) / np.sqrt(behind.size)
-    surely = error > 0.0 and stdtr(behind.size - 1, -np.mean(behind) / error) < SURELY_WORSE
-    return bool(surely and worse >= LEFT * (best.held_out - 1.0))
+    everywhere = bool(np.all(behind > 0.0)) and worse >= LEFT * (best.held_out - 1.0)
+    return everywhere or worse > CLEARLY_WORSE * (before - best.held_out)
 
 
 def _leaves(analysis: Analysis, other: str) -> bool:

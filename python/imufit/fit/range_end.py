@@ -18,6 +18,8 @@ BELOW = 4
 """Steps of the resolution below it that are looked at as well."""
 JUMP = 8.0
 """Steps of the resolution by which a reading comes to the end or leaves it: one that stands still is not cut off."""
+NOISY = 0.2
+"""... unless it reads the same less often than this: then its noise shows, and is gone where it is cut off."""
 CHANCE = 1e-6
 """Probability of so many equal readings in a row in a sensor that reads the same twice as often as this one."""
 TALLER = 2.0
@@ -76,7 +78,7 @@ class RangeEnd:
         arriving = int(np.count_nonzero(jump[at_end] > JUMP * self._step))
         # One long stay at the end is as good, unless this sensor often reads the same.
         same = max(self._same - (count - 1), 1) / max(self._pairs, 1)
-        stays = arriving >= 1 and count >= LEAST and same ** (count - 1) < CHANCE
+        stays = (arriving >= 1 or same < NOISY) and count >= LEAST and same ** (count - 1) < CHANCE
         if not (arriving >= LEAST or stays) or not count > TALLER * (value.size - count) / BELOW:
             return None
         return self.largest
