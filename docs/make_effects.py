@@ -22,7 +22,7 @@ prints the same.
 
 `f` is the specific force, `omega` the angular rate, `m` the magnetic flux density, all in the body frame; `temp` is the
 sensor's temperature. Typical sizes are those of low-cost sensors, in SI units; they decide where a log does not, and an
-effect more than 21 times as large is turned down as implausible.
+effect more than 21 times as large is turned down as implausible unless nothing at all is left beside it.
 """
 
 

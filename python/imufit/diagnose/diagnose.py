@@ -17,6 +17,7 @@ from imufit.diagnose.better_explained import with_better_explained
 from imufit.diagnose.compare import notes
 from imufit.diagnose.measured_columns import with_measured_columns
 from imufit.diagnose.rivals import correlations_with_best
+from imufit.diagnose.unusual_size import with_unusual_size
 from imufit.fit.analysis import OWN, Analysis, Estimate, pooled
 from imufit.fit.rest_passes import RestPasses
 from imufit.log.several import name_of
@@ -61,7 +62,8 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         return _spoilt(fit, analysis.faults)
     ids = analysis.slots
     slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
-    result = _decided_by_fits(fit, analysis.problem.diagnose(analysis.fitted_slots, slots, analysis.probe_slots))
+    result: Mapping[str, Any] = analysis.problem.diagnose(analysis.fitted_slots, slots, analysis.probe_slots)
+    result = _decided_by_fits(fit, with_unusual_size(analysis, result, slots))
     result = with_measured_columns(analysis, result)
     result = with_better_explained(analysis, result)
     confounded: dict[str, list[Rival]] = {}

@@ -19,6 +19,8 @@ pub enum Plausible {
     /// With the other sign: it can be a rival, but does not pass.
     OtherSign,
     /// A parameter lies far beyond what such sensors have.
+    TooLarge,
+    /// A parameter has a sign or a size that it cannot have.
     No,
 }
 
@@ -136,8 +138,10 @@ pub(crate) fn wald(question: &Question, total: &NormalEquations, variance: f64) 
     ChiSquared::new(m as f64).map_or(1.0, |d| if square.is_finite() { d.sf(square.max(0.0)) } else { 1.0 })
 }
 
-/// No sensor has an effect this many times larger than what is plausible: something else looks like it.
+/// Hardly any sensor has an effect this many times larger than what is plausible: something else looks like it.
 const BEYOND: f64 = 7.0;
+/// ... and none has one this many times larger.
+const FAR_BEYOND: f64 = 30.0;
 /// No axis reads so much of itself, or of another, too much.
 const LARGEST_GAIN: f64 = 0.3;
 /// Halves may differ by this much of the effect, squared.
@@ -330,19 +334,20 @@ impl Weighed {
             .map(|j| (values[j], covariance[(j, j)].max(0.0).sqrt()))
             .collect();
         let (card, first) = (problem.slots[out.slot].effect.card(), problem.slots[out.slot].first);
-        let small = candidate.iter().zip(&out.parameters).all(|(j, (value, error))| {
-            let gain = card
-                .parameters
-                .get((*j - first) % card.parameters.len())
-                .is_some_and(|p| p.unit == "1");
-            let limit = (BEYOND * problem.plausible[*j]).min(if gain { LARGEST_GAIN } else { f64::INFINITY });
-            !problem.typical[*j] || value.abs() - 3.0 * error <= limit
-        });
+        let within = |beyond: f64| {
+            candidate.iter().zip(&out.parameters).all(|(j, (value, error))| {
+                let own = card.parameters.get((*j - first) % card.parameters.len());
+                let gain = own.is_some_and(|p| p.unit == "1");
+                let limit = (beyond * problem.plausible[*j]).min(if gain { LARGEST_GAIN } else { f64::INFINITY });
+                !problem.typical[*j] || value.abs() - 3.0 * error <= limit
+            })
+        };
         let negative = out.parameters.iter().any(|(value, error)| *value < -3.0 * error);
         let sign = problem.slots[out.slot].effect.sign();
         out.plausible = match sign {
-            _ if !small => Plausible::No,
             Sign::Positive if negative => Plausible::No,
+            _ if !within(FAR_BEYOND) => Plausible::No,
+            _ if !within(BEYOND) => Plausible::TooLarge,
             Sign::RatherPositive if negative => Plausible::OtherSign,
             _ => Plausible::Yes,
         };

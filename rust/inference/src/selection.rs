@@ -83,7 +83,8 @@ pub fn promising(s: &Screened) -> bool {
 /// True if a candidate is significant, of a size that sensors have, and both halves of the log and all logs agree about it, but its
 /// sign may be that of something else.
 pub fn explains(s: &Screened, adjusted: f64) -> bool {
-    significant(s, adjusted) && s.stable && s.plausible != Plausible::No && s.agreed()
+    let possible = matches!(s.plausible, Plausible::Yes | Plausible::OtherSign);
+    significant(s, adjusted) && s.stable && possible && s.agreed()
 }
 
 /// True if a candidate explains something, and has the sign that it should have.

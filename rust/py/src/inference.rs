@@ -158,7 +158,9 @@ impl PyProblem {
             item.set_item("expected_ratio", s.expected_ratio)?;
             item.set_item("testable", s.testable)?;
             item.set_item("stable", s.stable)?;
-            item.set_item("plausible", s.plausible != Plausible::No)?;
+            let possible = matches!(s.plausible, Plausible::Yes | Plausible::OtherSign);
+            item.set_item("plausible", possible)?;
+            item.set_item("too_large", s.plausible == Plausible::TooLarge)?;
             item.set_item("other_sign", s.plausible == Plausible::OtherSign)?;
             item.set_item("agreed", s.agreed())?;
             item.set_item("passed", selection::passes(s, *p))?;

@@ -1,0 +1,38 @@
+"""Effects far beyond their typical size: named if they explain everything, and not if something is left."""
+
+import numpy as np
+import pytest
+from imufit import Log, SensorModel, simulate
+
+
+def made(**size: float) -> Log:
+    effects = {"acc.scale_temperature": dict.fromkeys("xyz", 0.0) | size}
+    return simulate.simulate("handheld", effects, 4, 60.0).to_log()
+
+
+def test_a_drift_thirty_times_as_large_as_usual_is_named():
+    answer = SensorModel().fit(made(x=0.006, y=-0.006)).diagnose()
+    assert (answer.verdict, answer.best) == ("missing", "acc.scale_temperature")
+    assert (answer.candidates[0].status, answer.unexplained) == ("passed", ())
+
+
+def test_one_three_hundred_times_as_large_is_not():
+    answer = SensorModel().fit(made(x=0.06)).diagnose()
+    assert answer.best is None
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_only_looks_like_it_is_not(seed):
+    log = made(x=0.006, y=0.004)
+    table = log.to_dataframe()
+    # A product of temperature and force that turns round in the middle of the log.
+    later = table["t"] > table["t"].median()
+    rng = np.random.default_rng(seed)
+    plain = simulate.simulate("handheld", {}, 4, 60.0).to_log().to_dataframe()
+    for axis in "xyz":
+        drift = table[f"acc_{axis}"] - plain[f"acc_{axis}"]
+        table[f"acc_{axis}"] = (
+            plain[f"acc_{axis}"] + np.where(later, -drift, drift) + 1e-3 * rng.normal(size=len(table))
+        )
+    answer = SensorModel().fit(Log.from_dataframe(table, log.metadata)).diagnose()
+    assert answer.best != "acc.scale_temperature"
