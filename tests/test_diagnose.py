@@ -304,3 +304,12 @@ def test_before_expected_and_after_agree(answered):
 def test_what_cannot_be_added_is_refused_in_words(answered, effect, problem):
     with pytest.raises(InputError, match=problem):
         answered[0].add(effect)
+
+
+def test_a_residual_above_the_noise_floor_is_never_said_to_be_at_it():
+    noise = Noise(gyr=SensorNoise(8.7e-4, random_walk=8e-4))
+    fit = SensorModel().fit(simulate.simulate("handheld", {}, 1, 60.0, noise=noise).to_log())
+    answer = fit.diagnose()
+    assert (answer.verdict, answer.best) == ("adequate", None)
+    assert f"{fit.ratio:.2f} times the noise" in answer.sentence
+    assert "at its noise floor" not in answer.sentence

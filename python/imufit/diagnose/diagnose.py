@@ -104,6 +104,8 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     unshown = without_reference.untold(fit)
     if word == "adequate" and "rests" in without_reference.evidence_of(analysis):
         sentence = without_reference.adequate(fit.ratio, [candidate.effect for candidate in unshown])
+    elif word == "adequate" and fit.ratio > sentences.OFF_FLOOR:
+        sentence = sentences.above_floor(fit.ratio)
     sentence = sentences.with_disagreements(sentence, disagrees, spoilt=result["spoilt"])
     experiment = None
     if word == "ambiguous" and best is not None:

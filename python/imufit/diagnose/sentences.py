@@ -83,6 +83,18 @@ def verdict(
     return f"{text} Apart from it, {left}." if left else text
 
 
+OFF_FLOOR = 1.2
+"""Held-out error over the noise from which on a residual is no longer said to be at its noise floor."""
+
+
+def above_floor(ratio: float) -> str:
+    """Say that no effect is missing for certain, although the residual is larger than the noise."""
+    return (
+        f"No effect is missing for certain, but the residual stands at {ratio:.2f} times the noise: what is left "
+        "changes so slowly, or so seldom, that it cannot be told from zeros that wander."
+    )
+
+
 def spoilt(faults: Sequence[DataFault]) -> str:
     """Say which faults of the data have to be put right before any effect can be judged."""
     said = " ".join(fault.sentence for fault in faults)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from imufit.diagnose.sentences import OFF_FLOOR
 from imufit.errors import InputError
 from imufit.fit.rest_passes import NEEDS_REFERENCE, RestPasses
 from imufit.model.catalogue import effects
@@ -141,6 +142,3 @@ def adequate(ratio: float, refused: Sequence[str]) -> str:
     if refused:
         return f"{text}; {len(refused)} effects it cannot show at all."
     return f"{text}."
-
-
-OFF_FLOOR = 1.2
