@@ -16,10 +16,13 @@ __all__ = [
     "Evidence",
     "Facts",
     "Filter",
+    "LineDecoder",
     "PoseJudge",
     "Problem",
     "Profile",
     "Survey",
+    "WireDecoder",
+    "WireEncoder",
     "__version__",
     "allan_deviation",
     "allan_freedom",
@@ -118,6 +121,62 @@ def mpu6050_decode(
     data: NDArray[np.uint8], afs_sel: int = 0, fs_sel: int = 0, temperature: bool = True
 ) -> tuple[_Array, _Array, _Array | None, NDArray[np.bool_], NDArray[np.bool_]]: ...
 def mpu6050_facts() -> _Mpu6050: ...
+
+# --- the wire protocol: docs/wire.md
+
+class _WireAnnouncement(TypedDict):
+    name: str
+    tick: float
+    columns: list[str]
+    ranges: list[float]
+    rates: list[float]
+
+class _WireBatch(_WireAnnouncement):
+    start: int
+    stamps: NDArray[np.uint32]
+    sequence: NDArray[np.uint16]
+    lost: NDArray[np.uint32]
+    values: _Array
+
+class _LineBatch(TypedDict):
+    columns: list[str]
+    values: _Array
+    lost: NDArray[np.uint32]
+
+@final
+class WireDecoder:
+    def __new__(cls) -> WireDecoder: ...
+    def feed(self, data: bytes) -> None: ...
+    def interrupted(self) -> None: ...
+    def finish(self) -> None: ...
+    def take(self) -> list[_WireBatch]: ...
+    def take_texts(self) -> list[str]: ...
+    def announcement(self) -> _WireAnnouncement | None: ...
+    def counts(self) -> dict[str, int]: ...
+
+@final
+class LineDecoder:
+    def __new__(cls) -> LineDecoder: ...
+    def feed(self, data: bytes) -> None: ...
+    def interrupted(self) -> None: ...
+    def finish(self) -> None: ...
+    def take(self) -> list[_LineBatch]: ...
+    def take_texts(self) -> list[str]: ...
+    def counts(self) -> dict[str, int]: ...
+
+@final
+class WireEncoder:
+    def __new__(
+        cls,
+        name: str,
+        tick: int,
+        streams: Sequence[tuple[float, str, bytes | list[int], list[tuple[str, float, float, float]]]],
+        start: int,
+    ) -> WireEncoder: ...
+    def columns(self) -> list[str]: ...
+    def announce(self) -> bytes: ...
+    def text(self, text: str) -> bytes: ...
+    def samples(self, stamps: NDArray[np.uint32], values: _Array) -> tuple[bytes, NDArray[np.uint64]]: ...
 
 # --- filters
 

@@ -1,7 +1,11 @@
-//! What sensors deliver, decoded to SI units: one device a file, with its registers, ranges and filters as data.
+//! What sensors deliver, decoded to SI units: one device a file, with its registers, ranges and filters as data; and the wire
+//! protocol in which a microcontroller sends it.
 #![cfg_attr(test, allow(clippy::float_cmp))]
 
+pub mod hmc5883l;
+pub mod lines;
 pub mod mpu6050;
+pub mod wire;
 
 /// Standard gravity, m/s^2: the g of data sheets.
 pub const STANDARD_GRAVITY: f64 = 9.80665;

@@ -17,6 +17,7 @@ mod replay_arguments;
 mod rests;
 mod trials;
 mod window;
+mod wire;
 
 use pyo3::prelude::*;
 
@@ -27,6 +28,7 @@ fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     attitude::register(m)?;
     calibration::register(m)?;
     device::register(m)?;
+    wire::register(m)?;
     filters::register(m)?;
     trials::register(m)?;
     model::register(m)?;
