@@ -65,6 +65,30 @@ fn unexplained(rows: &[Regressed]) -> f64 {
     sum
 }
 
+/// What a derivative leaves of the readings may exceed the least by this factor before a wider polynomial has lost motion.
+const LOST: f64 = 1.05;
+
+/// What each width leaves unexplained of the reference's derivative; infinite for those that lose motion.
+///
+/// A derivative that is smoothed away leaves nothing unexplained, and a noisy sensor could not explain it all before. So the readings
+/// are asked as well: of the widths beyond the one that explains them best those count that explain them as well.
+fn errors(samples: &[Vec<Regressed>]) -> Vec<f64> {
+    let of_readings = |rows: &Vec<Regressed>| {
+        let turned = |(derivative, vectors, shared): &Regressed| {
+            let (readings, rest) = shared.split_at(3);
+            let columns: Vec<f64> = derivative.iter().chain(&rest[3..]).copied().collect();
+            (Vector3::from_column_slice(readings), vectors.clone(), columns)
+        };
+        unexplained(&rows.iter().map(turned).collect::<Vec<_>>())
+    };
+    let readings: Vec<f64> = samples.iter().map(of_readings).collect();
+    let known = (0..readings.len()).filter(|k| readings[*k].is_finite());
+    let best = known.min_by(|a, b| readings[*a].total_cmp(&readings[*b]));
+    let lost = |k: usize| best.is_some_and(|best| k > best && readings[k] > LOST * readings[best]);
+    let error = |(k, rows): (usize, &Vec<Regressed>)| if lost(k) { f64::INFINITY } else { unexplained(rows) };
+    samples.iter().enumerate().map(error).collect()
+}
+
 /// An axis turns if its rate stands out of the reference's noise by this factor.
 const TURNING: f64 = 2.5;
 
@@ -95,9 +119,9 @@ pub fn still_axes(widths: &Bandwidth, chosen: Smoothing) -> [bool; 3] {
 
 /// Width for the attitude of a log of `n` rows.
 pub fn of_attitude(widths: &Bandwidth, rows: &SampledRows, n: usize) -> Smoothing {
-    let error: Vec<f64> = (0..WIDTHS.len())
+    let samples: Vec<Vec<Regressed>> = (0..WIDTHS.len())
         .map(|k| {
-            let sample: Vec<_> = widths
+            widths
                 .sampled(k)
                 .filter_map(|(row, rate, _)| {
                     let (y, slope) = rows.get(&row)?.rate;
@@ -107,11 +131,10 @@ pub fn of_attitude(widths: &Bandwidth, rows: &SampledRows, n: usize) -> Smoothin
                         .all(|v| v.is_finite())
                         .then(|| (Vector3::from(rate), vec![], shared))
                 })
-                .collect();
-            unexplained(&sample)
+                .collect()
         })
         .collect();
-    widths.choose(&error, n)
+    widths.choose(&errors(&samples), n)
 }
 
 /// Width for the position, with the rates of the attitude at the width chosen for it.
@@ -127,9 +150,9 @@ pub fn of_position(
         .sampled(k)
         .map(|(row, rate, above)| (row, (Vector3::from(rate), Vector3::from(above))))
         .collect();
-    let error: Vec<f64> = (0..WIDTHS.len())
+    let samples: Vec<Vec<Regressed>> = (0..WIDTHS.len())
         .map(|k| {
-            let sample: Vec<_> = widths
+            widths
                 .sampled(k)
                 .filter_map(|(row, acceleration, _)| {
                     let (at, (omega, alpha)) = (rows.get(&row)?, rates.get(&row)?);
@@ -154,9 +177,8 @@ pub fn of_position(
                         .all(|v| v.is_finite())
                         .then_some((target, vectors, shared))
                 })
-                .collect();
-            unexplained(&sample)
+                .collect()
         })
         .collect();
-    widths.choose(&error, n)
+    widths.choose(&errors(&samples), n)
 }

@@ -1,0 +1,36 @@
+"""How far a reference is smoothed: by its own noise and motion, whatever the noise of the sensor."""
+
+import numpy as np
+import pytest
+from imufit import Log, SensorModel
+from scipy.spatial.transform import Rotation
+
+RATE = 100.0
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def bouncing(noise: float, seed: int) -> Log:
+    """A sensor that is carried by a person who walks: up and down twice a second, turning a little all the time."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, 90.0, 1.0 / RATE)
+    swing = [(0.15, 0.9, 0.0), (0.2, 0.6, 1.0), (0.8, 0.11, 2.0)]
+    angles = np.stack([a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in swing], axis=1)
+    attitude = Rotation.from_euler("xyz", angles)
+    terms = [(0, 0.01, 1.0), (1, 0.012, 2.0), (2, 0.02, 2.0), (2, 0.006, 4.0)]
+    position, acceleration = np.zeros((t.size, 3)), np.zeros((t.size, 3))
+    for axis, size, f in terms:
+        w = 2.0 * np.pi * f
+        position[:, axis] += size * np.sin(w * t + axis)
+        acceleration[:, axis] -= size * w**2 * np.sin(w * t + axis)
+    force = attitude.inv().apply(acceleration + 9.80665 * UP) + noise * rng.normal(size=(t.size, 3))
+    return Log.from_arrays(t, acc=force, reference=attitude, ref_p=position, frame="ENU")
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.4, 1.5])
+def test_a_noisy_accelerometer_does_not_smooth_the_motion_away(noise):
+    fit = SensorModel().fit(bouncing(noise, 1))
+    assert fit.ratio == pytest.approx(1.0, abs=0.03)
+    residual = fit.compare().channels
+    assert all(channel.rms == pytest.approx(noise, rel=0.05) for channel in residual)
+    answer = fit.diagnose()
+    assert (answer.verdict, answer.best) == ("adequate", None)
