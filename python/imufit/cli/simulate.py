@@ -90,7 +90,7 @@ def simulate(
     output: Path,
     json_file: Path | None,
 ) -> None:
-    """Simulate a log of SCENARIO: turntable, arm, poses, tilt, handheld, or one of a machine tool, machine_...
+    """Simulate a log of SCENARIO: turntable, arm, poses, six_sides, tilt, handheld, or one of a machine tool, machine_...
 
     What was done to it is kept sealed beside the log; `imufit reveal LOG` opens it.
     """
