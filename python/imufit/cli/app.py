@@ -18,6 +18,7 @@ from imufit.cli.compare import compare
 from imufit.cli.convert import convert
 from imufit.cli.demo import demo
 from imufit.cli.diagnose import diagnose
+from imufit.cli.emulate import emulate
 from imufit.cli.explain import explain
 from imufit.cli.export import export
 from imufit.cli.fit import fit
@@ -88,6 +89,7 @@ for _command in (
     tune,
     allan,
     convert,
+    emulate,
     demo,
 ):
     imufit.add_command(_command)

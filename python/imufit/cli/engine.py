@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from imufit.emulate import Emulator
     from imufit.grade import BlindGrade
     from imufit.log import Contents, Log
     from imufit.results import EffectCard, Ladder
@@ -307,6 +308,22 @@ def save_simulation(simulation: Simulation, path: Path) -> Path:
 
     log_of(simulation).write(path)
     return seal(simulation.truth, path)
+
+
+def emulator(
+    source: str, *, faults: Sequence[str], fault_rates: Sequence[str], clock: Mapping[str, Any], **settings: Any
+) -> Emulator:
+    """Return a device without hardware, not yet plugged in; faults and their rates as on the command line.
+
+    Raises
+    ------
+    InputError
+        It cannot be emulated; the message says why.
+    """
+    from imufit.emulate import Clock, Emulator, parse_fault_rate  # noqa: PLC0415
+
+    rates = dict(parse_fault_rate(text) for text in fault_rates)
+    return Emulator(source, faults=faults, fault_rates=rates, clock=Clock(**clock), **settings)
 
 
 def unseal(path: Path) -> Truth:

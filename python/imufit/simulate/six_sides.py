@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,7 +22,8 @@ FREELY = 24
 
 def _side(label: str) -> Array:
     """Return the body axis (3,) of a label."""
-    return np.eye(3)["xyz".index(label[1])] * (1.0 if label[0] == "+" else -1.0)
+    axis: Array = np.eye(3)["xyz".index(label[1])]
+    return axis if label[0] == "+" else -axis
 
 
 def _six_sides(plan: Plan) -> Trajectory:
@@ -44,7 +46,7 @@ def _six_sides(plan: Plan) -> Trajectory:
 
     while now < plan.duration:
         attitude = upright
-        for before, after in zip(ROUNDS, ROUNDS[1:], strict=False):
+        for before, after in pairwise(ROUNDS):
             # Turned about b x a, a is where b was.
             quarter = rotation_from_vector(0.5 * np.pi * np.cross(_side(after), _side(before)))
             attitude = attitude @ quarter
