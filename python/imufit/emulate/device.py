@@ -18,6 +18,8 @@ Stream = tuple[float, str, bytes, list[Channel]]
 
 ROOM = 25.0
 """Temperature (degC) that a device shows whose source has none: its registers always hold one."""
+GRAVITY = 9.80665
+"""What an MPU6050's g are, m/s^2."""
 LOW_PASS = 3
 """`DLPF_CFG` of an emulated MPU6050, 44 and 42 Hz: with a low-pass it samples at 1 kHz over a divider."""
 COMPASS = (0x18, 0x20, 0x00)
@@ -82,10 +84,10 @@ def _needs(source: Source, device: str, sensors: Sequence[str]) -> None:
             )
 
 
-def _range(source: Source, sensor: str, ranges: Sequence[mpu6050.FullScale]) -> int:
-    """Select the smallest range that holds the readings, or the largest."""
+def _range(source: Source, sensor: str, ranges: Sequence[mpu6050.FullScale], unit: float) -> int:
+    """Select the smallest range that holds the readings, or the largest; `unit` is that of the ranges."""
     top = max(float(np.nanmax(np.abs(values))) for values in source.groups[sensor].values())
-    fits = [index for index, one in enumerate(ranges) if HEADROOM * top <= one.range]
+    fits = [index for index, one in enumerate(ranges) if HEADROOM * top <= one.range * unit]
     return fits[0] if fits else len(ranges) - 1
 
 
@@ -97,8 +99,9 @@ def _mpu6050(source: Source) -> Device:
     temp = np.interp(source.t, source.t[there], temp[there])
     values = np.column_stack([*source.groups["acc"].values(), *source.groups["gyr"].values(), temp])
     divider = int(np.clip(round(1000.0 / source.rate) - 1, 0, 255))
-    ranges = (_range(source, "gyr", mpu6050.GYR_RANGES), _range(source, "acc", mpu6050.ACC_RANGES))
-    registers = bytes([divider, LOW_PASS, ranges[0] << 3, ranges[1] << 3])
+    gyr = _range(source, "gyr", mpu6050.GYR_RANGES, float(np.radians(1.0)))
+    acc = _range(source, "acc", mpu6050.ACC_RANGES, GRAVITY)
+    registers = bytes([divider, LOW_PASS, gyr << 3, acc << 3])
     columns = (*SENSORS["acc"], *SENSORS["gyr"], "temp")
     # Registers hold the last reading; there are none for a row without one.
     values[~np.isfinite(values).all(axis=1)] = np.nan

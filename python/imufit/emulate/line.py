@@ -17,7 +17,7 @@ from typing import Protocol
 from imufit.errors import InputError
 
 SETTLING = 0.1
-"""Time (s) that a reader of a pty gets before anything is sent: opening a serial port throws away what is there."""
+"""Time (s) that a reader gets before anything is sent: pyserial throws away what is there when it opens a port."""
 QUEUED = 0.02
 """Time (s) in which the system passes on what was written to a pty."""
 _PREFIX = "socket://"
@@ -170,6 +170,7 @@ class Socket:
         self._port = port
         self._server: socket.socket | None = None
         self._reader: socket.socket | None = None
+        self._since = 0.0
 
     @property
     def address(self) -> str:
@@ -193,7 +194,7 @@ class Socket:
         self._server = server
 
     def attached(self) -> bool:
-        """Return whether a reader is connected, and let one in if it waits."""
+        """Return whether a reader has been connected for `SETTLING`, and let one in if it waits."""
         if self._reader is not None and self._left(self._reader):
             self._reader.close()
             self._reader = None
@@ -204,7 +205,8 @@ class Socket:
                 return False
             self._reader.setblocking(False)
             self._reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return self._reader is not None
+            self._since = time.monotonic()
+        return self._reader is not None and time.monotonic() - self._since >= SETTLING
 
     @staticmethod
     def _left(reader: socket.socket) -> bool:
