@@ -74,7 +74,7 @@ class FreeTurning:
             return
         away = readings - np.array(found[0])
         length = np.linalg.norm(away, axis=1)
-        # Readings of a rotation about one axis lie on a circle: the sphere through them is any, and no direction is seen.
+        # Readings of a rotation about one axis lie on a circle, through which there are many spheres.
         fits = np.abs(length - found[1]) < 0.3 * found[1]
         nearest = np.argmax(away[fits] @ DIRECTIONS.T, axis=1)
         self._seen = frozenset(nearest.tolist())
