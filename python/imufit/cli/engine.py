@@ -42,6 +42,17 @@ def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], set
     return calibrate(list(logs), cost, sensors=sensors or ("acc", "gyr", "mag"), settings=settings)
 
 
+def calibrate_live(
+    port: str, keep: Path, mapping: Sequence[str], *, sensors: Sequence[str], **options: Any
+) -> tuple[Any, Log]:
+    """Guide through a calibration of the device at `port`; return it and the log that was kept."""
+    from imufit.calibrate import calibrate_live  # noqa: PLC0415
+    from imufit.log import parse_mapping  # noqa: PLC0415
+
+    chosen = sensors or ("acc", "gyr", "mag")
+    return calibrate_live(port, keep, mapping=parse_mapping(*mapping) or None, sensors=chosen, **options)
+
+
 def contents(log: Log) -> Contents:
     """Return what a log holds and what it lacks."""
     from imufit.log import contents  # noqa: PLC0415
