@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LARGEST_DRIFT: Final = 0.05
-"""Drift beyond which the device's seconds are taken as they are: resonators are off by 0.005, RC oscillators by 0.03."""
+"""Drift beyond which the device's seconds are taken as they are: resonators are off by 0.005, RC circuits by 0.03."""
 SHORTEST: Final = 0.5
 """Time over which a drift is fitted at least, s."""
 FEWEST: Final = 20

@@ -93,7 +93,7 @@ class LiveRows:
         self._line.close()
 
     def __iter__(self) -> Iterator[dict[str, Array]]:
-        """Give each batch as (n,) arrays by name: `t`, s from the first row, strictly increasing; columns in SI units."""
+        """Give each batch as (n,) arrays by name: `t`, s from the first row, increasing; the rest in SI units."""
         last = time.monotonic()
         over = {"duration": self._duration, "give_up": self._give_up}
         for parts in listen(self._reception, stopped=self._stopped, **over):

@@ -57,7 +57,7 @@ def time_column(columns: tuple[str, ...]) -> tuple[int, float | None] | None:
 
 
 def guessed_unit(values: Array, arrival: Array) -> float:
-    """Find the unit of a column of time that does not name it: by the host's clock, or by its step where that is too short.
+    """Find the unit of a column of time that does not name it: by the host's clock, or in a short piece by its step.
 
     Parameters
     ----------
