@@ -1,26 +1,19 @@
-"""A calibration on a running device: rows go to the wizard and into a log, and the log is calibrated."""
+"""A calibration on a running device: it is recorded while the wizard looks on, and the log is calibrated."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Final
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, Final
 
 from imufit.calibrate.calibrate import calibrate
 from imufit.calibrate.calibration import Calibration
 from imufit.calibrate.poses import SIDES
 from imufit.calibrate.wizard import Stage, Wizard
 from imufit.errors import InputError
-from imufit.log import Log, Metadata
-from imufit.log.assemble import group_fields
-from imufit.log.place import Place
-from imufit.record import LiveRows
-
-Array = NDArray[np.float64]
+from imufit.log import Log, read
+from imufit.record import LiveConverter, record
 
 PATIENCE: Final = 300.0
 """Time without anything new after which a live calibration is given up, s."""
@@ -43,16 +36,16 @@ def calibrate_live(
 ) -> tuple[Calibration, Log]:
     """Guide a person through a calibration of a running device.
 
-    The six sides are wanted, in any order, and free rotation if there is a magnetometer; then the log of everything
-    that came is calibrated as `imufit.calibrate.calibrate` does. It is written in any case, also if this is
-    interrupted or given up.
+    The six sides are wanted, in any order, and free rotation if there is a magnetometer. Everything that comes is
+    recorded as `imufit.record.record` does, and stays if this is stopped by Ctrl-C, given up or killed; the log is
+    calibrated as `imufit.calibrate.calibrate` does.
 
     Parameters
     ----------
     port : str
         Whatever pyserial opens.
     keep : Path
-        Log to be written: Parquet, CSV or NPZ.
+        Log to be written: Parquet, CSV or NPZ. It must not exist.
     baud : int
         Bits per second.
     form : {"auto", "binary", "text"}
@@ -78,57 +71,53 @@ def calibrate_live(
     Raises
     ------
     InputError
-        The port cannot be opened, it was given up, or the log does not tell a calibration; the log is kept.
+        The port cannot be opened, the log is in the way, it was stopped or given up, or the log does not tell a
+        calibration; what was recorded is kept.
     """
-    wizard = Wizard(sensors, rests, settings)
-    held: list[dict[str, Array]] = []
-    with LiveRows(port, baud=baud, form=form, header=header, mapping=mapping, idle=True) as rows:
-        try:
-            _guide(rows, wizard, held, give_up, show)
-        finally:
-            log = _log_of(held, keep, rows.name)
-            if log is not None:
-                log.write(keep)
-    if log is None:
-        raise InputError(rows.trouble or "nothing came from the device", file=port)
-    if not wizard.complete:
+    looked = _Looking(Wizard(sensors, rests, settings), LiveConverter(mapping), give_up, show)
+    record(
+        port,
+        keep,
+        baud=baud,
+        form=form,
+        header=header,
+        mapping=mapping,
+        stopped=looked.is_over,
+        watch=lambda _reception, rows, _texts: looked.see(rows),
+    )
+    if not looked.wizard.complete:
+        why = f"given up after {give_up:g} s without anything new" if looked.is_late() else "stopped"
         raise InputError(
-            f"given up after {give_up:g} s without anything new: {wizard.wanted} missing",
+            f"{why}: {looked.wizard.wanted} missing",
             remedy=f"What came is in {keep}: imufit calibrate {keep} makes of it what it can.",
         )
+    log = read(keep)
     return calibrate(log, cost, sensors=sensors, settings=settings), log
 
 
-def _guide(
-    rows: LiveRows,
-    wizard: Wizard,
-    held: list[dict[str, Array]],
-    give_up: float,
-    show: Callable[[Stage], None],
-) -> None:
-    """Feed the wizard until it is complete, or nothing new came for too long."""
-    news, since = None, time.monotonic()
-    for batch in rows:
-        if batch["t"].size:
-            held.append(batch)
-        stage = wizard.feed(batch)
-        show(stage)
+class _Looking:
+    """Feeds the wizard with what is recorded, and says when it is over."""
+
+    def __init__(self, wizard: Wizard, converter: LiveConverter, give_up: float, show: Callable[[Stage], None]) -> None:
+        self.wizard = wizard
+        self._converter, self._give_up, self._show = converter, give_up, show
+        self._news: Any = None
+        self._since = time.monotonic()
+
+    def see(self, rows: Sequence[Any]) -> None:
+        """Take rows as they arrived."""
+        for part in rows:
+            self.wizard.feed(self._converter.batch(part))
+        stage = self.wizard.stage
+        self._show(stage)
         now = (stage.done, stage.rests, stage.directions)
-        if now != news:
-            news, since = now, time.monotonic()
-        if wizard.complete or time.monotonic() - since > give_up:
-            return
+        if now != self._news:
+            self._news, self._since = now, time.monotonic()
 
+    def is_late(self) -> bool:
+        """Whether nothing new came for too long."""
+        return time.monotonic() - self._since > self._give_up
 
-def _log_of(held: Sequence[dict[str, Array]], keep: Path, name: str) -> Log | None:
-    """Make one log of all batches; None without any."""
-    if not held:
-        return None
-    columns = dict.fromkeys(column for batch in held for column in batch)
-    table = {
-        column: np.concatenate([batch.get(column, np.full(len(batch["t"]), np.nan)) for batch in held])
-        for column in columns
-    }
-    metadata = Metadata(sensor=name or None)
-    fields = group_fields(table.pop("t"), table, {}, start=0, metadata=metadata, place=Place())
-    return Log(**fields, metadata=metadata, path=keep)
+    def is_over(self) -> bool:
+        """Whether the recording is to end."""
+        return self.wizard.complete or self.is_late()

@@ -119,8 +119,6 @@ def calibrate(
 def _place_of(keep: Path | None, model: Path | None) -> Path:
     """Return where the log goes: where told, or beside the model by a name that is free."""
     if keep is not None:
-        if keep.exists():
-            raise click.UsageError(f"{str(keep)!r} exists: a recording is not written over")
         return keep
     if model is None:
         raise click.UsageError("what PORT sends has to be kept: name a model with -o, or a log with --keep")
