@@ -105,11 +105,12 @@ def turned(rng, angles, axis=None):
 
 def test_rotation_about_one_axis_is_no_free_rotation_whatever_the_hard_iron():
     rng, free, one = np.random.default_rng(0), FreeTurning(), FreeTurning()
+    iron = np.array([90.0, -40.0, 10.0])
     for field in turned(rng, 1500):
-        free.step(field + [90.0, -40.0, 10.0])
+        free.step(field + iron)
     assert free.complete
     for field in turned(rng, 1500, [0.0, 0.0, 1.0]) + rng.normal(0.0, 0.3, (1500, 3)):
-        one.step(field + [90.0, -40.0, 10.0])
+        one.step(field + iron)
     assert not one.complete
     assert one.progress < 0.7
 

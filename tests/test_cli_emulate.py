@@ -65,7 +65,7 @@ def test_ctrl_c_ends_it_with_its_summary_which_alone_stands_on_standard_output()
     with emulate("handheld", "--loop", "--wait", "--json", "-", tell="stderr") as (process, port):
         assert port.startswith("/dev/")
         with serial.serial_for_url(port, timeout=DEADLINE) as line:
-            assert line.read(100)
+            assert len(line.read(2000)) == 2000
             process.send_signal(signal.SIGINT)
             out, err = process.communicate(timeout=DEADLINE)
     assert (process.returncode, err) == (0, "")

@@ -27,7 +27,7 @@ from imufit.errors import InputError
 from imufit.log import Log
 
 PROBE = 5.0
-"""Length (s) of a scenario by which the highest rate is found."""
+"""Length (s) of a scenario by which the load of the line is judged."""
 
 
 class Emulator:
@@ -125,13 +125,16 @@ class Emulator:
         opened_at = partial(open_source, source, device=device, effects=effects, seed=seed, mapping=tuple(mapping))
         # What the line carries in a second of the device.
         carried = None if baud is None else int(baud / (hurry if np.isfinite(hurry) else 1.0))
-        if rate == "max" and carried is not None:
-            probe = DEVICES[device](opened_at(duration=PROBE))
-            rate = load_of(probe, FORMS[form](probe, ticks.tick, 0)).highest_rate(carried)
+        if carried is not None and (rate == "max" or np.isfinite(hurry)):
+            short = opened_at(rate=None if rate == "max" else rate, duration=PROBE)
+            probe = DEVICES[device](short)
+            load = load_of(probe, FORMS[form](probe, ticks.tick, 0))
+            if rate == "max":
+                rate = load.highest_rate(carried)
+            else:
+                check(load, short.rate, carried)
         opened = opened_at(rate=None if rate == "max" else rate, duration=duration)
         streams = DEVICES[device](opened)
-        if carried is not None and np.isfinite(hurry):
-            check(load_of(streams, FORMS[form](streams, ticks.tick, 0)), opened.rate, carried)
         planned = [parse_fault(fault) if isinstance(fault, str) else fault for fault in faults]
         unplugged = any(fault.kind == "unplug" for fault in planned) or (fault_rates or {}).get("unplug", 0.0) > 0.0
         if unplugged and on == "pty" and link is None:
