@@ -23,6 +23,7 @@ from imufit.cli.export import export
 from imufit.cli.fit import fit
 from imufit.cli.grade import grade
 from imufit.cli.ladder import ladder
+from imufit.cli.monitor import monitor
 from imufit.cli.names import unknown
 from imufit.cli.record import record
 from imufit.cli.recover import recover
@@ -91,6 +92,7 @@ for _command in (
     allan,
     convert,
     record,
+    monitor,
     recover,
     demo,
 ):

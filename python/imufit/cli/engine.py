@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -368,3 +368,17 @@ def recover(file: Path, path: Path | None, **options: Any) -> Recording:
     from imufit.record import recover  # noqa: PLC0415
 
     return recover(file, path, **options)
+
+
+def monitor(port: str, filters: Sequence[str], mapping: Sequence[str], model: Any, **options: Any) -> Iterator[Any]:
+    """Give states of a device until it is stopped; `mapping` as for `open_log`."""
+    from imufit.log import parse_mapping  # noqa: PLC0415
+    from imufit.monitor import Monitor  # noqa: PLC0415
+    from imufit.record.signals import requests_to_end  # noqa: PLC0415
+
+    chosen = parse_mapping(*mapping) or None
+    with (
+        requests_to_end() as ended,
+        Monitor(port, filters, model=model, mapping=chosen, stopped=ended, **options) as states,
+    ):
+        yield from states

@@ -8,8 +8,8 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs, map_option
-from imufit.cli.port import duration_option, port_argument
 from imufit.cli.output import Output
+from imufit.cli.port import duration_option, port_argument
 
 
 @click.command(short_help="From a serial device to a log that cannot be lost.")

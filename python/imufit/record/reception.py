@@ -123,22 +123,26 @@ class Reception:
     def nothing_whole(self) -> str:
         """Why nothing could be decoded so far; empty if something was."""
         frames, lines = self._frames.counts(), self._lines.counts()
-        if frames["samples"] or lines["samples"]:
-            return ""
-        if not self._bytes:
-            return "nothing came from the device"
-        if lines["unexplained"]:
-            return "rows of numbers came, but no header that names them: give one with --header t_ms,acc_x,..."
-        if frames["unexplained"]:
-            return f"{frames['unexplained']} samples came, but no announcement that says what they hold"
-        if self._frames.announcement() is not None:
-            return "the device announced itself, but sent no sample"
-        if self._doubtful and self._doubtful[-1].isascii() and self._doubtful[-1].isprintable():
-            return f"no row and no frame came, but the device says {self._doubtful[-1][:80]!r}"
-        return (
+        said = self._doubtful[-1] if self._doubtful else ""
+        reasons = {
+            "": frames["samples"] or lines["samples"],
+            "nothing came from the device": not self._bytes,
+            "rows of numbers came, but no header that names them: give one with --header t_ms,acc_x,...": lines[
+                "unexplained"
+            ],
+            f"{frames['unexplained']} samples came, but no announcement that says what they hold": frames[
+                "unexplained"
+            ],
+            "the device announced itself, but sent no sample": self._frames.announcement() is not None,
+            f"no row and no frame came, but the device says {said[:80]!r}": said.isascii()
+            and said.isprintable()
+            and said,
+        }
+        otherwise = (
             f"{self._bytes} bytes came, but no whole frame and no rows under a header: check --baud, "
             "and that the device speaks the wire protocol"
         )
+        return next((reason for reason, holds in reasons.items() if holds), otherwise)
 
 
 def listen(
