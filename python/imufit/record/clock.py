@@ -18,6 +18,10 @@ SHORTEST: Final = 0.5
 """Time over which a drift is fitted at least, s."""
 FEWEST: Final = 20
 """Reads with rows from which on a drift is fitted."""
+LONG_EDGE: Final = 0.1
+"""Share of the time of the arrivals that an edge of the hull spans at least, if they keep the device's pace."""
+PROMPT: Final = 0.02
+"""Delay up to which rows count as prompt in any case, s."""
 SAME_CLOCK: Final = 0.5
 """Difference of the offsets of two pieces up to which one clock ran on between them, s."""
 _CLOSE: Final = 0.1  # of a step: what lies between the last row of a clock and the first one of the next at least
@@ -152,10 +156,46 @@ def _rate(x: Array, late: Array, runs: Sequence[slice]) -> tuple[float, bool, bo
     if x.size < FEWEST or max(spans) < SHORTEST:
         return 1.0, False, False
     ordered = [np.argsort(x[rows], kind="stable") for rows in runs]
-    slope = common_slope([(x[rows][o], late[rows][o]) for rows, o in zip(runs, ordered, strict=True)])
-    if abs(slope) > LARGEST_DRIFT:
+    slope = drift([(x[rows][o], late[rows][o]) for rows, o in zip(runs, ordered, strict=True)])
+    if slope is None:
         return 1.0, False, max(spans) > 2.0
     return 1.0 + slope, True, False
+
+
+def drift(runs: Sequence[tuple[Array, Array]]) -> float | None:
+    """Slope of the delay over the device's time, one for all runs of its clock.
+
+    Rows that had piled up before the port was read come late by seconds, and would turn the line: what lies far above
+    the longest edge of the hulls is left out of the fit.
+
+    Parameters
+    ----------
+    runs : sequence of (x, y)
+        Device time in ascending order, and arrival less device time, s.
+
+    Returns
+    -------
+    float or None
+        None where no edge of a possible slope is long: the arrivals have another pace.
+    """
+    longest, rough = 0.0, 0.0
+    for x, y in runs:
+        corners, heights = lower_hull(x, y)
+        widths = np.diff(corners)
+        slopes = np.diff(heights) / widths
+        widths = np.where(np.abs(slopes) <= LARGEST_DRIFT, widths, 0.0)
+        if widths.size and widths.max() > longest:
+            longest, rough = float(widths.max()), float(slopes[np.argmax(widths)])
+    if longest < LONG_EDGE * max(float(np.ptp(x + y)) for x, y in runs):
+        return None
+    kept = []
+    for x, y in runs:
+        above = y - rough * x
+        above -= above.min()
+        prompt = above <= max(PROMPT, 5.0 * float(np.median(above)))
+        kept.append((x[prompt], y[prompt]))
+    slope = common_slope(kept)
+    return slope if abs(slope) <= LARGEST_DRIFT else rough
 
 
 def _runs(offsets: Array, begins: NDArray[np.intp], device: Array, start: NDArray[np.uint8], rate: float) -> list[int]:

@@ -68,7 +68,7 @@ class Journal:
         try:
             return PartFile(path)
         except OSError as error:
-            raise InputError(f"{path} cannot be written ({error.strerror or error})", file=path) from None
+            raise DiskError(f"{path} cannot be written ({error.strerror or error})", file=path) from None
 
     @property
     def paths(self) -> list[Path]:

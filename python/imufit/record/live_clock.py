@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.record.arrived import Announced, Arrived
-from imufit.record.clock import LARGEST_DRIFT, common_slope, spread_arrivals
+from imufit.record.clock import drift, spread_arrivals
 from imufit.record.ticks import Unwrapper, guessed_unit, time_column
 
 Array = NDArray[np.float64]
@@ -17,7 +17,7 @@ BIN: Final = 0.25
 """Of the arrivals in so much time the earliest is kept, s."""
 KEPT: Final = 1200
 """Arrivals kept: the drift is that of the last five minutes."""
-SLEW: Final = 0.01
+SLEW: Final = 0.001
 """Share of the time that passes by which the offset is set right, so that no step is off by more."""
 _SETTLED: Final = 2.0  # of arrivals before a drift is believed, s
 
@@ -109,8 +109,8 @@ class LiveClock:
         x, y = np.array(self._points).T
         if x[-1] - x[0] < _SETTLED or np.any(np.diff(x) <= 0.0):
             return
-        slope = common_slope([(x, y)])
-        self._alien = abs(slope) > LARGEST_DRIFT
-        rate = 1.0 if self._alien else 1.0 + slope
+        slope = drift([(x, y)])
+        self._alien = slope is None
+        rate = 1.0 + (slope or 0.0)
         self._offset += (self._rate - rate) * self._device_end
         self._rate = rate

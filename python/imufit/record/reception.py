@@ -47,6 +47,7 @@ class Reception:
         self.form: str | None = "text" if header is not None else None if form == "auto" else form
         self._opening = line.opening
         self._bytes = 0
+        self._damaged: int | None = None
         self._texts: list[str] = []
         self._doubtful: list[str] = []  # lines that are messages if the form is text
         self._frames = _imufit.WireDecoder()
@@ -74,8 +75,13 @@ class Reception:
         return self._taken(now)
 
     def finish(self) -> list[Arrived]:
-        """Nothing more is read: return samples that still wait for an announcement, if there ever was one."""
-        if self.form == "binary":
+        """Nothing more is read: return samples that still wait for an announcement, if there ever was one.
+
+        Half a frame that is left is no damage: it is this end that cuts it.
+        """
+        if self.form is not None:
+            self._damaged = self.counts["damaged"]
+        if self.form != "text":
             self._frames.finish()
         return self._taken(time.monotonic())
 
@@ -110,26 +116,33 @@ class Reception:
         """Bytes, samples, and what is ``lost``, ``damaged``, ``unknown``, ``unexplained``, ``restarts``."""
         nothing = dict.fromkeys(("samples", "lost", "damaged", "unknown", "unexplained", "restarts"), 0)
         of_form = {} if self.form is None else (self._lines if self.form == "text" else self._frames).counts()
-        return {**nothing, **of_form, "bytes": self._bytes}
+        whole = {} if self._damaged is None else {"damaged": self._damaged}
+        return {**nothing, **of_form, **whole, "bytes": self._bytes}
 
     @property
     def nothing_whole(self) -> str:
         """Why nothing could be decoded so far; empty if something was."""
         frames, lines = self._frames.counts(), self._lines.counts()
-        if frames["samples"] or lines["samples"]:
-            return ""
-        if not self._bytes:
-            return "nothing came from the device"
-        if lines["unexplained"]:
-            return "rows of numbers came, but no header that names them: give one with --header t_ms,acc_x,..."
-        if self._frames.announcement() is not None:
-            return "the device announced itself, but sent no sample"
-        if self._doubtful and self._doubtful[-1].isascii() and self._doubtful[-1].isprintable():
-            return f"no row and no frame came, but the device says {self._doubtful[-1][:80]!r}"
-        return (
+        said = self._doubtful[-1] if self._doubtful else ""
+        reasons = {
+            "": frames["samples"] or lines["samples"],
+            "nothing came from the device": not self._bytes,
+            "rows of numbers came, but no header that names them: give one with --header t_ms,acc_x,...": lines[
+                "unexplained"
+            ],
+            f"{frames['unexplained']} samples came, but no announcement that says what they hold": frames[
+                "unexplained"
+            ],
+            "the device announced itself, but sent no sample": self._frames.announcement() is not None,
+            f"no row and no frame came, but the device says {said[:80]!r}": said.isascii()
+            and said.isprintable()
+            and said,
+        }
+        otherwise = (
             f"{self._bytes} bytes came, but no whole frame and no rows under a header: check --baud, "
             "and that the device speaks the wire protocol"
         )
+        return next((reason for reason, holds in reasons.items() if holds), otherwise)
 
 
 def listen(

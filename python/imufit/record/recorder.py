@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import FrameType
 
 from imufit.errors import InputError
 from imufit.record.arrived import Arrived
@@ -17,6 +13,7 @@ from imufit.record.journal import DiskError, Journal
 from imufit.record.live_rows import check_mapping
 from imufit.record.part import part_path, read_part
 from imufit.record.reception import Reception, listen
+from imufit.record.signals import requests_to_end
 from imufit.record.transport import Line
 from imufit.results import Recording
 
@@ -85,7 +82,7 @@ def record(
     check_target(path, force)
     line = Line(port, baud)
     reception = Reception(line, form, header)
-    with _signals() as interrupted:
+    with requests_to_end() as interrupted:
         line.open()
         try:
             journal = Journal(path, reception, mapping)
@@ -200,24 +197,3 @@ def converted(
         for path in reversed(paths):
             path.unlink(missing_ok=True)
     return recording
-
-
-@contextmanager
-def _signals() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C and requests to end only set a flag: they are an ordinary end of a recording."""
-    came = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield came.is_set
-        return
-
-    def end(_number: int, _frame: FrameType | None) -> None:
-        came.set()
-
-    names = ("SIGINT", "SIGTERM", "SIGHUP")
-    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    before = {number: signal.signal(number, end) for number in numbers}
-    try:
-        yield came.is_set
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
