@@ -1,14 +1,14 @@
 """Frames and lines per second of the decoders of the wire protocol, beside Python's own means in the same run.
 
-Frames of an MPU6050 (27 bytes on the wire) that come in pieces of 4096 bytes, as a serial port delivers them. Beside them:
+Frames of an MPU6050 (27 bytes on the wire) that come in pieces of 4096 bytes, as a serial port has them. Beside it:
 
-- struct: frame by frame with `bytes.split`, `binascii.crc_hqx` (the same polynomial in C, begun with 0xFFFF) and `struct`,
-  the stuffing taken out by slices;
-- numpy: frames of one length are rows of a matrix, stuffing and check sum go through it column by column; it has all frames
-  at once and keeps no account of what is missing.
+- struct: frame by frame with `bytes.split`, `binascii.crc_hqx` (the same polynomial in C, begun with 0xFFFF) and
+  `struct`, the stuffing taken out by slices;
+- numpy: frames of one length are rows of a matrix, stuffing and check sum go through it column by column; it has all
+  frames at once and keeps no account of what is missing.
 
-Lines of ten numbers: beside `float` on the cells, Python's csv, `numpy.loadtxt` and pyarrow's reader of CSV; the last two have
-the whole text at once. All must find the same values. Ratios (ours / the other) carry over to other machines.
+Lines of ten numbers: beside `float` on the cells, Python's csv, `numpy.loadtxt` and pyarrow's reader of CSV; the last
+two have the whole text at once. All must find the same values. Ratios (ours / the other) carry over to other machines.
 Run: ``python benches/wire.py [FRAMES]``.
 """
 
@@ -159,7 +159,7 @@ def main() -> None:
     random = np.random.default_rng(1)
     encoder = _imufit.WireEncoder("bench", 1000, [(1000.0, "mpu6050", REGISTERS, [])], 1)
     stamps = np.arange(n, dtype=np.uint32) * 1000
-    values = random.normal(0, 1, (n, 7)) + [0, 0, G, 0, 0, 0, 25.0]
+    values = random.normal(np.array([0, 0, G, 0, 0, 0, 25.0]), 1, (n, 7))
     samples, _ = encoder.samples(stamps, values)
     # An announcement has another length than a sample.
     stream = encoder.announce() + samples

@@ -55,6 +55,7 @@ impl<const END: u8, const LONGEST: usize> Pieces<END, LONGEST> {
         if !self.overlong {
             self.begun.extend_from_slice(portion);
         }
+        debug_assert!(self.begun.len() <= LONGEST);
     }
 }
 
