@@ -23,7 +23,10 @@ from imufit.cli.export import export
 from imufit.cli.fit import fit
 from imufit.cli.grade import grade
 from imufit.cli.ladder import ladder
+from imufit.cli.monitor import monitor
 from imufit.cli.names import unknown
+from imufit.cli.record import record
+from imufit.cli.recover import recover
 from imufit.cli.replay import replay
 from imufit.cli.reveal import reveal
 from imufit.cli.simulate import simulate
@@ -88,6 +91,9 @@ for _command in (
     tune,
     allan,
     convert,
+    record,
+    monitor,
+    recover,
     demo,
 ):
     imufit.add_command(_command)

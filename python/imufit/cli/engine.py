@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from imufit.grade import BlindGrade
     from imufit.log import Contents, Log
-    from imufit.results import EffectCard, Ladder
+    from imufit.results import EffectCard, Ladder, Recording
     from imufit.simulate import Grade, Simulation, Truth
 
 Progress = Callable[[int, int, str], None]
@@ -345,3 +345,40 @@ def grade_blind(*, sets: Sequence[str], logs: int, seed: int, processes: int | N
     from imufit.grade import grade  # noqa: PLC0415
 
     return grade(sets, logs=logs, seed=seed, processes=processes, progress=progress)
+
+
+def status_line(mapping: Sequence[str], quiet: bool) -> Any:
+    """Return the status line of a recording; `mapping` as for `open_log`."""
+    from imufit.log import parse_mapping  # noqa: PLC0415
+    from imufit.record.status import StatusLine  # noqa: PLC0415
+
+    return StatusLine(parse_mapping(*mapping) or None, quiet)
+
+
+def record(port: str, path: Path, mapping: Sequence[str], **options: Any) -> Recording:
+    """Record a device; `mapping` as for `open_log`."""
+    from imufit.log import parse_mapping  # noqa: PLC0415
+    from imufit.record import record  # noqa: PLC0415
+
+    return record(port, path, mapping=parse_mapping(*mapping) or None, **options)
+
+
+def recover(file: Path, path: Path | None, **options: Any) -> Recording:
+    """Make a log of what a crash left."""
+    from imufit.record import recover  # noqa: PLC0415
+
+    return recover(file, path, **options)
+
+
+def monitor(port: str, filters: Sequence[str], mapping: Sequence[str], model: Any, **options: Any) -> Iterator[Any]:
+    """Give states of a device until it is stopped; `mapping` as for `open_log`."""
+    from imufit.log import parse_mapping  # noqa: PLC0415
+    from imufit.monitor import Monitor  # noqa: PLC0415
+    from imufit.record.signals import requests_to_end  # noqa: PLC0415
+
+    chosen = parse_mapping(*mapping) or None
+    with (
+        requests_to_end() as ended,
+        Monitor(port, filters, model=model, mapping=chosen, stopped=ended, **options) as states,
+    ):
+        yield from states
