@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -51,6 +52,25 @@ def parse_effect(text: str) -> tuple[str, dict[str, float] | None]:
     return effect, parameters
 
 
+def chosen_effects(texts: Sequence[str]) -> dict[str, dict[str, float] | None]:
+    """Read effects as `parse_effect`, each of them once.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        As given on the command line.
+
+    Raises
+    ------
+    click.UsageError
+        As `parse_effect`, or an effect that is named twice.
+    """
+    chosen = dict(parse_effect(text) for text in texts)
+    if len(chosen) < len(texts):
+        raise click.UsageError("--effect names one effect twice")
+    return chosen
+
+
 @click.command(short_help="A synthetic log, on request with a hidden effect.")
 @click.argument("scenario", type=Known("scenario", lambda: list(engine.scenarios())), metavar="SCENARIO")
 @click.option(
@@ -90,7 +110,7 @@ def simulate(
     output: Path,
     json_file: Path | None,
 ) -> None:
-    """Simulate a log of SCENARIO: turntable, arm, poses, tilt, handheld, or one of a machine tool, machine_...
+    """Simulate a log of SCENARIO: turntable, arm, poses, six_sides, tilt, handheld, or of a machine tool, machine_...
 
     What was done to it is kept sealed beside the log; `imufit reveal LOG` opens it.
     """
@@ -98,9 +118,7 @@ def simulate(
         raise click.UsageError("--hidden picks the effect itself: leave out --effect")
     if hidden is not None and seed is not None:
         raise click.UsageError("--hidden is the seed: leave out --seed")
-    chosen = dict(parse_effect(text) for text in effects)
-    if len(chosen) < len(effects):
-        raise click.UsageError("--effect names one effect twice")
+    chosen = chosen_effects(effects)
     given = {"duration": duration, "rate": rate, "size": size, "frame": frame}
     settings = {name: value for name, value in given.items() if value is not None}
     out = Output(json_file)
