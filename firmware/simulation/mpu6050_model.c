@@ -47,9 +47,11 @@ static struct pose pose(const struct mpu6050_model *model, double t, struct pose
     if (k == 0 || k == model->poses)
         return course[k == 0 ? 0 : k - 1];
     struct pose a = course[k - 1], b = course[k];
-    double span = b.t - a.t, part = (t - a.t) / span;
-    change->roll = (b.roll - a.roll) / span;
-    change->pitch = (b.pitch - a.pitch) / span;
+    /* Half a swing, so that it begins and ends at rest. */
+    double span = b.t - a.t, phase = M_PI * (t - a.t) / span;
+    double part = (1 - cos(phase)) / 2, speed = M_PI / 2 * sin(phase) / span;
+    change->roll = (b.roll - a.roll) * speed;
+    change->pitch = (b.pitch - a.pitch) * speed;
     return (struct pose){t, a.roll + part * (b.roll - a.roll), a.pitch + part * (b.pitch - a.pitch)};
 }
 

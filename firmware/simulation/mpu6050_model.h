@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Attitude at a time; between two it turns evenly. */
+/* Attitude at a time; it swings from one to the next. */
 struct pose {
     double t, roll, pitch; /* s, rad */
 };

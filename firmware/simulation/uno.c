@@ -1,11 +1,11 @@
 /* The Uno without hardware: its program under simavr, an MPU6050 that is tilted on its I2C bus, a pseudo terminal as its
    serial line.
 
-       uno_simulation FIRMWARE.elf [--course FILE] [--away FROM TO] [--fast]
+       uno_simulation FIRMWARE.elf [--course FILE] [--away FROM TO] [--seconds S] [--fast]
 
-   Prints the terminal's path, and runs until it is stopped: in real time, or, with --fast, as fast as it can. A full terminal
-   holds the simulation up, so that nothing is lost. FILE has a line "t roll pitch" (s, deg) for each pose; the tilt goes evenly
-   from one to the next. The sensor acknowledges nothing between FROM and TO (s), as if its wires were off, and is as after
+   Prints the terminal's path, and runs for S simulated seconds or until it is stopped: in real time, or, with --fast, as fast
+   as it can. A full terminal holds it up, so that nothing is lost. FILE has a line "t roll pitch"
+   (s, deg) for each pose; the tilt swings from one to the next. The sensor acknowledges nothing between FROM and TO (s), as if its wires were off, and is as after
    power-up when it comes back. */
 #include <avr_twi.h>
 #include <avr_uart.h>
@@ -18,6 +18,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
@@ -45,9 +46,11 @@ struct simulation {
     struct mpu6050_model model;
     struct pose poses[POSES];
     double away_from, away_to;
+    double until;
     bool selected;
     bool addressed; /* an address to write to was the last thing on the bus */
-    int terminal;
+    int terminal; /* this end */
+    int other;    /* the reader's end, held open so that a reader may come and go */
 };
 
 static void give_up(const char *what)
@@ -148,13 +151,12 @@ static void open_terminal(struct simulation *s)
     if (s->terminal < 0 || grantpt(s->terminal) || unlockpt(s->terminal))
         give_up("no pseudo terminal");
     const char *path = ptsname(s->terminal);
-    /* Held open, so that a reader may come and go. */
-    int other = open(path, O_RDWR | O_NOCTTY);
+    s->other = open(path, O_RDWR | O_NOCTTY);
     struct termios settings;
-    if (other < 0 || tcgetattr(other, &settings))
+    if (s->other < 0 || tcgetattr(s->other, &settings))
         give_up("the pseudo terminal does not open");
     cfmakeraw(&settings);
-    tcsetattr(other, TCSANOW, &settings);
+    tcsetattr(s->other, TCSANOW, &settings);
     printf("%s\n", path);
     fflush(stdout);
 }
@@ -171,6 +173,14 @@ static void read_course(struct simulation *s, const char *name)
     fclose(file);
     if (s->model.poses == 0)
         give_up("the course has no pose");
+}
+
+/* Bytes that nobody has read yet. */
+static int unread(const struct simulation *s)
+{
+    int n = 0;
+    ioctl(s->other, FIONREAD, &n);
+    return n;
 }
 
 static double clock_now(void)
@@ -192,7 +202,7 @@ static void pace(const struct simulation *s, double *begin)
 
 int main(int count, char **arguments)
 {
-    static struct simulation s = {.model = {.poses = 1}, .away_from = INFINITY};
+    static struct simulation s = {.model = {.poses = 1}, .away_from = INFINITY, .until = INFINITY};
     bool fast = false;
     s.model.course = s.poses;
     if (count < 2)
@@ -205,8 +215,10 @@ int main(int count, char **arguments)
         } else if (!strcmp(arguments[k], "--away") && k + 2 < count) {
             s.away_from = atof(arguments[++k]);
             s.away_to = atof(arguments[++k]);
+        } else if (!strcmp(arguments[k], "--seconds") && k + 1 < count) {
+            s.until = atof(arguments[++k]);
         } else {
-            give_up("the options are --course FILE, --away FROM TO and --fast");
+            give_up("the options are --course FILE, --away FROM TO, --seconds S and --fast");
         }
     }
     avr_global_logger_set(log_line);
@@ -230,7 +242,7 @@ int main(int count, char **arguments)
     open_terminal(&s);
 
     double begin = clock_now();
-    for (avr_cycle_count_t next = 0;;) {
+    for (avr_cycle_count_t next = 0; now(&s) < s.until;) {
         int state = avr_run(s.avr);
         if (state == cpu_Done || state == cpu_Crashed)
             give_up("the processor has stopped");
@@ -239,4 +251,8 @@ int main(int count, char **arguments)
             next = s.avr->cycle + CLOCK / 1000;
         }
     }
+    /* What is unread is lost when this end is closed. */
+    while (unread(&s) > 0)
+        usleep(1000);
+    return 0;
 }
