@@ -4,7 +4,7 @@
        uno_simulation FIRMWARE.elf [--course FILE] [--away FROM TO] [--seconds S] [--fast]
 
    Prints the terminal's path, and runs for S simulated seconds or until it is stopped: in real time, or, with --fast, as fast
-   as it can. A full terminal holds it up, so that nothing is lost. FILE has a line "t roll pitch"
+   as it can. It begins when the terminal is opened; a full one holds it up, so that a slow reader loses nothing. FILE has a line "t roll pitch"
    (s, deg) for each pose; the tilt swings from one to the next. The sensor acknowledges nothing between FROM and TO (s), as if its wires were off, and is as after
    power-up when it comes back. */
 #include <avr_twi.h>
@@ -12,6 +12,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <poll.h>
 #include <sim_avr.h>
 #include <sim_elf.h>
 #include <stdarg.h>
@@ -38,6 +39,7 @@ enum {
 };
 #define POSES 1000
 #define CLOCK 16000000 /* Hz */
+#define PATIENCE 1000  /* hundredths of a second for a reader to read the rest */
 #define LATE 0.05      /* s of real time behind which it does not try to catch up */
 
 struct simulation {
@@ -49,8 +51,8 @@ struct simulation {
     double until;
     bool selected;
     bool addressed; /* an address to write to was the last thing on the bus */
-    int terminal; /* this end */
-    int other;    /* the reader's end, held open so that a reader may come and go */
+    int terminal;
+    char path[64]; /* of the reader's end */
 };
 
 static void give_up(const char *what)
@@ -134,12 +136,21 @@ static void mend_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void 
         avr->data[address] &= (uint8_t)~DONE;
 }
 
-/* The serial line sends a byte. */
+/* A hang-up means that nobody has the terminal open. */
+static bool has_reader(const struct simulation *s)
+{
+    struct pollfd state = {.fd = s->terminal};
+    return poll(&state, 1, 0) == 0 || !(state.revents & POLLHUP);
+}
+
+/* The serial line sends a byte: to nobody, if nobody listens. */
 static void line_says(struct avr_irq_t *irq, uint32_t value, void *parameter)
 {
     (void)irq;
     const struct simulation *s = parameter;
     uint8_t byte = (uint8_t)value;
+    if (!has_reader(s))
+        return;
     while (write(s->terminal, &byte, 1) != 1)
         if (errno != EINTR)
             give_up("the terminal is closed");
@@ -150,15 +161,29 @@ static void open_terminal(struct simulation *s)
     s->terminal = posix_openpt(O_RDWR | O_NOCTTY);
     if (s->terminal < 0 || grantpt(s->terminal) || unlockpt(s->terminal))
         give_up("no pseudo terminal");
-    const char *path = ptsname(s->terminal);
-    s->other = open(path, O_RDWR | O_NOCTTY);
+    /* The settings are the reader's end's: bytes as they are. */
     struct termios settings;
-    if (s->other < 0 || tcgetattr(s->other, &settings))
+    if (ptsname_r(s->terminal, s->path, sizeof s->path) || tcgetattr(s->terminal, &settings))
         give_up("the pseudo terminal does not open");
     cfmakeraw(&settings);
-    tcsetattr(s->other, TCSANOW, &settings);
-    printf("%s\n", path);
+    tcsetattr(s->terminal, TCSANOW, &settings);
+    /* Until it has been opened and closed it does not tell that nobody has it open. */
+    close(open(s->path, O_RDWR | O_NOCTTY));
+    printf("%s\n", s->path);
     fflush(stdout);
+}
+
+/* What is unread is lost when this end is closed. */
+static void wait_until_read(const struct simulation *s)
+{
+    int other = has_reader(s) ? open(s->path, O_RDWR | O_NOCTTY) : -1;
+    /* It stands in two buffers, of which one is asked: twice, so that the other had time to pass its bytes on. */
+    for (int k = 0, idle = 0; other >= 0 && k < PATIENCE && idle < 2; k++) {
+        int n = 0;
+        usleep(10000);
+        ioctl(other, FIONREAD, &n);
+        idle = n ? 0 : idle + 1;
+    }
 }
 
 static void read_course(struct simulation *s, const char *name)
@@ -173,14 +198,6 @@ static void read_course(struct simulation *s, const char *name)
     fclose(file);
     if (s->model.poses == 0)
         give_up("the course has no pose");
-}
-
-/* Bytes that nobody has read yet. */
-static int unread(const struct simulation *s)
-{
-    int n = 0;
-    ioctl(s->other, FIONREAD, &n);
-    return n;
 }
 
 static double clock_now(void)
@@ -241,6 +258,8 @@ int main(int count, char **arguments)
     avr_irq_register_notify(avr_io_getirq(s.avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), line_says, &s);
     open_terminal(&s);
 
+    while (!has_reader(&s))
+        usleep(1000);
     double begin = clock_now();
     for (avr_cycle_count_t next = 0; now(&s) < s.until;) {
         int state = avr_run(s.avr);
@@ -251,8 +270,6 @@ int main(int count, char **arguments)
             next = s.avr->cycle + CLOCK / 1000;
         }
     }
-    /* What is unread is lost when this end is closed. */
-    while (unread(&s) > 0)
-        usleep(1000);
+    wait_until_read(&s);
     return 0;
 }
