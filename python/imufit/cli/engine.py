@@ -375,12 +375,12 @@ def grade_blind(*, sets: Sequence[str], logs: int, seed: int, processes: int | N
     return grade(sets, logs=logs, seed=seed, processes=processes, progress=progress)
 
 
-def status_line(mapping: Sequence[str], quiet: bool) -> Any:
+def status_line(mapping: Sequence[str], quiet: bool, **options: Any) -> Any:
     """Return the status line of a recording; `mapping` as for `open_log`."""
     from imufit.log import parse_mapping  # noqa: PLC0415
     from imufit.record.status import StatusLine  # noqa: PLC0415
 
-    return StatusLine(parse_mapping(*mapping) or None, quiet)
+    return StatusLine(parse_mapping(*mapping) or None, quiet, **options)
 
 
 def record(port: str, path: Path, mapping: Sequence[str], **options: Any) -> Recording:

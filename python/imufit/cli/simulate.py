@@ -9,11 +9,10 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option
-from imufit.cli.names import Known, unknown
+from imufit.cli.names import FRAMES, Known, unknown
 from imufit.cli.output import Output
 
 SIZES = ("large", "medium", "small")
-FRAMES = ("NED", "ENU", "NWU")
 
 
 def parse_effect(text: str) -> tuple[str, dict[str, float] | None]:
