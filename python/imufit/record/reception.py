@@ -12,7 +12,7 @@ from imufit.errors import InputError
 from imufit.record.arrived import FORMS, Arrived, of_frames, of_lines
 from imufit.record.transport import Line
 
-PAUSE: Final = (0.004, 0.007)
+PAUSE: Final = (0.006, 0.012)
 """Shortest and longest wait between two reads, s: irregular, so that no rate of a device falls in step with it."""
 
 _DOUBTFUL: Final = 50
