@@ -136,6 +136,7 @@ class _WireBatch(_WireAnnouncement):
     stamps: NDArray[np.uint32]
     sequence: NDArray[np.uint16]
     lost: NDArray[np.uint32]
+    feed: NDArray[np.uint64]
     values: _Array
 
 class _LineBatch(TypedDict):

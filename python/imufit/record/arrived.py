@@ -91,8 +91,8 @@ class Arrived:
         return cls(parts[0].announced, *(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
-def of_frames(batch: Any, arrival: float, opening: int) -> Arrived:
-    """Rows of a batch of frames, as `WireDecoder.take` gives them."""
+def of_frames(batch: Any, arrival: Array, opening: NDArray[np.uint32]) -> Arrived:
+    """Rows of a batch of frames, as `WireDecoder.take` gives them, with what is known of when each came."""
     announced = Announced(
         "binary",
         batch["name"],
@@ -104,8 +104,8 @@ def of_frames(batch: Any, arrival: float, opening: int) -> Arrived:
     n = len(batch["stamps"])
     return Arrived(
         announced,
-        np.full(n, arrival),
-        np.full(n, opening, np.uint32),
+        arrival,
+        opening,
         np.full(n, batch["start"], np.uint8),
         batch["stamps"],
         batch["sequence"],

@@ -5,7 +5,9 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable, Iterator
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
 
 from imufit import _imufit
 from imufit.errors import InputError
@@ -51,6 +53,9 @@ class Reception:
         self._texts: list[str] = []
         self._doubtful: list[str] = []  # lines that are messages if the form is text
         self._frames = _imufit.WireDecoder()
+        # of each call of feed from the first that may still wait for its announcement: number, arrival, opening
+        self._feeds: list[tuple[float, int]] = []
+        self._first_feed = 1
         self._lines = _imufit.LineDecoder()
         if header is not None:
             self._lines.feed(header.encode() + b"\n")
@@ -70,6 +75,7 @@ class Reception:
         self._bytes += len(data)
         if self.form != "text":
             self._frames.feed(data)
+            self._feeds.append((now, self._opening))
         if self.form != "binary":
             self._lines.feed(data)
         return self._taken(now)
@@ -88,7 +94,7 @@ class Reception:
     def _taken(self, now: float) -> list[Arrived]:
         rows: list[Arrived] = []
         if self.form != "text":
-            rows = [of_frames(batch, now, self._opening) for batch in self._frames.take()]
+            rows = [self._of_frames(batch) for batch in self._frames.take()]
             texts = self._frames.take_texts()
             if self.form is None and (rows or texts or self._frames.announcement() is not None):
                 self.form = "binary"
@@ -105,6 +111,18 @@ class Reception:
             else:
                 self._doubtful = (self._doubtful + texts)[-_DOUBTFUL:]
         return [part for part in rows if part.n]
+
+    def _of_frames(self, batch: Any) -> Arrived:
+        """Rows of a batch, each with when it came: before an announcement explained it, perhaps on another opening."""
+        if not batch["feed"].size:
+            return of_frames(batch, np.empty(0), np.empty(0, np.uint32))
+        place = (batch["feed"] - np.uint64(self._first_feed)).astype(np.intp)
+        arrival, opening = np.array(self._feeds[: int(place[-1]) + 1]).T
+        rows = of_frames(batch, arrival[place], opening[place].astype(np.uint32))
+        # Rows come in order: nothing before the last one is asked for again.
+        del self._feeds[: int(place[-1])]
+        self._first_feed += int(place[-1])
+        return rows
 
     def take_texts(self) -> list[str]:
         """Messages of the device since this was last asked."""

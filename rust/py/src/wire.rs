@@ -82,7 +82,8 @@ struct PyWireDecoder(decoder::Decoder);
 
 decoder_class!(PyWireDecoder {
     /// Samples since this was last asked: for each start of the device and each announcement a dictionary with what was announced,
-    /// `start`, and arrays `stamps` (n,) ticks, `sequence` (n,), `lost` (n,) frames missing before each, `values` (n, columns) SI units.
+    /// `start`, and arrays `stamps` (n,) ticks, `sequence` (n,), `lost` (n,) frames missing before each, `feed` (n,) the call of feed,
+    /// from 1, that brought each, and `values` (n, columns) SI units.
     fn take<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let out = PyList::empty(py);
         for batch in self.0.take() {
@@ -91,6 +92,7 @@ decoder_class!(PyWireDecoder {
             item.set_item("start", batch.start)?;
             item.set_item("stamps", PyArray1::from_vec(py, batch.stamps))?;
             item.set_item("sequence", PyArray1::from_vec(py, batch.sequence))?;
+            item.set_item("feed", PyArray1::from_vec(py, batch.feed))?;
             let columns = batch.announcement.columns().len();
             add_rows(&item, batch.values, columns, batch.lost)?;
             out.append(item)?;

@@ -23,6 +23,8 @@ pub struct Batch {
     pub sequence: Vec<u16>,
     /// Frames missing before each, modulo 2^16.
     pub lost: Vec<u32>,
+    /// Number of the call of `feed`, from 1, that brought the end of each: it may have waited for its announcement since.
+    pub feed: Vec<u64>,
     /// Values, SI units, sample by sample.
     pub values: Vec<f64>,
 }
@@ -66,12 +68,15 @@ struct Waiting {
     start: u8,
     sequence: u16,
     lost: u32,
+    feed: u64,
     payload: Vec<u8>,
 }
 
 /// Decoder of a stream of bytes that may begin, break off and go on anywhere.
 #[derive(Default)]
 pub struct Decoder {
+    /// Calls of `feed`.
+    feeds: u64,
     pieces: Pieces<0, LONGEST>,
     /// A frame without its stuffing.
     body: Vec<u8>,
@@ -90,6 +95,7 @@ pub struct Decoder {
 impl Decoder {
     /// Takes some bytes.
     pub fn feed(&mut self, bytes: &[u8]) {
+        self.feeds += 1;
         self.counts.bytes += bytes.len() as u64;
         let mut pieces = std::mem::take(&mut self.pieces);
         pieces.feed(bytes, |piece| self.piece(piece));
@@ -202,7 +208,8 @@ impl Decoder {
             && *start == frame.start
         {
             let announcement = announcement.clone();
-            self.read(&announcement, frame.start, frame.sequence, lost, frame.payload);
+            let now = (frame.sequence, lost, self.feeds);
+            self.read(&announcement, frame.start, now, frame.payload);
             return;
         }
         if self.waiting.len() == KEPT {
@@ -213,17 +220,25 @@ impl Decoder {
             start: frame.start,
             sequence: frame.sequence,
             lost,
+            feed: self.feeds,
             payload: frame.payload.to_vec(),
         });
     }
 
     fn read_waiting(&mut self, announcement: &Arc<Announcement>) {
         while let Some(w) = self.waiting.pop_front() {
-            self.read(announcement, w.start, w.sequence, w.lost, &w.payload);
+            self.read(announcement, w.start, (w.sequence, w.lost, w.feed), &w.payload);
         }
     }
 
-    fn read(&mut self, announcement: &Arc<Announcement>, start: u8, sequence: u16, lost: u32, payload: &[u8]) {
+    /// Reads a sample that came as that number, after so many lost ones, with that call of `feed`.
+    fn read(
+        &mut self,
+        announcement: &Arc<Announcement>,
+        start: u8,
+        (sequence, lost, feed): (u16, u32, u64),
+        payload: &[u8],
+    ) {
         let same = |b: &Batch| b.start == start && Arc::ptr_eq(&b.announcement, announcement);
         if !self.batches.last().is_some_and(same) {
             self.batches.push(Batch {
@@ -232,6 +247,7 @@ impl Decoder {
                 stamps: Vec::new(),
                 sequence: Vec::new(),
                 lost: Vec::new(),
+                feed: Vec::new(),
                 values: Vec::new(),
             });
         }
@@ -240,6 +256,7 @@ impl Decoder {
             batch.stamps.push(stamp);
             batch.sequence.push(sequence);
             batch.lost.push(lost);
+            batch.feed.push(feed);
             self.counts.samples += 1;
         } else {
             self.counts.unknown += 1;
@@ -319,8 +336,11 @@ mod tests {
         let mut decoder = Decoder::default();
         decoder.feed(&early);
         assert!(decoder.take().is_empty());
+        decoder.feed(&samples(&mut encoder, 5..6).concat());
         decoder.feed(&encoder.announce());
-        assert_eq!(stamps(&mut decoder), [0, 1000, 2000, 3000, 4000]);
+        let batches = decoder.take();
+        assert_eq!(batches[0].stamps, [0, 1000, 2000, 3000, 4000, 5000]);
+        assert_eq!(batches[0].feed, [1, 1, 1, 1, 1, 2]);
     }
 
     #[test]
