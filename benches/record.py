@@ -59,7 +59,8 @@ def run(duration: float, device: list[str], folder: Path) -> dict[str, object]:
         "sent": len(whole),
         "unread": len(table) - len(whole),
         "lost": lost,
-        "gaps": len(recording["gaps"]),
+        # but for the end, where the device is gone
+        "gaps": len(recording["gaps"]) - (recording["ended"] == "line lost"),
         "off": [float(np.median(off)), float(np.quantile(off, 0.999)), float(off.max())],
         "drift": recording["clock"]["drift_ppm"],
         "recording": recording["cpu_share"],
@@ -73,7 +74,9 @@ def main() -> None:
     parser.add_argument("--duration", type=float, help="Length of each run, s.")
     chosen = parser.parse_args().duration
     print(f"{'device':<24}{'s':>6}{'Hz':>7}{'sent':>10}{'lost':>6}{'gaps':>6}", end="")
-    print(f"{'off by, ms: median':>20}{'99.9 %':>9}{'largest':>9}{'drift ppm':>11}{'CPU recording':>15}{'all of it':>11}")
+    print(
+        f"{'off by, ms: median':>20}{'99.9 %':>9}{'largest':>9}{'drift ppm':>11}{'CPU recording':>15}{'all of it':>11}"
+    )
     for name, length, device in DEVICES:
         duration = chosen or length
         with tempfile.TemporaryDirectory() as folder:

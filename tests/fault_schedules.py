@@ -1,6 +1,6 @@
 """A device, a line and a disk on which everything goes wrong when told, in a time of their own.
 
-`Device` makes the bytes and knows of each frame where it stands among them. `World` plays them to `imufit.record.record`
+`Device` makes the bytes and knows where each frame stands among them. `World` plays them to `imufit.record.record`
 through the real transport, and notes what was read. What ought to be in a log follows from the bytes alone: a frame
 counts if all of it was read, unaltered, from a place where a frame can begin.
 """
@@ -16,7 +16,7 @@ import numpy as np
 import serial
 from imufit import InputError, _imufit, read
 from imufit.log import Log
-from imufit.record import finish, journal, part, reception, record, recorder, recover, transport
+from imufit.record import journal, part, reception, record, recorder, recover, transport
 
 STEP = 0.01
 """Time between two samples, s."""
@@ -118,7 +118,8 @@ class Taken:
     ended: str = ""
     reads: list[tuple[float, int]] = field(default_factory=list)
     opened: list[int] = field(default_factory=list)
-    sizes: list[int] = field(default_factory=list)
+    writes: list[tuple[float, int]] = field(default_factory=list)
+    ended_at: float = 0.0
 
 
 class Disk:
@@ -154,6 +155,10 @@ class World:
         return self.now
 
     def sleep(self, seconds):
+        """Between two reads: what was written since the last one is noted."""
+        path = part.part_path(self.log)
+        if path.exists() and (not self.taken.writes or self.taken.writes[-1][1] != path.stat().st_size):
+            self.taken.writes.append((self.now, path.stat().st_size))
         due = self.device.events[self.place].at if self.place < len(self.device.events) else self.now
         self.now += max(seconds, min(due - self.now, 0.03))
 
@@ -177,9 +182,6 @@ class World:
 
     def read(self, most):
         """What pyserial's read gives: bytes that have come, or an error."""
-        path = part.part_path(self.log)
-        if path.exists() and (not self.taken.sizes or self.taken.sizes[-1] != path.stat().st_size):
-            self.taken.sizes.append(path.stat().st_size)
         data = self._follow(most)
         self.taken.end = self.offset
         if data:
@@ -240,6 +242,7 @@ class World:
         except InputError as error:
             said = str(error)
             self.taken.ended = "full" if self.disk.room is not None else "nothing"
+        self.taken.ended_at = self.now
         self.disk.room = None
         self.log_fails = False
         return self.taken, said
@@ -341,16 +344,15 @@ def check(device, world, taken, said):
     frames = intact(device, taken)
     log = world.log
     if taken.ended == "killed":
-        late = _cut(world, taken)
-        _recovered(device, world, taken, late)
+        _recovered(device, world, taken, _cut(world, taken))
     elif taken.ended == "full":
         if not log.exists() and part.parts_of(log):
             assert "imufit recover" in said, said
-            _recovered(device, world, taken, journal.EVERY)
+            _recovered(device, world, taken, taken.ended_at)
         elif log.exists():
-            _compared(device, taken, read(log), journal.EVERY)
+            _compared(device, taken, read(log), taken.ended_at)
         else:
-            assert not _early(taken, frames, journal.EVERY), said
+            assert not _early(taken, frames, taken.ended_at), said
     elif taken.ended == "nothing":
         assert not all_explained(frames), said
         assert not log.exists()
@@ -363,39 +365,37 @@ def check(device, world, taken, said):
 
 
 def _cut(world, taken):
-    """Leave of the last write what a process had written that was killed in it; return how old rows may be."""
+    """Return when the recorder was killed: now, or within its last write, of which only some is left then."""
     path = part.part_path(world.log)
-    size = path.stat().st_size
-    if len(taken.sizes) < 2 or world.rng.random() < 0.5:
-        return journal.EVERY
-    before = taken.sizes[-2] if taken.sizes[-1] == size else taken.sizes[-1]
-    os.truncate(path, world.rng.randint(before, size - 1))
-    return 2.0 * journal.EVERY
+    sizes = [size for _, size in taken.writes]
+    if len(sizes) < 2 or world.rng.random() < 0.5 or path.stat().st_size != sizes[-1]:
+        return taken.ended_at
+    os.truncate(path, world.rng.randint(sizes[-2], sizes[-1] - 1))
+    return taken.writes[-1][0]
 
 
-def _early(taken, frames, late):
-    """Numbers that were read, and explained, so long ago that they must have been written."""
-    end = taken.reads[-1][0] if taken.reads else 0.0
-    old = max((offset for t, offset in taken.reads if t < end - late - 0.05), default=taken.begin)
+def _early(taken, frames, ended_at):
+    """Numbers that were read, and explained, so long before the end that they must have been written."""
+    old = max((offset for t, offset in taken.reads if t < ended_at - journal.EVERY - 0.05), default=taken.begin)
     return explained([frame for frame in frames if frame.end <= old])
 
 
-def _recovered(device, world, taken, late):
+def _recovered(device, world, taken, ended_at):
     try:
         recover(part.part_path(world.log))
     except InputError:
-        assert not _early(taken, intact(device, taken), late)
+        assert not _early(taken, intact(device, taken), ended_at)
         for path in part.parts_of(world.log):
             path.unlink()
         return
-    _compared(device, taken, read(world.log), late)
+    _compared(device, taken, read(world.log), ended_at)
 
 
-def _compared(device, taken, log, late):
+def _compared(device, taken, log, ended_at):
     """What was written is the beginning of what was read, all but the last moment of it."""
     frames = intact(device, taken)
     numbers = log.covariates["number"].astype(int).tolist()
     assert numbers == all_explained(frames)[: len(numbers)]
-    early = _early(taken, frames, late)
+    early = _early(taken, frames, ended_at)
     assert len(numbers) >= len(early), (len(numbers), len(early))
     check_gaps(device, taken, log)

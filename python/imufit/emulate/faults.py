@@ -85,9 +85,10 @@ def _garbage(pieces: list[Piece], fault: Fault, rng: np.random.Generator) -> lis
 
 
 def _parted(piece: Piece, noise: Piece, rng: np.random.Generator) -> list[Piece]:
-    if piece.row is None or len(piece.data) < 2:
+    if piece.row is None or len(piece.data) < 4:
         return [piece]
-    at = int(rng.integers(1, len(piece.data)))
+    # Not right before its end: an end among the random bytes would leave it whole.
+    at = int(rng.integers(1, len(piece.data) - 2))
     return [Piece(piece.data[:at], piece.row, False), noise, Piece(piece.data[at:], piece.row, False)]
 
 
