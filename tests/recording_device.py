@@ -4,6 +4,7 @@ import contextlib
 import os
 import select
 import socket
+import time
 import tty
 
 import numpy as np
@@ -56,10 +57,12 @@ class Pty:
         self.port = os.ttyname(theirs)
         self._theirs = theirs
 
-    def send(self, data):
-        while data:
-            _, ready, _ = select.select([], [self._ours], [], 5.0)
-            assert ready, "nobody reads"
+    def send(self, data, unless=lambda: False):
+        """Send all of it, unless that has become needless."""
+        end = time.monotonic() + 20.0
+        while data and not unless():
+            _, ready, _ = select.select([], [self._ours], [], 0.1)
+            assert ready or time.monotonic() < end, "nobody reads"
             with contextlib.suppress(BlockingIOError):
                 data = data[os.write(self._ours, data) :]
 
