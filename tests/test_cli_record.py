@@ -101,6 +101,7 @@ def test_ctrl_c_is_an_ordinary_end(pty, tmp_path, number):
     code, out, err = process.end(number)
     assert (code, err) == (0, "")
     told = json.loads(out)
+    # all that had arrived by then
     assert (told["n"], told["ended"], told["file"]) == (50, "stopped", str(log))
     assert {"lost", "damaged", "gaps", "clock", "cpu_share", "rate_hz", "duration_s"} <= told.keys()
     assert imufit.read(log).n == 50
