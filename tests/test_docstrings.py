@@ -20,6 +20,7 @@ PARTS = (
     "results",
     "report",
     "export",
+    "emulate",
     "allan",
     "tune",
 )

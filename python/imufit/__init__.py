@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from imufit import calibrate as calibrate
     from imufit import device as device
     from imufit import diagnose as diagnose
+    from imufit import emulate as emulate
     from imufit import errors as errors
     from imufit import export as export
     from imufit import faults as faults
@@ -41,6 +42,7 @@ else:
         "calibrate",
         "device",
         "diagnose",
+        "emulate",
         "errors",
         "export",
         "faults",

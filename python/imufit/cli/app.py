@@ -18,6 +18,7 @@ from imufit.cli.compare import compare
 from imufit.cli.convert import convert
 from imufit.cli.demo import demo
 from imufit.cli.diagnose import diagnose
+from imufit.cli.emulate import emulate
 from imufit.cli.explain import explain
 from imufit.cli.export import export
 from imufit.cli.fit import fit
@@ -94,6 +95,7 @@ for _command in (
     record,
     monitor,
     recover,
+    emulate,
     demo,
 ):
     imufit.add_command(_command)

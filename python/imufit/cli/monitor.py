@@ -13,7 +13,7 @@ from imufit.cli import engine
 from imufit.cli.arguments import EXISTING, effects_from_option, json_option, keep_inputs, map_option
 from imufit.cli.names import FILTERS, KnownList
 from imufit.cli.output import Output
-from imufit.cli.port import duration_option, port_argument
+from imufit.cli.port import duration_option, frame_option, port_argument
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     "--model", "model_file", type=EXISTING, metavar="MODEL", help="Take its effects out of the readings first."
 )
 @effects_from_option
+@frame_option
 @duration_option
 @click.option("--plain", is_flag=True, help="Lines of numbers instead of a table; so it is where there is no terminal.")
 @click.option(
@@ -56,6 +57,7 @@ def monitor(
     mapping: tuple[str, ...],
     filters: tuple[tuple[str, ...], ...],
     model_file: Path | None,
+    frame: str,
     duration: float | None,
     give_up: float | None,
     plain: bool,
@@ -74,6 +76,7 @@ def monitor(
         baud=baud,
         form=form,
         header=header,
+        frame=frame,
         duration=duration,
         give_up=give_up,
         every=1.0 / updates,

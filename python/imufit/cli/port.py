@@ -7,6 +7,16 @@ from typing import Any, TypeVar
 
 import click
 
+from imufit.cli.names import FRAMES, Known
+
+frame_option = click.option(
+    "--frame",
+    type=Known("frame", lambda: FRAMES),
+    metavar="|".join(FRAMES),
+    default="NED",
+    show_default=True,
+    help="Reference frame of the attitude: for a sensor that lies z up, NWU or ENU.",
+)
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 

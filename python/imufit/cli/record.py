@@ -9,13 +9,14 @@ import click
 from imufit.cli import engine
 from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs, map_option
 from imufit.cli.output import Output
-from imufit.cli.port import duration_option, port_argument
+from imufit.cli.port import duration_option, frame_option, port_argument
 
 
 @click.command(short_help="From a serial device to a log that cannot be lost.")
 @port_argument
 @map_option
 @click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
+@frame_option
 @duration_option
 @click.option("--force", is_flag=True, help="Overwrite LOG if it is there already.")
 @click.option("--quiet", is_flag=True, help="No status line and no messages of the device.")
@@ -28,6 +29,7 @@ def record(
     header: str | None,
     mapping: tuple[str, ...],
     output: Path,
+    frame: str,
     duration: float | None,
     give_up: float | None,
     force: bool,
@@ -41,7 +43,7 @@ def record(
     """
     keep_inputs([], [output, json_file])
     out = Output(json_file)
-    with engine.status_line(mapping, quiet) as status:
+    with engine.status_line(mapping, quiet, frame=frame) as status:
         result = engine.record(
             port,
             output,
@@ -49,6 +51,7 @@ def record(
             baud=baud,
             form=form,
             header=header,
+            frame=frame,
             duration=duration,
             give_up=give_up,
             force=force,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from imufit.log.metadata import Frame
 from imufit.monitor.correction import LiveCorrection
 from imufit.record.attitude import LiveAttitude
 from imufit.record.live_rows import LiveRows
@@ -90,6 +91,8 @@ class Monitor:
         complementary and kalman without one.
     model : SensorModel, optional
         Its effects are taken out of the readings first.
+    frame : {"NED", "ENU", "NWU"}
+        Reference frame of the angles: for a sensor that lies z up, NWU or ENU.
     every : float
         Time from one state to the next, s.
     stopped : callable, optional
@@ -109,12 +112,14 @@ class Monitor:
         filters: Sequence[str] = (),
         *,
         model: SensorModel | None = None,
+        frame: Frame = "NED",
         every: float = 0.1,
         stopped: Callable[[], bool] = lambda: False,
         **options: Any,
     ) -> None:
         self._filters = tuple(filters)
         self._correction = None if model is None else LiveCorrection(model)
+        self._frame: Frame = frame
         self._every = every
         self._rows = LiveRows(port, idle=True, stopped=stopped, **options)
         self._attitude: LiveAttitude | None = None
@@ -160,7 +165,7 @@ class Monitor:
             batch = self._correction(batch)
         if self._attitude is None or self._columns != self._rows.columns:
             self._columns = self._rows.columns
-            self._attitude = LiveAttitude(self._columns, self._filters)
+            self._attitude = LiveAttitude(self._columns, self._filters, frame=self._frame)
         self._attitude.add(batch)
         self._n += batch["t"].size
         self._t = float(batch["t"][-1])

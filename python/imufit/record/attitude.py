@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.log.columns import GROUPS, SENSORS
+from imufit.log.metadata import Frame
 from imufit.replay import Stream
 
 Array = NDArray[np.float64]
@@ -41,6 +42,8 @@ class LiveAttitude:
         Columns of the device.
     filters : sequence of str
         Names out of `imufit.replay.FILTERS`; none means those of the papers for the sensors that are there.
+    frame : {"NED", "ENU", "NWU"}
+        Reference frame of the angles.
 
     Attributes
     ----------
@@ -48,7 +51,7 @@ class LiveAttitude:
         Roll, pitch and yaw after the last row, rad, for each filter; NaN before its start.
     """
 
-    def __init__(self, columns: Sequence[str], filters: Sequence[str] = ()) -> None:
+    def __init__(self, columns: Sequence[str], filters: Sequence[str] = (), *, frame: Frame = "NED") -> None:
         self.sensors = sensors_in(columns)
         descriptions = _imufit.filter_descriptions()
         chosen = tuple(filters) or (WITH_MAG if "mag" in self.sensors else WITHOUT_MAG)
@@ -57,7 +60,7 @@ class LiveAttitude:
             name = next(name for name in chosen if name not in runnable)
             missing = " and ".join(sorted(set(descriptions[name]["needs"]) - set(self.sensors)))
             raise InputError(f"{name} needs {missing}, which the device does not send", remedy="Take another filter.")
-        self._stream = Stream(runnable, self.sensors) if runnable else None
+        self._stream = Stream(runnable, self.sensors, frame=frame) if runnable else None
         self.angles: dict[str, Array] = {name: np.full(3, np.nan) for name in runnable}
 
     def add(self, batch: Mapping[str, Array]) -> None:

@@ -172,7 +172,8 @@ def _metadata(recording: Recording, parts: Sequence[Part], messages: list[dict[s
     if messages:
         described["messages"] = messages
     sensor = {"sensor": recording.device} if recording.device else {}
-    return Metadata.from_mapping({**sensor, KEY: described})
+    frame = {"frame": parts[0].about["frame"]} if "frame" in parts[0].about else {}
+    return Metadata.from_mapping({**sensor, **frame, KEY: described})
 
 
 def check_target(log: Path, force: bool) -> None:

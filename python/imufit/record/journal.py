@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from imufit.errors import InputError
+from imufit.log.metadata import Frame
 from imufit.record.arrived import Arrived
 from imufit.record.columns import Columns
 from imufit.record.finish import utc_now
@@ -33,6 +34,8 @@ class Journal:
         Where the rows come from.
     mapping : mapping or None
         Source text for target columns.
+    frame : {"NED", "ENU", "NWU"}
+        Reference frame that the log will name.
 
     Raises
     ------
@@ -40,7 +43,9 @@ class Journal:
         A part is there already, left by a crash, or cannot be made.
     """
 
-    def __init__(self, log: Path, reception: Reception, mapping: Mapping[str, str] | None) -> None:
+    def __init__(
+        self, log: Path, reception: Reception, mapping: Mapping[str, str] | None, frame: Frame = "NED"
+    ) -> None:
         self._log = log
         self._reception = reception
         self._mapping = mapping
@@ -49,6 +54,7 @@ class Journal:
             "utc": utc_now(),
             "monotonic": time.monotonic(),
             "mapping": None if mapping is None else dict(mapping),
+            "frame": frame,
         }
         self._held: list[Arrived] = []
         self._texts: list[tuple[float, str]] = []

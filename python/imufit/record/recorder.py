@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from imufit.errors import InputError
+from imufit.log.metadata import Frame
 from imufit.record.arrived import Arrived
 from imufit.record.finish import check_target, log_of, unreadable, write_log
 from imufit.record.journal import DiskError, Journal
@@ -29,6 +30,7 @@ def record(
     form: str = "auto",
     header: str | None = None,
     mapping: Mapping[str, str] | None = None,
+    frame: Frame = "NED",
     duration: float | None = None,
     give_up: float | None = None,
     force: bool = False,
@@ -55,6 +57,8 @@ def record(
         Names of the columns in text form, for a device that prints none.
     mapping : mapping, optional
         Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
+    frame : {"NED", "ENU", "NWU"}
+        Reference frame that the log names: for a sensor that lies z up, NWU or ENU.
     duration : float, optional
         Length of the recording, s.
     give_up : float, optional
@@ -85,7 +89,7 @@ def record(
     with requests_to_end() as interrupted:
         line.open()
         try:
-            journal = Journal(path, reception, mapping)
+            journal = Journal(path, reception, mapping, frame)
             begin = time.monotonic(), time.process_time()
             try:
                 end = _run(

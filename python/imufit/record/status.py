@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final, Self
 import numpy as np
 
 from imufit.errors import InputError
+from imufit.log.metadata import Frame
 from imufit.record.arrived import Arrived
 from imufit.record.attitude import LiveAttitude
 from imufit.record.live_rows import LiveConverter
@@ -42,9 +43,12 @@ class StatusLine:
         Source text for target columns.
     quiet : bool
         Whether to say nothing at all.
+    frame : {"NED", "ENU", "NWU"}
+        Reference frame of the attitude.
     """
 
-    def __init__(self, mapping: Mapping[str, str] | None = None, quiet: bool = False) -> None:
+    def __init__(self, mapping: Mapping[str, str] | None = None, quiet: bool = False, *, frame: Frame = "NED") -> None:
+        self._frame: Frame = frame
         self._quiet = quiet
         self._shown = sys.stderr.isatty() and not quiet
         self._converter = LiveConverter(mapping)
@@ -118,7 +122,8 @@ class StatusLine:
                 return
             if self._attitude is None:
                 sensors = self._converter.names
-                self._attitude = LiveAttitude(sensors, ("mahony",) if "mag_x" in sensors and "acc_x" in sensors else ())
+                filters = ("mahony",) if "mag_x" in sensors and "acc_x" in sensors else ()
+                self._attitude = LiveAttitude(sensors, filters, frame=self._frame)
             self._attitude.add(batch)
             if "temp" in batch and np.isfinite(batch["temp"]).any():
                 self._temp = float(batch["temp"][np.isfinite(batch["temp"])][-1])
