@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -60,7 +60,6 @@ class Journal:
         self._texts: list[tuple[float, str]] = []
         self._lost_since: float | None = None
         self._next = 0.0
-        self.n = 0
         if parts_of(log):
             raise InputError(
                 "an earlier recording left this part",
@@ -108,6 +107,11 @@ class Journal:
         if now >= self._next and (self._held or told):
             self._write()
 
+    @property
+    def n(self) -> int:
+        """Rows that are written."""
+        return sum(part.rows for part in self._parts)
+
     def end(self, why: str) -> None:
         """Write what is left, and why the recording ended.
 
@@ -117,6 +121,8 @@ class Journal:
             For `Recording.ended`.
         """
         self._write(ended=why)
+        for part in self._parts:
+            self._guarded(part, part.settle)
 
     def close(self) -> None:
         """Close the files."""
@@ -141,8 +147,11 @@ class Journal:
         told: dict[str, Any] = {"counts": self._reception.counts, "now": now, "lost_since": self._lost_since, **more}
         if texts:
             told["texts"] = texts
+        self._guarded(part, lambda: part.write(Arrived.joined(held) if held else None, told))
+
+    @staticmethod
+    def _guarded(part: PartFile, write: Callable[[], None]) -> None:
         try:
-            part.write(Arrived.joined(held) if held else None, told)
+            write()
         except OSError as error:
             raise DiskError(f"{part.path} cannot be written ({error.strerror or error})") from None
-        self.n += sum(rows.n for rows in held)
