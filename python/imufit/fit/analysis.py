@@ -361,15 +361,15 @@ class Analysis:
 
     def _iterated(self) -> tuple[Analysis, Estimate]:
         analysis, estimate = self._stepped()
-        for _ in range(MAX_SEARCHES):
-            moved = analysis._searched_again(estimate)
-            if moved is None:
-                break
-            analysis, estimate = moved._stepped()
+        for _ in range(MAX_SEARCHES if analysis._held else 0):
+            searched, moved = analysis._searched_again(estimate)
+            if not moved:
+                return searched, searched.estimate()
+            analysis, estimate = searched._stepped()
         return analysis, estimate
 
-    def _searched_again(self, estimate: Estimate) -> Analysis | None:
-        """Search anew for what is held, beside what is fitted now; None if it does not move."""
+    def _searched_again(self, estimate: Estimate) -> tuple[Analysis, bool]:
+        """Search anew for what is held, beside what is fitted now; and whether it moves."""
         model, own = self.moved_to(estimate)
         surveyed = [each.surveyed for each in self.logs]
         found = dict(self.found)
@@ -382,7 +382,10 @@ class Analysis:
             now = found[effect.id]
             if np.any(np.abs(np.subtract(now.start, present)) > 0.1 * np.maximum(now.spread, estimate.errors[slot])):
                 moved[effect.id] = now.start
-        return replace(self, found=found).around(model.starting_at(moved), own, lean=True) if moved else None
+        searched = replace(self, found=found)
+        if moved:
+            searched = searched.around(model.starting_at(moved), own, lean=True)
+        return searched, bool(moved)
 
     def _stepped(self) -> tuple[Analysis, Estimate]:
         analysis, estimate = self, self.estimate()
