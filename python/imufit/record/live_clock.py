@@ -17,6 +17,8 @@ BIN: Final = 0.25
 """Of the arrivals in so much time the earliest is kept, s."""
 KEPT: Final = 1200
 """Arrivals kept: the drift is that of the last five minutes."""
+EACH: Final = 4
+"""Arrivals kept after which the drift is fitted anew."""
 SLEW: Final = 0.001
 """Share of the time that passes by which the offset is set right, so that no step is off by more."""
 _SETTLED: Final = 2.0  # of arrivals before a drift is believed, s
@@ -37,6 +39,8 @@ class LiveClock:
         self._rate = 1.0
         self._alien = False
         self._offset = 0.0
+        self._lowest = 0.0
+        self._bin = 0.0  # where the bin of the last point begins
         self._segment = -1
         self._device_end = 0.0
         self._points: list[tuple[float, float]] = []  # device time, arrival less device time
@@ -89,28 +93,33 @@ class LiveClock:
         """Rows on one piece of the device's clock."""
         end, late = float(device[-1]), float(arrival[-1] - device[-1])
         new = not self._points
-        if new or end - self._points[-1][0] >= BIN:
+        if new or end - self._bin >= BIN:
+            self._bin = end
             self._points.append((end, late))
             self._fit()
         elif late < self._points[-1][1]:
             self._points[-1] = (end, late)
-        wanted = min(y - (self._rate - 1.0) * x for x, y in self._points[-KEPT:])
+        self._lowest = min(self._lowest, late - (self._rate - 1.0) * end)
         if new:
-            self._offset = wanted
-        elif not self._alien:
-            most = SLEW * max(end - self._device_end, 0.0)
-            self._offset += float(np.clip(wanted - self._offset, -most, most))
-        self._device_end = end
-        return self._offset + self._rate * device
+            self._offset, self._device_end = self._lowest, end
+        before, passed = self._offset, end - self._device_end
+        if passed > 0.0 and not self._alien:
+            self._offset += min(max(self._lowest - self._offset, -SLEW * passed), SLEW * passed)
+            share = np.clip((device - self._device_end) / passed, 0.0, 1.0)
+            offset = before + (self._offset - before) * share
+        else:
+            offset = np.full(device.size, before)
+        self._device_end = max(end, self._device_end)
+        return np.asarray(offset + self._rate * device, dtype=np.float64)
 
     def _fit(self) -> None:
         """Fit the rate anew, so that the time goes on from where it is."""
         self._points = self._points[-KEPT:]
         x, y = np.array(self._points).T
-        if x[-1] - x[0] < _SETTLED or np.any(np.diff(x) <= 0.0):
-            return
-        slope = drift([(x, y)])
-        self._alien = slope is None
-        rate = 1.0 + (slope or 0.0)
-        self._offset += (self._rate - rate) * self._device_end
-        self._rate = rate
+        if x.size % EACH == 0 and x[-1] - x[0] >= _SETTLED and np.all(np.diff(x) > 0.0):
+            slope = drift([(x, y)])
+            self._alien = slope is None
+            rate = 1.0 + (slope or 0.0)
+            self._offset += (self._rate - rate) * self._device_end
+            self._rate = rate
+        self._lowest = float(np.min(y - (self._rate - 1.0) * x))

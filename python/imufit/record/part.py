@@ -7,6 +7,7 @@ import os
 import time
 import zlib
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -102,6 +103,9 @@ class PartFile:
             fcntl.flock(self._file, fcntl.LOCK_EX)
         self._whole = 0
         self._synced = time.monotonic()
+        # a slow disk must not keep the line from being read
+        self._syncer = ThreadPoolExecutor(1)
+        self._syncing: Future[None] | None = None
         self._sink = _Bytes()
         self._stream: Any = None
         self._schema: Any = None
@@ -146,16 +150,15 @@ class PartFile:
         note = json.dumps({**told, "check": _check(columns)}).encode()
         self._stream.write_batch(batch, custom_metadata={_KEY: note})
         self._append()
-        if time.monotonic() - self._synced > SYNC:
-            self.sync()
-
-    def sync(self) -> None:
-        """Wait until it is on the disk."""
-        os.fsync(self._file)
-        self._synced = time.monotonic()
+        if time.monotonic() - self._synced > SYNC and (self._syncing is None or self._syncing.done()):
+            if self._syncing is not None:
+                self._syncing.result()
+            self._syncing = self._syncer.submit(os.fsync, self._file)
+            self._synced = time.monotonic()
 
     def close(self) -> None:
         """Close the file; it needs no end."""
+        self._syncer.shutdown()
         os.close(self._file)
 
     def _append(self) -> None:

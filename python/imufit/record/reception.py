@@ -12,10 +12,11 @@ from imufit.errors import InputError
 from imufit.record.arrived import FORMS, Arrived, of_frames, of_lines
 from imufit.record.transport import Line
 
-PAUSE: Final = (0.004, 0.007)
+PAUSE: Final = (0.006, 0.012)
 """Shortest and longest wait between two reads, s: irregular, so that no rate of a device falls in step with it."""
 
 _DOUBTFUL: Final = 50
+_LAST: Final = 64  # reads at the end at most: a kernel's buffer, and not a device that never stops
 
 
 class Reception:
@@ -171,5 +172,11 @@ def listen(
         now = time.monotonic()
         lost = reception.line.lost_since
         if (end is not None and now >= end) or (give_up is not None and lost is not None and now - lost >= give_up):
-            return
+            break
         time.sleep(random.uniform(*PAUSE))
+    # what had come by then
+    for _ in range(_LAST):
+        before = reception.counts["bytes"]
+        yield reception.poll()
+        if reception.counts["bytes"] == before:
+            return

@@ -6,6 +6,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Sequence
+from itertools import groupby
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
 
@@ -111,7 +112,8 @@ class StatusLine:
     def _follow(self) -> None:
         """Run the filter over the rows that came."""
         held, self._held = self._held, []
-        for part in held:
+        for _, parts in groupby(held, lambda part: part.announced):
+            part = Arrived.joined(list(parts))
             if part.announced != self._converter.announced:
                 self._attitude = None
             try:
