@@ -34,7 +34,9 @@ class Schedule(RuleBasedStateMachine):
 
     @rule(junk=st.binary(min_size=1, max_size=60), at=SHARE)
     def garbage_in_a_frame(self, junk, at):
-        self.device.next(lambda data: data[: 1 + int(at * (len(data) - 1))] + junk + data[1 + int(at * (len(data) - 1)) :])
+        self.device.next(
+            lambda data: data[: 1 + int(at * (len(data) - 1))] + junk + data[1 + int(at * (len(data) - 1)) :]
+        )
 
     @rule(at=SHARE, bits=st.integers(1, 255), n=st.integers(1, 4))
     def damaged_byte(self, at, bits, n):

@@ -162,8 +162,21 @@ def test_what_arrived_before_a_line_broke_is_not_lost_with_it(plug, tmp_path):
     result = recorder.result(stop=False)
     assert result.ended == "line lost"
     np.testing.assert_array_equal(readings(imufit.read(tmp_path / "a.parquet")), values_of(range(2000)))
-    assert result.gaps[-1].reason == "unplugged"
-    assert result.gaps[-1].t_start == result.duration_s
+    assert result.gaps == (), "it ends there"
+
+
+def test_a_line_that_was_away_when_a_recording_was_stopped_is_told(plug, tmp_path):
+    device = Sender()
+    recorder = Recorder(plug.port, tmp_path / "a.parquet")
+    plug.plug()
+    plug.send(device.announce() + device.samples(range(20)))
+    recorder.until(lambda: recorder.seen == 20)
+    plug.unplug(gone=True)
+    recorder.until(lambda: recorder.lost)
+    result = recorder.result()
+    (gap,) = result.gaps
+    assert (gap.reason, gap.t_start) == ("unplugged", result.duration_s)
+    assert gap.t_end > gap.t_start
 
 
 def test_a_device_that_starts_anew_goes_on_in_the_same_log(pty, tmp_path):
