@@ -20,6 +20,9 @@ PARTS = (
     "results",
     "report",
     "export",
+    "emulate",
+    "record",
+    "monitor",
     "allan",
     "tune",
 )

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from imufit import calibrate as calibrate
     from imufit import device as device
     from imufit import diagnose as diagnose
+    from imufit import emulate as emulate
     from imufit import errors as errors
     from imufit import export as export
     from imufit import faults as faults
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from imufit import grade as grade
     from imufit import log as log
     from imufit import model as model
+    from imufit import monitor as monitor
+    from imufit import record as record
     from imufit import replay, simulate
     from imufit import report as report
     from imufit import results as results
@@ -41,6 +44,7 @@ else:
         "calibrate",
         "device",
         "diagnose",
+        "emulate",
         "errors",
         "export",
         "faults",
@@ -49,6 +53,8 @@ else:
         "grade",
         "log",
         "model",
+        "monitor",
+        "record",
         "replay",
         "report",
         "results",

@@ -6,6 +6,19 @@ Paper A of the documentation: six positions on a levelling table, least squares,
 from imufit.calibrate.calibrate import calibrate
 from imufit.calibrate.calibration import Calibration, SensorCalibration
 from imufit.calibrate.guide import Advice, PoseGuide
+from imufit.calibrate.live import calibrate_live
 from imufit.calibrate.poses import Pose, find_poses
+from imufit.calibrate.wizard import Stage, Wizard
 
-__all__ = ["Advice", "Calibration", "Pose", "PoseGuide", "SensorCalibration", "calibrate", "find_poses"]
+__all__ = [
+    "Advice",
+    "Calibration",
+    "Pose",
+    "PoseGuide",
+    "SensorCalibration",
+    "Stage",
+    "Wizard",
+    "calibrate",
+    "calibrate_live",
+    "find_poses",
+]

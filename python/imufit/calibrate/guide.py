@@ -57,12 +57,15 @@ class PoseGuide:
     ----------
     done : dict of str to (3,) array
         Mean specific force of each accepted side, m/s^2.
+    rests : int
+        Good poses so far, those of a side that is known already among them.
     """
 
     def __init__(self, settings: Mapping[str, float] | None = None) -> None:
         self._judge = _imufit.PoseJudge({"hold": 2.0, **(settings or {})})
         self._counted = False
         self.done: dict[str, Array] = {}
+        self.rests = 0
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -119,6 +122,7 @@ class PoseGuide:
         off = float(np.arccos(np.clip(abs(mean[axis]) / np.linalg.norm(mean), -1.0, 1.0)))
         if off > 2.5 * SAME_DIRECTION:
             return None, f"{side} is {np.degrees(off):.0f} deg off the vertical: lay the sensor flat."
+        self.rests += 1
         if side in self.done:
             return None, f"{side} up is known already."
         self.done[side] = mean

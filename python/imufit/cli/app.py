@@ -18,12 +18,16 @@ from imufit.cli.compare import compare
 from imufit.cli.convert import convert
 from imufit.cli.demo import demo
 from imufit.cli.diagnose import diagnose
+from imufit.cli.emulate import emulate
 from imufit.cli.explain import explain
 from imufit.cli.export import export
 from imufit.cli.fit import fit
 from imufit.cli.grade import grade
 from imufit.cli.ladder import ladder
+from imufit.cli.monitor import monitor
 from imufit.cli.names import unknown
+from imufit.cli.record import record
+from imufit.cli.recover import recover
 from imufit.cli.replay import replay
 from imufit.cli.reveal import reveal
 from imufit.cli.simulate import simulate
@@ -88,6 +92,10 @@ for _command in (
     tune,
     allan,
     convert,
+    record,
+    monitor,
+    recover,
+    emulate,
     demo,
 ):
     imufit.add_command(_command)

@@ -1,18 +1,29 @@
-"""``imufit calibrate``: paper A's calibration, and what it is worth."""
+"""``imufit calibrate``: paper A's calibration, from logs or on a running device, and what it is worth."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import EXISTING, json_option, keep_inputs, map_option, model_output, plot_option
+from imufit.cli.arguments import (
+    EXISTING,
+    LOG_ENDINGS,
+    OutputFile,
+    json_option,
+    keep_inputs,
+    map_option,
+    model_output,
+    plot_option,
+)
+from imufit.cli.live_screen import LiveScreen
 from imufit.cli.output import Output
 
 
 @click.command(short_help="Calibrate accelerometer, gyro and magnetometer.")
-@click.argument("logs", metavar="LOG...", type=EXISTING, nargs=-1, required=True)
+@click.argument("logs", metavar="LOG...", type=EXISTING, nargs=-1)
 @map_option
 @click.option(
     "--cost",
@@ -29,6 +40,25 @@ from imufit.cli.output import Output
 @click.option(
     "--hold", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="Shortest pose, s (default 0.6)."
 )
+@click.option("--live", "port", metavar="PORT", help="Guide through a calibration of the device there.")
+@click.option("--baud", type=click.IntRange(min=1), metavar="BAUD", help="Bits per second of PORT (default 115200).")
+@click.option("--form", type=click.Choice(["auto", "binary", "text"]), help="What PORT sends (default auto).")
+@click.option("--header", metavar="NAMES", help="Columns of text without a header, such as t_ms,acc_x,acc_y,acc_z.")
+@click.option(
+    "--keep",
+    type=OutputFile(LOG_ENDINGS),
+    metavar="LOG",
+    help="Where to keep what PORT sent (default: beside the model, .parquet).",
+)
+@click.option(
+    "--rests", type=click.IntRange(min=6), metavar="N", help="Good rests wanted of PORT, the six sides among them (6)."
+)
+@click.option(
+    "--give-up",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="S",
+    help="End after so long without anything new from PORT, s (default 300).",
+)
 @model_output
 @json_option
 @plot_option
@@ -39,19 +69,40 @@ def calibrate(
     cost: str | None,
     sensors: tuple[str, ...],
     hold: float | None,
+    port: str | None,
     output: Path | None,
     json_file: Path | None,
     plot_file: Path | None,
+    **live: Any,
 ) -> None:
-    """Calibrate a sensor from one or several LOGs of it.
+    """Calibrate a sensor from one or several LOGs of it, or a running device with --live PORT.
 
     The accelerometer from poses at rest (labelled in the column `pose`, or found), the gyro from the rests and the
-    turns between them, the magnetometer from free rotation.
+    turns between them, the magnetometer from free rotation. On a running device the terminal says which side to lay
+    up next; nothing has to be pressed, and what came is kept as a log.
     """
-    keep_inputs(logs, [output, json_file, plot_file])
     out = Output(json_file)
-    read = [engine.read_log(path, mapping) for path in logs]
-    result = engine.calibrate(read, cost, sensors, {} if hold is None else {"hold": hold})
+    settings = {} if hold is None else {"hold": hold}
+    given = {name: value for name, value in live.items() if value is not None}
+    if port is None:
+        if given:
+            raise click.UsageError(f"--{next(iter(given)).replace('_', '-')} is for --live PORT")
+        if not logs:
+            raise click.UsageError("name a LOG, or a device with --live PORT")
+        keep_inputs(logs, [output, json_file, plot_file])
+        read = [engine.read_log(path, mapping) for path in logs]
+        result = engine.calibrate(read, cost, sensors, settings)
+    else:
+        if logs:
+            raise click.UsageError("calibrate either a LOG or a device with --live PORT")
+        keep = _place_of(given.pop("keep", None), output)
+        keep_inputs([], [output, json_file, plot_file, keep])
+        with LiveScreen(quiet=str(json_file) == "-") as screen:
+            result, log = engine.calibrate_live(
+                port, keep, mapping, cost=cost, sensors=sensors, settings=settings, show=screen, **given
+            )
+        read = [log]
+        out.wrote(keep)
     for sensor in result.sensors.values():
         out.say(sensor.sentence(), bold=True)
     remarks = [remark for sensor in result.sensors.values() for remark in sensor.remarks]
@@ -63,3 +114,16 @@ def calibrate(
     out.json(result.to_dict())
     if plot_file is not None:
         out.plot(plot_file, result.plot(read))
+
+
+def _place_of(keep: Path | None, model: Path | None) -> Path:
+    """Return where the log goes: where told, or beside the model by a name that is free."""
+    if keep is not None:
+        return keep
+    if model is None:
+        raise click.UsageError("what PORT sends has to be kept: name a model with -o, or a log with --keep")
+    path, number = model.with_suffix(".parquet"), 1
+    while path.exists():
+        number += 1
+        path = model.with_name(f"{model.stem}-{number}.parquet")
+    return path

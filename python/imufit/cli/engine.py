@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from imufit.emulate import Emulator
     from imufit.grade import BlindGrade
     from imufit.log import Contents, Log
-    from imufit.results import EffectCard, Ladder
+    from imufit.results import EffectCard, Ladder, Recording
     from imufit.simulate import Grade, Simulation, Truth
 
 Progress = Callable[[int, int, str], None]
@@ -39,6 +40,17 @@ def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], set
     from imufit.calibrate import calibrate  # noqa: PLC0415
 
     return calibrate(list(logs), cost, sensors=sensors or ("acc", "gyr", "mag"), settings=settings)
+
+
+def calibrate_live(
+    port: str, keep: Path, mapping: Sequence[str], *, sensors: Sequence[str], **options: Any
+) -> tuple[Any, Log]:
+    """Guide through a calibration of the device at `port`; return it and the log that was kept."""
+    from imufit.calibrate import calibrate_live  # noqa: PLC0415
+    from imufit.log import parse_mapping  # noqa: PLC0415
+
+    chosen = sensors or ("acc", "gyr", "mag")
+    return calibrate_live(port, keep, mapping=parse_mapping(*mapping) or None, sensors=chosen, **options)
 
 
 def contents(log: Log) -> Contents:
@@ -309,6 +321,22 @@ def save_simulation(simulation: Simulation, path: Path) -> Path:
     return seal(simulation.truth, path)
 
 
+def emulator(
+    source: str, *, faults: Sequence[str], fault_rates: Sequence[str], clock: Mapping[str, Any], **settings: Any
+) -> Emulator:
+    """Return a device without hardware, not yet plugged in; faults and their rates as on the command line.
+
+    Raises
+    ------
+    InputError
+        It cannot be emulated; the message says why.
+    """
+    from imufit.emulate import Clock, Emulator, parse_fault_rate  # noqa: PLC0415
+
+    rates = dict(parse_fault_rate(text) for text in fault_rates)
+    return Emulator(source, faults=faults, fault_rates=rates, clock=Clock(**clock), **settings)
+
+
 def unseal(path: Path) -> Truth:
     """Return what was done to a simulated log.
 
@@ -345,3 +373,40 @@ def grade_blind(*, sets: Sequence[str], logs: int, seed: int, processes: int | N
     from imufit.grade import grade  # noqa: PLC0415
 
     return grade(sets, logs=logs, seed=seed, processes=processes, progress=progress)
+
+
+def status_line(mapping: Sequence[str], quiet: bool, **options: Any) -> Any:
+    """Return the status line of a recording; `mapping` as for `open_log`."""
+    from imufit.log import parse_mapping  # noqa: PLC0415
+    from imufit.record.status import StatusLine  # noqa: PLC0415
+
+    return StatusLine(parse_mapping(*mapping) or None, quiet, **options)
+
+
+def record(port: str, path: Path, mapping: Sequence[str], **options: Any) -> Recording:
+    """Record a device; `mapping` as for `open_log`."""
+    from imufit.log import parse_mapping  # noqa: PLC0415
+    from imufit.record import record  # noqa: PLC0415
+
+    return record(port, path, mapping=parse_mapping(*mapping) or None, **options)
+
+
+def recover(file: Path, path: Path | None, **options: Any) -> Recording:
+    """Make a log of what a crash left."""
+    from imufit.record import recover  # noqa: PLC0415
+
+    return recover(file, path, **options)
+
+
+def monitor(port: str, filters: Sequence[str], mapping: Sequence[str], model: Any, **options: Any) -> Iterator[Any]:
+    """Give states of a device until it is stopped; `mapping` as for `open_log`."""
+    from imufit.log import parse_mapping  # noqa: PLC0415
+    from imufit.monitor import Monitor  # noqa: PLC0415
+    from imufit.record.signals import requests_to_end  # noqa: PLC0415
+
+    chosen = parse_mapping(*mapping) or None
+    with (
+        requests_to_end() as ended,
+        Monitor(port, filters, model=model, mapping=chosen, stopped=ended, **options) as states,
+    ):
+        yield from states

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 FILTERS = ("accel", "gyro", "complementary", "kalman", "triad", "quest", "mahony", "hybrid", "mekf", "smoother")
+FRAMES = ("NED", "ENU", "NWU")
 FORMS = {
     "c-header": "C99 header, SI units",
     "arduino": "sketch with a function to call after reading the sensor, SI units",

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option
-from imufit.cli.names import Known, unknown
+from imufit.cli.names import FRAMES, Known, unknown
 from imufit.cli.output import Output
 
 SIZES = ("large", "medium", "small")
-FRAMES = ("NED", "ENU", "NWU")
 
 
 def parse_effect(text: str) -> tuple[str, dict[str, float] | None]:
@@ -49,6 +49,25 @@ def parse_effect(text: str) -> tuple[str, dict[str, float] | None]:
         except ValueError:
             raise click.UsageError(f"--effect {text}: {part!r} does not read NAME=NUMBER") from None
     return effect, parameters
+
+
+def chosen_effects(texts: Sequence[str]) -> dict[str, dict[str, float] | None]:
+    """Read effects as `parse_effect`, each of them once.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        As given on the command line.
+
+    Raises
+    ------
+    click.UsageError
+        As `parse_effect`, or an effect that is named twice.
+    """
+    chosen = dict(parse_effect(text) for text in texts)
+    if len(chosen) < len(texts):
+        raise click.UsageError("--effect names one effect twice")
+    return chosen
 
 
 @click.command(short_help="A synthetic log, on request with a hidden effect.")
@@ -90,7 +109,7 @@ def simulate(
     output: Path,
     json_file: Path | None,
 ) -> None:
-    """Simulate a log of SCENARIO: turntable, arm, poses, tilt, handheld, or one of a machine tool, machine_...
+    """Simulate a log of SCENARIO: turntable, arm, poses, six_sides, tilt, handheld, or of a machine tool, machine_...
 
     What was done to it is kept sealed beside the log; `imufit reveal LOG` opens it.
     """
@@ -98,9 +117,7 @@ def simulate(
         raise click.UsageError("--hidden picks the effect itself: leave out --effect")
     if hidden is not None and seed is not None:
         raise click.UsageError("--hidden is the seed: leave out --seed")
-    chosen = dict(parse_effect(text) for text in effects)
-    if len(chosen) < len(effects):
-        raise click.UsageError("--effect names one effect twice")
+    chosen = chosen_effects(effects)
     given = {"duration": duration, "rate": rate, "size": size, "frame": frame}
     settings = {name: value for name, value in given.items() if value is not None}
     out = Output(json_file)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol
@@ -72,6 +73,8 @@ def open_source(path: Path) -> Source:
     try:
         if path.stat().st_size == 0:
             raise InputError("the file is empty (0 bytes)", file=path, remedy="Record or copy it again.")
+        if re.fullmatch(r"\.part\d*", suffix):
+            raise InputError("this is what a recording wrote while it ran", file=path, remedy=f"imufit recover {path}")
         if suffix not in SUFFIXES and not looks_like_text(path):
             raise InputError(
                 f"the suffix {suffix or '(none)'} is not a log's, and the file is no text",

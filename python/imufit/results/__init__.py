@@ -13,6 +13,7 @@ from imufit.results.effect_card import EffectCard
 from imufit.results.ladder import Ladder, Revision, Step
 from imufit.results.log_parameters import LogParameters
 from imufit.results.parameter import Parameter
+from imufit.results.recording import Recording, RecordingClock, RecordingGap
 from imufit.results.table import Table
 from imufit.results.tilt import Mark, TiltComparison, TiltFigures
 
@@ -33,6 +34,9 @@ __all__ = [
     "Mark",
     "Panel",
     "Parameter",
+    "Recording",
+    "RecordingClock",
+    "RecordingGap",
     "Revision",
     "Rival",
     "Spectrum",

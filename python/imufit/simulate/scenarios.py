@@ -13,6 +13,7 @@ from imufit.simulate.machine_tool import MACHINE_TOOL
 from imufit.simulate.motion import Array, Cruise, Product, Signal, Sinusoids, Steps, Sum
 from imufit.simulate.robot_arm import ROBOT_ARM
 from imufit.simulate.scenario import Plan, Scenario
+from imufit.simulate.six_sides import SIX_SIDES
 from imufit.simulate.truth import Fixed, Joint, Legs, Trajectory, rotation_from_vector
 
 X, Y, Z = np.eye(3)
@@ -218,6 +219,7 @@ SCENARIOS: Mapping[str, Scenario] = {
     ),
     **MACHINE_TOOL,
     **ROBOT_ARM,
+    **SIX_SIDES,
 }
 
 

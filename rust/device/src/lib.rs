@@ -5,6 +5,7 @@
 pub mod hmc5883l;
 pub mod lines;
 pub mod mpu6050;
+pub mod pieces;
 pub mod wire;
 
 /// Standard gravity, m/s^2: the g of data sheets.

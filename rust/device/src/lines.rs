@@ -4,6 +4,8 @@
 
 use std::sync::Arc;
 
+use crate::pieces::{Piece, Pieces};
+
 /// Bytes that a line may have. Longer ones are damaged.
 pub const LONGEST: usize = 4096;
 
@@ -31,11 +33,23 @@ pub struct Counts {
     pub unexplained: u64,
 }
 
+impl Counts {
+    /// Each with its name.
+    pub fn named(&self) -> [(&'static str, u64); 4] {
+        [
+            ("bytes", self.bytes),
+            ("samples", self.samples),
+            ("damaged", self.damaged),
+            ("unexplained", self.unexplained),
+        ]
+    }
+}
+
 /// What a line is.
 enum Line {
     Empty,
     Header(Vec<String>),
-    Row(Vec<f64>),
+    Row,
     Message,
     Damaged,
 }
@@ -43,11 +57,12 @@ enum Line {
 /// Decoder of lines that may begin, break off and go on anywhere.
 #[derive(Default)]
 pub struct Decoder {
-    piece: Vec<u8>,
-    overlong: bool,
+    pieces: Pieces<b'\n', LONGEST>,
     /// Whether a whole line has come since the port was opened: the first may lack its beginning.
     begun: bool,
     columns: Option<Arc<Vec<String>>>,
+    /// Numbers of the last line.
+    numbers: Vec<f64>,
     lost: u32,
     batches: Vec<Batch>,
     texts: Vec<String>,
@@ -56,8 +71,8 @@ pub struct Decoder {
 
 /// Cells of a line: separated by commas, semicolons or tabs, whichever come first.
 fn cells(line: &str) -> impl Iterator<Item = &str> {
-    let separator = line.chars().find(|c| matches!(c, ',' | ';' | '\t')).unwrap_or(',');
-    line.split(separator).map(str::trim)
+    let separator = line.bytes().find(|c| matches!(c, b',' | b';' | b'\t')).unwrap_or(b',');
+    line.split(char::from(separator)).map(str::trim)
 }
 
 fn number(cell: &str) -> Option<f64> {
@@ -75,7 +90,8 @@ fn is_name(cell: &str) -> bool {
     first && number(cell).is_none() && cell.len() <= 64 && !letters.any(|c| matches!(c, ':' | '=' | '!' | '?'))
 }
 
-fn read(line: &[u8]) -> Line {
+/// What a line is; the numbers in it.
+fn read(line: &[u8], numbers: &mut Vec<f64>) -> Line {
     let Ok(line) = std::str::from_utf8(line) else {
         return Line::Damaged;
     };
@@ -86,16 +102,17 @@ fn read(line: &[u8]) -> Line {
     if line.starts_with('#') || line.starts_with("//") {
         return Line::Message;
     }
-    let all: Vec<&str> = cells(line).collect();
-    let numbers: Vec<f64> = all.iter().filter_map(|c| number(c)).collect();
-    if all.len() > 1 && numbers.len() == all.len() && !numbers.iter().all(|v| v.is_nan()) {
-        return Line::Row(numbers);
+    let mut all = 0;
+    numbers.clear();
+    numbers.extend(cells(line).inspect(|_| all += 1).filter_map(number));
+    if all > 1 && numbers.len() == all && !numbers.iter().all(|v| v.is_nan()) {
+        return Line::Row;
     }
-    if all.len() > 1 && all.iter().all(|c| is_name(c)) {
-        return Line::Header(all.into_iter().map(str::to_string).collect());
+    if all > 1 && cells(line).all(is_name) {
+        return Line::Header(cells(line).map(str::to_string).collect());
     }
     // Mostly numbers: a row that came to harm.
-    if numbers.len() * 2 > all.len() && all.len() > 1 {
+    if numbers.len() * 2 > all && all > 1 {
         return Line::Damaged;
     }
     Line::Message
@@ -105,31 +122,22 @@ impl Decoder {
     /// Takes some bytes.
     pub fn feed(&mut self, bytes: &[u8]) {
         self.counts.bytes += bytes.len() as u64;
-        let mut pieces = bytes.split(|b| *b == b'\n');
-        let Some(last) = pieces.next_back() else { return };
-        for piece in pieces {
-            self.keep(piece);
-            let line = std::mem::take(&mut self.piece);
-            if self.overlong {
-                self.damaged();
-                self.overlong = false;
-            } else {
-                self.line(&line);
+        let mut pieces = std::mem::take(&mut self.pieces);
+        pieces.feed(bytes, |piece| {
+            match piece {
+                Piece::Whole(line) => self.line(line),
+                Piece::Overlong => self.damaged(),
             }
             self.begun = true;
-            self.piece = line;
-            self.piece.clear();
-        }
-        self.keep(last);
+        });
+        self.pieces = pieces;
     }
 
     /// The port was closed and opened anew: half a line from before does not go on, and the next may lack its beginning.
     pub fn interrupted(&mut self) {
-        if !self.piece.is_empty() || self.overlong {
+        if self.pieces.interrupted() {
             self.damaged();
         }
-        self.piece.clear();
-        self.overlong = false;
         self.begun = false;
     }
 
@@ -153,23 +161,14 @@ impl Decoder {
         self.counts
     }
 
-    fn keep(&mut self, piece: &[u8]) {
-        if self.piece.len() + piece.len() > LONGEST {
-            self.overlong = true;
-            self.piece.clear();
-        }
-        if !self.overlong {
-            self.piece.extend_from_slice(piece);
-        }
-    }
-
     fn damaged(&mut self) {
         self.counts.damaged += 1;
         self.lost += 1;
     }
 
     fn line(&mut self, line: &[u8]) {
-        match read(line) {
+        let mut numbers = std::mem::take(&mut self.numbers);
+        match read(line, &mut numbers) {
             Line::Empty => {}
             Line::Header(names) => {
                 if self.columns.as_deref() != Some(&names) {
@@ -177,11 +176,12 @@ impl Decoder {
                 }
             }
             // A number that lacks its first digits is a number all the same.
-            Line::Row(_) if !self.begun => self.damaged(),
-            Line::Row(values) => self.row(&values),
+            Line::Row if !self.begun => self.damaged(),
+            Line::Row => self.row(&numbers),
             Line::Message => self.texts.push(String::from_utf8_lossy(line).trim().to_string()),
             Line::Damaged => self.damaged(),
         }
+        self.numbers = numbers;
     }
 
     fn row(&mut self, values: &[f64]) {
@@ -247,6 +247,7 @@ mod tests {
         decoder.interrupted();
         decoder.feed(b"23,4\n5,6\n");
         assert_eq!(decoder.take()[0].values, [1.0, 2.0, 5.0, 6.0]);
+        assert_eq!(decoder.counts().damaged, 2);
     }
 
     #[test]

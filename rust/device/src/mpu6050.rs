@@ -175,7 +175,17 @@ pub struct Scales {
     gyr: f64,
 }
 
+/// The range that a register selects: bits 4 and 3 of `ACCEL_CONFIG` or `GYRO_CONFIG`.
+pub const fn selected(ranges: &[FullScale; 4], register: u8) -> FullScale {
+    ranges[(register >> 3 & 3) as usize]
+}
+
 impl Scales {
+    /// By the registers `ACCEL_CONFIG` and `GYRO_CONFIG`.
+    pub fn of_registers(accel_config: u8, gyro_config: u8) -> Self {
+        Self::of(selected(&ACCELEROMETER, accel_config), selected(&GYRO, gyro_config))
+    }
+
     /// By `AFS_SEL` (accelerometer) and `FS_SEL` (gyro).
     pub fn new(afs_sel: u8, fs_sel: u8) -> Result<Self, DeviceError> {
         let refuse = |name, came, register| DeviceError::Selection { name, came, register };
@@ -185,10 +195,14 @@ impl Scales {
         let gyr = GYRO
             .get(usize::from(fs_sel))
             .ok_or_else(|| refuse("fs_sel", fs_sel, "GYRO_CONFIG"))?;
-        Ok(Self {
+        Ok(Self::of(*acc, *gyr))
+    }
+
+    fn of(acc: FullScale, gyr: FullScale) -> Self {
+        Self {
             acc: STANDARD_GRAVITY / acc.sensitivity,
             gyr: 1_f64.to_radians() / gyr.sensitivity,
-        })
+        }
     }
 }
 
@@ -204,6 +218,19 @@ fn triple(bytes: &[u8], at: usize, scale: f64, values: &mut Vec<f64>, clipped: &
         values.push(f64::from(count) * scale);
         clipped.push(count == i16::MIN || count == i16::MAX);
     }
+}
+
+/// Temperature of a count, degC.
+fn temperature(count: i16) -> f64 {
+    f64::from(count) / TEMPERATURE_SENSITIVITY + TEMPERATURE_OFFSET
+}
+
+/// Decodes the block of registers 0x3B to 0x48: specific force, m/s^2; angular rate, rad/s; temperature, degC.
+pub fn decode_block(block: &[u8; 14], scales: &Scales) -> [f64; 7] {
+    let at = |at: usize| count(block, at);
+    let acc = |at_byte: usize| f64::from(at(at_byte)) * scales.acc;
+    let gyr = |at_byte: usize| f64::from(at(at_byte)) * scales.gyr;
+    [acc(0), acc(2), acc(4), gyr(8), gyr(10), gyr(12), temperature(at(6))]
 }
 
 /// Decodes a burst of whole frames.
@@ -236,9 +263,7 @@ pub fn decode(bytes: &[u8], frame: Frame, scales: &Scales) -> Result<Readings, D
             &mut readings.gyr_clipped,
         );
         if has_temperature {
-            readings
-                .temp
-                .push(f64::from(count(block, 6)) / TEMPERATURE_SENSITIVITY + TEMPERATURE_OFFSET);
+            readings.temp.push(temperature(count(block, 6)));
         }
     }
     Ok(readings)
@@ -311,6 +336,11 @@ mod tests {
             let scales = Scales::new(afs_sel, fs_sel).unwrap();
             let whole = decode(&block(counts), Frame::WithTemperature, &scales).unwrap();
             let ranges = (ACCELEROMETER[usize::from(afs_sel)], GYRO[usize::from(fs_sel)]);
+            let registers = Scales::of_registers(0xE7 | afs_sel << 3, 0xE7 | fs_sel << 3);
+            let of_block = decode_block(&block(counts).try_into().unwrap(), &registers);
+            prop_assert_eq!(of_block[..3].to_vec(), whole.acc.clone());
+            prop_assert_eq!(of_block[3..6].to_vec(), whole.gyr.clone());
+            prop_assert_eq!(of_block[6], whole.temp[0]);
             for axis in 0..3 {
                 let g = whole.acc[axis] / STANDARD_GRAVITY * ranges.0.sensitivity;
                 prop_assert_eq!(g.round(), f64::from(counts[axis]));

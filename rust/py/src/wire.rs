@@ -30,34 +30,57 @@ fn add_announcement(out: &Bound<'_, PyDict>, announcement: &Announcement) -> PyR
     )
 }
 
+/// The Python class of a decoder: what both forms have in common, and what is a form's own.
+macro_rules! decoder_class {
+    ($class:ident { $($own:item)* }) => {
+        #[pymethods]
+        impl $class {
+            /// A decoder that has seen nothing.
+            #[new]
+            fn new() -> Self {
+                Self::default()
+            }
+
+            /// Takes some bytes, which may begin and end anywhere.
+            fn feed(&mut self, py: Python<'_>, data: &[u8]) {
+                py.detach(|| self.0.feed(data));
+            }
+
+            /// The port was closed and opened anew.
+            fn interrupted(&mut self) {
+                self.0.interrupted();
+            }
+
+            /// Nothing more comes.
+            fn finish(&mut self) {
+                self.0.finish();
+            }
+
+            /// Messages since this was last asked.
+            fn take_texts(&mut self) -> Vec<String> {
+                self.0.take_texts()
+            }
+
+            /// What came so far, by name.
+            fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+                let out = PyDict::new(py);
+                for (name, count) in self.0.counts().named() {
+                    out.set_item(name, count)?;
+                }
+                Ok(out)
+            }
+
+            $($own)*
+        }
+    };
+}
+
 /// Decoder of the binary form.
 #[pyclass(name = "WireDecoder", module = "imufit._imufit")]
 #[derive(Default)]
 struct PyWireDecoder(decoder::Decoder);
 
-#[pymethods]
-impl PyWireDecoder {
-    /// A decoder that has seen nothing.
-    #[new]
-    fn new() -> Self {
-        Self::default()
-    }
-
-    /// Takes some bytes, which may begin and end anywhere.
-    fn feed(&mut self, py: Python<'_>, data: &[u8]) {
-        py.detach(|| self.0.feed(data));
-    }
-
-    /// The port was closed and opened anew.
-    fn interrupted(&mut self) {
-        self.0.interrupted();
-    }
-
-    /// Nothing more comes.
-    fn finish(&mut self) {
-        self.0.finish();
-    }
-
+decoder_class!(PyWireDecoder {
     /// Samples since this was last asked: for each start of the device and each announcement a dictionary with what was announced,
     /// `start`, and arrays `stamps` (n,) ticks, `sequence` (n,), `lost` (n,) frames missing before each, `values` (n, columns) SI units.
     fn take<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
@@ -75,11 +98,6 @@ impl PyWireDecoder {
         Ok(out)
     }
 
-    /// Messages since this was last asked.
-    fn take_texts(&mut self) -> Vec<String> {
-        self.0.take_texts()
-    }
-
     /// The last announcement; None before the first.
     fn announcement<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(announcement) = self.0.announcement() else {
@@ -89,54 +107,14 @@ impl PyWireDecoder {
         add_announcement(&out, announcement)?;
         Ok(Some(out))
     }
-
-    /// What came so far, by name.
-    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let counts = self.0.counts();
-        let out = PyDict::new(py);
-        for (name, count) in [
-            ("bytes", counts.bytes),
-            ("samples", counts.samples),
-            ("lost", counts.lost),
-            ("damaged", counts.damaged),
-            ("unknown", counts.unknown),
-            ("unexplained", counts.unexplained),
-            ("restarts", counts.restarts),
-        ] {
-            out.set_item(name, count)?;
-        }
-        Ok(out)
-    }
-}
+});
 
 /// Decoder of the text form.
 #[pyclass(name = "LineDecoder", module = "imufit._imufit")]
 #[derive(Default)]
 struct PyLineDecoder(lines::Decoder);
 
-#[pymethods]
-impl PyLineDecoder {
-    /// A decoder that has seen nothing.
-    #[new]
-    fn new() -> Self {
-        Self::default()
-    }
-
-    /// Takes some bytes, which may begin and end anywhere.
-    fn feed(&mut self, py: Python<'_>, data: &[u8]) {
-        py.detach(|| self.0.feed(data));
-    }
-
-    /// The port was closed and opened anew.
-    fn interrupted(&mut self) {
-        self.0.interrupted();
-    }
-
-    /// Nothing more comes.
-    fn finish(&mut self) {
-        self.0.finish();
-    }
-
+decoder_class!(PyLineDecoder {
     /// Rows since this was last asked: for each header a dictionary with `columns` as it spells them, and arrays `values` (n, columns) as
     /// they stand there and `lost` (n,) damaged lines before each.
     fn take<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
@@ -149,27 +127,7 @@ impl PyLineDecoder {
         }
         Ok(out)
     }
-
-    /// Other lines since this was last asked.
-    fn take_texts(&mut self) -> Vec<String> {
-        self.0.take_texts()
-    }
-
-    /// What came so far, by name.
-    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let counts = self.0.counts();
-        let out = PyDict::new(py);
-        for (name, count) in [
-            ("bytes", counts.bytes),
-            ("samples", counts.samples),
-            ("damaged", counts.damaged),
-            ("unexplained", counts.unexplained),
-        ] {
-            out.set_item(name, count)?;
-        }
-        Ok(out)
-    }
-}
+});
 
 /// A stream as Python gives it: rate, form, registers, channels (name, scale, offset, range).
 type StreamArguments = (f32, String, Vec<u8>, Vec<(String, f32, f32, f32)>);

@@ -65,6 +65,15 @@ impl Form {
         }
     }
 
+    /// Number of columns that it fills.
+    pub fn width(&self) -> usize {
+        match self {
+            Self::Counts(_, channels) => channels.len(),
+            Self::Mpu6050(_) => 7,
+            Self::Hmc5883l(_) => 3,
+        }
+    }
+
     /// Columns of a log that it fills.
     pub fn columns(&self) -> Vec<&str> {
         match self {
@@ -78,16 +87,9 @@ impl Form {
     pub fn ranges(&self) -> Vec<f64> {
         match self {
             Self::Counts(_, channels) => channels.iter().map(|c| f64::from(c.range)).collect(),
-            Self::Mpu6050(registers) => {
-                let end = |selection: u8, ranges: &[mpu6050::FullScale; 4], unit: f64| {
-                    ranges.get(usize::from(selection)).map_or(0.0, |r| r.range * unit)
-                };
-                let acc = end(
-                    selection(registers[3]),
-                    &mpu6050::ACCELEROMETER,
-                    crate::STANDARD_GRAVITY,
-                );
-                let gyr = end(selection(registers[2]), &mpu6050::GYRO, 1_f64.to_radians());
+            Self::Mpu6050([_, _, gyro_config, accel_config]) => {
+                let acc = mpu6050::selected(&mpu6050::ACCELEROMETER, *accel_config).range * crate::STANDARD_GRAVITY;
+                let gyr = mpu6050::selected(&mpu6050::GYRO, *gyro_config).range.to_radians();
                 vec![acc, acc, acc, gyr, gyr, gyr, 0.0]
             }
             Self::Hmc5883l(registers) => {
@@ -111,13 +113,10 @@ impl Form {
                     values.push(count * f64::from(channel.scale) + f64::from(channel.offset));
                 }
             }
-            Self::Mpu6050(registers) => {
-                let readings = Scales::new(selection(registers[3]), selection(registers[2]))
-                    .and_then(|scales| mpu6050::decode(bytes, Burst::WithTemperature, &scales));
-                match readings {
-                    Ok(r) => values.extend(r.acc.iter().chain(&r.gyr).chain(&r.temp)),
-                    Err(_) => values.extend([f64::NAN; 7]),
-                }
+            Self::Mpu6050([_, _, gyro_config, accel_config]) => {
+                let scales = Scales::of_registers(*accel_config, *gyro_config);
+                let readings = bytes.try_into().map(|block| mpu6050::decode_block(block, &scales));
+                values.extend(readings.unwrap_or([f64::NAN; 7]));
             }
             Self::Hmc5883l(registers) => {
                 let field = match (<&[u8; hmc5883l::BYTES]>::try_from(bytes), hmc5883l::scale(registers[1])) {
@@ -128,11 +127,6 @@ impl Form {
             }
         }
     }
-}
-
-/// `AFS_SEL` or `FS_SEL`: bits 4 and 3 of a register.
-const fn selection(register: u8) -> u8 {
-    (register >> 3) & 3
 }
 
 /// One stream: numbers that come at one rate.
@@ -300,7 +294,7 @@ impl Announcement {
                 stream.form.decode(own, values);
                 rest = after;
             } else {
-                values.extend(stream.form.columns().iter().map(|_| f64::NAN));
+                values.extend(std::iter::repeat_n(f64::NAN, stream.form.width()));
             }
         }
         Some(u32::from_le_bytes([a, b, c, d]))

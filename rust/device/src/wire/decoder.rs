@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::announcement::Announcement;
 use super::frame::{self, Frame, LONGEST};
+use crate::pieces::{Piece, Pieces};
 
 /// Samples kept until an announcement says what they hold.
 const KEPT: usize = 1 << 16;
@@ -45,6 +46,21 @@ pub struct Counts {
     pub restarts: u64,
 }
 
+impl Counts {
+    /// Each with its name.
+    pub fn named(&self) -> [(&'static str, u64); 7] {
+        [
+            ("bytes", self.bytes),
+            ("samples", self.samples),
+            ("lost", self.lost),
+            ("damaged", self.damaged),
+            ("unknown", self.unknown),
+            ("unexplained", self.unexplained),
+            ("restarts", self.restarts),
+        ]
+    }
+}
+
 /// A sample that waits for an announcement.
 struct Waiting {
     start: u8,
@@ -56,10 +72,8 @@ struct Waiting {
 /// Decoder of a stream of bytes that may begin, break off and go on anywhere.
 #[derive(Default)]
 pub struct Decoder {
-    /// Bytes since the last end.
-    piece: Vec<u8>,
-    /// Whether the piece has become too long to be a frame.
-    overlong: bool,
+    pieces: Pieces<0, LONGEST>,
+    /// A frame without its stuffing.
     body: Vec<u8>,
     /// The last announcement, and the start that it was made for.
     announced: Option<(u8, Arc<Announcement>)>,
@@ -77,34 +91,14 @@ impl Decoder {
     /// Takes some bytes.
     pub fn feed(&mut self, bytes: &[u8]) {
         self.counts.bytes += bytes.len() as u64;
-        let mut pieces = bytes.split(|b| *b == 0);
-        let Some(last) = pieces.next_back() else { return };
-        for piece in pieces {
-            if self.piece.is_empty() && !self.overlong {
-                self.end(piece);
-            } else {
-                self.keep(piece);
-                let whole = std::mem::take(&mut self.piece);
-                if self.overlong {
-                    self.counts.damaged += 1;
-                    self.overlong = false;
-                } else {
-                    self.end(&whole);
-                }
-                self.piece = whole;
-                self.piece.clear();
-            }
-        }
-        self.keep(last);
+        let mut pieces = std::mem::take(&mut self.pieces);
+        pieces.feed(bytes, |piece| self.piece(piece));
+        self.pieces = pieces;
     }
 
     /// The port was closed and opened anew: half a frame from before does not go on.
     pub fn interrupted(&mut self) {
-        if !self.piece.is_empty() || self.overlong {
-            self.counts.damaged += 1;
-        }
-        self.piece.clear();
-        self.overlong = false;
+        self.counts.damaged += u64::from(self.pieces.interrupted());
     }
 
     /// Nothing more comes: samples that still wait are read by the last announcement, if there was any.
@@ -137,29 +131,19 @@ impl Decoder {
         self.announced.as_ref().map(|(_, announcement)| announcement.as_ref())
     }
 
-    fn keep(&mut self, piece: &[u8]) {
-        if self.piece.len() + piece.len() > LONGEST {
-            self.overlong = true;
-            self.piece.clear();
-        }
-        if !self.overlong {
-            self.piece.extend_from_slice(piece);
-        }
-    }
-
     /// What stood between two ends.
-    fn end(&mut self, piece: &[u8]) {
-        // Two ends in a row: some devices send one before a frame as well.
-        if piece.is_empty() {
-            return;
-        }
-        let mut body = std::mem::take(&mut self.body);
-        let found = if piece.len() > LONGEST {
-            None
-        } else {
-            frame::decode(piece, &mut body)
+    fn piece(&mut self, piece: Piece) {
+        let stuffed = match piece {
+            // Two ends in a row: some devices send one before a frame as well.
+            Piece::Whole([]) => return,
+            Piece::Whole(stuffed) => stuffed,
+            Piece::Overlong => {
+                self.counts.damaged += 1;
+                return;
+            }
         };
-        match found {
+        let mut body = std::mem::take(&mut self.body);
+        match frame::decode(stuffed, &mut body) {
             Some(frame) => self.frame(&frame),
             None => self.counts.damaged += 1,
         }

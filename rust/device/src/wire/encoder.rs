@@ -55,9 +55,7 @@ impl Encoder {
         payload.push(0);
         let mut rest = values;
         for (k, stream) in self.announcement.streams.iter().enumerate().take(STREAMS) {
-            let (own, after) = rest
-                .split_at_checked(stream.form.columns().len())
-                .unwrap_or((rest, &[]));
+            let (own, after) = rest.split_at_checked(stream.form.width()).unwrap_or((rest, &[]));
             rest = after;
             if own.iter().any(|v| !v.is_nan()) {
                 payload[4] |= 1 << k;
@@ -89,13 +87,8 @@ fn counts(form: &Form, values: &[f64], out: &mut Vec<u8>) {
             }
         }
         Form::Mpu6050([_, _, gyro_config, accel_config]) => {
-            let sensitivity = |ranges: &[mpu6050::FullScale; 4], register: u8| {
-                ranges
-                    .get(usize::from(register >> 3 & 3))
-                    .map_or(0.0, |r| r.sensitivity)
-            };
-            let acc = sensitivity(&mpu6050::ACCELEROMETER, *accel_config) / crate::STANDARD_GRAVITY;
-            let gyr = sensitivity(&mpu6050::GYRO, *gyro_config) * 1_f64.to_degrees();
+            let acc = mpu6050::selected(&mpu6050::ACCELEROMETER, *accel_config).sensitivity / crate::STANDARD_GRAVITY;
+            let gyr = mpu6050::selected(&mpu6050::GYRO, *gyro_config).sensitivity * 1_f64.to_degrees();
             let temp = (value(6) - mpu6050::TEMPERATURE_OFFSET) * mpu6050::TEMPERATURE_SENSITIVITY;
             let force = (0..3).map(|k| value(k) * acc);
             let rate = (3..6).map(|k| value(k) * gyr);

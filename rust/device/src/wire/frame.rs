@@ -1,9 +1,9 @@
 //! One frame: head, payload, check sum, and how it is told from the next.
 
-use crc::{CRC_16_IBM_3740, Crc};
+use crc::{CRC_16_IBM_3740, Crc, Table};
 
-/// The check sum: polynomial 0x1021, from 0xFFFF on, not reflected ("CCITT-FALSE").
-const CHECK: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
+/// The check sum: polynomial 0x1021, from 0xFFFF on, not reflected ("CCITT-FALSE"); sixteen bytes at a time.
+static CHECK: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_IBM_3740);
 
 /// Bytes of head and check sum.
 const AROUND: usize = 6;
@@ -41,12 +41,25 @@ pub fn encode(frame: &Frame) -> Vec<u8> {
     out
 }
 
+/// Takes the stuffing out: each byte that tells a run's length stands for the 0 behind the run. Run by run, which is several times as
+/// fast as byte by byte (`cobs::decode`).
+fn unstuff(stuffed: &[u8], body: &mut Vec<u8>) -> Option<()> {
+    body.clear();
+    let mut rest = stuffed;
+    while let Some((length, after)) = rest.split_first() {
+        let (run, next) = after.split_at_checked(usize::from(length.checked_sub(1)?))?;
+        body.extend_from_slice(run);
+        if *length < u8::MAX && !next.is_empty() {
+            body.push(0);
+        }
+        rest = next;
+    }
+    Some(())
+}
+
 /// The frame in what stood between two ends, unpacked into `body`; `None` if it is damaged.
 pub fn decode<'a>(stuffed: &[u8], body: &'a mut Vec<u8>) -> Option<Frame<'a>> {
-    body.clear();
-    body.resize(stuffed.len(), 0);
-    let report = cobs::decode(stuffed, body).ok()?;
-    let body = body.get(..report.frame_size())?;
+    unstuff(stuffed, body)?;
     let (checked, check) = body.split_at_checked(body.len().checked_sub(2)?)?;
     if body.len() < AROUND || CHECK.checksum(checked).to_le_bytes() != *check {
         return None;
@@ -85,6 +98,17 @@ mod tests {
             prop_assert!(!stuffed.contains(&0));
             let mut body = Vec::new();
             prop_assert_eq!(decode(stuffed, &mut body), Some(frame));
+        }
+
+        #[test]
+        fn stuffing_is_taken_out_as_by_the_package(
+            stuffed in prop::collection::vec(prop_oneof![1u8..6, 250u8.., 1u8..], 1..600),
+        ) {
+            let mut body = Vec::new();
+            let ours = unstuff(&stuffed, &mut body).map(|()| body);
+            let mut theirs = vec![0; stuffed.len()];
+            let report = cobs::decode(&stuffed, &mut theirs);
+            prop_assert_eq!(ours, report.ok().map(|r| theirs[..r.frame_size()].to_vec()));
         }
 
         #[test]

@@ -1,0 +1,147 @@
+"""``imufit emulate``: a device without hardware."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import OutputFile, json_option, keep_inputs, map_option
+from imufit.cli.output import Output
+from imufit.cli.simulate import chosen_effects
+
+DEVICES = ("floats", "mpu6050", "gy86")
+FORMS = ("binary", "text")
+KINDS = ("garbage", "drop", "crc", "unplug", "reset")
+
+
+class NumberOr(click.ParamType):  # type: ignore[type-arg]
+    """A number above zero, or one word.
+
+    Parameters
+    ----------
+    word : str
+        The word.
+    """
+
+    name = "number"
+
+    def __init__(self, word: str) -> None:
+        self._word = word
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
+        """Return the number, or the word."""
+        if value == self._word:
+            return self._word
+        try:
+            number = float(value)
+        except ValueError:
+            number = 0.0
+        if not 0.0 < number < float("inf"):
+            self.fail(f"{value!r} is neither a number above 0 nor {self._word}", param, ctx)
+        return number
+
+
+@click.command(short_help="A device without hardware: a scenario or a log on a pty or socket.")
+@click.argument("source", metavar="SCENARIO|LOG")
+@map_option
+@click.option("--on", default="pty", show_default=True, metavar="pty|socket://127.0.0.1:PORT", help="Where it is read.")
+@click.option(
+    "--link",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="PATH",
+    help="Symbolic link to the pty, which stays the same when the device is unplugged.",
+)
+@click.option("--device", type=click.Choice(DEVICES), default="floats", show_default=True, help="What it sends.")
+@click.option("--form", type=click.Choice(FORMS), default="binary", show_default=True, help="Frames or lines of text.")
+@click.option("--rate", type=NumberOr("max"), metavar="HZ|max", help="Samples a second; max: what --baud carries.")
+@click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="Time until it ends, s.")
+@click.option("--loop", is_flag=True, help="Begin again after the last sample; for ever without --duration.")
+@click.option(
+    "--speed", type=NumberOr("max"), default=1.0, metavar="X|max", help="Times faster than real; max: as it is read."
+)
+@click.option("--baud", type=click.IntRange(min=300), metavar="BAUD", help="What the line carries, bits a second.")
+@click.option("--tick", type=click.IntRange(1, 10**9), default=1000, metavar="NS", help="Tick of its clock, ns (1000).")
+@click.option("--clock-drift", type=float, default=0.0, metavar="PPM", help="By how much its clock goes fast.")
+@click.option(
+    "--clock-jitter", type=click.FloatRange(min=0.0), default=0.0, metavar="S", help="Noise of its stamps, s."
+)
+@click.option(
+    "--clock-start", type=click.IntRange(0, 2**32 - 1), default=0, metavar="TICKS", help="Where its clock begins."
+)
+@click.option(
+    "--fault",
+    "faults",
+    multiple=True,
+    metavar="KIND@S[:LENGTH]",
+    help=f"What goes wrong when: {', '.join(KINDS)}. Repeatable.",
+)
+@click.option(
+    "--fault-rate", "fault_rates", multiple=True, metavar="KIND=PER_S", help="What goes wrong by chance. Repeatable."
+)
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="ID[:NAME=VALUE,...]",
+    help="Effect of a scenario's sensor, SI units; without values they are drawn. Repeatable.",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, metavar="SEED", help="Seed of everything random.")
+@click.option("--wait/--no-wait", default=None, help="Switch it on when somebody reads (a socket) or at once (a pty).")
+@click.option(
+    "--sent", type=OutputFile((".parquet",)), metavar="FILE", help="Keep every sample with what became of it, .parquet."
+)
+@json_option
+def emulate(
+    source: str,
+    *,
+    mapping: tuple[str, ...],
+    tick: int,
+    clock_drift: float,
+    clock_jitter: float,
+    clock_start: int,
+    faults: tuple[str, ...],
+    fault_rates: tuple[str, ...],
+    effects: tuple[str, ...],
+    sent: Path | None,
+    json_file: Path | None,
+    **options: Any,
+) -> None:
+    """Be a device that measures a SCENARIO of `imufit simulate`, or what a LOG holds.
+
+    The first line on standard output is the port that `imufit record`, `imufit monitor` and `imufit calibrate --live`
+    open. Ctrl-C ends it.
+    """
+    keep_inputs([Path(source)], [sent, json_file])
+    out = Output(json_file)
+    device = engine.emulator(
+        source,
+        faults=faults,
+        fault_rates=fault_rates,
+        clock={"tick": tick, "drift": clock_drift, "jitter": clock_jitter, "start": clock_start},
+        effects=chosen_effects(effects),
+        sent=sent or False,
+        mapping=mapping,
+        **options,
+    )
+    device.open()
+    # Whoever waits for the port reads one line; with the JSON on standard output it stands on standard error.
+    click.echo(device.port, err=str(json_file) == "-")
+    sys.stdout.flush()
+    try:
+        device.run()
+    except KeyboardInterrupt:
+        device.stop()
+    found = device.summary()
+    out.say(
+        f"{found['samples']} samples over {found['duration_s']:.1f} s: {found['intact']} sent whole, "
+        f"{found['unread']} without a reader, {found['overrun']} with a reader too slow."
+    )
+    if found["faults"]:
+        out.say(f"Faults: {', '.join('{kind}@{at_s:.3f}'.format(**fault) for fault in found['faults'])}.")
+    if sent is not None:
+        out.wrote(sent)
+    out.json(found)

@@ -1,0 +1,31 @@
+"""``imufit recover``: a log of what a crash left."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs
+from imufit.cli.output import Output
+
+
+@click.command(short_help="A log of what a recording left that was killed or ran out of disk.")
+@click.argument("file", metavar="FILE", type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="LOG", help="Log to write; without it the one meant to be."
+)
+@click.option("--force", is_flag=True, help="Overwrite LOG if it is there already.")
+@click.option("--keep", is_flag=True, help="Keep the .part files.")
+@json_option
+def recover(file: Path, *, output: Path | None, force: bool, keep: bool, json_file: Path | None) -> None:
+    """Make the log of FILE, a LOG.part that `imufit record` left. Every whole batch is saved."""
+    keep_inputs([file], [output, json_file])
+    out = Output(json_file)
+    result = engine.recover(file, output, force=force, keep=keep)
+    out.say(result.sentence, bold=True)
+    out.say(*result.sentences()[1:])
+    out.table(result.gap_table())
+    out.wrote(Path(result.file))
+    out.json(result.to_dict())

@@ -1,0 +1,129 @@
+"""Rows as they come from a line: what the device says they hold, the numbers, and when they arrived."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+FORMS: Final = ("binary", "text")
+
+
+@dataclass(frozen=True)
+class Announced:
+    """What a device says of its rows.
+
+    Attributes
+    ----------
+    form : {"binary", "text"}
+        Form of the wire protocol.
+    name : str
+        Name of the device; empty in text form.
+    tick : float
+        Tick of its clock, s; 0 in text form.
+    columns : tuple of str
+        Columns as it names them.
+    ranges, rates : tuple of float
+        Per column: value at which it clips, SI units, and rows per second; 0 where that is not known.
+    """
+
+    form: str
+    name: str
+    tick: float
+    columns: tuple[str, ...]
+    ranges: tuple[float, ...] = ()
+    rates: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Arrived:
+    """Rows of one start of a device, in order; n rows.
+
+    Attributes
+    ----------
+    announced : Announced
+        What they hold.
+    arrival : (n,) array
+        When the bytes that ended each row were read, s on the clock of `time.monotonic`.
+    opening : (n,) uint32 array
+        How often the line was opened anew before.
+    start : (n,) uint8 array
+        Number of the device's start; 0 in text form.
+    stamps : (n,) uint32 array
+        Ticks of the device's clock; 0 in text form.
+    sequence : (n,) uint16 array
+        Number of each frame; 0 in text form.
+    lost : (n,) uint32 array
+        Frames missing, or lines damaged, before each row.
+    values : (n, columns) array
+        Numbers as decoded: SI units in binary form.
+    """
+
+    announced: Announced
+    arrival: Array
+    opening: NDArray[np.uint32]
+    start: NDArray[np.uint8]
+    stamps: NDArray[np.uint32]
+    sequence: NDArray[np.uint16]
+    lost: NDArray[np.uint32]
+    values: Array
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return int(self.arrival.size)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Arrived]) -> Self:
+        """Join rows of one announcement, in order.
+
+        Parameters
+        ----------
+        parts : sequence of Arrived
+            At least one.
+        """
+        names = ("arrival", "opening", "start", "stamps", "sequence", "lost", "values")
+        return cls(parts[0].announced, *(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+
+
+def of_frames(batch: Any, arrival: float, opening: int) -> Arrived:
+    """Rows of a batch of frames, as `WireDecoder.take` gives them."""
+    announced = Announced(
+        "binary",
+        batch["name"],
+        batch["tick"],
+        tuple(batch["columns"]),
+        tuple(batch["ranges"]),
+        tuple(batch["rates"]),
+    )
+    n = len(batch["stamps"])
+    return Arrived(
+        announced,
+        np.full(n, arrival),
+        np.full(n, opening, np.uint32),
+        np.full(n, batch["start"], np.uint8),
+        batch["stamps"],
+        batch["sequence"],
+        batch["lost"],
+        batch["values"],
+    )
+
+
+def of_lines(batch: Any, arrival: float, opening: int) -> Arrived:
+    """Rows of a batch of lines, as `LineDecoder.take` gives them."""
+    n = len(batch["lost"])
+    return Arrived(
+        Announced("text", "", 0.0, tuple(batch["columns"])),
+        np.full(n, arrival),
+        np.full(n, opening, np.uint32),
+        np.zeros(n, np.uint8),
+        np.zeros(n, np.uint32),
+        np.zeros(n, np.uint16),
+        batch["lost"],
+        batch["values"],
+    )

@@ -1,0 +1,148 @@
+"""What a running recording writes: rows in parts, a batch every quarter of a second."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from imufit.errors import InputError
+from imufit.log.metadata import Frame
+from imufit.record.arrived import Arrived
+from imufit.record.columns import Columns
+from imufit.record.finish import utc_now
+from imufit.record.part import PartFile, part_path, parts_of
+from imufit.record.reception import Reception
+
+EVERY: Final = 0.25
+"""Time after which rows are written, s: what a crash may cost."""
+
+
+class DiskError(InputError):
+    """The disk is full or gone."""
+
+
+class Journal:
+    """The parts of a recording; another one begins when the device announces other columns.
+
+    Parameters
+    ----------
+    log : Path
+        The log to be; its first part is made at once.
+    reception : Reception
+        Where the rows come from.
+    mapping : mapping or None
+        Source text for target columns.
+    frame : {"NED", "ENU", "NWU"}
+        Reference frame that the log will name.
+
+    Raises
+    ------
+    InputError
+        A part is there already, left by a crash, or cannot be made.
+    """
+
+    def __init__(
+        self, log: Path, reception: Reception, mapping: Mapping[str, str] | None, frame: Frame = "NED"
+    ) -> None:
+        self._log = log
+        self._reception = reception
+        self._mapping = mapping
+        self._about = {
+            "port": reception.line.port,
+            "utc": utc_now(),
+            "monotonic": time.monotonic(),
+            "mapping": None if mapping is None else dict(mapping),
+            "frame": frame,
+        }
+        self._held: list[Arrived] = []
+        self._texts: list[tuple[float, str]] = []
+        self._lost_since: float | None = None
+        self._next = 0.0
+        self.n = 0
+        if parts_of(log):
+            raise InputError(
+                "an earlier recording left this part",
+                file=part_path(log),
+                remedy=f"Run imufit recover {part_path(log)} first, or delete it.",
+            )
+        self._parts = [self._made(1)]
+
+    def _made(self, number: int) -> PartFile:
+        path = part_path(self._log, number)
+        try:
+            return PartFile(path)
+        except OSError as error:
+            raise DiskError(f"{path} cannot be written ({error.strerror or error})", file=path) from None
+
+    @property
+    def paths(self) -> list[Path]:
+        """Parts written so far."""
+        return [part.path for part in self._parts]
+
+    def take(self, rows: Sequence[Arrived], texts: Sequence[str] = ()) -> None:
+        """Keep rows and messages, and write them when it is time.
+
+        Parameters
+        ----------
+        rows : sequence of Arrived
+            As they came.
+        texts : sequence of str
+            Messages of the device.
+
+        Raises
+        ------
+        DiskError
+            The disk is full or gone: what was written stays.
+        InputError
+            The device announces columns of which no log can be made. What came before stays.
+        """
+        now = time.monotonic()
+        self._texts += [(now, text) for text in texts]
+        for part in rows:
+            if self._held and self._held[-1].announced != part.announced:
+                self._write()
+            self._held.append(part)
+        told = self._lost_since != self._reception.line.lost_since
+        if now >= self._next and (self._held or told):
+            self._write()
+
+    def end(self, why: str) -> None:
+        """Write what is left, and why the recording ended.
+
+        Parameters
+        ----------
+        why : str
+            For `Recording.ended`.
+        """
+        self._write(ended=why)
+
+    def close(self) -> None:
+        """Close the files."""
+        for part in self._parts:
+            part.close()
+
+    def _write(self, **more: Any) -> None:
+        held, self._held = self._held, []
+        texts, self._texts = self._texts, []
+        now = time.monotonic()
+        self._next = now + EVERY
+        self._lost_since = self._reception.line.lost_since
+        if held and held[0].announced != self._parts[-1].announced:
+            Columns(held[0].announced, self._mapping)
+            if self._parts[-1].announced is not None:
+                self._parts.append(self._made(len(self._parts) + 1))
+            self._parts[-1].begin(held[0].announced, self._about)
+        part = self._parts[-1]
+        if part.announced is None:
+            self._texts = texts
+            return
+        told: dict[str, Any] = {"counts": self._reception.counts, "now": now, "lost_since": self._lost_since, **more}
+        if texts:
+            told["texts"] = texts
+        try:
+            part.write(Arrived.joined(held) if held else None, told)
+        except OSError as error:
+            raise DiskError(f"{part.path} cannot be written ({error.strerror or error})") from None
+        self.n += sum(rows.n for rows in held)

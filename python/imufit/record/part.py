@@ -1,0 +1,305 @@
+"""What is written while a recording runs: append-only, so that a crash leaves all but the last quarter of a second."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+import zlib
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from imufit.errors import InputError
+from imufit.record.arrived import Announced, Arrived
+
+try:
+    import fcntl
+except ImportError:  # Windows keeps others from a file that is open anyway
+    fcntl = None  # type: ignore[assignment]
+
+VERSION: Final = 1
+SYNC: Final = 1.0
+"""Time after which what is written is on the disk, s: a power cut loses no more."""
+_KEY: Final = b"imufit_part"
+_RAW: Final[dict[str, Any]] = {
+    "arrival": np.float64,
+    "opening": np.uint32,
+    "start": np.uint8,
+    "stamps": np.uint32,
+    "sequence": np.uint16,
+    "lost": np.uint32,
+}
+"""Columns before those of the device: how each row arrived, see `Arrived`."""
+
+
+def part_path(log: Path, number: int = 1) -> Path:
+    """Place of a part of a log: ``walk.parquet.part``, then ``walk.parquet.part2`` and so on.
+
+    Parameters
+    ----------
+    log : Path
+        The log to be.
+    number : int
+        From 1.
+    """
+    return log.with_name(f"{log.name}.part" + ("" if number == 1 else str(number)))
+
+
+def parts_of(log: Path) -> list[Path]:
+    """Parts of a log that are there, in order.
+
+    Parameters
+    ----------
+    log : Path
+        The log to be.
+    """
+    parts: list[Path] = []
+    while (path := part_path(log, len(parts) + 1)).exists():
+        parts.append(path)
+    return parts
+
+
+class _Bytes:
+    """Takes what Arrow writes, to be written to the file at once."""
+
+    closed = False
+
+    def __init__(self) -> None:
+        self.held = bytearray()
+
+    def write(self, data: Any) -> int:
+        self.held += memoryview(data).cast("B")
+        return len(data)
+
+    def flush(self) -> None:
+        """Keep everything."""
+
+
+class PartFile:
+    """One part: an Arrow IPC stream of rows under one announcement, each batch with a check sum.
+
+    Parameters
+    ----------
+    path : Path
+        File to make.
+
+    Raises
+    ------
+    FileExistsError
+        It is there already.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0), 0o666)
+        if fcntl is not None:
+            fcntl.flock(self._file, fcntl.LOCK_EX)
+        self._whole = 0
+        self._synced = time.monotonic()
+        # a slow disk must not keep the line from being read
+        self._syncer = ThreadPoolExecutor(1)
+        self._syncing: Future[None] | None = None
+        self._sink = _Bytes()
+        self._stream: Any = None
+        self._schema: Any = None
+        self.announced: Announced | None = None
+
+    def begin(self, announced: Announced, about: Mapping[str, Any]) -> None:
+        """Write what the rows will hold.
+
+        Parameters
+        ----------
+        announced : Announced
+            What the device says.
+        about : mapping
+            What else has to be known to make a log of them: plain values.
+        """
+        self.announced = announced
+        told = json.dumps({**about, "version": VERSION, "announced": asdict(announced)})
+        self._schema = _schema(announced).with_metadata({_KEY: told.encode()})
+        self._stream = pa.ipc.new_stream(pa.PythonFile(self._sink, "w"), self._schema)
+        self._append()
+
+    def write(self, rows: Arrived | None, told: Mapping[str, Any]) -> None:
+        """Append rows at once: all of them are in the file afterwards, or none.
+
+        Parameters
+        ----------
+        rows : Arrived or None
+            At least one row; None for a batch that only tells.
+        told : mapping
+            What is known now: plain values.
+
+        Raises
+        ------
+        OSError
+            The disk is full or gone. The file ends with the last whole batch.
+        """
+        width = 0 if self.announced is None else len(self.announced.columns)
+        raw = [np.empty(0, k) if rows is None else getattr(rows, name) for name, k in _RAW.items()]
+        values = np.empty((width, 0)) if rows is None else np.ascontiguousarray(rows.values.T)
+        columns = [*raw, *values]
+        batch = pa.RecordBatch.from_arrays([pa.array(c) for c in columns], schema=self._schema)
+        note = json.dumps({**told, "check": _check(columns)}).encode()
+        self._stream.write_batch(batch, custom_metadata={_KEY: note})
+        self._append()
+        if time.monotonic() - self._synced > SYNC and (self._syncing is None or self._syncing.done()):
+            if self._syncing is not None:
+                self._syncing.result()
+            self._syncing = self._syncer.submit(os.fsync, self._file)
+            self._synced = time.monotonic()
+
+    def close(self) -> None:
+        """Close the file; it needs no end."""
+        self._syncer.shutdown()
+        os.close(self._file)
+
+    def _append(self) -> None:
+        data, self._sink.held = self._sink.held, bytearray()
+        done = 0
+        try:
+            while done < len(data):
+                done += os.write(self._file, memoryview(data)[done:])
+        except OSError:
+            os.ftruncate(self._file, self._whole)
+            os.lseek(self._file, self._whole, os.SEEK_SET)
+            raise
+        self._whole += done
+
+
+def _schema(announced: Announced) -> Any:
+    """Arrow's types of the columns."""
+    fields = [pa.field(name, pa.from_numpy_dtype(kind)) for name, kind in _RAW.items()]
+    return pa.schema([*fields, *(pa.field(name, pa.float64()) for name in announced.columns)])
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a part holds.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    announced : Announced
+        What the device says.
+    about : dict
+        What else was written at its beginning.
+    rows : Arrived or None
+        All rows of whole batches; None if there is none.
+    told : list of dict
+        What each batch told.
+    dropped : int
+        Bytes behind the last whole batch.
+    """
+
+    path: Path
+    announced: Announced
+    about: dict[str, Any]
+    rows: Arrived | None
+    told: list[dict[str, Any]]
+    dropped: int
+
+
+def read_part(path: Path) -> Part | None:
+    """Read the whole batches of a part, whatever stands behind them.
+
+    Parameters
+    ----------
+    path : Path
+        File; it may be cut off anywhere.
+
+    Returns
+    -------
+    Part or None
+        None if not even its beginning is whole.
+
+    Raises
+    ------
+    InputError
+        This is no part of a recording, or a recording is still running.
+    """
+    with path.open("rb") as file:
+        if fcntl is not None:
+            try:
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except OSError:
+                raise InputError("this recording is still running", file=path, remedy="Stop it first.") from None
+        size = path.stat().st_size
+        data = pa.BufferReader(pa.py_buffer(file.read()))
+    try:
+        stream = pa.ipc.open_stream(data)
+    except (pa.ArrowException, OSError):
+        stream = None
+    metadata = (stream.schema.metadata or {}) if stream is not None else {}
+    if stream is None or _KEY not in metadata:
+        if stream is None and _is_cut_off(path, size):
+            return None
+        raise InputError(
+            "this is no part of a recording", file=path, remedy="imufit record writes LOG.part while it runs."
+        )
+    try:
+        about = json.loads(metadata[_KEY])
+        version = about.pop("version")
+        if version != VERSION:
+            raise InputError(
+                f"this part was written by another version (form {version}, known is {VERSION})",
+                file=path,
+                remedy="Use the imufit that recorded it.",
+            )
+        said = about.pop("announced")
+        plain: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in said.items()}
+        announced = Announced(**plain)
+        as_written = stream.schema.equals(_schema(announced))
+    except InputError:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError):
+        as_written = False
+    if not as_written:
+        raise InputError("the beginning of this part is damaged", file=path, remedy="Record again.")
+    pieces, told, whole = _batches(stream, data, announced)
+    rows = Arrived.joined(pieces) if pieces else None
+    return Part(path, announced, about, rows, told, size - whole)
+
+
+def _is_cut_off(path: Path, size: int) -> bool:
+    """Whether a file without a whole beginning is nothing, zeros, or the beginning of an Arrow stream."""
+    with path.open("rb") as file:
+        start = file.read(4)
+    return start == b"\xff\xff\xff\xff"[: len(start)] or not any(start) or size == 0
+
+
+def _batches(stream: Any, data: Any, announced: Announced) -> tuple[list[Arrived], list[dict[str, Any]], int]:
+    """Rows of the whole batches, what they tell, and where the last one ends."""
+    pieces: list[Arrived] = []
+    told: list[dict[str, Any]] = []
+    whole = int(data.tell())
+    while True:
+        try:
+            batch, custom = stream.read_next_batch_with_custom_metadata()
+            note = json.loads(custom[_KEY])
+            columns = [np.asarray(column.to_numpy(zero_copy_only=False)) for column in batch.columns]
+            if note.pop("check") != _check(columns):
+                return pieces, told, whole
+        except (StopIteration, pa.ArrowException, OSError, KeyError, TypeError, ValueError, AttributeError):
+            return pieces, told, whole
+        whole = int(data.tell())
+        told.append(note)
+        if batch.num_rows:
+            raw: dict[str, Any] = dict(zip(_RAW, columns, strict=False))
+            pieces.append(Arrived(announced, **raw, values=np.stack(columns[len(_RAW) :], axis=1)))
+
+
+def _check(columns: Sequence[NDArray[Any]]) -> int:
+    """CRC-32 of all columns."""
+    check = 0
+    for column in columns:
+        check = zlib.crc32(np.ascontiguousarray(column).tobytes(), check)
+    return check

@@ -1,0 +1,152 @@
+"""A serial line that may be unplugged and comes back."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from typing import TYPE_CHECKING, Final
+
+from imufit.errors import InputError
+
+if TYPE_CHECKING:
+    import serial
+
+try:
+    from termios import error as _TerminalError  # noqa: N812
+except ImportError:  # Windows has no termios
+    _TerminalError = OSError  # type: ignore[misc, assignment]
+
+_FAILURES: Final = (OSError, ValueError, _TerminalError)
+
+BLOCK: Final = 1 << 16
+"""Bytes read at once at most."""
+BACKOFF: Final = (0.1, 2.0)
+"""Shortest and longest wait between two attempts to open a lost line, s."""
+
+
+class Line:
+    """A serial line, opened anew as often as it is lost.
+
+    It reads what has come and never waits for more: pyserial drops what it has already got when a line breaks while it
+    waits.
+
+    Parameters
+    ----------
+    port : str
+        Whatever pyserial opens: ``/dev/ttyUSB0``, ``COM3``, a pseudo-terminal, ``socket://127.0.0.1:5000``, ``loop://``.
+    baud : int
+        Bits per second; has no meaning for sockets and pseudo-terminals.
+
+    Attributes
+    ----------
+    opening : int
+        How often the line was opened anew: 0 at first.
+    lost_since : float or None
+        When it was lost, s on the clock of `time.monotonic`; None while it is open.
+    why : str
+        Why it was lost last.
+    """
+
+    def __init__(self, port: str, baud: int = 115200) -> None:
+        self.port = port
+        self.baud = baud
+        self.opening = 0
+        self.lost_since: float | None = None
+        self.why = ""
+        self._serial: serial.SerialBase | None = None
+        self._wait = BACKOFF[0]
+        self._next_try = 0.0
+
+    def open(self) -> None:
+        """Open the line for the first time.
+
+        Raises
+        ------
+        InputError
+            It cannot be opened; the remedy names the ports that are there.
+        """
+        try:
+            self._serial = self._opened()
+        except _FAILURES as error:
+            raise _refusal(self.port, error) from None
+
+    def read(self) -> bytes:
+        """Return what has come since the last call, at most `BLOCK` bytes; nothing while the line is lost."""
+        if self._serial is None and not self._reopen():
+            return b""
+        assert self._serial is not None
+        try:
+            return bytes(self._serial.read(BLOCK))
+        except OSError as error:
+            self._lost(error)
+            return b""
+
+    def close(self) -> None:
+        """Close the line."""
+        if self._serial is not None:
+            with contextlib.suppress(OSError):  # it is gone already
+                self._serial.close()
+            self._serial = None
+
+    def _opened(self) -> serial.SerialBase:
+        import serial  # noqa: PLC0415 - only who records needs it
+
+        # exclusive: two readers of one port would take each other's bytes
+        return serial.serial_for_url(self.port, baudrate=self.baud, timeout=0, exclusive=True)
+
+    def _lost(self, error: OSError) -> None:
+        self.close()
+        self.why = str(error)
+        self.lost_since = time.monotonic()
+        self._wait = BACKOFF[0]
+        self._next_try = self.lost_since + self._wait
+
+    def _reopen(self) -> bool:
+        """Try to open the line again, if it is time for that."""
+        if time.monotonic() < self._next_try:
+            return False
+        try:
+            self._serial = self._opened()
+        except _FAILURES as error:
+            self.why = str(error)
+            self._wait = min(2.0 * self._wait, BACKOFF[1])
+            self._next_try = time.monotonic() + self._wait
+            return False
+        self.lost_since = None
+        self.opening += 1
+        return True
+
+
+def _refusal(port: str, error: Exception) -> InputError:
+    """Say why a port cannot be opened and which ones there are."""
+    from serial.tools import list_ports  # noqa: PLC0415
+
+    if "://" in port:
+        if isinstance(error, ValueError):
+            return InputError(
+                f"the port {port} cannot be opened ({error})",
+                remedy="Write socket://HOST:PORT, or the name of a serial port.",
+            )
+        return InputError(
+            f"the port {port} cannot be opened ({_plain(error)})", remedy="Start what is to listen there first."
+        )
+    there = [found.device for found in list_ports.comports()]
+    listing = f"Ports here: {', '.join(there)}." if there else "There is no serial port here: plug the device in."
+    number = getattr(error, "errno", None)
+    if number == 2 or isinstance(error, FileNotFoundError):  # ENOENT
+        return InputError(f"there is no port {port}", remedy=listing)
+    if number == 13:  # EACCES
+        return InputError(
+            f"the port {port} may not be opened by this user",
+            remedy="Join its group (sudo usermod -aG dialout $USER) and log in again.",
+        )
+    if number in (11, 16) or "exclusively lock" in str(error):  # EAGAIN, EBUSY
+        return InputError(f"the port {port} is in use", remedy="Close the serial monitor or whatever reads it.")
+    return InputError(f"the port {port} cannot be opened ({_plain(error)})", remedy=listing)
+
+
+def _plain(error: Exception) -> str:
+    """Return the cause in words, without the numbers that pyserial puts around it."""
+    cause = error.__cause__ or error.__context__
+    words = getattr(cause, "strerror", None) or getattr(error, "strerror", None)
+    return str(words or error).splitlines()[0]
