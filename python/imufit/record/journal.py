@@ -112,15 +112,17 @@ class Journal:
         """Rows that are written."""
         return sum(part.rows for part in self._parts)
 
-    def end(self, why: str) -> None:
+    def end(self, why: str, away: float | None = None) -> None:
         """Write what is left, and why the recording ended.
 
         Parameters
         ----------
         why : str
             For `Recording.ended`.
+        away : float, optional
+            Since when the line had been lost then, s on the clock of `time.monotonic`.
         """
-        self._write(ended=why)
+        self._write(ended=why, lost_since=away)
         for part in self._parts:
             self._guarded(part, part.settle)
 
