@@ -11,7 +11,7 @@ CARGO_FLAGS := --workspace --release
 SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-rust test-python lint docs wheel bench clean
+.PHONY: help build demo test test-rust test-python fuzz lint docs wheel bench clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -29,8 +29,17 @@ test-rust: ## Rust tests
 test-python: $(STAMP) ## Python tests
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
+# A frame or a line is a few ten bytes; no sanitizer, since there is no unsafe code for it to watch.
+FUZZ_FLAGS := --sanitizer none --fuzz-dir rust/device/fuzz
+FUZZ_LIMITS := -max_total_time=30 -rss_limit_mb=512 -max_len=4096
+
+fuzz: ## Any bytes for the decoders of the wire protocol, a minute; installs cargo-fuzz
+	cargo fuzz --version >/dev/null 2>&1 || cargo install cargo-fuzz --locked --quiet
+	for target in frames lines; do cargo fuzz run $(FUZZ_FLAGS) $$target -- $(FUZZ_LIMITS) || exit 1; done
+
 lint: $(STAMP) ## Formatting, clippy, ruff, mypy, stubs, import layers
 	cargo fmt --all --check
+	rustfmt --check --edition 2024 rust/device/fuzz/fuzz_targets/*.rs
 	cargo clippy $(CARGO_FLAGS) --all-targets -- -D warnings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

@@ -21,6 +21,8 @@ PARTS = (
     "report",
     "export",
     "emulate",
+    "record",
+    "monitor",
     "allan",
     "tune",
 )

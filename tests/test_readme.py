@@ -17,6 +17,7 @@ PAGES = (
     "docs/own_effect.md",
     "docs/several.md",
     "docs/calibration.md",
+    "docs/device.md",
     "docs/replay.md",
     "docs/tuning.md",
     "docs/tilt.md",

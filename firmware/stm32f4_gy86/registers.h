@@ -96,6 +96,7 @@ struct gpio {
 #define ADC_CR2_ADON BIT(0)
 #define ADC_CR2_SWSTART BIT(30)
 #define ADC_CCR_TSVREFE BIT(23)
+#define ADC_CCR_QUARTER BIT(16) /* of 84 MHz: 36 are allowed */
 #define ADC_THERMOMETER 16 /* channel: its last bits are noise */
 
 /* Interrupts */

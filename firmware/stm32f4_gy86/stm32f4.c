@@ -76,7 +76,7 @@ void stm32f4_start(void)
 static uint8_t noise(void)
 {
     uint32_t mixed = board_ticks();
-    ADC_CCR = ADC_CCR_TSVREFE;
+    ADC_CCR = ADC_CCR_TSVREFE | ADC_CCR_QUARTER;
     ADC1_SMPR1 = 0; /* the shortest sampling: the most noise */
     ADC1_SQR3 = ADC_THERMOMETER;
     ADC1_CR2 = ADC_CR2_ADON;

@@ -25,8 +25,9 @@ void stm32f4_bus_start(void)
     I2C1_CR1 = I2C_CR1_SWRST;
     I2C1_CR1 = 0;
     I2C1_CR2 = stm32f4_bus_clock / 1000000;
-    I2C1_CCR = I2C_CCR_FAST | (stm32f4_bus_clock / (3 * 400000)); /* low for two parts, high for one */
-    I2C1_TRISE = stm32f4_bus_clock / 1000000 * 300 / 1000 + 1;    /* edges of 300 ns */
+    /* Low for two parts of a clock, high for one; rounded up, so that it is not faster than 400 kHz. */
+    I2C1_CCR = I2C_CCR_FAST | ((stm32f4_bus_clock + 3 * 400000 - 1) / (3 * 400000));
+    I2C1_TRISE = stm32f4_bus_clock / 1000000 * 300 / 1000 + 1; /* edges of 300 ns */
     I2C1_CR1 = I2C_CR1_PE;
 }
 

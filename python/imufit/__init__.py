@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from imufit import grade as grade
     from imufit import log as log
     from imufit import model as model
+    from imufit import monitor as monitor
+    from imufit import record as record
     from imufit import replay, simulate
     from imufit import report as report
     from imufit import results as results
@@ -51,6 +53,8 @@ else:
         "grade",
         "log",
         "model",
+        "monitor",
+        "record",
         "replay",
         "report",
         "results",

@@ -214,6 +214,8 @@ def notes(evidence: LogEvidence) -> tuple[str, ...]:
                 )
     if facts.field_estimated and "mag" in facts.sensors:
         out.append("The reference field was estimated from this log and is fitted along.")
+    if evidence.passes.commanded is not None:
+        out.append("The reference is the attitude at ref_angle: ref_q is the same but for its noise.")
     coloured = sorted({CHANNELS[k][:3] for k, taps in enumerate(evidence.filters) if taps})
     if coloured:
         out.append(f"The residual noise of {', '.join(coloured)} is coloured; the fit whitens it.")

@@ -33,6 +33,7 @@ OWN = frozenset({"acc.bias", "gyr.bias", "ref.alignment", "ref.tilt", FIELD_REFE
 All other effects are the sensor's, and the same in every log."""
 
 MAX_ITERATIONS = 6
+MAX_SEARCHES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +163,8 @@ class Analysis:
         model = model.starting_at(starts)
         values = _with_own(surveyed, model, self.unnamed, own)
         fitted = [_fitted(each, model, self.unnamed, at) for each, at in zip(surveyed, values, strict=True)]
-        found = search(surveyed, fitted, asked)
+        kept = {key: self.found[key] for key in model.effects if key in self.found}
+        found = kept | search(surveyed, fitted, asked)
         probes = _probes(surveyed) if with_candidates and not lean and only is None else ()
         columns = [*asked, *probes]
         evidence = [each.around(at, columns, found, lean=lean) for each, at in zip(self.logs, fitted, strict=True)]
@@ -247,15 +249,23 @@ class Analysis:
             return [value for log in self.having(key) for value in self.own[log][key]]
         return self.model.stack()[slot][1]
 
+    @property
+    def _held(self) -> list[int]:
+        """Slots of effects that stay at what a search found: readings jump as they change, no slope leads there."""
+        return [slot for slot, (effect, _) in enumerate(self.model.stack()) if effect.tried_at_full_size]
+
     def _estimate(self, chosen: list[int]) -> Estimate:
-        result = self.problem.estimate(chosen)
-        values, errors, at = {}, {}, 0
-        for slot in chosen:
-            present = np.asarray(self._present(slot))
-            count = present.size
-            values[slot] = self._within_reach(slot, present + result["step"][at : at + count])
-            errors[slot] = result["standard_error"][at : at + count]
-            at += count
+        held = [slot for slot in chosen if slot in self._held]
+        free = [slot for slot in chosen if slot not in held]
+        result = self.problem.estimate(free)
+        errors = _by_slot(self, free, result["standard_error"])
+        if held:
+            errors = _by_slot(self, chosen, self.problem.estimate(chosen)["standard_error"])
+            searched = {slot: self.found.get(self.slots[slot]) for slot in held}
+            errors |= {slot: np.maximum(errors[slot], found.spread) for slot, found in searched.items() if found}
+        steps = _by_slot(self, free, result["step"])
+        values = {slot: np.asarray(self._present(slot)) for slot in chosen}
+        values |= {slot: self._within_reach(slot, values[slot] + step) for slot, step in steps.items()}
         return Estimate(values, errors, result["full_step"], result["held_out"], result["training"], result["folds"])
 
     def _within_reach(self, slot: int, values: Array) -> Array:
@@ -350,6 +360,34 @@ class Analysis:
         return best, best.estimate()
 
     def _iterated(self) -> tuple[Analysis, Estimate]:
+        analysis, estimate = self._stepped()
+        for _ in range(MAX_SEARCHES if analysis._held else 0):
+            searched, moved = analysis._searched_again(estimate)
+            if not moved:
+                return searched, searched.estimate()
+            analysis, estimate = searched._stepped()
+        return analysis, estimate
+
+    def _searched_again(self, estimate: Estimate) -> tuple[Analysis, bool]:
+        """Search anew for what is held, beside what is fitted now; and whether it moves."""
+        model, own = self.moved_to(estimate)
+        surveyed = [each.surveyed for each in self.logs]
+        found = dict(self.found)
+        moved = {}
+        for slot in self._held:
+            effect, present = model.stack()[slot]
+            fitted = [_fitted(each, model, self.unnamed, at) for each, at in zip(surveyed, own, strict=True)]
+            others = [{key: at for key, at in values.items() if key != effect.id} for values in fitted]
+            found |= search(surveyed, others, {effect.id: effect}, {effect.id: present})
+            now = found[effect.id]
+            if np.any(np.abs(np.subtract(now.start, present)) > 0.1 * np.maximum(now.spread, estimate.errors[slot])):
+                moved[effect.id] = now.start
+        searched = replace(self, found=found)
+        if moved:
+            searched = searched.around(model.starting_at(moved), own, lean=True)
+        return searched, bool(moved)
+
+    def _stepped(self) -> tuple[Analysis, Estimate]:
         analysis, estimate = self, self.estimate()
         for _ in range(MAX_ITERATIONS):
             if analysis.linear or analysis.converged(estimate):
@@ -357,6 +395,12 @@ class Analysis:
             analysis = analysis.around(*analysis.moved_to(estimate), lean=True)
             estimate = analysis.estimate()
         return analysis, estimate
+
+
+def _by_slot(analysis: Analysis, slots: Sequence[int], parameters: Array) -> dict[int, Array]:
+    """Cut numbers for the parameters of some slots, one slot after the other, into those of each."""
+    counts = [len(analysis._present(slot)) for slot in slots]
+    return dict(zip(slots, np.split(parameters, np.cumsum(counts)[:-1]), strict=True)) if slots else {}
 
 
 def pooled(values: Array, errors: Array) -> tuple[Array, Array]:

@@ -13,6 +13,7 @@ from imufit import _imufit
 from imufit.errors import InputError
 from imufit.faults import row_faults
 from imufit.fit.column_noise import ColumnNoise
+from imufit.fit.commanded import CommandedAttitude
 from imufit.fit.range_end import RangeEnd
 from imufit.log import Chunk, LogSource
 from imufit.progress import Progress
@@ -74,11 +75,16 @@ class Passes:
         """Share of noise in each covariate's variance (``temp`` too), once the log has been surveyed."""
         self._progress = progress
         self.row_faults, self._left_out = row_faults(log)
+        self.commanded = self._commanded()
+        """Attitude that the commanded angle of a rig gives, where the log's own is the same but noisier."""
 
     def chunks(self, margin: int, label: str) -> Iterator[dict[str, Any]]:
         """Chunks of the log as the compiled core takes them, telling the progress."""
         for chunk in self.log.chunks(CHUNK_ROWS, margin):
             arrays = chunk_arrays(chunk, self.covariates)
+            angle = chunk.log.ref_angle
+            if self.commanded is not None and angle is not None:
+                arrays["ref_q"] = self.commanded.attitude(angle)
             self._leave_out(arrays)
             yield arrays
             self._progress(chunk.start + chunk.end - chunk.begin, self.log.n, label)
@@ -159,12 +165,20 @@ class Passes:
                 found[sensor] = float(value)
         return found, {sensor: end.largest for sensor, end in ends.items() if end.largest > 0.0}
 
+    def _commanded(self) -> CommandedAttitude | None:
+        axis = self.log.metadata.rig_axis
+        if axis is None:
+            return None
+        return CommandedAttitude.of((chunk.log for chunk in self.log.chunks(CHUNK_ROWS, 0)), "xyz".index(axis))
+
     def _rig(self) -> tuple[int, list[float]] | None:
         """Axis of a one-axis rig and its attitude at the angle zero; None for a log of anything else."""
         axis = self.log.metadata.rig_axis
         if axis is None:
             return None
         number = "xyz".index(axis)
+        if self.commanded is not None:
+            return number, self.commanded.zero.as_quat(scalar_first=True).tolist()
         for chunk in self.log.chunks(CHUNK_ROWS, 0):
             q, angle = chunk.log.ref_q, chunk.log.ref_angle
             if q is None or angle is None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from imufit import _imufit
 from imufit.fit.surveyed_log import SurveyedLog
 from imufit.model.catalogue import find_effect
@@ -23,14 +25,20 @@ class Found:
         Values of all its parameters that its columns are taken for.
     start : list of float
         Values to start a fit from.
+    spread : list of float
+        Standard deviation of these where the search decides them for good; else zero.
     """
 
     trial: list[float]
     start: list[float]
+    spread: list[float]
 
 
 def search(
-    logs: Sequence[SurveyedLog], fitted: Sequence[Mapping[str, list[float]]], candidates: Mapping[str, _imufit.Effect]
+    logs: Sequence[SurveyedLog],
+    fitted: Sequence[Mapping[str, list[float]]],
+    candidates: Mapping[str, _imufit.Effect],
+    around: Mapping[str, list[float]] | None = None,
 ) -> dict[str, Found]:
     """Search for those candidates that have something to search for, each alone on top of a model, in all logs at once.
 
@@ -42,6 +50,8 @@ def search(
         For each log the effects of its model with their parameters, which move along.
     candidates : mapping
         Effects by id.
+    around : mapping, optional
+        By id values of all parameters near which is to be searched; without it everywhere.
 
     Returns
     -------
@@ -54,9 +64,13 @@ def search(
     }
     # The longest log tells of the longest times.
     guides = {key: logs[max(known, key=lambda k: _duration(logs[k]))].facts for key, known in tellers.items() if known}
-    grids = {key: candidates[key].search(facts) for key, facts in guides.items()}
-    grids = {key: grid for key, grid in grids.items() if grid}
     finer = 0
+    if around is None:
+        grids = {key: candidates[key].search(facts) for key, facts in guides.items()}
+    else:
+        grids = {key: candidates[key].search(facts, around[key], finer) for key, facts in guides.items()}
+        finer += 1
+    grids = {key: grid for key, grid in grids.items() if grid}
     while grids:
         profiles: dict[str, list[_imufit.Profile]] = {key: [] for key in grids}
         for k, (each, values) in enumerate(zip(logs, fitted, strict=True)):
@@ -70,9 +84,9 @@ def search(
             best = _imufit.best_trial(searches)
             grid = grids.pop(key)
             if best is not None:
-                number, step, gain = best
-                found[key] = _found(candidates[key], grid[number], step)
-                if gain > CHANCE:
+                number, step, spread, gain = best
+                found[key] = _found(candidates[key], grid[number], step, spread)
+                if gain > CHANCE and not _resolved(grid, spread):
                     grids[key] = candidates[key].search(guides[key], found[key].trial, finer)
         grids = {key: grid for key, grid in grids.items() if grid}
         finer += 1
@@ -83,9 +97,17 @@ def _duration(each: SurveyedLog) -> float:
     return each.facts.t_end - each.facts.t_start
 
 
-def _found(effect: _imufit.Effect, trial: list[float], step: list[float]) -> Found:
+def _resolved(grid: list[list[float]], spread: list[float]) -> bool:
+    """Return whether a grid is finer than what the log can tell."""
+    steps = np.diff(np.sort(grid, axis=0), axis=0).min(axis=0, initial=np.inf)
+    return bool(np.any(spread > steps))
+
+
+def _found(effect: _imufit.Effect, trial: list[float], step: list[float], spread: list[float]) -> Found:
+    if effect.tried_at_full_size:
+        return Found(step, step, spread)
     start = [
         searched if name in effect.searched else moved
         for (name, _, _), searched, moved in zip(effect.parameters, trial, step, strict=True)
     ]
-    return Found(trial, start)
+    return Found(trial, start, spread)

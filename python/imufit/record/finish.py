@@ -84,6 +84,7 @@ def log_of(
         runs = sum(int(piece.timing.run[-1]) + 1 for piece in pieces)
         clock = RecordingClock("device", float(fit.offsets[0]) - first, fit.drift_ppm, fit.jitter, fit.latest, runs)
     device = held[0].announced
+    why = ended or told.get("ended", "crash")
     recording = Recording(
         file=str(file),
         port=about["port"],
@@ -95,9 +96,9 @@ def log_of(
         rate_hz=1.0 / typical_step(t) if t.size > 1 else None,
         columns=tuple(names),
         **{name: int(counts.get(name, 0)) for name in ("lost", "damaged", "unknown", "unexplained")},
-        gaps=(*_gaps(pieces, t), *_gap_at_end(told, t, first)),
+        gaps=(*_gaps(pieces, t), *(_gap_at_end(told, t, first) if why != "line lost" else ())),
         clock=clock,
-        ended=ended or told.get("ended", "crash"),
+        ended=why,
         cpu_share=cpu_share,
         notes=tuple(dict.fromkeys([*_dropped(parts), *(n for piece in pieces for n in piece.timing.notes)])),
     )

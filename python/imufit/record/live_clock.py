@@ -101,12 +101,16 @@ class LiveClock:
             self._points[-1] = (end, late)
         self._lowest = min(self._lowest, late - (self._rate - 1.0) * end)
         if new:
-            self._offset = self._lowest
-        elif not self._alien:
-            most = SLEW * max(end - self._device_end, 0.0)
-            self._offset += min(max(self._lowest - self._offset, -most), most)
-        self._device_end = end
-        return self._offset + self._rate * device
+            self._offset, self._device_end = self._lowest, end
+        before, passed = self._offset, end - self._device_end
+        if passed > 0.0 and not self._alien:
+            self._offset += min(max(self._lowest - self._offset, -SLEW * passed), SLEW * passed)
+            share = np.clip((device - self._device_end) / passed, 0.0, 1.0)
+            offset = before + (self._offset - before) * share
+        else:
+            offset = np.full(device.size, before)
+        self._device_end = max(end, self._device_end)
+        return np.asarray(offset + self._rate * device, dtype=np.float64)
 
     def _fit(self) -> None:
         """Fit the rate anew, so that the time goes on from where it is."""

@@ -20,7 +20,8 @@ class RecordingGap:
     Attributes
     ----------
     t_start, t_end : float
-        Time of the last row before it and of the first one after it, s.
+        Time of the last row before it and of the first one after it, s; of the end of the recording if the line was
+        still away then.
     reason : str
         ``unplugged`` (the line was lost and opened anew), ``reset`` (the device started anew) or ``lost frames``.
     frames : int

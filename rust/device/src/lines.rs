@@ -247,6 +247,7 @@ mod tests {
         decoder.interrupted();
         decoder.feed(b"23,4\n5,6\n");
         assert_eq!(decoder.take()[0].values, [1.0, 2.0, 5.0, 6.0]);
+        assert_eq!(decoder.counts().damaged, 2);
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use imufit_model::effect::EffectError;
 use imufit_model::facts::LogFacts;
 use imufit_model::sensor::CHANNELS;
-use imufit_model::sensor_model::{ChannelColumns, SensorModel};
+use imufit_model::sensor_model::{ChannelColumns, SensorModel, Slot};
 use imufit_model::window::Window;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -52,8 +52,11 @@ impl Sums {
 pub struct Best {
     /// Number of the trial.
     pub trial: usize,
-    /// The candidate's parameters as a step from zero along the trial's columns finds them.
+    /// The candidate's parameters as a step from zero along the trial's columns finds them; where a search asks how well just
+    /// the tried size does, the mean of all trials, each by how likely it makes the readings.
     pub parameters: Vec<f64>,
+    /// Standard deviation of that mean; zero elsewhere.
+    pub spread: Vec<f64>,
     /// Drop of the sum of squares in units of the noise that the trial leaves.
     pub gain: f64,
 }
@@ -94,9 +97,18 @@ impl Profile {
         }
     }
 
+    fn slot(&self, trial: usize) -> Option<&Slot> {
+        self.model.slots().iter().filter(|s| !s.in_model).nth(trial)
+    }
+
     fn range(&self, trial: usize) -> std::ops::Range<usize> {
-        let slot = self.model.slots().iter().filter(|s| !s.in_model).nth(trial);
-        slot.map_or(0..0, |s| s.first..s.first + s.parameters.len())
+        self.slot(trial).map_or(0..0, |s| s.first..s.first + s.parameters.len())
+    }
+
+    /// Values that the candidate's parameters have in a trial, if it is asked how well just these do.
+    fn given(&self, trial: usize) -> Option<&[f64]> {
+        let slot = self.slot(trial)?;
+        slot.effect.tried_at_full_size().then_some(&slot.parameters)
     }
 
     /// Adds the core rows of a window.
@@ -224,6 +236,33 @@ impl Profile {
     }
 }
 
+/// Step of the first `fitted` parameters that goes best with given values of the others, and these.
+fn with_given(equations: &NormalEquations, fitted: usize, values: &[f64]) -> Option<DVector<f64>> {
+    let kept: Vec<usize> = (0..fitted).collect();
+    let others: Vec<usize> = (fitted..fitted + values.len()).collect();
+    let beside = equations.given(&kept, &others, values);
+    let step = beside.solve(&DVector::zeros(fitted))?.solution;
+    let all = step.iter().chain(values).copied();
+    Some(DVector::from_iterator(fitted + values.len(), all))
+}
+
+/// Mean and standard deviation of the values tried, each by how likely it makes the readings, from their sums of squares. Where
+/// readings do not change between two trials, both are as good.
+fn likely(tried: &[(&[f64], f64)]) -> (Vec<f64>, Vec<f64>) {
+    let least = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
+    let weights: Vec<f64> = tried.iter().map(|t| (0.5 * (least - t.1)).exp()).collect();
+    let sum: f64 = weights.iter().sum();
+    let count = tried.first().map_or(0, |t| t.0.len());
+    let mean = |k: usize, of: &dyn Fn(f64) -> f64| {
+        let weighted = tried.iter().zip(&weights).map(|(t, w)| w * of(t.0[k]));
+        weighted.sum::<f64>() / sum
+    };
+    let means: Vec<f64> = (0..count).map(|k| mean(k, &|v| v)).collect();
+    let spread = (0..count).map(|k| mean(k, &|v| (v - means[k]).powi(2)).sqrt());
+    let spread = spread.collect();
+    (means, spread)
+}
+
 /// The trial that lowers the sum of squares of all logs most; `None` without trials or samples. The searches are for the same
 /// trials; the candidate's parameters are the same in all logs, the model's move along in each log by themselves.
 pub fn best(logs: &[&Profile]) -> Option<Best> {
@@ -254,7 +293,7 @@ pub fn best(logs: &[&Profile]) -> Option<Best> {
         sum
     };
     let mut found: Option<(usize, DVector<f64>)> = None;
-    let mut gain = 0.0;
+    let (mut gain, mut of_given) = (0.0, None);
     for _ in 0..ROUNDS {
         let weights: Vec<[f64; CHANNELS]> = (0..logs.len())
             .map(|log| {
@@ -268,12 +307,16 @@ pub fn best(logs: &[&Profile]) -> Option<Best> {
             .into_par_iter()
             .filter_map(|trial| {
                 let equations = equations(trial, &weights);
-                let precision = DVector::zeros(equations.parameters());
-                let step = equations.solve(&precision)?.solution;
+                let step = match logs[0].given(trial) {
+                    Some(values) => with_given(&equations, fitted, values)?,
+                    None => equations.solve(&DVector::zeros(equations.parameters()))?.solution,
+                };
                 let square = equations.residual_square(&step);
                 square.is_finite().then_some((trial, square, step))
             })
             .collect();
+        let tried: Option<Vec<(&[f64], f64)>> = solved.iter().map(|s| Some((logs[0].given(s.0)?, s.1))).collect();
+        of_given = tried.map(|tried| likely(&tried));
         let (trial, square, step) = solved.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
         let alone = equations(trial, &weights).selected(&(0..fitted).collect::<Vec<_>>());
         let without = alone.solve(&DVector::zeros(fitted))?.solution;
@@ -281,10 +324,12 @@ pub fn best(logs: &[&Profile]) -> Option<Best> {
         found = Some((trial, step));
     }
     found.map(|(trial, step)| {
-        let own = step.rows(fitted, step.len() - fitted);
+        let own: Vec<f64> = step.iter().skip(fitted).copied().collect();
+        let (parameters, spread) = of_given.unwrap_or_else(|| (own.clone(), vec![0.0; own.len()]));
         Best {
             trial,
-            parameters: own.iter().copied().collect(),
+            parameters,
+            spread,
             gain,
         }
     })

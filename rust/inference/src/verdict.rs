@@ -1,5 +1,7 @@
 //! Adequate, missing, ambiguous or unknown: the only place where this is decided.
 
+use std::collections::BTreeMap;
+
 use imufit_model::rest_channels;
 use imufit_model::sensor::{CHANNELS, Sensor};
 use imufit_model::sensor_model::Slot;
@@ -261,11 +263,10 @@ fn settle(
         None => Kind::Unknown,
         Some(first) => {
             let sensors = slots[first].effect.sensors();
-            let left = unexplained
+            let concerned = unexplained
                 .iter()
-                .filter(|d| told_of(problem, d).iter().any(|s| sensors.contains(s)))
-                .map(|d| d.gain)
-                .fold(0.0, f64::max);
+                .filter(|d| told_of(problem, d).iter().any(|s| sensors.contains(s)));
+            let left = left_by(concerned);
             let gain = if chosen.is_empty() {
                 gain_of(screened, first)
             } else {
@@ -291,6 +292,16 @@ fn settle(
         disagreements,
         spoilt,
     }
+}
+
+/// What dependences are worth together: on each channel the one that brings most, since others there may be the same thing again.
+fn left_by<'a>(found: impl Iterator<Item = &'a Dependence>) -> f64 {
+    let mut most: BTreeMap<(Option<usize>, usize), f64> = BTreeMap::new();
+    for each in found {
+        let gain = most.entry((each.log, each.channel)).or_insert(0.0);
+        *gain = gain.max(each.gain);
+    }
+    most.values().sum()
 }
 
 /// Sensors that the channel of a dependence tells of.

@@ -175,6 +175,12 @@ pub trait Effect: Send + Sync {
         self.columns(rows, sensor, trial, out)
     }
 
+    /// True if [`Effect::candidate_columns`] times the trial's own values are what the effect of that size does, so that a search
+    /// asks how well just that size does.
+    fn tried_at_full_size(&self) -> bool {
+        false
+    }
+
     /// What it adds to the reading where that is not the sum of its parameters times their columns; `None` where it is.
     fn added(&self, _rows: &Rows, _sensor: Sensor, _parameters: &[f64]) -> Option<Triple> {
         None

@@ -237,12 +237,12 @@ impl PyProfile {
 }
 
 /// Number of the best trial of searches over several logs for the same trials, the candidate's parameters as a step finds
-/// them, and the drop of the sum of squares in units of the noise; None where no sample can be used.
+/// them, their standard deviation where they are the mean of trials of that size (else zero), and the drop of the sum of squares in units of the noise; None where no sample can be used.
 #[pyfunction]
-fn best_trial(py: Python<'_>, profiles: Vec<PyRef<'_, PyProfile>>) -> Option<(usize, Vec<f64>, f64)> {
+fn best_trial(py: Python<'_>, profiles: Vec<PyRef<'_, PyProfile>>) -> Option<(usize, Vec<f64>, Vec<f64>, f64)> {
     let logs: Vec<&Profile> = profiles.iter().map(|p| &p.0).collect();
     let best = py.detach(|| profile::best(&logs))?;
-    Some((best.trial, best.parameters, best.gain))
+    Some((best.trial, best.parameters, best.spread, best.gain))
 }
 
 /// Residual of each of the nine channels over the core rows of a chunk, (rows,), SI units (magnetometer uT), after a

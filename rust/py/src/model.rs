@@ -76,6 +76,12 @@ impl PyEffect {
         self.0.strongly_curved()
     }
 
+    /// True if a search finds it by how well it does at just the size tried, and no step moves it.
+    #[getter]
+    fn tried_at_full_size(&self) -> bool {
+        self.0.tried_at_full_size()
+    }
+
     /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new
     /// values.
     #[getter]

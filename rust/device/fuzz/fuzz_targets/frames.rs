@@ -105,8 +105,9 @@ fuzz_target!(|input: Input| {
     let (mut got, mut told_texts) = (Vec::new(), 0);
     // Bytes since the last end: the next frame is damaged with them.
     let mut begun: Vec<u8> = Vec::new();
-    // Frames since the last one that arrives.
-    let mut missing = 0;
+    // Frames since the last one that arrives; and since the last sample, which says so.
+    let (mut missing, mut untold) = (0, 0);
+    let (mut want_told, mut told) = (0, 0);
     // A frame that the fuzzer made up by chance, or an announcement or sample of its own, makes the account another one.
     let mut foreign = false;
     let mut feed = |decoder: &mut Decoder, mut wire: &[u8]| {
@@ -165,6 +166,7 @@ fuzz_target!(|input: Input| {
                 // The frame of the old start breaks off; what it lost is not known.
                 arrives = true;
                 missing = 0;
+                untold = 0;
                 [vec![0], device.frame(ANNOUNCEMENT, &announcement())].concat()
             }
             Event::Interruption => {
@@ -183,11 +185,16 @@ fuzz_target!(|input: Input| {
         }
         if arrives {
             lost += missing;
-            missing = 0;
+            untold += std::mem::take(&mut missing);
+            if matches!(event, Event::Sample { .. }) {
+                want_told += std::mem::take(&mut untold);
+            }
         } else if !matches!(event, Event::Garbage(_) | Event::Endless(..) | Event::Interruption) {
             missing += 1;
         }
-        got.extend(delivered(&decoder.take()));
+        let batches = decoder.take();
+        told += batches.iter().flat_map(|b| &b.lost).map(|n| u64::from(*n)).sum::<u64>();
+        got.extend(delivered(&batches));
         told_texts += decoder.take_texts().len();
     }
     decoder.finish();
@@ -198,6 +205,6 @@ fuzz_target!(|input: Input| {
         assert_eq!(got, want);
         assert_eq!(counts.samples as usize, want.len());
         assert_eq!(told_texts, texts);
-        assert_eq!(counts.lost, lost);
+        assert_eq!((counts.lost, told), (lost, want_told));
     }
 });

@@ -8,7 +8,7 @@ use crate::card::{Card, Found, Parameter, Stage, parameters};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::ideal::{Command, ReferenceChange};
-use crate::rig::{Play, Rig, RigError};
+use crate::rig::{Play, Rig, RigError, Slack};
 use crate::sensor::Sensor;
 
 /// What is wrong with the rig.
@@ -98,6 +98,10 @@ const WIDTHS: (f64, f64, u32) = (5e-5, 0.1, 18);
 const ROUNDS: usize = 3;
 const STEPS: i32 = 8;
 
+/// Part of a width by which a wider and a narrower play differ from it, of which its column is the difference; rad at least.
+const SPREAD: f64 = 0.1;
+const LEAST_SPREAD: f64 = 1e-6;
+
 /// Range of the commanded angle, rad.
 fn travel(rig: &Rig) -> f64 {
     let angles = || rig.knots.iter().map(|k| k.angle);
@@ -134,7 +138,7 @@ fn turned<const P: usize>(rows: &Rows, sensor: Sensor, out: &mut Columns, slopes
 fn play_columns<'a>(
     rows: &'a Rows,
     width: f64,
-    slope: impl Fn(crate::rig::Slack, &Command) -> [f64; 2] + 'a,
+    slope: impl Fn(Slack, &Command) -> [f64; 2] + 'a,
 ) -> impl Iterator<Item = [[f64; 2]; 1]> + 'a {
     let command = &rows.ideal.command;
     let first = command.first().map_or(0.0, |c| c.t);
@@ -169,8 +173,15 @@ impl Effect for RigEffect {
         let command = &rows.ideal.command;
         match self.kind {
             Kind::Backlash => {
-                // The end of a crossing shifts with the width, which no slope can tell: the rate has none.
-                let slopes = play_columns(rows, parameters[0], |slack, _| [slack.slope, 0.0]);
+                // The end of a crossing shifts with the width, which only a difference shows: the rate jumps there.
+                let width = parameters[0];
+                let half = (SPREAD * width.abs()).max(LEAST_SPREAD);
+                let change = move |slack: Slack, c: &Command| [slack.error, slack.follow * c.rate];
+                let wider = play_columns(rows, width + half, change);
+                let narrower = play_columns(rows, width - half, change);
+                let slopes = wider
+                    .zip(narrower)
+                    .map(|([wide], [narrow])| [[0, 1].map(|k| 0.5 * (wide[k] - narrow[k]) / half)]);
                 turned(rows, sensor, out, slopes);
             }
             Kind::Flexure => {
@@ -211,6 +222,10 @@ impl Effect for RigEffect {
         });
         turned(rows, sensor, out, secants);
         Ok(())
+    }
+
+    fn tried_at_full_size(&self) -> bool {
+        self.kind == Kind::Backlash
     }
 
     fn strongly_curved(&self) -> bool {
