@@ -2,9 +2,11 @@
 
 import concurrent.futures
 import multiprocessing
+import os
 import resource
 import signal
 import tempfile
+import threading
 from pathlib import Path
 
 import imufit.record.part
@@ -254,3 +256,37 @@ def test_what_is_written_is_put_on_the_disk_each_second(tmp_path, monkeypatch):
         concurrent.futures.wait([file._syncing] if file._syncing else [])
     file.close()
     assert np.diff([1000.0, *calls]).tolist() == [1.25, 1.25]
+
+
+def test_a_disk_that_stalls_keeps_nobody_waiting_and_loses_nothing(tmp_path, monkeypatch):
+    stalled, write = threading.Event(), os.write
+
+    def slow(file, data):
+        assert stalled.wait(30.0)
+        return write(file, data)
+
+    monkeypatch.setattr(imufit.record.part.os, "write", slow)
+    file = PartFile(tmp_path / "a.part")
+    file.begin(DEVICE, ABOUT)
+    for k in range(10):
+        file.write(rows(10 * k, 10), told(10))
+    assert file.rows == 0, "they wait in memory"
+    stalled.set()
+    file.settle()
+    assert file.rows == 100
+    file.close()
+    np.testing.assert_array_equal(read_part(tmp_path / "a.part").rows.values, rows(0, 100).values)
+
+
+def test_nothing_is_written_behind_a_batch_that_failed(tmp_path, monkeypatch):
+    file = PartFile(tmp_path / "a.part")
+    file.begin(DEVICE, ABOUT)
+    file.write(rows(0, 10), told(10))
+    with monkeypatch.context() as disk:
+        disk.setattr(imufit.record.part.os, "write", lambda *_: (_ for _ in ()).throw(OSError(28, "full")))
+        with pytest.raises(OSError, match="full"):
+            file.write(rows(10, 10), told(10))
+    with pytest.raises(OSError, match="full"):
+        file.write(rows(20, 10), told(10))
+    file.close()
+    assert read_part(tmp_path / "a.part").rows.n == 10

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -60,7 +60,6 @@ class Journal:
         self._texts: list[tuple[float, str]] = []
         self._lost_since: float | None = None
         self._next = 0.0
-        self.n = 0
         if parts_of(log):
             raise InputError(
                 "an earlier recording left this part",
@@ -108,15 +107,24 @@ class Journal:
         if now >= self._next and (self._held or told):
             self._write()
 
-    def end(self, why: str) -> None:
+    @property
+    def n(self) -> int:
+        """Rows that are written."""
+        return sum(part.rows for part in self._parts)
+
+    def end(self, why: str, away: float | None = None) -> None:
         """Write what is left, and why the recording ended.
 
         Parameters
         ----------
         why : str
             For `Recording.ended`.
+        away : float, optional
+            Since when the line had been lost then, s on the clock of `time.monotonic`.
         """
-        self._write(ended=why)
+        self._write(ended=why, lost_since=away)
+        for part in self._parts:
+            self._guarded(part, part.settle)
 
     def close(self) -> None:
         """Close the files."""
@@ -141,8 +149,11 @@ class Journal:
         told: dict[str, Any] = {"counts": self._reception.counts, "now": now, "lost_since": self._lost_since, **more}
         if texts:
             told["texts"] = texts
+        self._guarded(part, lambda: part.write(Arrived.joined(held) if held else None, told))
+
+    @staticmethod
+    def _guarded(part: PartFile, write: Callable[[], None]) -> None:
         try:
-            part.write(Arrived.joined(held) if held else None, told)
+            write()
         except OSError as error:
             raise DiskError(f"{part.path} cannot be written ({error.strerror or error})") from None
-        self.n += sum(rows.n for rows in held)

@@ -6,8 +6,9 @@ import json
 import os
 import time
 import zlib
+from collections import deque
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -27,6 +28,8 @@ except ImportError:  # Windows keeps others from a file that is open anyway
 VERSION: Final = 1
 SYNC: Final = 1.0
 """Time after which what is written is on the disk, s: a power cut loses no more."""
+STALL: Final = 0.05
+"""Time for which the disk may keep the line from being read, s."""
 _KEY: Final = b"imufit_part"
 _RAW: Final[dict[str, Any]] = {
     "arrival": np.float64,
@@ -90,6 +93,11 @@ class PartFile:
     path : Path
         File to make.
 
+    Attributes
+    ----------
+    rows : int
+        Rows that are in the file.
+
     Raises
     ------
     FileExistsError
@@ -103,9 +111,12 @@ class PartFile:
             fcntl.flock(self._file, fcntl.LOCK_EX)
         self._whole = 0
         self._synced = time.monotonic()
-        # a slow disk must not keep the line from being read
-        self._syncer = ThreadPoolExecutor(1)
+        # a disk that stalls must not keep the line from being read
+        self._writer, self._syncer = ThreadPoolExecutor(1), ThreadPoolExecutor(1)
+        self._writing: deque[Future[None]] = deque()
         self._syncing: Future[None] | None = None
+        self._failed: OSError | None = None
+        self.rows = 0
         self._sink = _Bytes()
         self._stream: Any = None
         self._schema: Any = None
@@ -125,10 +136,12 @@ class PartFile:
         told = json.dumps({**about, "version": VERSION, "announced": asdict(announced)})
         self._schema = _schema(announced).with_metadata({_KEY: told.encode()})
         self._stream = pa.ipc.new_stream(pa.PythonFile(self._sink, "w"), self._schema)
-        self._append()
+        self._append(0)
 
     def write(self, rows: Arrived | None, told: Mapping[str, Any]) -> None:
-        """Append rows at once: all of them are in the file afterwards, or none.
+        """Append rows at once: all of them come into the file, or none.
+
+        That is so when this returns, unless the disk stalls for longer than `STALL`; then they wait in memory.
 
         Parameters
         ----------
@@ -140,7 +153,7 @@ class PartFile:
         Raises
         ------
         OSError
-            The disk is full or gone. The file ends with the last whole batch.
+            The disk is full or gone. The file ends with the last whole batch, and nothing more is written.
         """
         width = 0 if self.announced is None else len(self.announced.columns)
         raw = [np.empty(0, k) if rows is None else getattr(rows, name) for name, k in _RAW.items()]
@@ -149,29 +162,54 @@ class PartFile:
         batch = pa.RecordBatch.from_arrays([pa.array(c) for c in columns], schema=self._schema)
         note = json.dumps({**told, "check": _check(columns)}).encode()
         self._stream.write_batch(batch, custom_metadata={_KEY: note})
-        self._append()
+        self._append(0 if rows is None else rows.n)
         if time.monotonic() - self._synced > SYNC and (self._syncing is None or self._syncing.done()):
             if self._syncing is not None:
                 self._syncing.result()
             self._syncing = self._syncer.submit(os.fsync, self._file)
             self._synced = time.monotonic()
 
+    def settle(self) -> None:
+        """Wait until everything is written.
+
+        Raises
+        ------
+        OSError
+            The disk is full or gone.
+        """
+        while self._writing:
+            self._writing.popleft().result()
+
     def close(self) -> None:
         """Close the file; it needs no end."""
+        self._writer.shutdown()
         self._syncer.shutdown()
         os.close(self._file)
 
-    def _append(self) -> None:
+    def _append(self, rows: int) -> None:
         data, self._sink.held = self._sink.held, bytearray()
+        self._writing.append(self._writer.submit(self._put, data, rows))
+        while self._writing:
+            wait([self._writing[0]], STALL)
+            if not self._writing[0].done():
+                return
+            self._writing.popleft().result()
+
+    def _put(self, data: bytearray, rows: int) -> None:
+        """Write a batch; after one that failed, none: there would be a hole."""
+        if self._failed is not None:
+            raise self._failed
         done = 0
         try:
             while done < len(data):
                 done += os.write(self._file, memoryview(data)[done:])
-        except OSError:
+        except OSError as error:
+            self._failed = error
             os.ftruncate(self._file, self._whole)
             os.lseek(self._file, self._whole, os.SEEK_SET)
             raise
         self._whole += done
+        self.rows += rows
 
 
 def _schema(announced: Announced) -> Any:

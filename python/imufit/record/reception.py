@@ -16,7 +16,6 @@ PAUSE: Final = (0.006, 0.012)
 """Shortest and longest wait between two reads, s: irregular, so that no rate of a device falls in step with it."""
 
 _DOUBTFUL: Final = 50
-_LAST: Final = 64  # reads at the end at most: a kernel's buffer, and not a device that never stops
 
 
 class Reception:
@@ -172,11 +171,5 @@ def listen(
         now = time.monotonic()
         lost = reception.line.lost_since
         if (end is not None and now >= end) or (give_up is not None and lost is not None and now - lost >= give_up):
-            break
-        time.sleep(random.uniform(*PAUSE))
-    # what had come by then
-    for _ in range(_LAST):
-        before = reception.counts["bytes"]
-        yield reception.poll()
-        if reception.counts["bytes"] == before:
             return
+        time.sleep(random.uniform(*PAUSE))

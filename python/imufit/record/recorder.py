@@ -125,10 +125,12 @@ def _run(
             journal.take(rows, texts)
             if watch is not None:
                 watch(reception, rows, texts)
-        lost = reception.line.lost_since is not None and give_up is not None
-        why = "stopped" if stopped() else "line lost" if lost else "duration"
+        away = reception.line.lost_since
+        why = "stopped" if stopped() else "line lost" if away is not None and give_up is not None else "duration"
+        if away is None:  # what had arrived by then
+            journal.take(reception.poll(), reception.take_texts())
         journal.take(reception.finish(), reception.take_texts())
-        journal.end(why)
+        journal.end(why, away)
     except DiskError as error:
         return "disk full", error
     except InputError as error:

@@ -92,7 +92,12 @@ class Line:
         import serial  # noqa: PLC0415 - only who records needs it
 
         # exclusive: two readers of one port would take each other's bytes
-        return serial.serial_for_url(self.port, baudrate=self.baud, timeout=0, exclusive=True)
+        line = serial.serial_for_url(self.port, do_not_open=True, baudrate=self.baud, timeout=0, exclusive=True)
+        if self.port.lower().startswith("socket:"):
+            # what comes with the connection is no rest of an earlier one, as it may be with a serial port
+            line.reset_input_buffer = lambda: None  # type: ignore[method-assign]
+        line.open()
+        return line
 
     def _lost(self, error: OSError) -> None:
         self.close()
