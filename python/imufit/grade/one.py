@@ -77,6 +77,8 @@ def hidden_in(setting: Setting, found: Drawn, kind: str = "", model: tuple[str, 
     effects = {**dict.fromkeys(model), found.effect: found.parameters}
     simulation = simulate(setting.scenario, effects, setting.seed, **setting.options)
     twin = None
-    if setting.options["noise"].attitude_deg > 0.0 and not injection(found.effect).vibration:
-        twin = simulate(setting.scenario, {}, setting.seed, **setting.options)
+    if setting.options["noise"].attitude_deg > 0.0:
+        # What shakes the sensor shakes the twin, too.
+        shaken = {found.effect: dict.fromkeys(found.parameters, 0.0)} if injection(found.effect).vibration else {}
+        twin = simulate(setting.scenario, shaken, setting.seed, **setting.options)
     return Puzzle("one", kind or found.effect, simulation, found.rivals, model, twin)
