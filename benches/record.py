@@ -59,8 +59,7 @@ def run(duration: float, device: list[str], folder: Path) -> dict[str, object]:
         "sent": len(whole),
         "unread": len(table) - len(whole),
         "lost": lost,
-        # but for the end, where the device is gone
-        "gaps": len(recording["gaps"]) - (recording["ended"] == "line lost"),
+        "gaps": len(recording["gaps"]),
         "off": [float(np.median(off)), float(np.quantile(off, 0.999)), float(off.max())],
         "drift": recording["clock"]["drift_ppm"],
         "recording": recording["cpu_share"],
