@@ -262,7 +262,8 @@ class Analysis:
         if held:
             errors = _by_slot(self, chosen, self.problem.estimate(chosen)["standard_error"])
             searched = {slot: self.found.get(self.slots[slot]) for slot in held}
-            errors |= {slot: np.maximum(errors[slot], found.spread) for slot, found in searched.items() if found}
+            # A slope does not see the jumps that tell most of it.
+            errors |= {slot: np.array(found.spread) for slot, found in searched.items() if found}
         steps = _by_slot(self, free, result["step"])
         values = {slot: np.asarray(self._present(slot)) for slot in chosen}
         values |= {slot: self._within_reach(slot, values[slot] + step) for slot, step in steps.items()}
@@ -380,7 +381,7 @@ class Analysis:
             others = [{key: at for key, at in values.items() if key != effect.id} for values in fitted]
             found |= search(surveyed, others, {effect.id: effect}, {effect.id: present})
             now = found[effect.id]
-            if np.any(np.abs(np.subtract(now.start, present)) > 0.1 * np.maximum(now.spread, estimate.errors[slot])):
+            if np.any(np.abs(np.subtract(now.start, present)) > 0.1 * np.array(now.spread)):
                 moved[effect.id] = now.start
         searched = replace(self, found=found)
         if moved:

@@ -85,8 +85,9 @@ def search(
             grid = grids.pop(key)
             if best is not None:
                 number, step, spread, gain = best
-                found[key] = _found(candidates[key], grid[number], step, spread)
-                if gain > CHANCE and not _resolved(grid, spread):
+                steps = _steps(grid)
+                found[key] = _found(candidates[key], grid[number], step, spread, steps)
+                if gain > CHANCE and not any(s > h for s, h in zip(spread, steps, strict=True)):
                     grids[key] = candidates[key].search(guides[key], found[key].trial, finer)
         grids = {key: grid for key, grid in grids.items() if grid}
         finer += 1
@@ -97,15 +98,18 @@ def _duration(each: SurveyedLog) -> float:
     return each.facts.t_end - each.facts.t_start
 
 
-def _resolved(grid: list[list[float]], spread: list[float]) -> bool:
-    """Return whether a grid is finer than what the log can tell."""
-    steps = np.diff(np.sort(grid, axis=0), axis=0).min(axis=0, initial=np.inf)
-    return bool(np.any(spread > steps))
+def _steps(grid: list[list[float]]) -> list[float]:
+    """Return the smallest distance of two trials in each parameter; zero where all are the same."""
+    apart = np.diff(np.sort(grid, axis=0), axis=0)
+    return [float(min(column[column > 0.0], default=0.0)) for column in apart.T]
 
 
-def _found(effect: _imufit.Effect, trial: list[float], step: list[float], spread: list[float]) -> Found:
+def _found(
+    effect: _imufit.Effect, trial: list[float], step: list[float], spread: list[float], steps: list[float]
+) -> Found:
     if effect.tried_at_full_size:
-        return Found(step, step, spread)
+        # No grid tells more than its own step.
+        return Found(step, step, [max(s, h / np.sqrt(12.0)) for s, h in zip(spread, steps, strict=True)])
     start = [
         searched if name in effect.searched else moved
         for (name, _, _), searched, moved in zip(effect.parameters, trial, step, strict=True)

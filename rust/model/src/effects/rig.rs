@@ -98,10 +98,6 @@ const WIDTHS: (f64, f64, u32) = (5e-5, 0.1, 18);
 const ROUNDS: usize = 3;
 const STEPS: i32 = 8;
 
-/// Part of a width by which a wider and a narrower play differ from it, of which its column is the difference; rad at least.
-const SPREAD: f64 = 0.1;
-const LEAST_SPREAD: f64 = 1e-6;
-
 /// Range of the commanded angle, rad.
 fn travel(rig: &Rig) -> f64 {
     let angles = || rig.knots.iter().map(|k| k.angle);
@@ -173,15 +169,8 @@ impl Effect for RigEffect {
         let command = &rows.ideal.command;
         match self.kind {
             Kind::Backlash => {
-                // The end of a crossing shifts with the width, which only a difference shows: the rate jumps there.
-                let width = parameters[0];
-                let half = (SPREAD * width.abs()).max(LEAST_SPREAD);
-                let change = move |slack: Slack, c: &Command| [slack.error, slack.follow * c.rate];
-                let wider = play_columns(rows, width + half, change);
-                let narrower = play_columns(rows, width - half, change);
-                let slopes = wider
-                    .zip(narrower)
-                    .map(|([wide], [narrow])| [[0, 1].map(|k| 0.5 * (wide[k] - narrow[k]) / half)]);
+                // The end of a crossing shifts with the width, which no slope can tell: the rate has none.
+                let slopes = play_columns(rows, parameters[0], |slack, _| [slack.slope, 0.0]);
                 turned(rows, sensor, out, slopes);
             }
             Kind::Flexure => {
