@@ -31,9 +31,9 @@ test-python: $(STAMP) ## Python tests
 
 # A frame or a line is a few ten bytes; no sanitizer, since there is no unsafe code for it to watch.
 FUZZ_FLAGS := --sanitizer none --fuzz-dir rust/device/fuzz
-FUZZ_LIMITS := -max_total_time=30 -rss_limit_mb=512 -max_len=4096
+FUZZ_LIMITS := -max_total_time=60 -rss_limit_mb=512 -max_len=4096
 
-fuzz: ## Any bytes for the decoders of the wire protocol, a minute; installs cargo-fuzz
+fuzz: ## Any bytes for the decoders of the wire protocol, a minute each; installs cargo-fuzz
 	cargo fuzz --version >/dev/null 2>&1 || cargo install cargo-fuzz --locked --quiet
 	for target in frames lines; do cargo fuzz run $(FUZZ_FLAGS) $$target -- $(FUZZ_LIMITS) || exit 1; done
 
