@@ -127,14 +127,10 @@ def emulate(
         mapping=mapping,
         **options,
     )
-    device.open()
-    # Whoever waits for the port reads one line; with the JSON on standard output it stands on standard error.
-    click.echo(device.port, err=str(json_file) == "-")
-    sys.stdout.flush()
-    try:
-        device.run()
-    except KeyboardInterrupt:
-        device.stop()
+    with engine.running(device):
+        # Whoever waits for the port reads one line; with the JSON on standard output it stands on standard error.
+        click.echo(device.port, err=str(json_file) == "-")
+        sys.stdout.flush()
     found = device.summary()
     out.say(
         f"{found['samples']} samples over {found['duration_s']:.1f} s: {found['intact']} sent whole, "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -335,6 +336,17 @@ def emulator(
 
     rates = dict(parse_fault_rate(text) for text in fault_rates)
     return Emulator(source, faults=faults, fault_rates=rates, clock=Clock(**clock), **settings)
+
+
+@contextmanager
+def running(device: Emulator) -> Iterator[None]:
+    """Let a device run until it has sent everything or is asked to end, also where Ctrl-C is ignored at the start."""
+    from imufit.record.signals import requests_to_end  # noqa: PLC0415
+
+    with requests_to_end() as asked, device:
+        yield
+        while not device.join(0.1) and not asked():
+            pass
 
 
 def unseal(path: Path) -> Truth:
