@@ -258,12 +258,12 @@ class Analysis:
         held = [slot for slot in chosen if slot in self._held]
         free = [slot for slot in chosen if slot not in held]
         result = self.problem.estimate(free)
-        errors = _by_slot(self, free, result["standard_error"])
-        if held:
-            errors = _by_slot(self, chosen, self.problem.estimate(chosen)["standard_error"])
-            searched = {slot: self.found.get(self.slots[slot]) for slot in held}
-            # A slope does not see the jumps that tell most of it.
-            errors |= {slot: np.array(found.spread) for slot, found in searched.items() if found}
+        # What is held is not known exactly, and leaves the others as open as if it were fitted along.
+        along = self.problem.estimate(chosen) if held else result
+        errors = _by_slot(self, chosen, along["standard_error"])
+        searched = {slot: self.found.get(self.slots[slot]) for slot in held}
+        # A slope does not see the jumps that tell most of it.
+        errors |= {slot: np.array(found.spread) for slot, found in searched.items() if found}
         steps = _by_slot(self, free, result["step"])
         values = {slot: np.asarray(self._present(slot)) for slot in chosen}
         values |= {slot: self._within_reach(slot, values[slot] + step) for slot, step in steps.items()}
