@@ -52,3 +52,18 @@ def test_a_column_that_says_nothing_has_no_noise(column):
     noise = ColumnNoise()
     noise.add(column)
     assert noise.share == 0.0
+
+
+@pytest.mark.parametrize("truth", ["temp", "heater"])
+def test_whitening_makes_the_noise_of_columns_louder(truth):
+    """A drift that stands out of the noise looks coloured; whitened, two columns agree less than their courses do."""
+    rng = np.random.default_rng(4)
+    sim = simulate.simulate("handheld", {}, 4, 90.0)
+    warm = 25.0 + 4.0 * np.sin(2 * np.pi * sim.t / 70.0)
+    cause = warm + (0.05 if truth == "temp" else 0.02) * rng.standard_normal(sim.t.size)
+    sim.gyr[:] += (warm - warm.mean())[:, None] * np.array([2e-3, -1.5e-3, 1e-3])
+    sim.temp[:] = cause if truth == "temp" else warm + 0.05 * rng.standard_normal(sim.t.size)
+    sim.covariates["heater"] = 0.1 * (cause if truth == "heater" else warm + 0.02 * rng.standard_normal(sim.t.size))
+    answer = SensorModel().fit(sim.to_log()).diagnose()
+    assert answer.verdict == "ambiguous"
+    assert {answer.best, *answer.ambiguous_with} == {"gyr.bias_temperature", "gyr.column:heater"}

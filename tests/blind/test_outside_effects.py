@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from imufit.simulate import INJECTIONS, OUTSIDE, Noise, SensorNoise, simulate
-from imufit.simulate.outside import beyond, play, vee
+from imufit.simulate.outside import beyond, past, play, vee
 
 QUIET = Noise(acc=SensorNoise(1e-300), gyr=SensorNoise(1e-300), mag=SensorNoise(1e-300), temperature=0.0)
 COLUMNS = ("motor_current", "vbat")
@@ -144,3 +144,35 @@ def test_field_that_varies_in_space_has_no_sources():
     np.testing.assert_allclose(position @ gradient, world, atol=1e-9)
     assert np.trace(gradient) == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(gradient, gradient.T, atol=1e-9)
+
+
+def test_a_creeping_sensor_follows_a_step_by_and_by():
+    since = np.arange(0.0, 30.0, 0.01)
+    step = np.where(since > 5.0, 1.0, 0.0)[:, None]
+    behind = past(step, since, 3.0)[:, 0]
+    np.testing.assert_allclose(behind[since > 5.0], 1.0 - np.exp(-(since[since > 5.0] - 5.0) / 3.0), atol=5e-3)
+    log, apart = change("acc.creep", three(0.01, 0.0, 0.0, forgotten=3.0), scenario="poses")
+    force = log.acc - apart
+    np.testing.assert_allclose(apart[:, 0], 0.01 * (past(force, log.t, 3.0) - force)[:, 0], atol=1e-9)
+
+
+def test_a_knock_turns_what_is_measured_and_keeps_its_length():
+    log, apart = change("acc.knock", three(0.0, 0.0, 1e-3, at=0.5), scenario="poses")
+    force = log.acc - apart
+    before = log.t < 0.49 * log.t[-1]
+    np.testing.assert_allclose(apart[before], np.cross(force[before], [0.0, 0.0, -5e-4]), atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(log.acc, axis=1), np.linalg.norm(force, axis=1), rtol=1e-6)
+
+
+def test_a_tone_has_its_frequency():
+    log, apart = change("gyr.tone", three(5e-3, 0.0, 0.0, frequency=1.7, phase=0.2))
+    np.testing.assert_allclose(apart[:, 0], 5e-3 * np.sin(2 * np.pi * 1.7 * (log.t - log.t[0]) + 0.2), atol=1e-9)
+
+
+def test_errors_follow_heading_and_speed():
+    log, apart = change("acc.heading", three(0.05, 0.0, 0.0))
+    heading = np.arctan2(*log.trajectory.at(log.t).rotation[:, [1, 0], 0].T)
+    assert explained(apart[:, 0], np.cos(2.0 * heading)) > 0.999
+    log, apart = change("gyr.speed", three(0.02, 0.0, 0.0), scenario="arm")
+    speed = np.linalg.norm(np.gradient(log.trajectory.at(log.t).position, log.t, axis=0), axis=1)
+    assert explained(apart[:, 0], speed**2) > 0.99

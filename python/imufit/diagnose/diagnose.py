@@ -15,6 +15,7 @@ from imufit.diagnose import sentences, without_reference
 from imufit.diagnose.agreement import answers_without, answers_without_faulty, disagreements
 from imufit.diagnose.better_explained import with_better_explained
 from imufit.diagnose.compare import notes
+from imufit.diagnose.fast_changes import with_fast_changes
 from imufit.diagnose.measured_columns import with_measured_columns
 from imufit.diagnose.rivals import correlations_with_best
 from imufit.diagnose.unusual_size import with_unusual_size
@@ -39,6 +40,8 @@ TOLD = 12.0
 """... and sum of squares, in units of the noise. If the other one is true, a fit gains that much once in 3000 times."""
 LEFT = 1.0
 """... or, if it stays behind in every part of the log, times what the best one leaves above the noise floor."""
+NEVER_AHEAD = 4.0 * TOLD
+"""In every part of the log is: in each, or by so much as a whole and in none ahead for certain."""
 NEAR = 0.5
 """Share of the best one's gain from which on a fit may show that another candidate explains more."""
 BESIDE = 10.0
@@ -66,6 +69,7 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     result = _decided_by_fits(fit, with_unusual_size(analysis, result, slots))
     result = with_measured_columns(analysis, result)
     result = with_better_explained(analysis, result)
+    result = with_fast_changes(analysis, fit.estimate.step, fit.ratio, result)
     confounded: dict[str, list[Rival]] = {}
     for first, second, correlation in result["correlations"]:
         if correlation < MIN_CORRELATION:
@@ -204,8 +208,11 @@ def _stays_behind(estimate: Estimate, best: Estimate, before: float) -> bool:
     if np.sum(behind) < TOLD:
         return False
     worse = estimate.held_out - best.held_out
-    everywhere = bool(np.all(behind > 0.0)) and worse >= LEFT * (best.held_out - 1.0)
-    return everywhere or worse > CLEARLY_WORSE * (before - best.held_out)
+    # By so much the ratio of a whole model may stand above one; the sum of squares is about the number of samples.
+    chance = 2.0 / np.sqrt(2.0 * np.sum(best.folds))
+    never_ahead = np.all(behind > -TOLD) and np.sum(behind) >= NEVER_AHEAD
+    everywhere = (np.all(behind > 0.0) or never_ahead) and worse >= LEFT * (best.held_out - 1.0 - chance)
+    return bool(everywhere) or worse > CLEARLY_WORSE * (before - best.held_out)
 
 
 def _leaves(analysis: Analysis, other: str) -> bool:
@@ -293,7 +300,7 @@ def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item
     def share(log: int) -> float:
         panels = residuals[log]["panels"]
         same = (p["share"] for p in panels if (p["channel"], p["covariate"]) == (item["channel"], item["covariate"]))
-        return float(next(same, 0.0))
+        return max(float(next(same, 0.0)), _share_of_gain(analysis.logs[log].floors, residuals[log], item))
 
     concerned = range(len(residuals)) if item["log"] is None else [item["log"]]
     having = [log for log in concerned if any(c["channel"] == item["channel"] for c in residuals[log]["channels"])]
@@ -304,6 +311,15 @@ def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item
     return Unexplained(
         item["channel"], item["covariate"], share(log), item["shape"], float(edges[first]), float(edges[last])
     )
+
+
+def _share_of_gain(floors: Sequence[float], residual: Mapping[str, Any], item: Mapping[str, Any]) -> float:
+    """Return what a dependence explains of the excess of its channel in a log, bins or not."""
+    channel = next((c for c in residual["channels"] if c["channel"] == item["channel"]), None)
+    if channel is None:
+        return 0.0
+    excess = channel["n"] * ((channel["rms"] / floors[channel["index"]]) ** 2 - 1.0)
+    return float(np.clip(item["gain"] / excess, 0.0, 1.0)) if excess > 0.0 else 0.0
 
 
 def _notes(analysis: Analysis) -> tuple[str, ...]:

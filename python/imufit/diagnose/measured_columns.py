@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 from imufit.diagnose.rivals import correlations_with_best, is_named, with_rivals
 from imufit.fit.analysis import Analysis
+from imufit.fit.log_evidence import LogEvidence
+from imufit.fit.passes import CHANNELS
 
 ALIKE = 0.99
 """Correlation of two effects' signals from which on the noise of their columns may be all that sets them apart."""
@@ -33,14 +37,34 @@ def with_measured_columns(analysis: Analysis, result: Mapping[str, Any]) -> Mapp
     best = result["best"]
     items = {item["slot"]: item for item in result["screened"]}
 
+    sensors = analysis.candidates[analysis.slots[best]].sensors
+
     def column(slot: int) -> str | None:
         return analysis.candidates[analysis.slots[slot]].column
 
     def same(slot: int, correlation: float) -> bool:
         if not items[slot]["passed"] or correlation < ALIKE or column(slot) == column(best):
             return False
-        noise = max(sum(each.surveyed.column_noise(column(s)) for s in (best, slot)) for each in analysis.logs)
+        noise = max(
+            sum(each.surveyed.column_noise(column(s)) for s in (best, slot)) * noise_gain(each, sensors)
+            for each in analysis.logs
+        )
         return bool(1.0 - correlation**2 <= NOISE * noise)
 
     alike = correlations_with_best(result).items()
     return with_rivals(result, [slot for slot, correlation in alike if same(slot, correlation)])
+
+
+def noise_gain(evidence: LogEvidence, sensors: Sequence[str]) -> float:
+    """Return by how much whitening raises the share of white noise in a column that changes slowly.
+
+    Parameters
+    ----------
+    evidence : LogEvidence
+        Evidence of a log, with its whitening filters.
+    sensors : sequence of str
+        Those whose residual is whitened.
+    """
+    taps = [np.asarray(evidence.filters[k]) for k, name in enumerate(CHANNELS) if name[:3] in sensors]
+    gains = [(1.0 + np.sum(a**2)) / max((1.0 - np.sum(a)) ** 2, 1e-9) for a in taps]
+    return float(max([1.0, *gains]))

@@ -90,8 +90,8 @@ OFF_FLOOR = 1.2
 def above_floor(ratio: float) -> str:
     """Say that no effect is missing for certain, although the residual is larger than the noise."""
     return (
-        f"No effect is missing for certain, but the residual stands at {ratio:.2f} times the noise: what is left "
-        "changes so slowly, or so seldom, that it cannot be told from zeros that wander."
+        f"No effect is missing for certain, but the residual stands at {ratio:.2f} times the noise: the noise is "
+        "stronger or more coloured than stated, or something is left that goes with nothing in the log."
     )
 
 

@@ -44,7 +44,7 @@ _RANK: Final = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Normal equations of each block over all parameters, the residual last, observations of unit variance.
+    """Normal equations of each block over the effects' parameters, the residual last, observations of unit variance.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Blocks:
         variance : list of float
             Of each channel's residual, the whole catalogue fitted; NaN for a channel that the log has not.
         parameters : int
-            Number of all parameters.
+            Number of parameters that are looked at, the first ones of the evidence.
         facts : Facts
             Of the log.
         """
@@ -79,11 +79,13 @@ class Blocks:
         for channel, each in enumerate(variance):
             if not (np.isfinite(each) and each > 0.0):
                 continue
-            at = np.array([*evidence.active(channel), parameters])
+            active = evidence.active(channel)
+            inside = [k for k, place in enumerate(active) if place < parameters]
+            at, taken = [*(active[k] for k in inside), parameters], [*inside, len(active)]
             for block in range(evidence.blocks):
                 gram = evidence.gram(channel, block)
                 if gram is not None:
-                    sums[block][np.ix_(at, at)] += gram / each
+                    sums[block][np.ix_(at, at)] += gram[np.ix_(taken, taken)] / each
         edges = np.linspace(facts.t_start, facts.t_end, evidence.blocks + 1)
         known = sums[:, -1, -1] > 0.0
         return cls(sums[known], (0.5 * (edges[1:] + edges[:-1]))[known], edges[:-1][known])
@@ -101,7 +103,8 @@ def time_faults(
     variance : list of float
         Of each channel's residual, the whole catalogue fitted; NaN for a channel that the log has not.
     places : mapping
-        Parameters of every effect by its id.
+        Parameters of every effect by its id. Dependences without a name, whose columns come after theirs, are not among
+        them: a delay that drifts would be what is looked for.
     facts : Facts
         Of the log.
     """

@@ -91,7 +91,8 @@ class LogEvidence:
             return cls(surveyed, slots, raw, raw, noise, noise, floors, [[] for _ in CHANNELS], faults)
         _check_samples(surveyed.log, fitted, raw_variance)
         if not any(fault.spoils for fault in faults):
-            faults = (*faults, *time_faults(raw, raw_variance, _places(surveyed, slots), facts))
+            effects = [slot for slot in slots if slot not in surveyed.probes]
+            faults = (*faults, *time_faults(raw, raw_variance, _places(surveyed, effects), facts))
         filters = passes.autocovariance(raw, facts, step).filters()
         floors = _floors(surveyed.log, raw_variance)
         white, variance = raw, raw_variance

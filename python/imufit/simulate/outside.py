@@ -65,6 +65,50 @@ def play(course: Array, width: float) -> Array:
     return followed
 
 
+def past(course: Array, since: Array, forgotten: float) -> Array:
+    """Return what something that forgets in `forgotten` seconds remembers of a course (n, k) at times `since`."""
+    new = -np.expm1(-np.diff(since) / forgotten)
+    remembered = np.empty_like(course)
+    remembered[0] = course[0]
+    for i, share in enumerate(new.tolist(), start=1):
+        remembered[i] = remembered[i - 1] + share * (course[i] - remembered[i - 1])
+    return remembered
+
+
+def _creep(s: Situation, p: Parameters) -> Array:
+    """Follow a part x, y, z of every change only little by little."""
+    return vector(p) * (past(s.input, s.since, p["forgotten"]) - s.input)
+
+
+def _knocked(s: Situation, p: Parameters) -> Array:
+    """Turn the sensor by x, y, z (rad) in its mounting at one instant, half of it the other way before."""
+    side = np.where(s.since > p["at"] * s.since[-1], 0.5, -0.5)
+    return np.cross(s.input, side[:, None] * vector(p))
+
+
+def _tone(s: Situation, p: Parameters) -> Array:
+    return times(np.sin(2.0 * np.pi * p["frequency"] * s.since + p["phase"]), p)
+
+
+def _loose(s: Situation, p: Parameters) -> Array:
+    """Jump to another level and back, each stay as long as chance (`pattern`) makes it."""
+    rng = np.random.default_rng(int(p["pattern"]))
+    stays = rng.exponential(np.tile([p["stay"], 4.0 * p["stay"]], 1000)) + 0.5 * p["stay"]
+    away = np.searchsorted(np.cumsum(stays), s.since) % 2 == 1
+    return times(centred(away.astype(np.float64)), p)
+
+
+def _twice_round(s: Situation, p: Parameters) -> Array:
+    """Go up and down twice in a whole turn of the heading."""
+    x, y = s.rotation[:, 0, 0], s.rotation[:, 1, 0]
+    return times(centred(np.cos(2.0 * np.arctan2(y, x))), p)
+
+
+def _speed(s: Situation, p: Parameters) -> Array:
+    velocity = np.gradient(s.position, s.since, axis=0)
+    return times(centred(np.sum(velocity**2, axis=1)), p)
+
+
 def _hysteresis(s: Situation, p: Parameters) -> Array:
     """Add c while it cools, subtract it while it warms, and turn over within a quarter of the temperature's range."""
     width = p["width"] * float(np.ptp(s.warmth))
@@ -147,6 +191,16 @@ def _beat(rng: np.random.Generator, run: Run) -> dict[str, float]:
     """Draw a mains frequency whose second harmonic, sampled at 100 Hz, beats two to seven times during the log."""
     beats = rng.uniform(2.0, 7.0) * rng.choice([-1.0, 1.0])
     return {"frequency": 100.0 + float(beats) / (run.stop - run.start), "phase": float(rng.uniform(-np.pi, np.pi))}
+
+
+def _pitch(rng: np.random.Generator, _run: Run) -> dict[str, float]:
+    """Draw a frequency between a fifth of a hertz and eight."""
+    return {"frequency": float(0.2 * 40.0 ** rng.uniform()), "phase": float(rng.uniform(-np.pi, np.pi))}
+
+
+def _pattern(rng: np.random.Generator, _run: Run) -> dict[str, float]:
+    """Draw how long a contact is lost in the middle, s, and what its stays are drawn from."""
+    return {"stay": float(rng.uniform(0.8, 2.0)), "pattern": float(rng.integers(1 << 30))}
 
 
 def _somewhere(low: float, high: float, name: str) -> Inner:
@@ -303,6 +357,55 @@ OUTSIDE: Mapping[str, Outside] = {
         _outside("mag.passing_magnet", "a magnet passes by", 3.0, _passing_by, ["t"], inner=_some_time("width")),
         _outside("acc.other_level", "another level for a while", 0.05, _while, ["t"], inner=_some_time("length")),
         _outside("gyr.other_level", "another level for a while", 5e-3, _while, ["t"], inner=_some_time("length")),
+        _outside("gyr.tone", "oscillation of one frequency", 5e-3, _tone, ["t"], inner=_pitch),
+        _outside("acc.tone", "oscillation of one frequency", 0.05, _tone, ["t"], inner=_pitch),
+        _outside("gyr.loose_contact", "hops between two levels", 5e-3, _loose, ["t"], inner=_pattern),
+        _outside(
+            "acc.creep", "creeps after every change", 0.01, _creep, own="f", inner=_somewhere(2.0, 8.0, "forgotten")
+        ),
+        _outside(
+            "gyr.current_memory",
+            "remembers the current",
+            5e-3,
+            lambda s, p: times(centred(past(s.covariates["motor_current"], s.since, p["forgotten"])), p),
+            ["motor_current"],
+            inner=_somewhere(4.0, 12.0, "forgotten"),
+        ),
+        _outside(
+            "acc.warm_misalignment",
+            "misalignment follows the temperature",
+            1e-3,
+            lambda s, p: vector(p) * s.warmth[:, None] * _next(s.input),
+            ["temp"],
+            of_next="f",
+        ),
+        _outside(
+            "acc.knock",
+            "mounting knocked askew",
+            0.01,
+            _knocked,
+            ["t"],
+            inner=_somewhere(0.3, 0.7, "at"),
+            scenarios=("turntable", "poses", "handheld"),
+        ),
+        _outside(
+            "acc.scale_rate",
+            "gain follows the square of the rate",
+            1e-3,
+            lambda s, p: vector(p) * np.sum(s.omega**2, axis=1)[:, None] * s.input,
+            ["omega_norm"],
+            own="f",
+            scenarios=LIVELY,
+        ),
+        _outside("acc.heading", "twice round with the heading", 0.05, _twice_round, ["heading"], scenarios=LIVELY),
+        _outside("gyr.speed", "follows the square of the speed", 0.02, _speed, ["speed"], scenarios=("arm",)),
+        _outside(
+            "mag.squared",
+            "follows the square of the field",
+            1e-3,
+            lambda s, p: vector(p) * centred(s.input**2),
+            own="m",
+        ),
     )
 }
 """Every effect outside the catalogue by its name."""

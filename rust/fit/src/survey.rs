@@ -9,6 +9,7 @@ use imufit_model::rig::Rig;
 use imufit_model::sensor::Sensor;
 use imufit_model::smoothing::Smoothing;
 use imufit_model::temperature_course::{Parts, TemperatureCourse};
+use imufit_model::vibration;
 use imufit_model::window::Window;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -58,6 +59,8 @@ pub struct Survey {
     width_rows: SampledRows,
     samples: Vec<Vec<f64>>,
     travel: Option<Travel>,
+    /// Power of the vibration at some rows.
+    shaking: Vec<f64>,
 }
 
 /// A sensor's reading at a row and its change from two rows before to two rows after; NaN where not known.
@@ -102,6 +105,7 @@ impl Survey {
             width_rows: SampledRows::new(),
             samples: vec![Vec::new(); axes],
             travel: given.rig.clone().map(Travel::new),
+            shaking: Vec::new(),
             given,
         }
     }
@@ -136,8 +140,13 @@ impl Survey {
                 last = Some(window.t[i]);
             }
         }
+        let passed = window.t[window.len() - 1] - window.t[0];
+        let power = vibration::power(window, passed / (window.len().max(2) - 1) as f64);
         for i in core.clone() {
             let row = window.offset + i;
+            if self.sampled(row, SAMPLES) {
+                self.shaking.extend(power.get(i - window.begin).filter(|p| **p > 0.0));
+            }
             if i > 0 && self.sampled(row, SAMPLES) {
                 self.steps.push(window.t[i] - window.t[i - 1]);
             }
@@ -272,6 +281,8 @@ impl Survey {
             attitude_smoothing,
             position_smoothing,
             silent_axes: self.silent_axes(attitude_columns, field),
+            silent_accelerations: self.attitude_width.noisy_axes(attitude_columns),
+            shaking_varies: vibration::varies(&mut self.shaking, dt),
             column_noise: [force_noise, rate_noise, attitude_noise * field.norm()],
             position_origin: self.origin.unwrap_or_default(),
             attitude_columns,

@@ -13,6 +13,8 @@ use imufit_fit::whitening;
 use imufit_model::sensor::{CHANNELS, Sensor};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
+use crate::orthonormal;
+
 /// Walk variances per block tried, in units of a block mean's variance.
 const GRID: [f64; 18] = [
     0.0, 3e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016, 0.032, 0.064, 0.128, 0.256, 0.5, 1.0, 2.0, 4.0, 10.0, 40.0, 200.0,
@@ -336,16 +338,7 @@ impl ChannelSums {
             let norm = column.norm();
             column /= norm.max(f64::MIN_POSITIVE);
         }
-        let basis = if columns.ncols() == 0 {
-            columns
-        } else {
-            let svd = columns.svd(true, false);
-            let kept: Vec<usize> = (0..svd.singular_values.len())
-                .filter(|k| svd.singular_values[*k] > 1e-6 && *k < blocks / 2)
-                .collect();
-            svd.u
-                .map_or_else(|| DMatrix::zeros(blocks, 0), |u| u.select_columns(&kept))
-        };
+        let basis = orthonormal::basis(columns, 1e-6, blocks / 2);
         (residual, basis)
     }
 

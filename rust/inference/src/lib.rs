@@ -10,6 +10,7 @@ pub mod drift;
 pub mod estimate;
 pub mod held_out;
 pub mod jackknife;
+pub mod orthonormal;
 pub mod part;
 pub mod problem;
 pub mod residual;

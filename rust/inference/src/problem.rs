@@ -93,8 +93,9 @@ impl Problem {
                 known[slot.first + k] = searched.then_some(slot.parameters[k]);
                 let j = slot.first + k;
                 let information: f64 = white_blocks.iter().map(|b| b.gram[(j, j)]).sum();
-                typical[j] = card.typical.is_some();
-                plausible[j] = match card.typical {
+                let size = card.typical.filter(|_| !slot.effect.size_is_open());
+                typical[j] = size.is_some();
+                plausible[j] = match size {
                     Some(typical) => PLAUSIBLE * typical,
                     None if information > 0.0 => STANDING_OUT / information.sqrt(),
                     None => 0.0,

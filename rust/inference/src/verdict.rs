@@ -18,6 +18,13 @@ use crate::{changes, together};
 
 /// A named effect must explain this share of what depends on anything in its sensors, or the answer is "unknown".
 const NAMED_SHARE: f64 = 0.8;
+/// Share of the best one's gain that may be left of how a reading depends on the very quantity that it measures: more means that
+/// its response is bent in a way that the catalogue lacks.
+const BENT_OTHERWISE: f64 = 0.1;
+/// The same if effects of one sensor have been taken to bend its response, as a series takes terms to follow any shape.
+const BENT_IN_SERIES: f64 = 0.02;
+/// From how many effects on these are a series.
+const SERIES: usize = 3;
 /// A rival recovers at least this share of the best candidate's gain.
 const RIVAL_SHARE: f64 = 0.5;
 /// What logs disagree about spoils the answer if it explains this much more than the best candidate.
@@ -242,6 +249,7 @@ fn settle(
         (dependence::test(problem, &fitted, &base, &channels), ALPHA),
         (dependence::test_probes(problem, &stack, probes), ALPHA),
         (changes::test(problem, &fitted), changes::CAUTION * ALPHA),
+        (changes::test_memories(problem, &fitted), ALPHA),
     ];
     let mut unexplained: Vec<Dependence> = asked
         .into_iter()
@@ -273,7 +281,14 @@ fn settle(
                 let alone = screening::base(problem, &indices(slots, model));
                 held_out::gain(&alone, &base).0
             };
-            if gain < NAMED_SHARE * (gain + left) {
+            let series = (path.iter()).filter(|s| slots[**s].effect.sensors().iter().any(|s| sensors.contains(s)));
+            let bent = left_by(unexplained.iter().filter(|d| of_own_quantity(problem, d, sensors)));
+            let allowed = if series.count() >= SERIES {
+                BENT_IN_SERIES
+            } else {
+                BENT_OTHERWISE
+            };
+            if bent > allowed * gain || gain < NAMED_SHARE * (gain + left) {
                 Kind::Unknown
             } else if rivals.is_empty() {
                 Kind::Missing
@@ -302,6 +317,17 @@ fn left_by<'a>(found: impl Iterator<Item = &'a Dependence>) -> f64 {
         *gain = gain.max(each.gain);
     }
     most.values().sum()
+}
+
+/// True if a channel of one of the sensors depends on the very quantity that it measures: its response is bent.
+fn of_own_quantity(problem: &Problem, found: &Dependence, sensors: &[Sensor]) -> bool {
+    let axis = ["x", "y", "z"][found.channel % 3];
+    let own = match told_of(problem, found)[..] {
+        [Sensor::Acc] => format!("f_{axis}"),
+        [Sensor::Gyr] => format!("omega_{axis}"),
+        _ => return false,
+    };
+    found.covariate == own && told_of(problem, found).iter().any(|s| sensors.contains(s))
 }
 
 /// Sensors that the channel of a dependence tells of.

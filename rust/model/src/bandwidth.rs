@@ -97,6 +97,8 @@ const REACH: f64 = 0.9;
 const BURIED: f64 = 2.0;
 /// Part of the mean square of a derivative from which on it shrinks what is fitted to it.
 const NOISY: f64 = 1e-3;
+/// ... and of that along one axis for the axis to be silent.
+const NOISY_AXIS: f64 = 0.1;
 /// The width whose second derivative tells how lively a row is.
 const LIVELY: usize = 4;
 
@@ -347,6 +349,16 @@ impl Bandwidth {
         let noise: f64 = rows().map(|s| 3.0 * s.gain_above[k]).sum::<f64>() * self.noise().powi(2);
         let all: f64 = rows().flat_map(|s| s.above[k]).map(|v| v * v).sum();
         noise > NOISY * all
+    }
+
+    /// Axes along which noise of the reference makes more than [`NOISY_AXIS`] of the highest derivative that enters columns.
+    pub fn noisy_axes(&self, width: Smoothing) -> [bool; 3] {
+        let Some(k) = WIDTHS.iter().position(|w| *w == width) else {
+            return [false; 3];
+        };
+        let rows = || self.samples.iter().filter(|s| s.reached[k]);
+        let noise: f64 = rows().map(|s| s.gain_above[k]).sum::<f64>() * self.noise().powi(2);
+        std::array::from_fn(|axis| noise > NOISY_AXIS * rows().map(|s| s.above[k][axis].powi(2)).sum::<f64>())
     }
 
     /// True if a width leaves nearly all rows with a reference: in a short log a wide polynomial would lose its ends.

@@ -196,6 +196,11 @@ pub trait Effect: Send + Sync {
         Sign::Any
     }
 
+    /// True if the typical size says nothing of how large it may be.
+    fn size_is_open(&self) -> bool {
+        false
+    }
+
     /// True if it stands for no physical cause and has so many columns that the noise is not found beside it.
     fn is_probe(&self) -> bool {
         false

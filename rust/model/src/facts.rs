@@ -16,6 +16,7 @@ pub const LOOKBACK: usize = 128;
 
 /// Facts of a log that its effects and its reference kinematics need: constants over all windows.
 #[derive(Clone, Debug)]
+#[allow(clippy::struct_excessive_bools)] // facts, not the states of a machine
 pub struct LogFacts {
     /// Number of rows.
     pub n: usize,
@@ -62,6 +63,10 @@ pub struct LogFacts {
     /// For each sensor the body axes along which its ideal reading never exceeds the noise of the reference (a rig that never turns
     /// about an axis, an axis that stays level): those readings are noise, and a column made of noise would give a scale of -1.
     pub silent_axes: [[bool; 3]; 3],
+    /// Body axes about which the angular acceleration is little more than the noise of the reference.
+    pub silent_accelerations: [bool; 3],
+    /// True if the sensor is shaken more at some times than at others.
+    pub shaking_varies: bool,
     /// Median time between reference samples, s.
     pub reference_dt: f64,
     /// Where the range of each sensor ends, if readings are cut off there; m/s^2, rad/s, uT.
@@ -126,6 +131,8 @@ impl LogFacts {
             attitude_columns: NARROWEST,
             position_columns: None,
             silent_axes: [[false; 3]; 3],
+            silent_accelerations: [false; 3],
+            shaking_varies: true,
             reference_dt: dt,
             ranges: [None; 3],
             rig: None,
@@ -171,6 +178,8 @@ impl LogFacts {
             attitude_columns: NARROWEST,
             position_columns: None,
             silent_axes: [[false; 3]; 3],
+            silent_accelerations: [false; 3],
+            shaking_varies: true,
             reference_dt: dt,
             ranges: [None; 3],
             rig: None,

@@ -12,12 +12,13 @@ use crate::facts::LogFacts;
 use crate::sensor::Sensor;
 use crate::temperature_course::PASTS;
 use crate::triple::Triple;
+use nalgebra::Vector3;
 
 /// Columns of a log's own that are asked about; a log with more is asked about the first ones.
 const MOST_COLUMNS: usize = 8;
 
 /// What the residual may depend on.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     /// k (c - mean) x.
     Gain(usize),
@@ -25,8 +26,26 @@ enum Kind {
     Product(Quantity, Quantity),
     /// k s with s what the past of the temperature amounts to, see [`crate::temperature_course`].
     TemperaturePast,
-    /// k (t - middle) x / duration.
+    /// k P(t) x with Legendre polynomials P of the part of the log that has passed.
     GainInTime,
+    /// k (t - middle) / duration y, with y the readings of the other axes: the mounting turns.
+    TurnInTime,
+    /// k (t - middle) / duration dx/dt.
+    DelayInTime,
+    /// k (c - mean)^2 x.
+    GainBent(Quantity),
+    /// k (c - mean) y, with y the readings of the other axes.
+    TurnBy(Quantity),
+    /// k (c - mean) dx/dt.
+    DelayBy(Quantity),
+    /// k |omega|^2 x.
+    GainByRate,
+    /// k y^2 with y the readings of all axes.
+    Squares,
+    /// k cos h, k sin h and the same of 2 h, with h the heading of the body's x axis.
+    Heading,
+    /// k v and k v^2, with v the speed of the reference position, m/s.
+    Speed,
     /// k u v of two vectors of the body frame, on every axis; not the squares of the sensor's own.
     Cross(Motion, Motion),
     /// k x where |x| is below one of [`SMALL`] times the full scale of such a motion.
@@ -102,7 +121,20 @@ pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
             kinds.extend(pairs.filter(|_| !facts.rests).map(|(u, v)| (sensor, Kind::Cross(u, v))));
         }
         if !facts.rests {
-            kinds.push((sensor, Kind::GainInTime));
+            let in_time = [Kind::GainInTime, Kind::TurnInTime, Kind::DelayInTime, Kind::Heading];
+            kinds.extend(in_time.map(|kind| (sensor, kind)));
+            let by = |q: &Quantity| [Kind::GainBent(*q), Kind::TurnBy(*q), Kind::DelayBy(*q)];
+            kinds.extend(quantities.iter().flat_map(by).map(|kind| (sensor, kind)));
+            if facts.position_smoothing.is_some() {
+                kinds.push((sensor, Kind::Speed));
+            }
+            // A gyroscope's own cube is in the catalogue.
+            if sensor != Sensor::Gyr {
+                kinds.push((sensor, Kind::GainByRate));
+            }
+            if sensor == Sensor::Mag {
+                kinds.push((sensor, Kind::Squares));
+            }
         }
         if facts.temperature_course.is_some() {
             kinds.push((sensor, Kind::TemperaturePast));
@@ -127,14 +159,36 @@ impl Probe {
             Quantity::Column(c) => facts.covariates[c].clone(),
         };
         let xyz = || AXES.map(str::to_string).to_vec();
+        let on_axes = |shapes: usize| (1..=shapes).flat_map(|k| AXES.map(|a| format!("{a}{k}"))).collect();
         let (stage, names, on, shape) = match &kind {
             Kind::TemperaturePast => (
                 Stage::Offset,
-                (0..PASTS).flat_map(|k| AXES.map(|a| format!("{a}{k}"))).collect(),
+                on_axes(PASTS),
                 name(Quantity::Temperature),
                 "its past counts as well",
             ),
-            Kind::GainInTime => (Stage::Gain, xyz(), "t".to_string(), "the gain drifts"),
+            Kind::GainInTime => (Stage::Gain, on_axes(DEGREES), "t".to_string(), "the gain drifts"),
+            Kind::TurnInTime => (Stage::Gain, on_axes(2), "t".to_string(), "the mounting turns"),
+            Kind::DelayInTime => (
+                Stage::Gain,
+                vec!["tau".to_string()],
+                "t".to_string(),
+                "the delay drifts",
+            ),
+            Kind::GainBent(q) => (Stage::Gain, xyz(), name(*q), "its gain follows it, bent"),
+            Kind::TurnBy(q) => (Stage::Gain, on_axes(2), name(*q), "the mounting turns with it"),
+            Kind::DelayBy(q) => (Stage::Gain, vec!["tau".to_string()], name(*q), "the delay follows it"),
+            Kind::GainByRate => (Stage::Gain, xyz(), "omega_norm".to_string(), "its gain follows it"),
+            Kind::Squares => (
+                Stage::Offset,
+                (0..3)
+                    .flat_map(|j| AXES.map(|a| format!("m_{0}*m_{0}{OF}{a}", AXES[j])))
+                    .collect(),
+                "m".to_string(),
+                "parabolic",
+            ),
+            Kind::Heading => (Stage::Offset, on_axes(4), "heading".to_string(), "once or twice a turn"),
+            Kind::Speed => (Stage::Offset, on_axes(2), "speed".to_string(), "growing with it"),
             Kind::Cross(u, v) => (
                 Stage::Offset,
                 pairs(*u, *v)
@@ -155,9 +209,7 @@ impl Probe {
             ),
             Kind::NearZero => (
                 Stage::Gain,
-                (1..=SMALL.len())
-                    .flat_map(|k| AXES.map(|a| format!("{a}{k}")))
-                    .collect(),
+                on_axes(SMALL.len()),
                 if sensor == Sensor::Acc { "f" } else { "omega" }.to_string(),
                 "another gain about zero",
             ),
@@ -199,6 +251,60 @@ fn pairs(u: Motion, v: Motion) -> impl Iterator<Item = (usize, usize)> {
     (0..9).map(|k| (k / 3, k % 3)).filter(move |(i, j)| u != v || i < j)
 }
 
+/// Legendre polynomials in which a gain may go with time.
+const DEGREES: usize = 4;
+
+/// Legendre polynomials of degree 1 to 4.
+fn legendre(u: f64) -> [f64; DEGREES] {
+    let square = u * u;
+    [
+        u,
+        0.5 * (3.0 * square - 1.0),
+        0.5 * u * (5.0 * square - 3.0),
+        0.125 * ((35.0 * square - 30.0) * square + 3.0),
+    ]
+}
+
+/// Rows on each side over which a speed is taken.
+const SPEED_ROWS: usize = 4;
+
+/// Speed of the reference position in every row, m/s; where it is not known, the last one.
+fn speeds(rows: &Rows) -> Vec<f64> {
+    let mut last = 0.0;
+    (0..rows.len())
+        .map(|i| {
+            let (before, after) = (i.saturating_sub(SPEED_ROWS), (i + SPEED_ROWS).min(rows.len() - 1));
+            if let (Some(p), Some(q)) = (rows.position.get(before), rows.position.get(after)) {
+                let speed = (q - p).norm() / (rows.t[after] - rows.t[before]);
+                if speed.is_finite() {
+                    last = speed;
+                }
+            }
+            last
+        })
+        .collect()
+}
+
+/// Parts of the log that have passed at each row.
+fn parts_of(rows: &Rows) -> Vec<f64> {
+    rows.t.iter().map(|t| part_of(rows.facts, *t)).collect()
+}
+
+/// Columns of a mounting that turns as much as `by` says: each axis sees the other two.
+fn fill_turn(rows: &Rows, by: &[f64], out: &mut Columns) {
+    for shift in 1..3 {
+        for axis in 0..3 {
+            let other = rows.x.axis((axis + shift) % 3).iter();
+            out.set(3 * (shift - 1) + axis, axis, by.iter().zip(other).map(|(b, x)| b * x));
+        }
+    }
+}
+
+/// Part of the log that has passed, from -0.5 to 0.5.
+fn part_of(facts: &LogFacts, t: f64) -> f64 {
+    (t - 0.5 * (facts.t_start + facts.t_end)) / (facts.t_end - facts.t_start)
+}
+
 /// A quantity less its mean; `None` where the log has it not.
 fn deviation(rows: &Rows, quantity: Quantity) -> Option<Vec<f64>> {
     match quantity {
@@ -206,6 +312,16 @@ fn deviation(rows: &Rows, quantity: Quantity) -> Option<Vec<f64>> {
         Quantity::Column(c) => {
             let mean = rows.facts.covariate_means.get(c)?;
             Some(rows.covariates.get(c)?.iter().map(|v| v - mean).collect())
+        }
+    }
+}
+
+impl Probe {
+    /// Column of a delay that is as long as `by` says.
+    fn fill_delay(&self, rows: &Rows, by: &[f64], out: &mut Columns) {
+        let rate = rows.ideal.rate(self.sensor[0]);
+        for axis in 0..3 {
+            out.set(0, axis, by.iter().zip(rate.axis(axis)).map(|(b, r)| b * r));
         }
     }
 }
@@ -220,7 +336,15 @@ impl Effect for Probe {
     }
 
     fn is_probe(&self) -> bool {
-        matches!(self.kind, Kind::Cross(..))
+        !matches!(
+            self.kind,
+            Kind::Gain(_)
+                | Kind::Product(..)
+                | Kind::TemperaturePast
+                | Kind::GainInTime
+                | Kind::NearZero
+                | Kind::Gradient
+        )
     }
 
     fn not_testable(&self, _: &LogFacts) -> Option<String> {
@@ -254,14 +378,69 @@ impl Effect for Probe {
                 }
             }
             Kind::GainInTime => {
-                let (start, end) = (rows.facts.t_start, rows.facts.t_end);
-                let part = |t: &f64| (t - 0.5 * (start + end)) / (end - start);
+                let parts: Vec<[f64; DEGREES]> =
+                    rows.t.iter().map(|t| legendre(2.0 * part_of(rows.facts, *t))).collect();
+                for degree in 0..DEGREES {
+                    for axis in 0..3 {
+                        let x = rows.x.axis(axis).iter();
+                        out.set(3 * degree + axis, axis, parts.iter().zip(x).map(|(p, x)| p[degree] * x));
+                    }
+                }
+            }
+            Kind::TurnInTime => fill_turn(rows, &parts_of(rows), out),
+            Kind::DelayInTime => self.fill_delay(rows, &parts_of(rows), out),
+            Kind::GainBent(q) => {
+                if let Some(by) = deviation(rows, *q) {
+                    for axis in 0..3 {
+                        out.set(axis, axis, by.iter().zip(rows.x.axis(axis)).map(|(c, x)| c * c * x));
+                    }
+                }
+            }
+            Kind::TurnBy(q) => {
+                if let Some(by) = deviation(rows, *q) {
+                    fill_turn(rows, &by, out);
+                }
+            }
+            Kind::DelayBy(q) => {
+                if let Some(by) = deviation(rows, *q) {
+                    self.fill_delay(rows, &by, out);
+                }
+            }
+            Kind::GainByRate => {
+                let square: Vec<f64> = (0..rows.len())
+                    .map(|i| rows.ideal.omega.row(i).norm_squared())
+                    .collect();
                 for axis in 0..3 {
-                    out.set(
-                        axis,
-                        axis,
-                        rows.t.iter().zip(rows.x.axis(axis)).map(|(t, x)| part(t) * x),
-                    );
+                    out.set(axis, axis, square.iter().zip(rows.x.axis(axis)).map(|(w, x)| w * x));
+                }
+            }
+            Kind::Squares => {
+                for other in 0..3 {
+                    for axis in 0..3 {
+                        out.set(3 * other + axis, axis, rows.x.axis(other).iter().map(|m| m * m));
+                    }
+                }
+            }
+            Kind::Heading => {
+                let headings: Vec<(f64, f64)> = (0..rows.len())
+                    .map(|i| {
+                        let x = rows.attitude(i) * Vector3::x();
+                        let level = x.x.hypot(x.y).max(f64::MIN_POSITIVE);
+                        (x.x / level, x.y / level)
+                    })
+                    .collect();
+                let shapes: [fn(f64, f64) -> f64; 4] = [|c, _| c, |_, s| s, |c, s| c * c - s * s, |c, s| 2.0 * c * s];
+                for (k, shape) in shapes.iter().enumerate() {
+                    for axis in 0..3 {
+                        out.set(3 * k + axis, axis, headings.iter().map(|(c, s)| shape(*c, *s)));
+                    }
+                }
+            }
+            Kind::Speed => {
+                let speeds = speeds(rows);
+                for axis in 0..3 {
+                    out.set(axis, axis, speeds.iter().copied());
+                    out.set(3 + axis, axis, speeds.iter().map(|v| v * v));
                 }
             }
             Kind::Cross(u, v) => {

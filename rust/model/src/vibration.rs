@@ -75,6 +75,26 @@ pub fn power(window: &Window, dt: f64) -> Vec<f64> {
         .collect()
 }
 
+/// Spread of the power between its first and last tenth, in what its own scatter in steady noise makes, and as a factor, above which
+/// the sensor is shaken more at some times than at others.
+const SPREAD: f64 = 4.0;
+const LEAST_FACTOR: f64 = 1.5;
+/// Part of the samples that count for themselves: the parabola leaves neighbours alike.
+const INDEPENDENT: f64 = 0.5;
+
+/// True if the power of the vibration at some rows is larger at some times than at others.
+pub fn varies(power: &mut [f64], dt: f64) -> bool {
+    if power.len() < 10 {
+        return false;
+    }
+    power.sort_unstable_by(f64::total_cmp);
+    let tenth = power.len() / 10;
+    let (low, high) = (power[tenth], power[power.len() - 1 - tenth]);
+    let samples = 3.0 * (2.0 * (REACH / dt).clamp(1.0, MOST_ROWS as f64) + 1.0);
+    let scatter = (2.0 / (INDEPENDENT * samples)).sqrt();
+    (high / low).ln() > LEAST_FACTOR.ln().max(SPREAD * scatter)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,5 +121,15 @@ mod tests {
         assert!((power[450] - 0.625).abs() < 0.06, "{}", power[450]);
         let part = super::power(&window.with_core(430, 460), 0.01);
         assert!((part[20] - power[450]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn shaking_varies_if_its_power_does_beyond_the_scatter_of_a_mean() {
+        // Rank k of a thousand: a spread of a factor of 1.3 is chance where 21 rows count, one of 4 is not.
+        let power = |factor: f64| -> Vec<f64> { (0..1000).map(|k| factor.powf(f64::from(k) / 800.0)).collect() };
+        assert!(!varies(&mut power(1.3), 0.02));
+        assert!(varies(&mut power(4.0), 0.02));
+        assert!(!varies(&mut [1.0, 100.0], 0.02));
+        assert!(!varies(&mut [], 0.02));
     }
 }

@@ -93,6 +93,8 @@ fn every_built_in_effect_keeps_the_contract() {
         attitude_columns: NARROWEST,
         position_columns: Some(NARROWEST),
         silent_axes: [[false; 3]; 3],
+        silent_accelerations: [false; 3],
+        shaking_varies: true,
         reference_dt: 0.01,
         ranges: [None; 3],
         rig: Some(rig(&t, &attitude)),

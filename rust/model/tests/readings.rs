@@ -100,6 +100,8 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
         attitude_columns: NARROWEST,
         position_columns: None,
         silent_axes: [[false; 3]; 3],
+        silent_accelerations: [false; 3],
+        shaking_varies: true,
         reference_dt: 0.01,
         ranges: [None; 3],
         rig: None,

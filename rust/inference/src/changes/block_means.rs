@@ -5,6 +5,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::drift::ChannelSums;
+use crate::orthonormal;
 
 /// Block means scatter by no less than this part of what their samples say (variance).
 const LEAST_SCATTER: f64 = 1e-3;
@@ -130,12 +131,7 @@ impl BlockMeans {
             return own;
         }
         let room = (self.blocks() / 2).saturating_sub(self.basis.ncols());
-        let svd = own.svd(true, false);
-        let kept: Vec<usize> = (0..svd.singular_values.len())
-            .filter(|k| svd.singular_values[*k] > INDEPENDENT && *k < room)
-            .collect();
-        svd.u
-            .map_or_else(|| DMatrix::zeros(self.blocks(), 0), |u| u.select_columns(&kept))
+        orthonormal::basis(own, INDEPENDENT, room)
     }
 
     /// The change that explains the means best of those asked for, and what it leaves.

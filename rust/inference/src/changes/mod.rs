@@ -1,11 +1,12 @@
 //! Changes in time: a residual whose mean jumps at one instant, swings at one frequency, lies elsewhere for a while, or
-//! rises and falls once, as no zero that wanders does.
+//! rises and falls once, as no zero that wanders does; and a mean that follows where a covariate was before.
 //!
 //! A walk strong enough for one large step, or for one swing, would have many of all kinds. So the likelihood of the block means
 //! with the step (or what it is), at the strength of the walk that suits it best, is compared with the likelihood without.
 
 pub mod block_means;
 pub mod humps;
+pub mod memory;
 pub mod stays;
 pub mod steps;
 pub mod swings;
@@ -29,14 +30,51 @@ const QUESTIONS: usize = 4;
 /// The largest step, swing, stay and hump of each channel beside the parameters of `model`, their p-values adjusted for all that were possible
 /// of each; and how many questions were asked.
 pub fn test(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
-    // A few rests in a block tell no step from a zero that wanders.
-    let told = |s: &&ChannelSums| s.of_blocks() && !problem.parts[s.log].white.layout.facts.rests;
-    let asked: Vec<&ChannelSums> = problem.sums.iter().filter(told).collect();
+    let asked = asked(problem);
     let found: Vec<Dependence> = asked
         .par_iter()
         .flat_map_iter(|sums| of_channel(problem, model, sums))
         .collect();
     (found, (QUESTIONS * asked.len()).max(1))
+}
+
+/// The largest memory of each channel beside the parameters of `model`, its p-value adjusted for all that were possible; and how many
+/// questions were asked.
+pub fn test_memories(problem: &Problem, model: &[usize]) -> (Vec<Dependence>, usize) {
+    let asked = asked(problem);
+    let found: Vec<Dependence> = asked
+        .par_iter()
+        .filter_map(|sums| memory_of(problem, model, sums))
+        .collect();
+    (found, asked.len().max(1))
+}
+
+/// Channels whose block means tell of time: a few rests in a block tell no step from a zero that wanders.
+fn asked(problem: &Problem) -> Vec<&ChannelSums> {
+    let told = |s: &&ChannelSums| s.of_blocks() && !problem.parts[s.log].white.layout.facts.rests;
+    problem.sums.iter().filter(told).collect()
+}
+
+/// The largest memory of one channel.
+fn memory_of(problem: &Problem, model: &[usize], all: &ChannelSums) -> Option<Dependence> {
+    let sums = all.with_sums(all.columns(model));
+    let means = BlockMeans::new(&sums)?;
+    let (memory, with) = memory::memory(problem, &sums, &means)?;
+    let louder = louder(problem, &sums, |squares| memory.weighted(squares));
+    let p = p_value(&memory.without, &with, means.blocks(), louder) * memory::possible(problem, sums.log) as f64;
+    let facts = &problem.parts[sums.log].white.layout.facts;
+    let block = (facts.t_end - facts.t_start) / means.blocks() as f64;
+    Some(Dependence {
+        channel: sums.channel,
+        covariate: memory.covariate,
+        log: (problem.parts.len() > 1).then_some(sums.log),
+        p_value: p,
+        gain: means.without.white - with.white,
+        shape: format!(
+            "its past counts as well, forgotten in {:.1} s",
+            block * memory.forgotten
+        ),
+    })
 }
 
 /// The largest step, swing, stay and hump of one channel.

@@ -14,7 +14,11 @@ fn fill(rows: &Rows, out: &mut Columns) {
             out.column(parameter, axis);
         }
         for row in 0..rows.len() {
-            let (omega, alpha) = (rows.ideal.omega.row(row), rows.ideal.alpha.row(row));
+            let (omega, mut alpha) = (rows.ideal.omega.row(row), rows.ideal.alpha.row(row));
+            // Noise of the reference's attitude is in what gravity reads, too: an acceleration made of it would agree with that.
+            for axis in (0..3).filter(|k| rows.facts.silent_accelerations[*k]) {
+                alpha[axis] = 0.0;
+            }
             let a = omega.cross(&omega.cross(&unit)) + alpha.cross(&unit);
             for axis in 0..3 {
                 out.column(parameter, axis)[row] = a[axis];

@@ -37,6 +37,8 @@ pub enum Needs {
     Temperature,
     /// A covariate of this name.
     Column(&'static str),
+    /// Shaking that is not the same all the time; how large its effect may be depends on how the sensor is shaken.
+    Shaking,
 }
 
 /// An effect on one sensor, linear in its parameters: a description and a function that fills its columns.
@@ -60,12 +62,19 @@ impl Effect for Linear {
         &self.sensor
     }
 
+    fn size_is_open(&self) -> bool {
+        self.needs == Needs::Shaking
+    }
+
     fn not_testable(&self, facts: &LogFacts) -> Option<String> {
         if !facts.sensors[self.sensor[0].index()] {
             return Some(format!("the log has no {}", self.sensor[0].name()));
         }
+        if self.needs == Needs::Shaking && !facts.shaking_varies {
+            return Some("the sensor is shaken alike all the time, or not at all".to_string());
+        }
         let lacking = match self.needs {
-            Needs::Sensor => None,
+            Needs::Sensor | Needs::Shaking => None,
             Needs::Temperature => (!facts.has_temperature).then_some("temp"),
             Needs::Column(name) => facts.covariate(name).is_none().then_some(name),
         };
@@ -74,7 +83,7 @@ impl Effect for Linear {
 
     fn column(&self) -> Option<&str> {
         match self.needs {
-            Needs::Sensor => None,
+            Needs::Sensor | Needs::Shaking => None,
             Needs::Temperature => Some("temp"),
             Needs::Column(name) => Some(name),
         }

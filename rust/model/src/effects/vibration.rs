@@ -31,7 +31,7 @@ pub fn rectification() -> Linear {
             parameters(&VECTOR, "1/(m/s^2)", 0.005),
         ),
         sensor: [Sensor::Acc],
-        needs: Needs::Sensor,
+        needs: Needs::Shaking,
         fill,
     }
 }

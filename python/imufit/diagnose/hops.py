@@ -1,0 +1,91 @@
+"""A residual that hops between two levels: a loose contact, popcorn noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+WINDOWS = (0.2, 0.4, 0.8)
+"""Times over which the residual is averaged, s, the shortest first, ..."""
+WINDOW_ROWS = 8
+"""... at least so many rows."""
+CLEAR = 5.0
+"""Differences that are hops stand out of the usual ones this many times."""
+ALIKE = 0.3
+"""Hops differ from their middle size by no more than this part, half of them."""
+FEWEST = 8
+"""Hops, up and down in turn, that chance does not make."""
+FEWEST_WINDOWS = 60
+"""Fewer windows tell nothing."""
+
+
+@dataclass(frozen=True)
+class Hops:
+    """Hops of a residual between two levels.
+
+    Attributes
+    ----------
+    size : float
+        Difference of the levels.
+    first : float
+        When the first hop comes, s.
+    count : int
+        Number of hops.
+    upper : float
+        Part of the time on the level that is rarer.
+    """
+
+    size: float
+    first: float
+    count: int
+    upper: float
+
+
+def hops(t: Array, residual: Array) -> Hops | None:
+    """Find whether a residual hops between two levels.
+
+    Noise of any colour has differences of all sizes, a burst of noise has hops of all sizes, and a zero that wanders
+    does not come back by what it went.
+
+    Parameters
+    ----------
+    t, residual : ndarray
+        (n,) time stamps, s, and residual; NaN where there is none.
+    """
+    known = np.isfinite(residual)
+    t, residual = t[known], residual[known]
+    if len(t) < 2:
+        return None
+    dt = float(np.median(np.diff(t)))
+    tried = (_hops(t, residual, max(WINDOW_ROWS, round(window / dt))) for window in WINDOWS)
+    return next((found for found in tried if found is not None), None)
+
+
+def _hops(t: Array, residual: Array, rows: int) -> Hops | None:
+    """Find hops between means of so many rows."""
+    windows = len(t) // rows
+    if windows < FEWEST_WINDOWS:
+        return None
+    means = residual[: windows * rows].reshape(windows, rows).mean(axis=1)
+    # The window between the two may hold the hop.
+    change = means[2:] - means[:-2]
+    usual = 1.4826 * float(np.median(np.abs(change)))
+    high = np.abs(change) > CLEAR * usual
+    edges = np.flatnonzero(np.diff(high, prepend=False, append=False))
+    peaks = [begin + int(np.argmax(np.abs(change[begin:end]))) for begin, end in edges.reshape(-1, 2)]
+    if len(peaks) < FEWEST:
+        return None
+    sizes = change[peaks]
+    middle = float(np.median(np.abs(sizes)))
+    in_turn = np.all(np.sign(sizes[1:]) == -np.sign(sizes[:-1]))
+    alike = float(np.median(np.abs(np.abs(sizes) - middle))) < 0.5 * ALIKE * middle
+    if not (in_turn and alike):
+        return None
+    at = t[[(k + 1) * rows for k in peaks]]
+    stays = np.diff(np.concatenate([[t[0]], at, [t[-1]]]))
+    share = float(np.sum(stays[1::2]) / np.sum(stays))
+    return Hops(middle, float(at[0]), len(peaks), min(share, 1.0 - share))
