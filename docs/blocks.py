@@ -42,7 +42,7 @@ def blocks(page: str) -> list[Block]:
     """Shell and Python blocks of a page, in order."""
     found = list(FENCE.finditer(page))
     out = []
-    for match, after in zip(found, [*found[1:], None], strict=True):
+    for match, after in zip(found, [*found[1:], None][: len(found)], strict=True):
         if match["skip"] or match["language"] not in ("sh", "python"):
             continue
         printed = after if after is not None and after["language"] == "text" else None

@@ -37,7 +37,7 @@ def test_the_cause_is_told_though_no_effect_has_it(name, scenario, cause, words)
     assert first.channel.startswith(name[:3])
     assert first.covariate.startswith(cause)
     assert first.shape.startswith(words)
-    assert 0.05 < first.share <= 1.0
+    assert 0.3 < first.share <= 1.0
 
 
 @pytest.mark.parametrize("seed", range(4))

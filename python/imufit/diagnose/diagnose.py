@@ -20,6 +20,8 @@ from imufit.diagnose.measured_columns import with_measured_columns
 from imufit.diagnose.rivals import correlations_with_best
 from imufit.diagnose.unusual_size import with_unusual_size
 from imufit.fit.analysis import OWN, Analysis, Estimate, pooled
+from imufit.fit.log_evidence import LogEvidence
+from imufit.fit.passes import CHANNELS
 from imufit.fit.rest_passes import RestPasses
 from imufit.log.several import name_of
 from imufit.model.catalogue import card_of
@@ -300,7 +302,7 @@ def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item
     def share(log: int) -> float:
         panels = residuals[log]["panels"]
         same = (p["share"] for p in panels if (p["channel"], p["covariate"]) == (item["channel"], item["covariate"]))
-        return max(float(next(same, 0.0)), _share_of_gain(analysis.logs[log].floors, residuals[log], item))
+        return max(float(next(same, 0.0)), _share(analysis.logs[log], residuals[log], item))
 
     concerned = range(len(residuals)) if item["log"] is None else [item["log"]]
     having = [log for log in concerned if any(c["channel"] == item["channel"] for c in residuals[log]["channels"])]
@@ -313,13 +315,28 @@ def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item
     )
 
 
-def _share_of_gain(floors: Sequence[float], residual: Mapping[str, Any], item: Mapping[str, Any]) -> float:
-    """Return what a dependence explains of the excess of its channel in a log, bins or not."""
-    channel = next((c for c in residual["channels"] if c["channel"] == item["channel"]), None)
-    if channel is None:
+def _share(evidence: LogEvidence, residual: Mapping[str, Any], item: Mapping[str, Any]) -> float:
+    """Return what a dependence explains of the excess of its channel in a log, bins or not.
+
+    Of columns of their own the error with them tells, of all axes of the sensor together. Of block means the whitened
+    gain does: what changes so slowly is whitened by the filter's gain at no frequency.
+    """
+    k = CHANNELS.index(item["channel"]) if item["channel"] in CHANNELS else None
+    if k is None:
         return 0.0
-    excess = channel["n"] * ((channel["rms"] / floors[channel["index"]]) ** 2 - 1.0)
-    return float(np.clip(item["gain"] / excess, 0.0, 1.0)) if excess > 0.0 else 0.0
+    excess = {
+        each["index"]: each["n"] * ((each["rms"] / evidence.floors[each["index"]]) ** 2 - 1.0)
+        for each in residual["channels"]
+    }
+    if item["held_out"] is not None:
+        before, after = item["held_out"]
+        drop = (before**2 - after**2) * sum(each["n"] for each in residual["channels"])
+        of = sum(excess.get(axis, 0.0) for axis in range(k - k % 3, k - k % 3 + 3))
+    else:
+        gain = (1.0 - sum(evidence.filters[k])) ** 2
+        drop = item["gain"] * evidence.variance[k] / (gain * evidence.floors[k] ** 2)
+        of = excess.get(k, 0.0)
+    return float(np.clip(drop / of, 0.0, 1.0)) if of > 0.0 else 0.0
 
 
 def _notes(analysis: Analysis) -> tuple[str, ...]:

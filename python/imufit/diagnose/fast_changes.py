@@ -80,6 +80,8 @@ def _changes(evidence: LogEvidence, step: Array) -> list[dict[str, Any]]:
         if hopping is not None:
             square, p_value = hopping.size**2 * hopping.upper * (1.0 - hopping.upper), 2.0**-hopping.count
             shape = f"{hopping.count} hops between two levels, the first at {hopping.first:.1f} s"
+        # The gain is one of the whitened residual, as that of other changes is.
+        whitened = (1.0 - sum(evidence.filters[index])) ** 2 * evidence.floors[index] ** 2 / evidence.variance[index]
         ratio = square / evidence.floors[index] ** 2
         certain = hopping is not None or p_value * len(channels) <= CHANCE
         if certain and ratio >= LEAST**2:
@@ -88,8 +90,9 @@ def _changes(evidence: LogEvidence, step: Array) -> list[dict[str, Any]]:
                     "channel": CHANNELS[index],
                     "covariate": "t",
                     "p_value": p_value,
-                    "gain": ratio * int(np.sum(np.isfinite(residual))),
+                    "gain": ratio * whitened * int(np.sum(np.isfinite(residual))),
                     "shape": shape,
+                    "held_out": None,
                 }
             )
     return found

@@ -33,6 +33,8 @@ pub struct Dependence {
     pub gain: f64,
     /// A word for how.
     pub shape: String,
+    /// Held-out error without and with it, as the residual stands, over all channels; `None` where only means were looked at.
+    pub held_out: Option<(f64, f64)>,
 }
 
 /// Orthonormal polynomials over bin ranks, constant included; at most as many as bins.
@@ -238,6 +240,7 @@ fn found(q: &Question, base: &HeldOut, asked: &Asked) -> Option<Dependence> {
         p_value,
         gain,
         shape: shape_name(&shape).to_string(),
+        held_out: None,
     })
 }
 
@@ -277,6 +280,7 @@ pub fn test_probes(problem: &Problem, stack: &[usize], probes: &[usize]) -> (Vec
                 p_value: judged.p_value,
                 gain: judged.gain,
                 shape: card.signature.clone(),
+                held_out: Some(judged.held_out),
             })
         })
         .collect();

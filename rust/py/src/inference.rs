@@ -178,6 +178,7 @@ impl PyProblem {
             item.set_item("gain", d.gain)?;
             item.set_item("p_value", d.p_value)?;
             item.set_item("shape", &d.shape)?;
+            item.set_item("held_out", d.held_out)?;
             unexplained.append(item)?;
         }
         out.set_item("unexplained", unexplained)?;

@@ -74,6 +74,7 @@ fn memory_of(problem: &Problem, model: &[usize], all: &ChannelSums) -> Option<De
             "its past counts as well, forgotten in {:.1} s",
             block * memory.forgotten
         ),
+        held_out: None,
     })
 }
 
@@ -128,6 +129,7 @@ fn of_channel(problem: &Problem, model: &[usize], all: &ChannelSums) -> Vec<Depe
         p_value,
         gain: without.white - with.white,
         shape,
+        held_out: None,
     };
     found.into_iter().map(dependence).collect()
 }
