@@ -66,6 +66,8 @@ def noise_of(kind, seed):
         noise += 0.3 * np.cumsum(rng.normal(size=t.size))
     elif kind == "bursts":
         noise *= np.where(rng.random(t.size // 200).repeat(200) < 0.1, 8.0, 1.0)
+    elif kind == "short bursts":
+        noise *= np.where(rng.random(t.size // 60).repeat(61)[: t.size] < 0.07, 15.0, 1.0)
     elif kind == "resonant":
         noise = lfilter([1.0], [1.0, -1.8 * np.cos(0.3), 0.81], noise)
     elif kind == "step":
@@ -74,10 +76,10 @@ def noise_of(kind, seed):
     return t, noise
 
 
-KINDS = ["white", "coloured", "slowly coloured", "walk", "bursts", "resonant", "step"]
+KINDS = ["white", "coloured", "slowly coloured", "walk", "bursts", "short bursts", "resonant", "step"]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("kind", KINDS)
 def test_noise_holds_no_tone_and_no_hops(kind, seed):
     t, noise = noise_of(kind, seed)

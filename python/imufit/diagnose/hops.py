@@ -21,6 +21,10 @@ FEWEST = 8
 """Hops, up and down in turn, that chance does not make."""
 FEWEST_WINDOWS = 60
 """Fewer windows tell nothing."""
+STAYING = 0.7
+"""Part of the size of the hops by which the levels between them differ."""
+SURE = 8.0
+"""... and its standard errors: noise that is louder for a while hops, too, but stays nowhere."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,20 @@ def hops(t: Array, residual: Array) -> Hops | None:
     return next((found for found in tried if found is not None), None)
 
 
+def _stay(means: Array, peaks: list[int], size: float) -> bool:
+    """Return whether means stay on two levels between hops at these places, away from the hops themselves."""
+    number = np.arange(len(means))
+    middles = np.asarray(peaks) + 1
+    away = np.min(np.abs(number[:, None] - middles), axis=1) > 1
+    other = np.searchsorted(middles, number) % 2 == 1
+    levels = [means[away & side] for side in (other, ~other)]
+    if min(map(len, levels)) < FEWEST:
+        return False
+    apart = abs(float(levels[0].mean() - levels[1].mean()))
+    error = float(np.sqrt(sum(level.var() / len(level) for level in levels)))
+    return apart >= max(STAYING * size, SURE * error)
+
+
 def _hops(t: Array, residual: Array, rows: int) -> Hops | None:
     """Find hops between means of so many rows."""
     windows = len(t) // rows
@@ -84,6 +102,8 @@ def _hops(t: Array, residual: Array, rows: int) -> Hops | None:
     in_turn = np.all(np.sign(sizes[1:]) == -np.sign(sizes[:-1]))
     alike = float(np.median(np.abs(np.abs(sizes) - middle))) < 0.5 * ALIKE * middle
     if not (in_turn and alike):
+        return None
+    if not _stay(means, peaks, middle):
         return None
     at = t[[(k + 1) * rows for k in peaks]]
     stays = np.diff(np.concatenate([[t[0]], at, [t[-1]]]))
