@@ -22,8 +22,8 @@ MOST_ROWS = 1 << 18
 """Rows of a log that are looked at, from its start."""
 ON_FLOOR = 1.01
 """Ratio to a stated noise up to which nothing is left that could be a tone."""
-LEAST = 0.1
-"""RMS of a tone or of hops that counts, over the noise."""
+LEAST = 0.15
+"""RMS of a tone or of hops that counts, over that of the residual: smoothing of a reference leaves small peaks."""
 CHANCE = 1e-6
 """Probability with which noise of a smooth spectrum makes a tone by chance, all frequencies and channels together."""
 
@@ -84,7 +84,7 @@ def _changes(evidence: LogEvidence, step: Array) -> list[dict[str, Any]]:
         whitened = (1.0 - sum(evidence.filters[index])) ** 2 * evidence.floors[index] ** 2 / evidence.variance[index]
         ratio = square / evidence.floors[index] ** 2
         certain = hopping is not None or p_value * len(channels) <= CHANCE
-        if certain and ratio >= LEAST**2:
+        if certain and square >= LEAST**2 * float(np.nanvar(residual)):
             found.append(
                 {
                     "channel": CHANNELS[index],

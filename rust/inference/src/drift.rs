@@ -432,7 +432,8 @@ impl Wandering<'_> {
     }
 }
 
-/// How strongly the zeros of each sensor wander in each log, every strength of the grid being as good before the log is seen.
+/// How strongly the zeros of each sensor wander in each log. Before the log is seen they are as likely not to wander as to do so, and every
+/// strength of the grid is as good.
 fn wandering(channels: &[ChannelSums]) -> Vec<Wandering<'_>> {
     let mut found = Vec::new();
     let logs = channels.iter().map(|c| c.log + 1).max().unwrap_or(0);
@@ -448,6 +449,9 @@ fn wandering(channels: &[ChannelSums]) -> Vec<Wandering<'_>> {
             for (t, l) in total.iter_mut().zip(channel.likelihoods()) {
                 *t += l;
             }
+        }
+        if first.strengths[0].kappa == 0.0 {
+            total[0] += (strengths.max(2) as f64 - 1.0).ln();
         }
         let most = total.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = total.iter().map(|l| (l - most).exp()).collect();
