@@ -333,8 +333,7 @@ def _share(evidence: LogEvidence, residual: Mapping[str, Any], item: Mapping[str
         drop = (before**2 - after**2) * sum(each["n"] for each in residual["channels"])
         of = sum(excess.get(axis, 0.0) for axis in range(k - k % 3, k - k % 3 + 3))
     else:
-        gain = (1.0 - sum(evidence.filters[k])) ** 2
-        drop = item["gain"] * evidence.variance[k] / (gain * evidence.floors[k] ** 2)
+        drop = item["gain"] * evidence.variance[k] / (evidence.slow_gain(k) * evidence.floors[k] ** 2)
         of = excess.get(k, 0.0)
     return float(np.clip(drop / of, 0.0, 1.0)) if of > 0.0 else 0.0
 

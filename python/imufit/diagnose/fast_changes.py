@@ -81,8 +81,7 @@ def _changes(evidence: LogEvidence, step: Array) -> list[dict[str, Any]]:
             square, p_value = hopping.size**2 * hopping.upper * (1.0 - hopping.upper), 2.0**-hopping.count
             shape = f"{hopping.count} hops between two levels, the first at {hopping.first:.1f} s"
         # The gain is one of the whitened residual, as that of other changes is.
-        whitened = (1.0 - sum(evidence.filters[index])) ** 2 * evidence.floors[index] ** 2 / evidence.variance[index]
-        ratio = square / evidence.floors[index] ** 2
+        whitened = square * evidence.slow_gain(index) / evidence.variance[index]
         certain = hopping is not None or p_value * len(channels) <= CHANCE
         if certain and square >= LEAST**2 * float(np.nanvar(residual)):
             found.append(
@@ -90,7 +89,7 @@ def _changes(evidence: LogEvidence, step: Array) -> list[dict[str, Any]]:
                     "channel": CHANNELS[index],
                     "covariate": "t",
                     "p_value": p_value,
-                    "gain": ratio * whitened * int(np.sum(np.isfinite(residual))),
+                    "gain": whitened * int(np.sum(np.isfinite(residual))),
                     "shape": shape,
                     "held_out": None,
                 }

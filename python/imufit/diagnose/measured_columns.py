@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from imufit.diagnose.rivals import correlations_with_best, is_named, with_rivals
 from imufit.fit.analysis import Analysis
 from imufit.fit.log_evidence import LogEvidence
@@ -65,6 +63,6 @@ def noise_gain(evidence: LogEvidence, sensors: Sequence[str]) -> float:
     sensors : sequence of str
         Those whose residual is whitened.
     """
-    taps = [np.asarray(evidence.filters[k]) for k, name in enumerate(CHANNELS) if name[:3] in sensors]
-    gains = [(1.0 + np.sum(a**2)) / max((1.0 - np.sum(a)) ** 2, 1e-9) for a in taps]
-    return float(max([1.0, *gains]))
+    channels = [k for k, name in enumerate(CHANNELS) if name[:3] in sensors]
+    white = {k: 1.0 + sum(tap**2 for tap in evidence.filters[k]) for k in channels}
+    return float(max([1.0, *(white[k] / max(evidence.slow_gain(k), 1e-9) for k in channels)]))

@@ -63,6 +63,10 @@ class LogEvidence:
         """What is known of the log as a whole."""
         return self.surveyed.facts
 
+    def slow_gain(self, channel: int) -> float:
+        """Return by how much whitening multiplies the square of what changes slowly in a channel."""
+        return float((1.0 - sum(self.filters[channel])) ** 2)
+
     @classmethod
     def of(cls, surveyed: SurveyedLog, fitted: Values, found: Mapping[str, Found]) -> LogEvidence:
         """Find the noise of a log and take its evidence.

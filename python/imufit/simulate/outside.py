@@ -120,11 +120,6 @@ def _dead_zone(s: Situation, p: Parameters) -> Array:
     return np.where(np.abs(s.input) < vector(p), -s.input, 0.0)
 
 
-def _hum(s: Situation, p: Parameters) -> Array:
-    """Add the second harmonic of the mains, which the sampling folds to a slow beat."""
-    return times(np.sin(2.0 * np.pi * p["frequency"] * s.since + p["phase"]), p)
-
-
 def _step(s: Situation, p: Parameters) -> Array:
     return times(centred((s.since > p["at"] * s.since[-1]).astype(np.float64)), p)
 
@@ -188,7 +183,7 @@ def _outside(
 
 
 def _beat(rng: np.random.Generator, run: Run) -> dict[str, float]:
-    """Draw a mains frequency whose second harmonic, sampled at 100 Hz, beats two to seven times during the log."""
+    """Draw a second harmonic of the mains that, sampled at 100 Hz, beats two to seven times during the log."""
     beats = rng.uniform(2.0, 7.0) * rng.choice([-1.0, 1.0])
     return {"frequency": 100.0 + float(beats) / (run.stop - run.start), "phase": float(rng.uniform(-np.pi, np.pi))}
 
@@ -315,8 +310,8 @@ OUTSIDE: Mapping[str, Outside] = {
         ),
         _outside("gyr.bias_step", "step of the bias", 5e-3, _step, ["t"], inner=_somewhere(0.2, 0.8, "at")),
         _outside("acc.bias_step", "step of the bias", 0.05, _step, ["t"], inner=_somewhere(0.2, 0.8, "at")),
-        _outside("acc.mains_hum", "hum that beats with the sampling", 0.05, _hum, inner=_beat),
-        _outside("mag.mains_hum", "hum that beats with the sampling", 1.0, _hum, inner=_beat),
+        _outside("acc.mains_hum", "hum that beats with the sampling", 0.05, _tone, inner=_beat),
+        _outside("mag.mains_hum", "hum that beats with the sampling", 1.0, _tone, inner=_beat),
         _outside(
             "gyr.cross_rate",
             "follows the size of another axis' rate",

@@ -74,25 +74,25 @@ pub fn memory(problem: &Problem, sums: &ChannelSums, means: &BlockMeans) -> Opti
         let Some(now) = means_of(problem, sums, covariate) else {
             continue;
         };
-        let as_it_is = DMatrix::from_columns(std::slice::from_ref(&now));
-        for forgotten in FORGOTTEN {
-            let columns = DMatrix::from_columns(&[now.clone(), past(&now, forgotten)]);
-            let (Some(without), Some(with)) = (means.beside(&as_it_is), means.beside(&columns)) else {
-                continue;
+        let remembered = |forgotten: f64| DMatrix::from_columns(&[now.clone(), past(&now, forgotten)]);
+        let Some((forgotten, with)) = means.best(FORGOTTEN.to_vec(), |forgotten| remembered(*forgotten)) else {
+            continue;
+        };
+        let Some(without) = means.beside(&DMatrix::from_columns(std::slice::from_ref(&now))) else {
+            continue;
+        };
+        let gain = |without: &Explained, with: &Explained| without.deviance - with.deviance;
+        if best
+            .as_ref()
+            .is_none_or(|(b, w)| gain(&without, &with) > gain(&b.without, w))
+        {
+            let memory = Memory {
+                covariate: bins.names[covariate].clone(),
+                forgotten,
+                columns: remembered(forgotten),
+                without,
             };
-            let gain = |without: &Explained, with: &Explained| without.deviance - with.deviance;
-            if best
-                .as_ref()
-                .is_none_or(|(b, w)| gain(&without, &with) > gain(&b.without, w))
-            {
-                let memory = Memory {
-                    covariate: bins.names[covariate].clone(),
-                    forgotten,
-                    columns,
-                    without,
-                };
-                best = Some((memory, with));
-            }
+            best = Some((memory, with));
         }
     }
     best
