@@ -147,6 +147,10 @@ class Vibration:
         """Return the vibration's acceleration (n, 3) at times `t` (s), body frame, m/s^2."""
         return self.envelope.at(t).value[:, None] * np.stack([tone.at(t).value for tone in self.tones], axis=1)
 
+    def rms(self, t: Array) -> float:
+        """Return the root mean square of the vibration over times `t` (s), of one axis, m/s^2."""
+        return float(np.sqrt(np.mean(self.power(t)) / 3.0))
+
     def power(self, t: Array) -> Array:
         """Return the local mean square (n,) of the vibration, all axes together, at times `t` (s), (m/s^2)^2."""
         total = sum(0.5 * float(np.sum(tone.amplitude**2)) for tone in self.tones)

@@ -74,9 +74,11 @@ class Study:
         every = np.ones(t.size, dtype=np.bool_)
         sampled = {"acc": every, "gyr": every, "mag": magnetometer_rows(self.noise, t)}
         sampled = {name: rows for name, rows in sampled.items() if name in self.names}
-        self.scale = Scale(
-            self.trajectory, self.environment, self.run, self.rows, sampled=sampled, white=self.noise.white()
-        )
+        white = self.noise.white()
+        if self.environment.vibration is not None:
+            # No reference tells of shaking: it is noise to whoever looks at the log.
+            white["acc"] = float(np.hypot(white["acc"], self.environment.vibration.rms(t)))
+        self.scale = Scale(self.trajectory, self.environment, self.run, self.rows, sampled=sampled, white=white)
 
     def coarse(self, rate: float = 10.0) -> tuple[Scale, float]:
         """Return a measure that looks at about `rate` rows a second, and how many rows stand behind each of these."""

@@ -282,6 +282,10 @@ impl Survey {
             position_smoothing,
             silent_axes: self.silent_axes(attitude_columns, field),
             silent_accelerations: self.attitude_width.noisy_axes(attitude_columns),
+            noise_shares: [
+                self.force_noise_shares(),
+                self.attitude_width.noise_shares(attitude_columns),
+            ],
             shaking_varies: vibration::varies(&mut self.shaking, dt),
             column_noise: [force_noise, rate_noise, attitude_noise * field.norm()],
             position_origin: self.origin.unwrap_or_default(),
@@ -301,6 +305,29 @@ impl Survey {
             force_noise,
         };
         (facts, samples)
+    }
+
+    /// Part that noise of the attitude makes of the mean square of the specific force along each axis. Of a body that translates only the
+    /// readings tell how large that is.
+    fn force_noise_shares(&self) -> [f64; 3] {
+        let noise = (self.attitude_width.noise() * self.given.gravity.norm()).powi(2);
+        let mut square = Vector3::<f64>::zeros();
+        let mut n = 0.0;
+        for row in self.width_rows.values() {
+            let held = row.attitude.inverse_transform_vector(&-self.given.gravity);
+            let force = if self.has_position { row.force.0 } else { held };
+            if force.iter().all(|v| v.is_finite()) {
+                square += force.component_mul(&force);
+                n += 1.0;
+            }
+        }
+        std::array::from_fn(|axis| {
+            if noise > 0.0 {
+                (n * noise / square[axis]).min(1.0)
+            } else {
+                0.0
+            }
+        })
     }
 
     /// For each sensor the axes along which its ideal reading is nothing but the noise of the reference.

@@ -162,10 +162,11 @@ fn question(problem: &Problem, model: &[usize], fitted: &[NormalEquations], aske
                 let sums = s.binned(&problem.parts[s.log].white, covariate, &q);
                 own.columns_mut(p, m).copy_from(&sums);
             }
-            s.with_sums(own)
+            s.with_sums(own).asked_of(channel)
         })
         .collect();
     Some(Question {
+        unsure: DMatrix::zeros(m, 0),
         raw: white.clone(),
         white,
         precision,

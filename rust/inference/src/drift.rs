@@ -21,6 +21,8 @@ const GRID: [f64; 18] = [
 ];
 /// The zero of a magnetometer wanders by no more than so many noise floors from block to block.
 const FARTHEST: f64 = 1.0;
+/// A zero has wandered before the log begins, for so many blocks: where it wanders visibly, an offset of the like is no bias.
+const BEFORE: f64 = 3.0;
 /// Fewer blocks than this cannot show a walk.
 const MIN_BLOCKS: usize = 8;
 
@@ -45,14 +47,20 @@ enum Walk {
     Vector(Arc<Vec<(usize, Vector3<f64>)>>),
 }
 
+/// Covariance of the means of two blocks of a walk that makes a unit step in the time of a block.
+fn walked(first: usize, second: usize) -> f64 {
+    let within = if first == second { 1.0 / 3.0 } else { 0.5 };
+    BEFORE + first.min(second) as f64 + within
+}
+
 impl Walk {
-    /// Covariance of the zeros behind the sums after unit steps from zero before the first block.
+    /// Covariance of the zeros behind the sums after unit steps.
     fn covariance(&self, sums: usize) -> DMatrix<f64> {
         match self {
-            Self::Zero => DMatrix::from_fn(sums, sums, |i, j| (i.min(j) + 1) as f64),
+            Self::Zero => DMatrix::from_fn(sums, sums, walked),
             Self::Vector(directions) => DMatrix::from_fn(sums, sums, |i, j| {
                 let ((a, u), (b, v)) = (&directions[i], &directions[j]);
-                (a.min(b) + 1) as f64 * u.dot(v)
+                walked(*a, *b) * u.dot(v)
             }),
         }
     }
@@ -75,6 +83,8 @@ pub struct ChannelSums {
     count: DVector<f64>,
     walk: Walk,
     strengths: Arc<Vec<Strength>>,
+    /// False if what is left of it does not tell how strongly the zeros of its sensor wander: the cause asked about moves it as well.
+    telling: bool,
 }
 
 /// ln det of a factorised matrix.
@@ -113,28 +123,19 @@ fn strengths(count: &DVector<f64>, most: f64) -> Vec<Strength> {
         return Vec::new();
     }
     let unit = filled as f64 / count.sum();
+    let steps = Walk::Zero.covariance(blocks);
     GRID.iter()
         .map(|step| step * unit)
         .filter(|kappa| *kappa <= most)
         .filter_map(|kappa| {
             // A block without samples has a mean of no weight.
             let noise = |b: usize| if count[b] > 0.0 { 1.0 / count[b] } else { 1e6 * unit };
-            let covariance = DMatrix::from_fn(blocks, blocks, |i, j| {
-                kappa * (i.min(j) + 1) as f64 + if i == j { noise(i) } else { 0.0 }
-            });
-            let covariance = Cholesky::new(covariance)?;
-            // Inverse covariance of a random walk from zero: tridiagonal.
-            let inner = DMatrix::from_fn(blocks, blocks, |i, j| match i.abs_diff(j) {
-                0 if i + 1 == blocks => 1.0 / kappa + count[i],
-                0 => 2.0 / kappa + count[i],
-                1 => -1.0 / kappa,
-                _ => 0.0,
-            });
-            let smoother = if kappa > 0.0 {
-                Cholesky::new(inner)?.inverse()
-            } else {
-                DMatrix::zeros(blocks, blocks)
-            };
+            let prior = &steps * kappa;
+            let covariance =
+                Cholesky::new(&prior + DMatrix::from_diagonal(&DVector::from_fn(blocks, |b, _| noise(b))))?;
+            // What the sums tell of each mean, and what the walk does.
+            let told = DMatrix::identity(blocks, blocks) + DMatrix::from_diagonal(count) * &prior;
+            let smoother = &prior * told.try_inverse()?;
             Some(Strength {
                 kappa,
                 log_determinant: log_determinant(&covariance),
@@ -196,6 +197,7 @@ pub fn channel_sums(
             count,
             walk: Walk::Zero,
             strengths,
+            telling: true,
         });
     }
     out
@@ -247,6 +249,7 @@ fn vector_sums(
         strengths: Arc::new(vector_strengths(&count, &directions, &walk)),
         count,
         walk,
+        telling: true,
     }
 }
 
@@ -276,7 +279,15 @@ impl ChannelSums {
             count: self.count.clone(),
             walk: self.walk.clone(),
             strengths: self.strengths.clone(),
+            telling: self.telling,
         }
+    }
+
+    /// The same where only the channel `asked` tells how strongly the zeros of its sensor wander.
+    #[must_use]
+    pub fn asked_of(mut self, asked: usize) -> Self {
+        self.telling = self.channel == asked || self.channel / 3 != asked / 3;
+        self
     }
 
     /// The same once some parameters have been given values: what these explain is taken off the residual.
@@ -389,6 +400,13 @@ impl ChannelSums {
             let mut row = later.row_mut(b);
             row += next;
         }
+        if let Some(first) = later
+            .nrows()
+            .checked_sub(1)
+            .map(|_| later.row(0) * (1.0 + BEFORE).sqrt())
+        {
+            later.row_mut(0).copy_from(&first);
+        }
         later.tr_mul(&later) * kappa
     }
 
@@ -401,6 +419,71 @@ impl ChannelSums {
         equations.right.gemv_tr(-self.weight, &self.sums, &right, 1.0);
         equations.square -= self.weight * self.right.dot(&right);
     }
+
+    /// What steady changes within the blocks say of the parameters, judged by how block means change from block to block: a walk goes on
+    /// within the blocks, so that these say nothing that the means have not said. `None` where sums are along directions.
+    fn steady(&self) -> Option<NormalEquations> {
+        if !self.of_blocks() {
+            return None;
+        }
+        let filled: Vec<usize> = (0..self.count.len()).filter(|b| self.count[*b] > 0.0).collect();
+        let mut out = NormalEquations::zeros(self.sums.ncols());
+        for (k, b) in filled.iter().enumerate() {
+            let (before, after) = (filled[k.saturating_sub(1)], filled[(k + 1).min(filled.len() - 1)]);
+            let apart = after.saturating_sub(before).max(1) as f64;
+            let change =
+                (self.sums.row(after) / self.count[after] - self.sums.row(before) / self.count[before]) / apart;
+            let right = (self.right[after] / self.count[after] - self.right[before] / self.count[before]) / apart;
+            // Sum of squares of n values that rise evenly by one.
+            let squares = self.weight * self.count[*b] / 12.0;
+            out.gram.gemm_tr(squares, &change, &change, 1.0);
+            out.right.axpy(squares * right, &change.transpose(), 1.0);
+            out.square += squares * right * right;
+        }
+        Some(out)
+    }
+
+    /// What the means of the blocks say of the parameters.
+    fn of_means(&self) -> NormalEquations {
+        let mut out = NormalEquations::zeros(self.sums.ncols());
+        let weights = self.count.map(|n| if n > 0.0 { self.weight / n } else { 0.0 });
+        let weighted = DMatrix::from_diagonal(&weights) * &self.sums;
+        out.gram.gemm_tr(1.0, &weighted, &self.sums, 1.0);
+        out.right.gemv_tr(1.0, &weighted, &self.right, 1.0);
+        out
+    }
+}
+
+/// Equations without what steady changes within the blocks say of the parameters.
+fn without_steady(channels: &[ChannelSums], equations: &NormalEquations) -> NormalEquations {
+    let mut means = NormalEquations::zeros(equations.right.len());
+    let mut within = equations.clone();
+    for channel in channels {
+        if let Some(steady) = channel.steady() {
+            let of_means = channel.of_means();
+            within.add(&of_means, -1.0);
+            within.add(&steady, -1.0);
+            means.add(&of_means, 1.0);
+        }
+    }
+    // Means tell of changes within blocks only about as much: what seems less than nothing is nothing.
+    let scale = equations
+        .gram
+        .diagonal()
+        .map(|g| if g > 0.0 { 1.0 / g.sqrt() } else { 0.0 });
+    let scaled = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
+        within.gram[(i, j)] * scale[i] * scale[j]
+    });
+    let eigen = scaled.symmetric_eigen();
+    let kept: Vec<usize> = (0..scale.len()).filter(|k| eigen.eigenvalues[*k] > 0.0).collect();
+    let vectors = eigen.eigenvectors.select_columns(&kept);
+    let values = eigen.eigenvalues.select_rows(&kept);
+    let back = scale.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 });
+    let half = DMatrix::from_diagonal(&back) * &vectors;
+    let mut out = equations.clone();
+    out.gram = &half * DMatrix::from_diagonal(&values) * half.transpose() + means.gram;
+    out.right = &half * vectors.tr_mul(&scale.component_mul(&within.right)) + means.right;
+    out
 }
 
 /// How strongly a sensor's zeros wander: the channels concerned and how probable each strength is.
@@ -445,7 +528,7 @@ fn wandering(channels: &[ChannelSums]) -> Vec<Wandering<'_>> {
         let Some(first) = own.first() else { continue };
         let strengths = first.strengths.len();
         let mut total = vec![0.0; strengths];
-        for channel in own.iter().filter(|c| c.strengths.len() == strengths) {
+        for channel in own.iter().filter(|c| c.telling && c.strengths.len() == strengths) {
             for (t, l) in total.iter_mut().zip(channel.likelihoods()) {
                 *t += l;
             }
@@ -464,15 +547,17 @@ fn wandering(channels: &[ChannelSums]) -> Vec<Wandering<'_>> {
     found
 }
 
-/// Probabilities with which a strength of the walk is exceeded, and the weight of the strengths around each.
-const LEVELS: [(f64, f64); 6] = [
-    (0.5, 0.5),
-    (0.1, 0.4),
-    (0.01, 0.09),
-    (0.001, 9e-3),
-    (1e-4, 9e-4),
-    (1e-5, 9e-5),
-];
+/// The strengths that a log leaves possible are gone through in steps of the probability with which the walk is stronger: each step leaves
+/// this part of it.
+const STEP: f64 = 0.6;
+/// Walks stronger than those of this probability are left out: no p-value that decides anything depends on them.
+const IMPROBABLE: f64 = 1e-6;
+
+/// Probabilities with which a strength of the walk is exceeded, and the weight of the strengths before each.
+fn levels() -> impl Iterator<Item = (f64, f64)> {
+    let above = std::iter::successors(Some(1.0), |p| Some(p * STEP));
+    above.take_while(|p| *p > IMPROBABLE).map(|p| (p * STEP, p - p * STEP))
+}
 
 /// The equations of a question with wandering zeros taken out, for strengths from the middle of what the log leaves possible to
 /// the far end, each with its weight. Empty if no zero wanders in a way that puts the answer in doubt.
@@ -481,10 +566,11 @@ const LEVELS: [(f64, f64); 6] = [
 /// The offset of a magnetometer is iron, which does not wander; the field does, from place to place, and counts for less where it does.
 pub fn without(channels: &[ChannelSums], equations: &NormalEquations) -> Vec<(f64, NormalEquations)> {
     let sensors = wandering(channels);
+    let steady_taken = without_steady(channels, equations);
     let inertial = |w: &Wandering| w.channels.iter().any(|c| c.channel / 3 != Sensor::Mag.index());
     let mut out: Vec<(f64, NormalEquations)> = Vec::new();
     let mut before: Option<Vec<usize>> = None;
-    for (probability, weight) in LEVELS {
+    for (probability, weight) in levels() {
         let strengths: Vec<usize> = sensors.iter().map(|w| w.exceeded(probability)).collect();
         if before.as_ref() == Some(&strengths) {
             if let Some(last) = out.last_mut() {
@@ -492,7 +578,7 @@ pub fn without(channels: &[ChannelSums], equations: &NormalEquations) -> Vec<(f6
             }
             continue;
         }
-        let mut reduced = equations.clone();
+        let mut reduced = steady_taken.clone();
         for (sensor, strength) in sensors.iter().zip(&strengths).filter(|(w, s)| w.any(**s)) {
             for channel in &sensor.channels {
                 channel.take_out(*strength, &mut reduced);
@@ -501,9 +587,7 @@ pub fn without(channels: &[ChannelSums], equations: &NormalEquations) -> Vec<(f6
         before = Some(strengths);
         out.push((weight, reduced));
     }
-    let doubtful = sensors
-        .iter()
-        .any(|w| inertial(w) && w.any(w.exceeded(LEVELS[LEVELS.len() - 1].0)));
+    let doubtful = sensors.iter().any(|w| inertial(w) && w.any(w.exceeded(IMPROBABLE)));
     if doubtful { out } else { Vec::new() }
 }
 
@@ -552,6 +636,7 @@ mod tests {
                 count: count.clone(),
                 walk: Walk::Zero,
                 strengths,
+                telling: true,
             }
         };
         let best = |s: &ChannelSums| {

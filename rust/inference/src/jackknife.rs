@@ -86,7 +86,7 @@ pub fn jackknife(question: &Question, group: usize) -> Option<Jackknife> {
         covariance.ger((b - 1.0) / b, &d, &d, 1.0);
     }
     let beta = estimate.rows(question.model, m).into_owned();
-    let square = square(&beta, &covariance);
+    let square = square(&beta, &(&covariance + &question.unsure * question.unsure.transpose()));
     Some(Jackknife {
         p_value: square.map_or(1.0, |square| hotelling(square, m, b)),
         square: square.unwrap_or(0.0),
@@ -195,6 +195,7 @@ mod tests {
             white,
             squares,
             rests: false,
+            unsure: DMatrix::zeros(p - 1, 0),
         }
     }
 

@@ -3,10 +3,13 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use imufit_fit::evidence::Layout;
 use imufit_fit::normal_equations::NormalEquations;
+use imufit_fit::whitening;
 use imufit_model::card::Found;
+use imufit_model::sensor::Sensor;
 use imufit_model::sensor_model::Slot;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::drift::{self, ChannelSums};
 use crate::part::{self, Part};
@@ -50,6 +53,8 @@ pub struct Question {
     pub precision: DVector<f64>,
     /// How many parameters belong to the model.
     pub model: usize,
+    /// By how much each direction asked about may come out wrong because the reference is noisy (directions x causes).
+    pub unsure: DMatrix<f64>,
     /// Block sums of every channel over the same parameters, for zeros that wander.
     pub sums: Vec<ChannelSums>,
     /// Blocks of each log: those of different logs are no neighbours.
@@ -63,8 +68,30 @@ pub struct Question {
 
 /// Plausible sizes are this many times the typical ones.
 const PLAUSIBLE: f64 = 3.0;
+/// Gains that come out too small where the reference is noisy.
+const GAINS: [&str; 2] = ["acc.scale", "gyr.scale"];
+/// They may by this many times the noise's part of the mean square.
+const ATTENUATION: f64 = 1.5;
+/// Less than this part no log can show.
+const ATTENUATION_SEEN: f64 = 1e-5;
 /// A parameter without typical size is given one at which its effect would stand out by this factor.
 const STANDING_OUT: f64 = 100.0;
+
+/// Part of the mean square that noise of the reference makes of what gains of a sensor multiply. Noise of the attitude is white, and filters
+/// that take slow noise out of the residual leave more of it than of the motion; rates are smoothed.
+fn attenuation(layout: &Layout, sensor: usize) -> [f64; 3] {
+    let shares = layout.facts.noise_shares[sensor];
+    std::array::from_fn(|axis| {
+        let filter = &layout.filters[3 * sensor + axis];
+        let white = 1.0 + filter.iter().map(|tap| tap * tap).sum::<f64>();
+        let raised = if sensor == Sensor::Acc.index() {
+            (white / whitening::gain(filter, 0.0).max(f64::MIN_POSITIVE)).max(1.0)
+        } else {
+            1.0
+        };
+        (shares[axis] * raised).min(1.0)
+    })
+}
 
 impl Problem {
     /// From the evidence of one log or of several; `own` tells which of all logs' slots each log has for itself.
@@ -209,11 +236,74 @@ impl Problem {
         let scale = DVector::from_iterator(m, candidate.iter().map(|j| self.plausible[*j]));
         let scaled = DMatrix::from_fn(m, m, |i, j| 0.5 * (schur[(i, j)] + schur[(j, i)]) * scale[i] * scale[j]);
         let size: f64 = (0..m).map(|j| own[(j, j)] * scale[j] * scale[j]).sum();
+        let least = self.noise_share(candidate).max(1e-8);
         let eigen = scaled.symmetric_eigen();
         let kept: Vec<usize> = (0..m)
-            .filter(|k| eigen.eigenvalues[*k] > 1.0 && eigen.eigenvalues[*k] > 1e-8 * size)
+            .filter(|k| eigen.eigenvalues[*k] > 1.0 && eigen.eigenvalues[*k] > least * size)
             .collect();
         DMatrix::from_fn(m, kept.len(), |i, k| scale[i] * eigen.eigenvectors[(i, kept[k])])
+    }
+
+    /// Slots of the gains of accelerometer and gyroscope, and how far each may seem off because what it is held against is noisy.
+    ///
+    /// Noise of the reference is in the quantity that a gain multiplies and, with the other sign, in the residual: a gain comes out too small
+    /// by the noise's part of the mean square (attenuation by errors in the variables; Fuller 1987, Measurement error models, sec. 1.1).
+    pub fn attenuated(&self, least: f64) -> Vec<(usize, [f64; 3])> {
+        let of = |(sensor, name): (usize, &&str)| {
+            let slot = self.slots.iter().position(|s| s.effect.card().id == **name)?;
+            let shares = self.parts.iter().map(|part| attenuation(&part.white.layout, sensor));
+            let most = shares.fold([0.0_f64; 3], |most, share| {
+                std::array::from_fn(|k| most[k].max(share[k]))
+            });
+            most.iter().any(|share| *share > least).then_some((slot, most))
+        };
+        GAINS.iter().enumerate().filter_map(of).collect()
+    }
+
+    /// By how much each direction of a candidate may come out wrong for that reason (directions x axes).
+    fn unsure(&self, model: &[usize], candidate: &[usize], directions: &DMatrix<f64>) -> DMatrix<f64> {
+        let (p, c, m) = (model.len(), candidate.len(), directions.ncols());
+        let mut gains: Vec<usize> = Vec::new();
+        let mut shares: Vec<f64> = Vec::new();
+        for (slot, most) in self.attenuated(ATTENUATION_SEEN) {
+            let first = self.slots[slot].first;
+            if !model.contains(&first) {
+                gains.extend(first..first + 3);
+                shares.extend(most);
+            }
+        }
+        let none = DMatrix::zeros(m, 0);
+        if gains.is_empty() {
+            return none;
+        }
+        let all: Vec<usize> = model.iter().chain(candidate).chain(&gains).copied().collect();
+        let gram = self.total(&all).gram;
+        let mut map = DMatrix::zeros(p + c, p + m);
+        map.view_mut((0, 0), (p, p)).fill_with_identity();
+        map.view_mut((p, p), (c, m)).copy_from(directions);
+        let mut inner = map.tr_mul(&(gram.view((0, 0), (p + c, p + c)) * &map));
+        for k in 0..p + m {
+            inner[(k, k)] += if k < p { self.precision(model[k]) } else { 1.0 };
+        }
+        let cross = map.tr_mul(&gram.view((0, p + c), (p + c, gains.len())));
+        let Some(factor) = Cholesky::new(inner) else {
+            return none;
+        };
+        let mut moved = factor.solve(&cross).rows(p, m).into_owned();
+        for (k, share) in shares.iter().enumerate() {
+            moved.column_mut(k).scale_mut(ATTENUATION * share);
+        }
+        moved
+    }
+
+    /// Part that noise of the reference makes of a candidate's columns: products of rates that cancel are nothing else.
+    fn noise_share(&self, candidate: &[usize]) -> f64 {
+        let slot = self.slots.iter().find(|s| candidate.first() == Some(&s.first));
+        let of = |slot: &Slot| {
+            let facts = self.parts.iter().map(|part| &part.white.layout.facts);
+            facts.map(|facts| slot.effect.noise_share(facts)).fold(0.0, f64::max)
+        };
+        slot.map_or(0.0, of)
     }
 
     /// Values of a candidate's parameters if all of them are known beforehand.
@@ -235,6 +325,7 @@ impl Problem {
     /// The question of a candidate (in the given directions) on top of a model.
     pub fn question(&self, model: &[usize], candidate: &[usize], directions: &DMatrix<f64>) -> Question {
         let (p, m) = (model.len(), directions.ncols());
+        let unsure = self.unsure(model, candidate, directions);
         let reduce =
             |blocks: &[NormalEquations]| blocks.iter().map(|b| b.reduced(model, candidate, directions)).collect();
         let mut precision = DVector::from_element(p + m, 1.0);
@@ -252,6 +343,7 @@ impl Problem {
             precision,
             model: p,
             sums,
+            unsure,
             logs: self.logs.clone(),
             squares: self.squares.clone(),
             rests: self.rests(),
@@ -275,6 +367,7 @@ impl Question {
             precision: self.precision.rows(0, self.model).into_owned(),
             model: self.model,
             sums: self.sums.iter().map(|s| s.with_sums(s.columns(&kept))).collect(),
+            unsure: DMatrix::zeros(0, 0),
             logs: self.logs.clone(),
             squares: self.squares.clone(),
             rests: self.rests,
@@ -307,6 +400,7 @@ impl Question {
             precision: self.precision.clone().resize_vertically(p + directions.ncols(), 1.0),
             model: p,
             sums: sums.collect(),
+            unsure: DMatrix::zeros(directions.ncols(), 0),
             logs: self.logs.clone(),
             squares: self.squares.clone(),
             rests: self.rests,

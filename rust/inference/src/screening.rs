@@ -131,10 +131,11 @@ pub(crate) fn wald(question: &Question, total: &NormalEquations, variance: f64) 
         .covariance()
         .view((question.model, question.model), (m, m))
         .into_owned();
-    let Some(factor) = Cholesky::new(covariance) else {
+    let unsure = &question.unsure * question.unsure.transpose();
+    let Some(factor) = Cholesky::new(covariance * variance + unsure) else {
         return 1.0;
     };
-    let square = beta.dot(&factor.solve(&beta)) / variance;
+    let square = beta.dot(&factor.solve(&beta));
     ChiSquared::new(m as f64).map_or(1.0, |d| if square.is_finite() { d.sf(square.max(0.0)) } else { 1.0 })
 }
 

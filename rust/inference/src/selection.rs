@@ -15,7 +15,7 @@ pub fn indices(slots: &[Slot], chosen: &[usize]) -> Vec<usize> {
     parameters
 }
 
-/// Weighs all candidates on top of a model, and says how many can be tested.
+/// Weighs all candidates on top of a model, and says how many shares of a false alarm those that can be tested have.
 pub fn weigh_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[usize]) -> (Vec<Weighed>, f64) {
     let fitted = indices(slots, model);
     let base = screening::base(problem, &fitted);
@@ -23,15 +23,24 @@ pub fn weigh_all(problem: &Problem, slots: &[Slot], model: &[usize], candidates:
         .par_iter()
         .map(|s| screening::weigh(problem, &fitted, &base, *s, &indices(slots, &[*s])))
         .collect();
-    let tried = weighed.iter().filter(|w| w.so_far().testable).count().max(1) as f64;
+    let tried = shares(slots, weighed.iter().map(Weighed::so_far));
     (weighed, tried)
+}
+
+/// Shares that the candidates which can be tested have of the chance of a false alarm.
+pub fn shares<'a>(slots: &[Slot], answers: impl Iterator<Item = &'a Screened>) -> f64 {
+    let testable = answers.filter(|s| s.testable);
+    testable
+        .map(|s| slots[s.slot].effect.card().shares)
+        .sum::<f64>()
+        .max(1.0)
 }
 
 /// Judges a weighed candidate; where a search went before, each of its trials counts.
 pub fn judge(problem: &Problem, slots: &[Slot], fitted: &[usize], weighed: Weighed) -> Screened {
     let slot = weighed.so_far().slot;
     let mut screened = weighed.judged(problem, fitted, &indices(slots, &[slot]));
-    screened.p_value = (screened.p_value * slots[slot].tried as f64).min(1.0);
+    screened.p_value = (screened.p_value * slots[slot].chances()).min(1.0);
     screened
 }
 

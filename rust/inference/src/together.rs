@@ -21,6 +21,7 @@ pub fn find(problem: &Problem, slots: &[Slot], model: &[usize], candidates: &[us
         slots,
         model,
         candidates,
+        shares: candidates.iter().map(|s| slots[*s].effect.card().shares).sum(),
     };
     let mut members: Vec<usize> = Vec::new();
     let mut dropped: Vec<usize> = Vec::new();
@@ -63,6 +64,8 @@ struct Search<'a> {
     slots: &'a [Slot],
     model: &'a [usize],
     candidates: &'a [usize],
+    /// Of the chance of a false alarm, of all candidates.
+    shares: f64,
 }
 
 impl Search<'_> {
@@ -98,7 +101,7 @@ impl Search<'_> {
             return None;
         }
         let judged = judge(self.problem, self.slots, &fitted, weighed);
-        let adjusted = (judged.p_value * self.candidates.len() as f64).min(1.0);
+        let adjusted = (judged.p_value * self.shares).min(1.0);
         Some((judged, adjusted))
     }
 

@@ -13,7 +13,7 @@ use crate::dependence::{self, Dependence};
 use crate::held_out;
 use crate::problem::Problem;
 use crate::screening::{self, Plausible, Screened};
-use crate::selection::{ALPHA, best_of, explains, indices, passes, screen_all, significant};
+use crate::selection::{ALPHA, best_of, explains, indices, passes, screen_all, shares, significant};
 use crate::{changes, together};
 
 /// A named effect must explain this share of what depends on anything in its sensors, or the answer is "unknown".
@@ -23,6 +23,8 @@ const NAMED_SHARE: f64 = 0.8;
 const BENT_OTHERWISE: f64 = 0.1;
 /// The same if effects of one sensor have been taken to bend its response, as a series takes terms to follow any shape.
 const BENT_IN_SERIES: f64 = 0.02;
+/// Gains that seem too small by more than this part, because what they multiply is noisy, would show as dependences.
+const ATTENUATED: f64 = 1e-4;
 /// From how many effects on these are a series.
 const SERIES: usize = 3;
 /// A rival recovers at least this share of the best candidate's gain.
@@ -146,7 +148,7 @@ pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize], probes: 
             let several = settle(problem, model, candidates, probes, &screened, &adjusted, &members);
             if several.kind != Kind::Unknown {
                 settled = several;
-                put_first(&mut screened, &mut adjusted, members);
+                put_first(slots, &mut screened, &mut adjusted, members);
             }
         }
     }
@@ -169,8 +171,8 @@ fn gain_of(screened: &[Screened], slot: usize) -> f64 {
 }
 
 /// Puts effects first that pass beside one another: what each brings alone stays, how sure it is comes from beside the others.
-fn put_first(screened: &mut Vec<Screened>, adjusted: &mut Vec<f64>, members: Vec<Screened>) {
-    let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
+fn put_first(slots: &[Slot], screened: &mut Vec<Screened>, adjusted: &mut Vec<f64>, members: Vec<Screened>) {
+    let tried = shares(slots, screened.iter());
     for member in members.into_iter().rev() {
         if let Some(at) = screened.iter().position(|s| s.slot == member.slot) {
             let alone = screened.remove(at);
@@ -242,12 +244,17 @@ fn settle(
         });
     }
 
-    let fitted = indices(slots, &stack);
+    // Rates that are noisy leave a gain in the residual, which is no dependence. (A specific force is hardly ever as noisy.)
+    let gyroscope = |slot: &usize| slots[*slot].effect.sensors() == [Sensor::Gyr];
+    let attenuated = problem.attenuated(ATTENUATED).into_iter().map(|(slot, _)| slot);
+    let attenuated = attenuated.filter(|slot| gyroscope(slot) && !stack.contains(slot));
+    let beside_noise: Vec<usize> = stack.iter().copied().chain(attenuated).collect();
+    let fitted = indices(slots, &beside_noise);
     let channels: Vec<usize> = (0..CHANNELS).collect();
     let base = screening::base(problem, &fitted);
     let asked = [
         (dependence::test(problem, &fitted, &base, &channels), ALPHA),
-        (dependence::test_probes(problem, &stack, probes), ALPHA),
+        (dependence::test_probes(problem, &beside_noise, probes), ALPHA),
         (changes::test(problem, &fitted), changes::CAUTION * ALPHA),
         (changes::test_memories(problem, &fitted), ALPHA),
     ];
@@ -352,7 +359,7 @@ fn rivals_of(
 ) -> (Vec<usize>, Vec<(usize, usize, f64)>) {
     let fitted = indices(slots, beside);
     let own = indices(slots, &[best]);
-    let tried = screened.iter().filter(|s| s.testable).count().max(1) as f64;
+    let tried = shares(slots, screened.iter());
     let passing = |(s, a): &(&Screened, &f64)| passes(s, **a);
     let alone = (screened.iter().zip(adjusted).find(passing)).is_some_and(|(s, _)| s.slot == best);
     let others: Vec<Screened>;
@@ -377,8 +384,7 @@ fn rivals_of(
         let c = confounding::correlation(problem, &fitted, &own, &beta, &theirs);
         correlations.push((best, other.slot, c));
         if other.gain >= RIVAL_SHARE * first.gain
-            && confounding::p_value_given(problem, &fitted, &theirs, &own) * tried * slots[other.slot].tried as f64
-                > ALPHA
+            && confounding::p_value_given(problem, &fitted, &theirs, &own) * tried * slots[other.slot].chances() > ALPHA
         {
             rivals.push(other.slot);
         }

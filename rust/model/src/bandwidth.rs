@@ -361,6 +361,25 @@ impl Bandwidth {
         std::array::from_fn(|axis| noise > NOISY_AXIS * rows().map(|s| s.above[k][axis].powi(2)).sum::<f64>())
     }
 
+    /// Part that noise of the reference makes of the mean square of the derivative, axis by axis.
+    pub fn noise_shares(&self, width: Smoothing) -> [f64; 3] {
+        let noise = self.derivative_noise(width).powi(2);
+        let Some(k) = WIDTHS.iter().position(|w| *w == width) else {
+            return [0.0; 3];
+        };
+        let rows = self.samples.iter().filter(|s| s.reached[k]);
+        let (square, n): ([f64; 3], f64) = rows.fold(([0.0; 3], 0.0), |(square, n), s| {
+            (std::array::from_fn(|a| square[a] + s.values[k][a].powi(2)), n + 1.0)
+        });
+        square.map(|square| {
+            if noise > 0.0 {
+                (n * noise / square).min(1.0)
+            } else {
+                0.0
+            }
+        })
+    }
+
     /// True if a width leaves nearly all rows with a reference: in a short log a wide polynomial would lose its ends.
     fn reaches(&self, width: usize) -> bool {
         let reached = |k: usize| self.samples.iter().filter(|s| s.reached[k]).count() as f64;

@@ -62,6 +62,9 @@ pub struct Card {
     pub mistaken_for: String,
     /// The experiment that confirms it.
     pub confirm: String,
+    /// How much of the chance of a false alarm it may use up, where most effects use one share: what a wandering zero imitates cannot become
+    /// as certain as others can, whatever the log (Genovese, Roeder and Wasserman 2006, False discovery control with p-value weighting).
+    pub shares: f64,
 }
 
 /// Parameter names of a 3-vector.

@@ -201,6 +201,11 @@ pub trait Effect: Send + Sync {
         false
     }
 
+    /// Part that noise of the reference makes of its columns, where these may cancel.
+    fn noise_share(&self, _facts: &LogFacts) -> f64 {
+        0.0
+    }
+
     /// True if it stands for no physical cause and has so many columns that the noise is not found beside it.
     fn is_probe(&self) -> bool {
         false

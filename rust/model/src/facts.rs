@@ -65,6 +65,9 @@ pub struct LogFacts {
     pub silent_axes: [[bool; 3]; 3],
     /// Body axes about which the angular acceleration is little more than the noise of the reference.
     pub silent_accelerations: [bool; 3],
+    /// Part that noise of the reference makes of the mean square of specific force and angular rate along each body axis, as they enter
+    /// columns.
+    pub noise_shares: [[f64; 3]; 2],
     /// True if the sensor is shaken more at some times than at others.
     pub shaking_varies: bool,
     /// Median time between reference samples, s.
@@ -132,6 +135,7 @@ impl LogFacts {
             position_columns: None,
             silent_axes: [[false; 3]; 3],
             silent_accelerations: [false; 3],
+            noise_shares: [[0.0; 3]; 2],
             shaking_varies: true,
             reference_dt: dt,
             ranges: [None; 3],
@@ -179,6 +183,7 @@ impl LogFacts {
             position_columns: None,
             silent_axes: [[false; 3]; 3],
             silent_accelerations: [false; 3],
+            noise_shares: [[0.0; 3]; 2],
             shaking_varies: true,
             reference_dt: dt,
             ranges: [None; 3],

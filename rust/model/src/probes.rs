@@ -38,6 +38,10 @@ enum Kind {
     TurnBy(Quantity),
     /// k (c - mean) dx/dt.
     DelayBy(Quantity),
+    /// k (c - mean) |omega|.
+    RateBy(Quantity),
+    /// k (c - mean) x^2.
+    SquareBy(Quantity),
     /// k |omega|^2 x.
     GainByRate,
     /// k y^2 with y the readings of all axes.
@@ -58,6 +62,8 @@ enum Kind {
 const SMALL: [f64; 5] = [0.005, 0.01, 0.02, 0.04, 0.08];
 /// Ideal readings count from this many times their noise on.
 const CLEAR: f64 = 5.0;
+/// What is left of products of the motion counts if it is this many times what noise leaves of them.
+const CANCELLED: f64 = 3.0;
 /// Names of the body axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
 /// Stands between a product of two quantities and the axis that it acts on, in the name of a parameter.
@@ -128,6 +134,10 @@ pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
             if facts.position_smoothing.is_some() {
                 kinds.push((sensor, Kind::Speed));
             }
+            if sensor != Sensor::Mag {
+                let by = |q: &Quantity| [Kind::RateBy(*q), Kind::SquareBy(*q)];
+                kinds.extend(quantities.iter().flat_map(by).map(|kind| (sensor, kind)));
+            }
             // A gyroscope's own cube is in the catalogue.
             if sensor != Sensor::Gyr {
                 kinds.push((sensor, Kind::GainByRate));
@@ -178,6 +188,13 @@ impl Probe {
             Kind::GainBent(q) => (Stage::Gain, xyz(), name(*q), "its gain follows it, bent"),
             Kind::TurnBy(q) => (Stage::Gain, on_axes(2), name(*q), "the mounting turns with it"),
             Kind::DelayBy(q) => (Stage::Gain, vec!["tau".to_string()], name(*q), "the delay follows it"),
+            Kind::RateBy(q) => (
+                Stage::Offset,
+                xyz(),
+                format!("{}*omega_norm", name(*q)),
+                "both act together",
+            ),
+            Kind::SquareBy(q) => (Stage::Gain, xyz(), name(*q), "it bends the response"),
             Kind::GainByRate => (Stage::Gain, xyz(), "omega_norm".to_string(), "its gain follows it"),
             Kind::Squares => (
                 Stage::Offset,
@@ -239,6 +256,7 @@ impl Probe {
                 signature: shape.to_string(),
                 mistaken_for,
                 confirm,
+                shares: 1.0,
             },
             sensor: [sensor],
             kind,
@@ -351,6 +369,19 @@ impl Effect for Probe {
         None
     }
 
+    fn noise_share(&self, facts: &LogFacts) -> f64 {
+        match self.kind {
+            Kind::Cross(u, v) => {
+                let share = |motion: Motion| {
+                    let shares = facts.noise_shares[motion as usize];
+                    3.0 / shares.iter().map(|share| 1.0 / share).sum::<f64>()
+                };
+                CANCELLED * (share(u) + share(v))
+            }
+            _ => 0.0,
+        }
+    }
+
     fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
         match &self.kind {
             Kind::Gain(c) => {
@@ -404,6 +435,21 @@ impl Effect for Probe {
             Kind::DelayBy(q) => {
                 if let Some(by) = deviation(rows, *q) {
                     self.fill_delay(rows, &by, out);
+                }
+            }
+            Kind::RateBy(q) => {
+                if let Some(by) = deviation(rows, *q) {
+                    let rates: Vec<f64> = (0..rows.len()).map(|i| rows.ideal.omega.row(i).norm()).collect();
+                    for axis in 0..3 {
+                        out.set(axis, axis, by.iter().zip(&rates).map(|(c, w)| c * w));
+                    }
+                }
+            }
+            Kind::SquareBy(q) => {
+                if let Some(by) = deviation(rows, *q) {
+                    for axis in 0..3 {
+                        out.set(axis, axis, by.iter().zip(rows.x.axis(axis)).map(|(c, x)| c * x * x));
+                    }
                 }
             }
             Kind::GainByRate => {

@@ -33,6 +33,11 @@ pub struct Slot {
 }
 
 impl Slot {
+    /// What a p-value of it is multiplied by, and then by the shares of all candidates, to count every chance of a false alarm.
+    pub fn chances(&self) -> f64 {
+        self.tried as f64 / self.effect.card().shares
+    }
+
     fn columns(&self, rows: &Rows, sensor: Sensor, out: &mut Columns) -> Result<(), EffectError> {
         if self.in_model {
             self.effect.columns(rows, sensor, &self.parameters, out)

@@ -94,6 +94,7 @@ fn every_built_in_effect_keeps_the_contract() {
         position_columns: Some(NARROWEST),
         silent_axes: [[false; 3]; 3],
         silent_accelerations: [false; 3],
+        noise_shares: [[0.0; 3]; 2],
         shaking_varies: true,
         reference_dt: 0.01,
         ranges: [None; 3],

@@ -101,6 +101,7 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
         position_columns: None,
         silent_axes: [[false; 3]; 3],
         silent_accelerations: [false; 3],
+        noise_shares: [[0.0; 3]; 2],
         shaking_varies: true,
         reference_dt: 0.01,
         ranges: [None; 3],

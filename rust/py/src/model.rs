@@ -353,6 +353,7 @@ fn python_effect(
         signature: word("signature")?,
         mistaken_for: word("mistaken_for")?,
         confirm: word("confirm")?,
+        shares: 1.0,
         id,
         stage,
         parameters: parameters

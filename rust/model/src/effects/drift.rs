@@ -1,7 +1,7 @@
 //! The zero of a sensor moves steadily with time.
 
 use super::{Linear, Needs, Words};
-use crate::card::{Stage, VECTOR, parameters};
+use crate::card::{Card, Stage, VECTOR, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
@@ -10,6 +10,9 @@ fn fill(rows: &Rows, out: &mut Columns) {
         out.set(axis, axis, rows.t.iter().map(|t| t - rows.facts.t_start));
     }
 }
+
+/// A zero that wanders may drift for as long as a log lasts.
+const SHARES: f64 = 5.0;
 
 /// `acc.bias_drift`, `gyr.bias_drift`.
 pub fn bias_drift(sensor: Sensor) -> Linear {
@@ -40,12 +43,13 @@ pub fn bias_drift(sensor: Sensor) -> Linear {
         ),
     };
     let unit = format!("{}/s", sensor.unit());
+    let card = words.card(
+        format!("{}.bias_drift", sensor.prefix()),
+        Stage::Offset,
+        parameters(&VECTOR, &unit, typical),
+    );
     Linear {
-        card: words.card(
-            format!("{}.bias_drift", sensor.prefix()),
-            Stage::Offset,
-            parameters(&VECTOR, &unit, typical),
-        ),
+        card: Card { shares: SHARES, ..card },
         sensor: [sensor],
         needs: Needs::Sensor,
         fill,

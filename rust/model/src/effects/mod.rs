@@ -124,6 +124,7 @@ impl Words<'_> {
             signature: self.signature.to_string(),
             mistaken_for: self.mistaken_for.to_string(),
             confirm: self.confirm.to_string(),
+            shares: 1.0,
         }
     }
 }
