@@ -201,7 +201,7 @@ def _spectra(evidence: LogEvidence, step: Array) -> tuple[Spectrum, ...]:
 def notes(evidence: LogEvidence) -> tuple[str, ...]:
     """Return what the reader should know about the figures of this log."""
     log, facts = evidence.surveyed.log, evidence.facts
-    out = list(log.notes)
+    out = [*log.notes, *evidence.passes.empty]
     stated = log.metadata.noise
     for index, (floor, variance) in enumerate(zip(evidence.floors, evidence.raw_variance, strict=True)):
         if index % 3 == 0 and CHANNELS[index][:3] in stated and np.isfinite(variance):

@@ -71,6 +71,8 @@ class Passes:
     def __init__(self, log: LogSource, progress: Progress) -> None:
         self.log = log
         self.covariates = covariate_names(log)
+        self.empty: list[str] = []
+        """What is to be said of columns without any value."""
         self.column_noise: dict[str, float] = {}
         """Share of noise in each covariate's variance (``temp`` too), once the log has been surveyed."""
         self._progress = progress
@@ -127,6 +129,7 @@ class Passes:
         names = ["temp", *self.covariates]
         known = np.zeros(len(names))
         noise = [ColumnNoise() for _ in names]
+        read = {sensor: np.zeros(3) for sensor in ("acc", "gyr", "mag")}
         for arrays in self.chunks(SURVEY_MARGIN, "surveying"):
             core = slice(arrays["begin"], arrays["end"])
             if arrays["ref_q"] is not None:
@@ -135,6 +138,9 @@ class Passes:
                 if column is not None:
                     known[k] += _held_count(column[core])
                     noise[k].add(column[core])
+            for sensor in read:
+                if arrays[sensor] is not None:
+                    read[sensor] += np.isfinite(arrays[sensor][core]).sum(axis=0)
             survey.add(arrays)
         if reference == 0:
             raise InputError(
@@ -143,9 +149,18 @@ class Passes:
                 remedy="Add the reference, or ref_angle with the metadata rig_axis.",
             )
         self.column_noise = {name: each.share for name, each in zip(names, noise, strict=True)}
+        if empty := [name for name, rows in zip(self.covariates, known[1:], strict=True) if rows == 0]:
+            # Rows without a value of every column count for nothing: without these columns they do.
+            self.empty += [f"Column {name} has no value in any row." for name in empty]
+            self.covariates = [name for name in self.covariates if name not in empty]
+            return self.survey()
         facts = survey.finish()
         if not facts.sensors:
             raise InputError("no sensor of the log has a sample", file=log.path)
+        for sensor, rows in read.items():
+            dead = [f"{sensor}_{axis}" for axis, count in zip("xyz", rows, strict=True) if count == 0]
+            if 0 < len(dead) < 3:
+                self.empty.append(f"{' and '.join(dead)} has no value in any row: {sensor} is left out.")
         return facts, dict(zip(names, known / log.n, strict=True))
 
     def ranges(self) -> tuple[dict[str, float], dict[str, float]]:

@@ -256,7 +256,10 @@ fn settle(
         (dependence::test(problem, &fitted, &base, &channels), ALPHA),
         (dependence::test_probes(problem, &beside_noise, probes), ALPHA),
         (changes::test(problem, &fitted), changes::CAUTION * ALPHA),
-        (changes::test_memories(problem, &fitted), ALPHA),
+        (
+            changes::test_memories(problem, &fitted),
+            changes::CAUTION_WITH_MEMORIES * ALPHA,
+        ),
     ];
     let mut unexplained: Vec<Dependence> = asked
         .into_iter()

@@ -22,6 +22,8 @@ use crate::problem::Problem;
 
 /// Noise that is coloured more slowly than any filter sees jumps and swings now and then: the chance of a false alarm is kept to this part of the usual.
 pub const CAUTION: f64 = 0.01;
+/// Memories of many covariates are as many ways to follow a zero that wanders; those that are none are hardly ever as certain.
+pub const CAUTION_WITH_MEMORIES: f64 = 0.1;
 /// p-value from which on no further stay is asked for.
 const SURE: f64 = 1e-7;
 /// Steps, swings, stays and humps are four questions.
