@@ -8,7 +8,7 @@ use imufit_fit::whitening;
 use imufit_model::sensor::{CHANNELS, Sensor};
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
-use super::walk::{BEFORE, Strength, Walk, log_determinant, strengths, vector_strengths};
+use super::walk::{Strength, Walk, log_determinant, strengths, vector_strengths};
 use crate::orthonormal;
 
 /// The zero of a magnetometer wanders by no more than so many noise floors from block to block.
@@ -67,17 +67,18 @@ pub fn channel_sums(
         }
         let sensor = channel / 3;
         // The axes of a sensor wander alike.
+        let walk = Walk::of(Sensor::ALL[sensor]);
         let same = out.iter().find(|o| o.channel / 3 == sensor && o.count == count);
         let strengths = if let Some(other) = same {
             other.strengths.clone()
         } else if sensor != Sensor::Mag.index() || white.layout.facts.rests {
-            Arc::new(strengths(&count, f64::INFINITY))
+            Arc::new(strengths(&count, f64::INFINITY, &walk))
         } else {
             let most = (3 * sensor..3 * sensor + 3)
                 .map(|c| (FARTHEST * floors[c]).powi(2) * weights[c] * whitening::gain(&white.layout.filters[c], 0.0))
                 .filter(|v| v.is_finite() && *v > 0.0)
                 .fold(0.0, f64::max);
-            Arc::new(strengths(&count, most))
+            Arc::new(strengths(&count, most, &walk))
         };
         out.push(ChannelSums {
             log,
@@ -86,7 +87,7 @@ pub fn channel_sums(
             sums,
             right,
             count,
-            walk: Walk::Zero,
+            walk,
             strengths,
             telling: true,
         });
@@ -188,7 +189,7 @@ impl ChannelSums {
 
     /// True if the sums are those of blocks.
     pub const fn of_blocks(&self) -> bool {
-        matches!(self.walk, Walk::Zero)
+        matches!(self.walk, Walk::Zero { .. })
     }
 
     /// Sums of a column that is constant within each bin of a covariate, over the rows of this channel: `values` has a column
@@ -198,7 +199,7 @@ impl ChannelSums {
         let of_block = |b: usize| evidence.get(b, self.channel);
         for k in 0..out.nrows() {
             let counts: Option<Vec<f64>> = match &self.walk {
-                Walk::Zero => of_block(k).map(|block| block.bin_count[covariate].clone()),
+                Walk::Zero { .. } => of_block(k).map(|block| block.bin_count[covariate].clone()),
                 Walk::Vector(directions) => {
                     let (b, direction) = &directions[k];
                     let axes = of_block(*b).and_then(|block| block.axes.as_ref());
@@ -274,28 +275,11 @@ impl ChannelSums {
         self.strengths.iter().map(of).collect()
     }
 
-    /// Covariance that a walk of one strength, from zero at the start, gives to the sums over the parameters' columns.
+    /// Covariance that a walk of one strength gives to the sums over the parameters' columns.
     pub(super) fn spread(&self, strength: usize) -> DMatrix<f64> {
         let kappa = self.weight * self.strengths[strength].kappa;
-        if let Walk::Vector(_) = self.walk {
-            let steps = self.walk.covariance(self.sums.nrows());
-            return self.sums.tr_mul(&(steps * &self.sums)) * kappa;
-        }
-        // A walk is the sum of its steps, and a step is seen by all blocks from its own on.
-        let mut later = self.sums.clone();
-        for b in (0..later.nrows().saturating_sub(1)).rev() {
-            let next = later.row(b + 1).into_owned();
-            let mut row = later.row_mut(b);
-            row += next;
-        }
-        if let Some(first) = later
-            .nrows()
-            .checked_sub(1)
-            .map(|_| later.row(0) * (1.0 + BEFORE).sqrt())
-        {
-            later.row_mut(0).copy_from(&first);
-        }
-        later.tr_mul(&later) * kappa
+        let steps = self.walk.covariance(self.sums.nrows());
+        self.sums.tr_mul(&(steps * &self.sums)) * kappa
     }
 
     /// Takes the wandering mean of one strength out of equations over the same parameters.

@@ -154,7 +154,7 @@ mod tests {
             (0..12).map(|_| uniform()).sum::<f64>() - 6.0
         };
         let count = DVector::from_element(48, 100.0);
-        let strengths = Arc::new(strengths(&count, f64::INFINITY));
+        let strengths = Arc::new(strengths(&count, f64::INFINITY, &Walk::of(Sensor::Gyr)));
         let mut sums = |walk: f64| {
             let mut level = 0.0;
             let right = DVector::from_fn(48, |_, _| {
@@ -169,7 +169,7 @@ mod tests {
                 sums,
                 right,
                 count: count.clone(),
-                walk: Walk::Zero,
+                walk: Walk::of(Sensor::Gyr),
                 strengths,
                 telling: true,
             }

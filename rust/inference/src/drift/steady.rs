@@ -76,6 +76,7 @@ pub(super) fn without_steady(channels: &[ChannelSums], equations: &NormalEquatio
 mod tests {
     use std::sync::Arc;
 
+    use imufit_model::sensor::Sensor;
     use nalgebra::{DMatrix, DVector};
 
     use super::super::walk::Walk;
@@ -103,7 +104,7 @@ mod tests {
             right: DVector::zeros(blocks),
             count: DVector::from_element(blocks, n as f64),
             sums: sums.clone(),
-            walk: Walk::Zero,
+            walk: Walk::of(Sensor::Gyr),
             strengths: Arc::new(Vec::new()),
             telling: true,
         };

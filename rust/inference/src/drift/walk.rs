@@ -2,14 +2,16 @@
 
 use std::sync::Arc;
 
+use imufit_model::sensor::Sensor;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
 /// Walk variances per block tried, in units of a block mean's variance.
 const GRID: [f64; 18] = [
     0.0, 3e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016, 0.032, 0.064, 0.128, 0.256, 0.5, 1.0, 2.0, 4.0, 10.0, 40.0, 200.0,
 ];
-/// A zero has wandered before the log begins, for so many blocks: where it wanders visibly, an offset of the like is no bias.
-pub(super) const BEFORE: f64 = 3.0;
+/// The zero of an inertial sensor has wandered before the log begins, for so many blocks: where it wanders visibly, an offset of the
+/// like is no bias.
+const BEFORE: f64 = 1.0;
 /// Fewer blocks than this cannot show a walk.
 const MIN_BLOCKS: usize = 8;
 
@@ -28,27 +30,37 @@ pub struct Strength {
 /// What the sums of a channel stand for.
 #[derive(Clone)]
 pub(super) enum Walk {
-    /// The sum of a block, whose zero makes a step from block to block.
-    Zero,
+    /// The sum of a block, whose zero makes a step from block to block, and has made some steps before the first.
+    Zero {
+        /// Variance of the zero where the log begins, in steps.
+        before: f64,
+    },
     /// Sums along directions within a block, whose rows are projections of a vector: its three zeros each make steps. Block
     /// and direction of each sum.
     Vector(Arc<Vec<(usize, Vector3<f64>)>>),
 }
 
 /// Covariance of the means of two blocks of a walk that makes a unit step in the time of a block.
-fn walked(first: usize, second: usize) -> f64 {
+fn walked(before: f64, first: usize, second: usize) -> f64 {
     let within = if first == second { 1.0 / 3.0 } else { 0.5 };
-    BEFORE + first.min(second) as f64 + within
+    before + first.min(second) as f64 + within
 }
 
 impl Walk {
+    /// Of a zero whose sums are those of blocks. The offset of a magnetometer is iron: it has not wandered before.
+    pub(super) fn of(sensor: Sensor) -> Self {
+        Self::Zero {
+            before: if sensor == Sensor::Mag { 0.0 } else { BEFORE },
+        }
+    }
+
     /// Covariance of the zeros behind the sums after unit steps.
     pub(super) fn covariance(&self, sums: usize) -> DMatrix<f64> {
         match self {
-            Self::Zero => DMatrix::from_fn(sums, sums, walked),
+            Self::Zero { before } => DMatrix::from_fn(sums, sums, |i, j| walked(*before, i, j)),
             Self::Vector(directions) => DMatrix::from_fn(sums, sums, |i, j| {
                 let ((a, u), (b, v)) = (&directions[i], &directions[j]);
-                walked(*a, *b) * u.dot(v)
+                walked(BEFORE, *a, *b) * u.dot(v)
             }),
         }
     }
@@ -87,14 +99,14 @@ pub(super) fn vector_strengths(
 }
 
 /// Every strength of the walk for blocks with these sample counts, up to the variance of a step `most`.
-pub(super) fn strengths(count: &DVector<f64>, most: f64) -> Vec<Strength> {
+pub(super) fn strengths(count: &DVector<f64>, most: f64, walk: &Walk) -> Vec<Strength> {
     let blocks = count.len();
     let filled = count.iter().filter(|n| **n > 0.0).count();
     if filled < MIN_BLOCKS {
         return Vec::new();
     }
     let unit = filled as f64 / count.sum();
-    let steps = Walk::Zero.covariance(blocks);
+    let steps = walk.covariance(blocks);
     GRID.iter()
         .map(|step| step * unit)
         .filter(|kappa| *kappa <= most)
