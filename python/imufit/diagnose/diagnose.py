@@ -104,8 +104,9 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     named = best if word in ("missing", "ambiguous") else None
     disagrees = disagreements(analysis, result["disagreements"])
     without = answers_without(fit, result["disagreements"], diagnose) if result["spoilt"] else ()
+    doubtful = next((candidate for candidate in candidates if candidate.status in sentences.DOUBTS), None)
     sentence = sentences.verdict(
-        word, by_id[best] if best else None, cards[best] if best else None, rivals, unexplained
+        word, by_id[best] if best else None, cards[best] if best else None, rivals, unexplained, doubtful
     )
     unshown = without_reference.untold(fit)
     if word == "adequate" and "rests" in without_reference.evidence_of(analysis):

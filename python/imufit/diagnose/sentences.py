@@ -18,6 +18,14 @@ def leading(parameters: Sequence[Parameter]) -> Parameter | None:
     return max(known, key=lambda p: abs(p.value / p.standard_error), default=None)
 
 
+DOUBTS = {
+    "differs between halves": "the two halves of the log disagree about it by more than chance",
+    "implausible size": "no sensor of this kind has so much of it",
+    "negative delay": "it would have to read what is yet to come",
+}
+"""Why a candidate that would explain much is not the answer, by its status."""
+
+
 def explanation(card: EffectCard, candidate: Candidate) -> str:
     """One candidate in a sentence: the physics, its size, what adding it should bring."""
     if candidate.status == "not testable here":
@@ -55,6 +63,7 @@ def verdict(
     card: EffectCard | None,
     rivals: Sequence[str],
     unexplained: Sequence[Unexplained],
+    doubtful: Candidate | None = None,
 ) -> str:
     """Give the answer in a sentence or two."""
     left = ""
@@ -69,6 +78,8 @@ def verdict(
             if left
             else "Something is missing."
         )
+        if doubtful is not None and not left and best is None:
+            text += f" {doubtful.effect} comes nearest, but {DOUBTS[doubtful.status]}."
         if best is not None:
             text += f" {best.effect} would take a part of it, but not most."
         return text

@@ -176,12 +176,26 @@ fn halves_agree(question: &Question, whole: &Jackknife) -> bool {
         return true;
     };
     let size = |v: &DVector<f64>| v.dot(&information.solve(v));
-    // How much more the blocks scatter than whitened noise would.
-    let scatter = question
-        .total()
-        .solve(&question.precision)
-        .and_then(|s| Cholesky::new(s.covariance().view((p, p), (m, m)).into_owned()))
-        .map_or(1.0, |c| (c.solve(&whole.covariance).trace() / m as f64).max(1.0));
+    // How much more the blocks scatter than whitened noise would, and how much less certain zeros that wander leave it.
+    let told = |total: &NormalEquations| -> Option<DMatrix<f64>> {
+        Some(
+            total
+                .solve(&question.precision)?
+                .covariance()
+                .view((p, p), (m, m))
+                .into_owned(),
+        )
+    };
+    let white = told(&question.total()).and_then(Cholesky::new);
+    let times = |covariance: &DMatrix<f64>| white.as_ref().map_or(1.0, |c| c.solve(covariance).trace() / m as f64);
+    let mut passed = 0.0;
+    let levels = question.totals_without_drift();
+    let middle = levels.iter().find(|(weight, _)| {
+        passed += weight;
+        passed >= 0.5
+    });
+    let wandering = middle.and_then(|(_, total)| told(total)).map_or(1.0, |c| times(&c));
+    let scatter = times(&whole.covariance).max(wandering).max(1.0);
     let difference = size(&(&first - &second));
     let mf = m as f64;
     let beta = whole.estimate.rows(p, m).into_owned();
