@@ -28,8 +28,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from imufit import Log, LogStream, _imufit, simulate
-from imufit.fit.passes import BLOCKS
-from imufit.fit.passes import CHANNELS, Passes, chunk_arrays
+from imufit.fit.passes import BLOCKS, CHANNELS, Passes, chunk_arrays
 from imufit.fit.surveyed_log import SurveyedLog
 from imufit.progress import silent
 
