@@ -37,6 +37,11 @@ Ideal = dict[str, np.ndarray]
 Column = dict[int, np.ndarray]
 
 
+def asked(candidates: dict[str, _imufit.Effect]) -> list[tuple[_imufit.Effect, list[float]]]:
+    """Candidates with the values that their columns are taken for: none of anything."""
+    return [(effect, [0.0] * len(effect.parameters)) for effect in candidates.values()]
+
+
 def log_of(rows: int) -> Log:
     """Nine axes, temperature and one covariate at 100 Hz."""
     return simulate.simulate("handheld", {"gyr.bias": None}, 1, rows / 100.0, covariates=("motor_current",)).to_log()
@@ -134,7 +139,7 @@ def ours(log: Log) -> tuple[Callable[[], _imufit.Evidence], float, int]:
     candidates = SurveyedLog.of(passes, facts, coverage).effects
 
     def take() -> _imufit.Evidence:
-        evidence = _imufit.Evidence(facts, [], list(candidates.values()), BLOCKS, [[] for _ in CHANNELS])
+        evidence = _imufit.Evidence(facts, [], asked(candidates), BLOCKS, [[] for _ in CHANNELS])
         for chunk in log.chunks(65536, facts.margin):
             evidence.add(chunk_arrays(chunk, passes.covariates))
         return evidence
@@ -206,7 +211,7 @@ def stream(path: Path) -> None:
     passes = Passes(log, silent)
     facts, coverage = passes.survey()
     candidates = SurveyedLog.of(passes, facts, coverage).effects
-    evidence = _imufit.Evidence(facts, [], list(candidates.values()), BLOCKS, [[] for _ in CHANNELS])
+    evidence = _imufit.Evidence(facts, [], asked(candidates), BLOCKS, [[] for _ in CHANNELS])
     passes.evidence(evidence, facts, "")
     status = Path("/proc/self/status").read_text(encoding="ascii")
     print(int(status.split("VmHWM:")[1].split()[0]) / 1024)
