@@ -1,6 +1,6 @@
-"""Evidence of a nine-axis log for the whole catalogue, beside the same least squares in numpy, on one core.
+"""Evidence of a nine-axis log for seventy parameters, beside the same least squares in numpy, on one core.
 
-numpy gets the ideal readings for free, builds the design matrix of all effects on all nine channels and solves it, once
+numpy gets the ideal readings for free, builds the design matrix of the same effects on all nine channels and solves it, once
 with `numpy.linalg.lstsq`, once by normal equations, and once by normal equations of each channel's own columns. Ours
 works out the ideal readings too, and keeps the sums of every block of time and of every bin of every covariate, from
 which come held-out errors, ranks and standard errors.
@@ -33,13 +33,27 @@ from imufit.fit.surveyed_log import SurveyedLog
 from imufit.progress import silent
 
 AXES = range(3)
+NAMED = (
+    *(f"{s}.{name}" for s in ("acc", "gyr") for name in ("bias", "scale", "misalignment", "bias_temperature")),
+    "acc.column:motor_current",
+    "gyr.column:motor_current",
+    "mag.current",
+    "acc.lever_arm",
+    "gyr.g_sensitivity",
+    "mag.hard_iron",
+    "mag.soft_iron",
+    "mag.field_reference",
+    "ref.alignment",
+    "ref.delay",
+)
+"""Effects whose columns numpy is given as well."""
 Ideal = dict[str, np.ndarray]
 Column = dict[int, np.ndarray]
 
 
 def asked(candidates: dict[str, _imufit.Effect]) -> list[tuple[_imufit.Effect, list[float]]]:
-    """Candidates with the values that their columns are taken for: none of anything."""
-    return [(effect, [0.0] * len(effect.parameters)) for effect in candidates.values()]
+    """Candidates that numpy has too, with the values that their columns are taken for: none of anything."""
+    return [(candidates[name], [0.0] * len(candidates[name].parameters)) for name in NAMED]
 
 
 def log_of(rows: int) -> Log:
@@ -144,7 +158,7 @@ def ours(log: Log) -> tuple[Callable[[], _imufit.Evidence], float, int]:
             evidence.add(chunk_arrays(chunk, passes.covariates))
         return evidence
 
-    return take, survey, sum(len(e.parameters) for e in candidates.values())
+    return take, survey, sum(len(candidates[name].parameters) for name in NAMED)
 
 
 def by_channel(sim: simulate.Simulation, x: Ideal) -> np.ndarray:
