@@ -1,9 +1,9 @@
 """Evidence of a nine-axis log for seventy parameters, beside the same least squares in numpy, on one core.
 
-numpy gets the ideal readings for free, builds the design matrix of the same effects on all nine channels and solves it, once
-with `numpy.linalg.lstsq`, once by normal equations, and once by normal equations of each channel's own columns. Ours
-works out the ideal readings too, and keeps the sums of every block of time and of every bin of every covariate, from
-which come held-out errors, ranks and standard errors.
+numpy gets the ideal readings for free, builds the design matrix of the same effects on all nine channels and solves it,
+once with `numpy.linalg.lstsq`, once by normal equations, and once by normal equations of each channel's own columns.
+Ours works out the ideal readings too, and keeps the sums of every block of time and of every bin of every covariate,
+from which come held-out errors, ranks and standard errors.
 
 Then the peak memory of evidence streamed from a Parquet file, as the file grows tenfold.
 

@@ -453,6 +453,8 @@ class _Dependence(TypedDict):
     gain: float
     p_value: float
     shape: str
+    held_out: tuple[float, float] | None
+    probe: int | None
 
 class _Disagreement(TypedDict):
     slot: int

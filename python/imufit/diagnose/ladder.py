@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from typing import Any
 
 from imufit.diagnose.add import add
 from imufit.diagnose.attitude import attitude_comparison
@@ -14,7 +15,7 @@ from imufit.fit import Fit
 from imufit.log.several import Logs
 from imufit.model import SensorModel
 from imufit.progress import Progress, silent
-from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
+from imufit.results import Addition, Candidate, Diagnosis, Ladder, Revision, Step
 
 MAX_STEPS = 12
 TOLD = 2.0
@@ -160,7 +161,30 @@ def next_effect(fit: Fit, diagnosis: Diagnosis, futile: Collection[str] = ()) ->
         passed = [
             c for c in passed if matters(c.held_out_before, c.held_out_after) and not (varies and c.effect in IRON)
         ]
+        passed = _beside_the_unexplained(fit, passed) if passed else []
     return passed[0].effect if passed else None
+
+
+def _beside_the_unexplained(fit: Fit, passed: list[Candidate]) -> list[Candidate]:
+    """Return those that still pass beside the columns of what nothing explains, the largest one of each sensor.
+
+    A gain that follows the rate looks like a gain, too, but beside it there is none.
+    """
+    analysis = fit.analysis
+    fitted = list(analysis.fitted_slots)
+    found = analysis.problem.diagnose(fitted, list(analysis.candidate_slots), analysis.probe_slots)["unexplained"]
+    largest: dict[str, Mapping[str, Any]] = {}
+    for item in found:
+        sensor = item["channel"][:3]
+        if item["probe"] is not None and item["gain"] > largest.get(sensor, {"gain": 0.0})["gain"]:
+            largest[sensor] = item
+    if not largest:
+        return passed
+    slots = {analysis.slots.index(c.effect): c for c in passed}
+    probes = [item["probe"] for item in largest.values()]
+    beside = analysis.problem.diagnose([*fitted, *probes], list(slots))["screened"]
+    still = {item["slot"] for item in beside if item["passed"]}
+    return [candidate for slot, candidate in slots.items() if slot in still]
 
 
 def _beside_the_unsure(fit: Fit) -> str | None:

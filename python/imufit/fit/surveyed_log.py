@@ -37,7 +37,7 @@ class SurveyedLog:
     refused : dict of str to str
         Why it cannot tell of the others.
     probes : dict of str to Effect
-        Dependences without a name that it can be asked about, see `rust/model/src/probes.rs`.
+        Dependences without a name that it can be asked about, see `rust/model/src/probes`.
     faults : tuple of DataFault
         What is wrong with its data, as far as rows, units and frames show.
     """

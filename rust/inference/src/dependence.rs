@@ -31,10 +31,14 @@ pub struct Dependence {
     pub p_value: f64,
     /// Held-out gain in units of the noise variance.
     pub gain: f64,
+    /// What of it is on this channel.
+    pub on_channel: f64,
     /// A word for how.
     pub shape: String,
     /// Held-out error without and with it, as the residual stands, over all channels; `None` where only means were looked at.
     pub held_out: Option<(f64, f64)>,
+    /// The slot of a probe that shows it; `None` where bins or means of blocks do.
+    pub probe: Option<usize>,
 }
 
 /// Orthonormal polynomials over bin ranks, constant included; at most as many as bins.
@@ -240,8 +244,10 @@ fn found(q: &Question, base: &HeldOut, asked: &Asked) -> Option<Dependence> {
         log: asked.log,
         p_value,
         gain,
+        on_channel: gain,
         shape: shape_name(&shape).to_string(),
         held_out: None,
+        probe: None,
     })
 }
 
@@ -257,14 +263,16 @@ pub fn test_probes(problem: &Problem, stack: &[usize], probes: &[usize]) -> (Vec
             let judged = selection::judge(problem, slots, &fitted, w);
             let slot = &slots[judged.slot];
             let sensor = slot.effect.sensors().first()?;
-            let certain = |(value, error): &(f64, f64)| (value / error.max(f64::MIN_POSITIVE)).abs();
-            let parameters = judged.parameters.iter().map(certain).enumerate();
-            let (largest, _) = parameters.max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let certain = |(value, error): &(f64, f64)| (value / error.max(f64::MIN_POSITIVE)).powi(2);
+            let certainties: Vec<f64> = judged.parameters.iter().map(certain).collect();
+            let (largest, _) = certainties.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
             // Parameters of vectors belong to an axis each, those of a gradient to all.
-            let axis = if slot.parameters.len().is_multiple_of(3) {
-                largest % 3
+            let (axis, share) = if slot.parameters.len().is_multiple_of(3) {
+                let axis = largest % 3;
+                let own: f64 = certainties.iter().skip(axis).step_by(3).sum();
+                (axis, own / certainties.iter().sum::<f64>().max(f64::MIN_POSITIVE))
             } else {
-                0
+                (0, 1.0 / 3.0)
             };
             let card = slot.effect.card();
             // What the axis itself causes is called as its own bins are.
@@ -280,8 +288,10 @@ pub fn test_probes(problem: &Problem, stack: &[usize], probes: &[usize]) -> (Vec
                 log: None,
                 p_value: judged.p_value,
                 gain: judged.gain,
+                on_channel: share * judged.gain,
                 shape: card.signature.clone(),
                 held_out: Some(judged.held_out),
+                probe: Some(judged.slot),
             })
         })
         .collect();

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::agreement::{self, Differing, Disagreement};
 use crate::confounding;
 use crate::dependence::{self, Dependence};
-use crate::held_out;
+use crate::held_out::{self, HeldOut};
 use crate::problem::Problem;
 use crate::screening::{self, Plausible, Screened};
 use crate::selection::{ALPHA, best_of, explains, indices, passes, screen_all, shares, significant};
@@ -31,6 +31,8 @@ const SERIES: usize = 3;
 const RIVAL_SHARE: f64 = 0.5;
 /// What logs disagree about spoils the answer if it explains this much more than the best candidate.
 const CLEARLY_MORE: f64 = 1.1;
+/// One dependence without a name is the cause if it alone explains this much more than all effects that would be named together.
+const ALONE: f64 = 1.05;
 /// Steps looked ahead to see whether named effects together explain the residual.
 const LOOK_AHEAD: usize = 10;
 
@@ -265,7 +267,8 @@ fn settle(
         .into_iter()
         .flat_map(|((found, tried), alpha)| found.into_iter().filter(move |d| d.p_value * tried as f64 <= alpha))
         .collect();
-    unexplained.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    like_with_like(slots, &mut unexplained);
+    unexplained.sort_by(|a, b| b.on_channel.total_cmp(&a.on_channel));
 
     let beside: Vec<usize> = model.iter().chain(&others).copied().collect();
     let (rivals, correlations) = best.map_or_else(Default::default, |best| {
@@ -292,13 +295,16 @@ fn settle(
                 held_out::gain(&alone, &base).0
             };
             let series = (path.iter()).filter(|s| slots[**s].effect.sensors().iter().any(|s| sensors.contains(s)));
+            let mut before = beside_noise.clone();
+            before.retain(|slot| !path.contains(slot));
+            let alone = better_alone(problem, &before, &base, &unexplained);
             let bent = left_by(unexplained.iter().filter(|d| of_own_quantity(problem, d, sensors)));
             let allowed = if series.count() >= SERIES {
                 BENT_IN_SERIES
             } else {
                 BENT_OTHERWISE
             };
-            if bent > allowed * gain || gain < NAMED_SHARE * (gain + left) {
+            if alone || bent > allowed * gain || gain < NAMED_SHARE * (gain + left) {
                 Kind::Unknown
             } else if rivals.is_empty() {
                 Kind::Missing
@@ -317,6 +323,33 @@ fn settle(
         disagreements,
         spoilt,
     }
+}
+
+/// Gives probes that bins show too the worth of these: bins lose some of what columns of their own have, and would come after them
+/// where another covariate is the cause.
+fn like_with_like(slots: &[Slot], found: &mut [Dependence]) {
+    let binned: Vec<(usize, String, f64)> = (found.iter())
+        .filter(|d| d.probe.is_none())
+        .map(|d| (d.channel, d.covariate.clone(), d.on_channel))
+        .collect();
+    for each in found.iter_mut() {
+        if each.probe.is_some_and(|probe| slots[probe].effect.shown_by_bins()) {
+            let same = (binned.iter()).find(|(channel, name, _)| *channel == each.channel && *name == each.covariate);
+            each.on_channel = same.map_or(each.on_channel, |(_, _, gain)| each.on_channel.min(*gain));
+        }
+    }
+}
+
+/// True if one dependence without a name explains more on top of the slots `model` than all that leads to the error `left`.
+fn better_alone(problem: &Problem, model: &[usize], left: &HeldOut, unexplained: &[Dependence]) -> bool {
+    let slots = problem.slots.as_slice();
+    let fitted = indices(slots, model);
+    let before = screening::base(problem, &fitted);
+    let (together, _) = held_out::gain(&before, left);
+    unexplained.iter().filter_map(|d| d.probe).any(|probe| {
+        let weighed = screening::weigh(problem, &fitted, &before, probe, &indices(slots, &[probe]));
+        weighed.so_far().gain > ALONE * together
+    })
 }
 
 /// What dependences are worth together: on each channel the one that brings most, since others there may be the same thing again.

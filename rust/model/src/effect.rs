@@ -211,6 +211,11 @@ pub trait Effect: Send + Sync {
         false
     }
 
+    /// True for a probe if bins of the covariate that it is called after show the same.
+    fn shown_by_bins(&self) -> bool {
+        false
+    }
+
     /// Trial values for parameters that no linear step finds (a period, a width): at first a grid over all that can be,
     /// then, around what the round before `round` found best, a finer one. Empty: nothing to search, or done.
     fn search(&self, _facts: &LogFacts, _found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {

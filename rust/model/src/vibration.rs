@@ -1,30 +1,35 @@
 //! How strongly the accelerometer is shaken around each row.
 
+use nalgebra::{Matrix3, Vector3};
+
 use crate::sensor::Sensor;
 use crate::window::Window;
 
-/// Rows to each side of the parabola that motion is taken to be, and the width of its Gaussian weights in rows: what it leaves
-/// lies above a tenth of the sampling rate, and above a fifth of it leaves nothing out.
-const HALF_WIDTH: usize = 8;
-const WEIGHT_WIDTH: f64 = 2.5;
+/// Rows to each side of the quartic that motion is taken to be, and the width of its Gaussian weights in rows: what it leaves
+/// lies above a tenth of the sampling rate, and above a fifth of it a hundredth of the power is missing.
+const HALF_WIDTH: usize = 12;
+const WEIGHT_WIDTH: f64 = 3.5;
 /// Time to each side of a row over which the power is a mean, s, and how many rows that may be at most.
 const REACH: f64 = 0.25;
 const MOST_ROWS: usize = 200;
 /// Rows further apart than this many usual steps have a gap between them, across which nothing is known.
 const GAP: f64 = 5.0;
 
-/// Weights with which the samples around a row make the value of the parabola through them there.
-fn parabola() -> [f64; 2 * HALF_WIDTH + 1] {
-    let offset = |j: usize| j as f64 - HALF_WIDTH as f64;
-    let gauss = |j: usize| (-0.5 * (offset(j) / WEIGHT_WIDTH).powi(2)).exp();
+/// Weights with which the samples around a row make the value of the quartic through them there.
+fn quartic() -> [f64; 2 * HALF_WIDTH + 1] {
+    let offset = |j: usize| (j as f64 - HALF_WIDTH as f64) / WEIGHT_WIDTH;
+    let gauss = |j: usize| (-0.5 * offset(j).powi(2)).exp();
     let moment = |power: i32| -> f64 { (0..=2 * HALF_WIDTH).map(|j| gauss(j) * offset(j).powi(power)).sum() };
-    let (m0, m2, m4) = (moment(0), moment(2), moment(4));
-    let determinant = m0 * m4 - m2 * m2;
-    std::array::from_fn(|j| gauss(j) * (m4 - m2 * offset(j).powi(2)) / determinant)
+    let moments = Matrix3::from_fn(|i, k| moment(2 * (i + k) as i32));
+    let weights = moments.cholesky().map_or(Vector3::x(), |c| c.solve(&Vector3::x()));
+    std::array::from_fn(|j| {
+        let square = offset(j).powi(2);
+        gauss(j) * (weights.x + weights.y * square + weights.z * square * square)
+    })
 }
 
-/// What a sample differs from the parabola through it and the samples around it; `None` where one is missing.
-fn beside_parabola(y: &[f64], n: usize, row: usize, axis: usize, weights: &[f64]) -> Option<f64> {
+/// What a sample differs from the quartic through it and the samples around it; `None` where one is missing.
+fn beside_quartic(y: &[f64], n: usize, row: usize, axis: usize, weights: &[f64]) -> Option<f64> {
     if row < HALF_WIDTH || row + HALF_WIDTH >= n {
         return None;
     }
@@ -34,7 +39,7 @@ fn beside_parabola(y: &[f64], n: usize, row: usize, axis: usize, weights: &[f64]
     left.is_finite().then_some(left)
 }
 
-/// Mean square of the vibration around each core row, all axes together, (m/s^2)^2: readings less the motion that a parabola follows.
+/// Mean square of the vibration around each core row, all axes together, (m/s^2)^2: readings less the motion that a quartic follows.
 /// Where too little is known it is zero.
 pub fn power(window: &Window, dt: f64) -> Vec<f64> {
     let Some(y) = window.reading(Sensor::Acc) else {
@@ -43,7 +48,7 @@ pub fn power(window: &Window, dt: f64) -> Vec<f64> {
     let n = window.len();
     let reach = ((REACH / dt) as usize).clamp(1, MOST_ROWS);
     let (first, last) = (window.begin.saturating_sub(reach), (window.end + reach).min(n));
-    let weights = parabola();
+    let weights = quartic();
     let gap = |row: usize| window.t[row] - window.t[row - 1] > GAP * dt;
     let mut begins: Vec<usize> = (0..n).collect();
     let mut ends: Vec<usize> = (1..=n).collect();
@@ -58,7 +63,7 @@ pub fn power(window: &Window, dt: f64) -> Vec<f64> {
     let (mut square, mut count) = (0.0, 0.0);
     for row in first..last {
         let whole = row >= begins[row] + HALF_WIDTH && row + HALF_WIDTH < ends[row];
-        let axes = [0, 1, 2].map(|axis| beside_parabola(y, n, row, axis, &weights).filter(|_| whole));
+        let axes = [0, 1, 2].map(|axis| beside_quartic(y, n, row, axis, &weights).filter(|_| whole));
         if let [Some(a), Some(b), Some(c)] = axes {
             square += a * a + b * b + c * c;
             count += 1.0;
@@ -79,7 +84,7 @@ pub fn power(window: &Window, dt: f64) -> Vec<f64> {
 /// the sensor is shaken more at some times than at others.
 const SPREAD: f64 = 4.0;
 const LEAST_FACTOR: f64 = 1.5;
-/// Part of the samples that count for themselves: the parabola leaves neighbours alike.
+/// Part of the samples that count for themselves: the quartic leaves neighbours alike.
 const INDEPENDENT: f64 = 0.5;
 
 /// True if the power of the vibration at some rows is larger at some times than at others.
@@ -118,7 +123,7 @@ mod tests {
         };
         let power = power(&window, 0.01);
         assert!(power[100] < 2e-3, "{}", power[100]);
-        assert!((power[450] - 0.625).abs() < 0.06, "{}", power[450]);
+        assert!((power[450] - 0.625).abs() < 0.015, "{}", power[450]);
         let part = super::power(&window.with_core(430, 460), 0.01);
         assert!((part[20] - power[450]).abs() < 1e-12);
     }

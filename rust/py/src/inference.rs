@@ -179,6 +179,7 @@ impl PyProblem {
             item.set_item("p_value", d.p_value)?;
             item.set_item("shape", &d.shape)?;
             item.set_item("held_out", d.held_out)?;
+            item.set_item("probe", d.probe)?;
             unexplained.append(item)?;
         }
         out.set_item("unexplained", unexplained)?;

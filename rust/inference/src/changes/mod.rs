@@ -72,11 +72,13 @@ fn memory_of(problem: &Problem, model: &[usize], all: &ChannelSums) -> Option<De
         log: (problem.parts.len() > 1).then_some(sums.log),
         p_value: p,
         gain: means.without.white - with.white,
+        on_channel: means.without.white - with.white,
         shape: format!(
             "its past counts as well, forgotten in {:.1} s",
             block * memory.forgotten
         ),
         held_out: None,
+        probe: None,
     })
 }
 
@@ -130,8 +132,10 @@ fn of_channel(problem: &Problem, model: &[usize], all: &ChannelSums) -> Vec<Depe
         log: (problem.parts.len() > 1).then_some(sums.log),
         p_value,
         gain: without.white - with.white,
+        on_channel: without.white - with.white,
         shape,
         held_out: None,
+        probe: None,
     };
     found.into_iter().map(dependence).collect()
 }

@@ -6,20 +6,23 @@ use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 use nalgebra::Vector3;
 
-fn fill(rows: &Rows, out: &mut Columns) {
+/// Accelerations of a row that a lever arm of one metre along each axis makes, m/s^2.
+pub fn accelerations_of_levers(rows: &Rows, row: usize) -> [Vector3<f64>; 3] {
+    let (omega, mut alpha) = (rows.ideal.omega.row(row), rows.ideal.alpha.row(row));
+    // Noise of the reference's attitude is in what gravity reads, too: an acceleration made of it would agree with that.
+    for axis in (0..3).filter(|k| rows.facts.silent_accelerations[*k]) {
+        alpha[axis] = 0.0;
+    }
     // omega x (omega x r) + alpha x r = ([omega]^2 + [alpha]) r
-    for parameter in 0..3 {
+    [0, 1, 2].map(|parameter| {
         let unit = Vector3::ith(parameter, 1.0);
-        for axis in 0..3 {
-            out.column(parameter, axis);
-        }
-        for row in 0..rows.len() {
-            let (omega, mut alpha) = (rows.ideal.omega.row(row), rows.ideal.alpha.row(row));
-            // Noise of the reference's attitude is in what gravity reads, too: an acceleration made of it would agree with that.
-            for axis in (0..3).filter(|k| rows.facts.silent_accelerations[*k]) {
-                alpha[axis] = 0.0;
-            }
-            let a = omega.cross(&omega.cross(&unit)) + alpha.cross(&unit);
+        omega.cross(&omega.cross(&unit)) + alpha.cross(&unit)
+    })
+}
+
+fn fill(rows: &Rows, out: &mut Columns) {
+    for row in 0..rows.len() {
+        for (parameter, a) in accelerations_of_levers(rows, row).into_iter().enumerate() {
             for axis in 0..3 {
                 out.column(parameter, axis)[row] = a[axis];
             }

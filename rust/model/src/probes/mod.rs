@@ -1,0 +1,253 @@
+//! Dependences without a name: columns that no effect of the catalogue has, and that tell that something unknown is at work.
+//!
+//! They are asked after everything else and never named, nor added to a model: a gain that follows a column of the log,
+//! two columns that act together, a magnetic field that varies from place to place. What the mean of a residual depends
+//! on needs none of them: bins of each covariate show that, whatever its shape.
+
+mod columns;
+mod words;
+
+use std::sync::Arc;
+
+use crate::card::Card;
+use crate::effect::{Columns, Effect, EffectError, Rows};
+use crate::facts::LogFacts;
+use crate::sensor::Sensor;
+use crate::triple::Triple;
+
+/// Columns of a log's own that are asked about; a log with more is asked about the first ones.
+const MOST_COLUMNS: usize = 8;
+
+/// What the residual may depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// k (c - mean) x.
+    Gain(usize),
+    /// k (c - mean) (d - mean).
+    Product(Quantity, Quantity),
+    /// k s with s what the past of the temperature amounts to, see [`crate::temperature_course`].
+    TemperaturePast,
+    /// k P(t) x with Legendre polynomials P of the part of the log that has passed.
+    GainInTime,
+    /// k (c - mean)^2 x.
+    GainBent(Quantity),
+    /// k (c - mean) y, with y the readings of the other axes.
+    TurnBy(Quantity),
+    /// k (c - mean) dx/dt.
+    DelayBy(Quantity),
+    /// k (c - mean) |omega|.
+    RateBy(Quantity),
+    /// k (c - mean) x^2.
+    SquareBy(Quantity),
+    /// k |omega|^2 x.
+    GainByRate,
+    /// k |omega| and k |omega|^2.
+    Rate,
+    /// k u of a vector that the sensor does not measure, on every axis.
+    Other(Motion),
+    /// (omega x (omega x r) + domega/dt x r) of each axis with an r of its own.
+    OwnLevers,
+    /// k y^2 with y the readings of all axes.
+    Squares,
+    /// k cos h, k sin h and the same of 2 h, with h the heading of the body's x axis.
+    Heading,
+    /// k v and k v^2, with v the speed of the reference position, m/s.
+    Speed,
+    /// k u v of two vectors of the body frame, on every axis; not the squares of the sensor's own.
+    Cross(Motion, Motion),
+    /// k x where |x| is below one of [`SMALL`] times the full scale of such a motion.
+    NearZero,
+    /// R^T G p with G symmetric and without trace, as the gradient of a field without sources is.
+    Gradient,
+}
+
+/// Parts of gravity (m/s^2) and of one rad/s below which a reading may be something else than a smaller reading.
+const SMALL: [f64; 5] = [0.005, 0.01, 0.02, 0.04, 0.08];
+/// Ideal readings count from this many times their noise on.
+const CLEAR: f64 = 5.0;
+/// What is left of products of the motion counts if it is this many times what noise leaves of them.
+const CANCELLED: f64 = 3.0;
+/// Names of the body axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// Stands between a product of two quantities and the axis that it acts on, in the name of a parameter.
+pub const OF: char = ':';
+
+/// A vector of the body frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Motion {
+    Force,
+    Rate,
+    Field,
+}
+
+impl Motion {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Force => "f",
+            Self::Rate => "omega",
+            Self::Field => "m",
+        }
+    }
+
+    fn of<'a>(self, rows: &Rows<'a>) -> &'a Triple {
+        match self {
+            Self::Force => &rows.ideal.f,
+            Self::Rate => &rows.ideal.omega,
+            Self::Field => &rows.ideal.m,
+        }
+    }
+}
+
+/// A quantity beside the sensors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Quantity {
+    /// Part of the log that has passed, from -0.5 to 0.5.
+    Time,
+    Temperature,
+    Column(usize),
+}
+
+/// A dependence without a name.
+pub struct Probe {
+    card: Card,
+    sensor: [Sensor; 1],
+    kind: Kind,
+}
+
+/// Everything that can be asked of a log with these facts.
+pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
+    let columns = facts.covariates.len().min(MOST_COLUMNS);
+    let mut quantities: Vec<Quantity> = (0..columns).map(Quantity::Column).collect();
+    if facts.has_temperature {
+        quantities.push(Quantity::Temperature);
+    }
+    let mut kinds = Vec::new();
+    for sensor in Sensor::ALL.into_iter().filter(|s| facts.sensors[s.index()]) {
+        if sensor != Sensor::Mag {
+            kinds.push((sensor, Kind::NearZero));
+            let pairs = [
+                (Motion::Force, Motion::Force),
+                (Motion::Rate, Motion::Rate),
+                (Motion::Force, Motion::Rate),
+            ]
+            .into_iter();
+            // A few poses show no products, nor how a gain went.
+            kinds.extend(pairs.filter(|_| !facts.rests).map(|(u, v)| (sensor, Kind::Cross(u, v))));
+        }
+        if !facts.rests {
+            let in_time = [
+                Kind::GainInTime,
+                Kind::TurnBy(Quantity::Time),
+                Kind::DelayBy(Quantity::Time),
+            ];
+            let of_motion = [Kind::Heading, Kind::Rate];
+            kinds.extend(in_time.into_iter().chain(of_motion).map(|kind| (sensor, kind)));
+            // Specific force on a gyroscope is in the catalogue.
+            let others: &[Motion] = match sensor {
+                Sensor::Acc => &[Motion::Rate, Motion::Field],
+                Sensor::Gyr => &[Motion::Field],
+                Sensor::Mag => &[Motion::Force, Motion::Rate],
+            };
+            let known = |motion: &&Motion| **motion != Motion::Field || facts.sensors[Sensor::Mag.index()];
+            kinds.extend(others.iter().filter(known).map(|motion| (sensor, Kind::Other(*motion))));
+            if sensor == Sensor::Acc {
+                kinds.push((sensor, Kind::OwnLevers));
+            }
+            let by = |q: &Quantity| [Kind::GainBent(*q), Kind::TurnBy(*q), Kind::DelayBy(*q)];
+            kinds.extend(quantities.iter().flat_map(by).map(|kind| (sensor, kind)));
+            if facts.position_smoothing.is_some() {
+                kinds.push((sensor, Kind::Speed));
+            }
+            if sensor != Sensor::Mag {
+                let by = |q: &Quantity| [Kind::RateBy(*q), Kind::SquareBy(*q)];
+                kinds.extend(quantities.iter().flat_map(by).map(|kind| (sensor, kind)));
+            }
+            // A gyroscope's own cube is in the catalogue.
+            if sensor != Sensor::Gyr {
+                kinds.push((sensor, Kind::GainByRate));
+            }
+            if sensor == Sensor::Mag {
+                kinds.push((sensor, Kind::Squares));
+            }
+        }
+        if facts.temperature_course.is_some() {
+            kinds.push((sensor, Kind::TemperaturePast));
+        }
+        kinds.extend((0..columns).map(|c| (sensor, Kind::Gain(c))));
+        for (k, first) in quantities.iter().enumerate() {
+            let others = quantities[k + 1..].iter();
+            kinds.extend(others.map(|second| (sensor, Kind::Product(*first, *second))));
+        }
+    }
+    if facts.position_smoothing.is_some() && facts.sensors[Sensor::Mag.index()] {
+        kinds.push((Sensor::Mag, Kind::Gradient));
+    }
+    let probe = |(sensor, kind)| Arc::new(Probe::new(facts, sensor, kind)) as Arc<dyn Effect>;
+    kinds.into_iter().map(probe).collect()
+}
+
+impl Probe {
+    fn new(facts: &LogFacts, sensor: Sensor, kind: Kind) -> Self {
+        Self {
+            card: words::card(facts, sensor, &kind),
+            sensor: [sensor],
+            kind,
+        }
+    }
+}
+
+/// Axes of two vectors whose products are asked about: all, of a vector with itself those of different axes.
+fn pairs(u: Motion, v: Motion) -> impl Iterator<Item = (usize, usize)> {
+    (0..9).map(|k| (k / 3, k % 3)).filter(move |(i, j)| u != v || i < j)
+}
+
+impl Effect for Probe {
+    fn card(&self) -> &Card {
+        &self.card
+    }
+
+    fn sensors(&self) -> &[Sensor] {
+        &self.sensor
+    }
+
+    fn is_probe(&self) -> bool {
+        !matches!(
+            self.kind,
+            Kind::Gain(_)
+                | Kind::Product(..)
+                | Kind::TemperaturePast
+                | Kind::GainInTime
+                | Kind::NearZero
+                | Kind::Gradient
+        )
+    }
+
+    fn shown_by_bins(&self) -> bool {
+        matches!(
+            self.kind,
+            Kind::Rate | Kind::Other(Motion::Force) | Kind::Other(Motion::Rate)
+        )
+    }
+
+    fn not_testable(&self, _: &LogFacts) -> Option<String> {
+        None
+    }
+
+    fn noise_share(&self, facts: &LogFacts) -> f64 {
+        match self.kind {
+            Kind::Cross(u, v) => {
+                let share = |motion: Motion| {
+                    let shares = facts.noise_shares.get(motion as usize).copied().unwrap_or_default();
+                    3.0 / shares.iter().map(|share| 1.0 / share).sum::<f64>()
+                };
+                CANCELLED * (share(u) + share(v))
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
+        columns::fill(&self.kind, self.sensor[0], rows, out);
+        Ok(())
+    }
+}
