@@ -4,18 +4,22 @@ Every tool gets what imufit has: the residual of the ideal sensor and the column
 channel over its noise, stacked. A tool names effects:
 
 - stepwise: statsmodels' least squares, whole effects added as long as Schwarz's criterion falls; the first is its
-  answer, all of them what it found
+  answer, all of them what it found (it gets the triangle of the columns' QR decomposition, which has the same sums of
+  squares)
 - lasso: scikit-learn's LassoLarsIC by the same criterion over columns of unit length; an effect is in if any of its
   columns is, the one whose columns explain most its answer
 - pysindy: sequentially thresholded least squares (STLSQ) over columns of unit length, threshold five standard errors
 - imufit: its first diagnosis; `ambiguous` counts with the effect that it puts first
 
-Right is the true effect as the answer; a false alarm is any effect found where nothing is hidden. Needs
-``pip install statsmodels scikit-learn pysindy``; a tool that is missing is left out with a line.
+Right is the true effect, or one of its true rivals, as the answer; a false alarm is any effect found where nothing is
+hidden. Effects without a column before their search (`gyr.warmup`) are imufit's alone. Needs
+``pip install statsmodels scikit-learn pysindy``; a tool that is missing is left out.
 
-Run: ``python benches/generic_tools.py [LOGS] [SEED]`` (default: 12 logs of each set, a fresh seed).
+Run: ``python benches/generic_tools.py [--logs N] [--seed N] [--write]`` (default: 12 logs of each set, a fresh seed);
+``--write`` puts the table into docs/blind.md.
 """
 
+import argparse
 import importlib
 import secrets
 import sys
@@ -23,6 +27,7 @@ import time
 import warnings
 from collections import defaultdict
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from imufit import Log, SensorModel, _imufit
@@ -32,8 +37,8 @@ from imufit.grade.wilson import interval
 
 Array = np.ndarray
 SETS = ("one", "small", "one-realistic", "nothing")
-ROWS = 4000
-"""Rows that a tool gets, at most: whole seconds spread over the log, so that none of them runs out of memory."""
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "blind.md"
+BEGIN, END = "<!-- measured by benches/generic_tools.py -->", "<!-- end of what generic tools did -->"
 
 
 class Problem:
@@ -58,13 +63,10 @@ class Problem:
 
         base = residual(zero)
         kept = [k for k, values in enumerate(base) if values is not None and np.isfinite(log.raw_variance[k])]
-        n = len(base[kept[0]])
-        every = max(1, n // ROWS)
-        rows = np.arange(n)[(np.arange(n) // 100) % every == 0] if every > 1 else np.arange(n)
         weights = {k: 1.0 / np.sqrt(log.raw_variance[k]) for k in kept}
 
         def stacked(channels: list[Array | None]) -> Array:
-            return np.concatenate([channels[k][rows] * weights[k] for k in kept])
+            return np.concatenate([channels[k] * weights[k] for k in kept])
 
         y = stacked(base)
         wanted = np.concatenate([self.places[key] for key in (*fit.analysis.unnamed, *self.candidates)])
@@ -88,14 +90,16 @@ class Problem:
 
 def stepwise(problem: Problem, sm: object) -> list[str]:
     chosen: list[str] = []
+    n = problem.y.size
+    corner = np.linalg.qr(np.column_stack([problem.x, problem.y]), mode="r")
 
     def bic(keys: list[str]) -> float:
         columns = np.concatenate([problem.always, *(problem.places[key] for key in keys)]).astype(int)
         columns = columns[problem.used[columns]]
         if columns.size == 0:
-            # Gauss' likelihood without any column, with the constants that statsmodels counts as well.
-            return float(problem.y.size * (np.log(2.0 * np.pi * np.mean(problem.y**2)) + 1.0))
-        return float(sm.OLS(problem.y, problem.x[:, columns]).fit().bic)
+            return float(n * np.log(problem.y @ problem.y / n))
+        found = sm.OLS(corner[:, -1], corner[:, columns]).fit()
+        return float(n * np.log(found.ssr / n) + found.model.rank * np.log(n))
 
     now = bic([])
     while len(chosen) < 10:
@@ -144,37 +148,50 @@ def answers(log: Log) -> dict[str, tuple[list[str], float]]:
         except ImportError:
             continue
         start = time.process_time()
-        found[name] = (tool(problem, package), time.process_time() - start)
+        with warnings.catch_warnings():
+            # Columns that are the same in a log, and paths that end early.
+            warnings.simplefilter("ignore")
+            found[name] = (tool(problem, package), time.process_time() - start)
     return found
 
 
 def share(count: int, of: int) -> str:
     low, high = interval(count, of)
-    return f"{count:3d}/{of:<3d} {100 * count / of:5.1f} % ({100 * low:.0f}-{100 * high:.0f})"
+    return f"{count} of {of}: {100 * count / of:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
 
 
 def main() -> None:
-    warnings.simplefilter("ignore")
-    logs = int(sys.argv[1]) if len(sys.argv) > 1 else 12
-    seed = int(sys.argv[2]) if len(sys.argv) > 2 else secrets.randbelow(10**6)
-    print(f"{logs} logs of each set, first seed {seed}")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--logs", type=int, default=12, help="logs of each set")
+    parser.add_argument("--seed", type=int, default=secrets.randbelow(10**6), help="first seed; fresh without it")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/blind.md")
+    given = parser.parse_args()
+    lines = [
+        f"{given.logs} logs of each set, seeds from {given.seed} on.",
+        "",
+        "| set | tool | right | names what is not there | CPU time a log |",
+        "|---|---|---:|---:|---:|",
+    ]
     for name in SETS:
         right: dict[str, int] = defaultdict(int)
         more: dict[str, int] = defaultdict(int)
         seconds: dict[str, float] = defaultdict(float)
-        for k in range(logs):
-            puzzle = draw(name, seed + k)
+        for k in range(given.logs):
+            puzzle = draw(name, given.seed + k)
             allowed = {*puzzle.truth, *puzzle.rivals}
             for tool, (found, used) in answers(puzzle.simulation.to_log()).items():
                 right[tool] += bool(found and found[0] in allowed) if puzzle.truth else not found
                 more[tool] += bool(set(found) - allowed)
                 seconds[tool] += used
-        print(f"\n{name}")
+            print(f"\r{name}: {k + 1} of {given.logs} ", end="", file=sys.stderr, flush=True)
         for tool, spent in seconds.items():
-            print(
-                f"  {tool:28s} right {share(right[tool], logs)}   names what is not there {share(more[tool], logs)}"
-                f"   {spent / logs:6.2f} s"
-            )
+            shares = f"{share(right[tool], given.logs)} | {share(more[tool], given.logs)}"
+            lines.append(f"| `{name}` | {tool} | {shares} | {spent / given.logs:.1f} s |")
+    text = "\n".join(lines)
+    print(f"\n{text}")
+    if given.write:
+        head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+        PAGE.write_text(f"{head}{BEGIN}\n\n{text}\n\n{END}{rest.partition(END)[2]}", encoding="utf-8")
 
 
 if __name__ == "__main__":

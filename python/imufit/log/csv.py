@@ -107,7 +107,10 @@ class CsvSource:
 
         table = pacsv.read_csv(
             pa.BufferReader(data),
-            read_options=pacsv.ReadOptions(column_names=list(self.names), block_size=_BLOCK + (1 << 20)),
+            # Ragged rows call back into Python: from this thread, not from one that may outlive the interpreter.
+            read_options=pacsv.ReadOptions(
+                column_names=list(self.names), block_size=_BLOCK + (1 << 20), use_threads=False
+            ),
             parse_options=pacsv.ParseOptions(delimiter=self._layout.separator, invalid_row_handler=skip),
             convert_options=pacsv.ConvertOptions(
                 column_types=types,
