@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from imufit.calibrate.poses import Pose
 from imufit.errors import InputError
 from imufit.figures import quantity
+from imufit.log.contents import SENSOR_NAMES
 from imufit.model.sensor_model import SensorModel
 from imufit.results.json_value import json_value
 from imufit.results.parameter import by_effect, parameter_frame, parameter_table
@@ -201,7 +202,7 @@ class SensorCalibration:
         }[self.sensor]
         if self.extras.get("from_motion"):
             what = "|f| less g in motion"
-        name = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}[self.sensor]
+        name = SENSOR_NAMES[self.sensor]
         if not np.isfinite(self.before):
             return f"{name}: bias from {self.items} rest{'s' if self.items != 1 else ''}."
         shown = [quantity.quantity(value, self.error_unit) for value in (self.before, self.after, self.held_out)]

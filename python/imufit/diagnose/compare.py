@@ -15,6 +15,7 @@ from imufit.diagnose.without_reference import refuse_rests
 from imufit.fit.analysis import Analysis
 from imufit.fit.log_evidence import LogEvidence
 from imufit.fit.passes import CHANNELS, UNITS
+from imufit.log.contents import SENSOR_NAMES
 from imufit.progress import Progress
 from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
 
@@ -209,9 +210,15 @@ def notes(evidence: LogEvidence) -> tuple[str, ...]:
             if not 1 / OFF_FLOOR < group / floor < OFF_FLOOR:
                 sensor = CHANNELS[index][:3]
                 out.append(
-                    f"The stated noise of {sensor} is {floor:.3g} {UNITS[sensor]}; what no effect explains here is "
-                    f"{group:.3g} {UNITS[sensor]}."
+                    f"The stated noise of {sensor} is {stated[sensor]:.3g} {UNITS[sensor]}; what no effect explains "
+                    f"here is {group:.3g} {UNITS[sensor]}."
                 )
+    for sensor, steps in zip(SENSOR_NAMES, facts.steps, strict=True):
+        if any(steps):
+            out.append(
+                f"Readings of {sensor} come in steps of {max(steps):.3g} {UNITS[sensor]}, coarse against the noise; "
+                "what rounding does to them is fitted along."
+            )
     if facts.field_estimated and "mag" in facts.sensors:
         out.append("The reference field was estimated from this log and is fitted along.")
     if evidence.passes.commanded is not None:

@@ -324,11 +324,13 @@ def _share(evidence: LogEvidence, residual: Mapping[str, Any], item: Mapping[str
     gain does: what changes so slowly is whitened by the filter's gain at no frequency.
     """
     k = CHANNELS.index(item["channel"]) if item["channel"] in CHANNELS else None
-    if k is None:
+    # A channel without any noise stands on one value.
+    if k is None or evidence.floors[k] == 0.0:
         return 0.0
     excess = {
         each["index"]: each["n"] * ((each["rms"] / evidence.floors[each["index"]]) ** 2 - 1.0)
         for each in residual["channels"]
+        if evidence.floors[each["index"]] > 0.0
     }
     if item["held_out"] is not None:
         before, after = item["held_out"]

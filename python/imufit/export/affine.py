@@ -17,7 +17,6 @@ from imufit.model.sensor_model import SensorModel
 Array = NDArray[np.float64]
 
 UNITS = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
-NAMES = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}
 OFFSETS = ("acc.bias", "gyr.bias", "mag.hard_iron")
 GAINS = ("acc.scale", "acc.misalignment", "gyr.scale", "gyr.misalignment", "mag.soft_iron")
 ON_TEMPERATURE = tuple(f"{sensor}.{part}_temperature" for sensor in UNITS for part in ("bias", "scale"))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from imufit.export.affine import NAMES, Affine, SensorAffine
+from imufit.export.affine import Affine, SensorAffine
 from imufit.export.c_header import c_matrix, c_vector
+from imufit.log.contents import SENSOR_NAMES
 
 GRAVITY = 9.80665
 """The g in which makers give accelerations, m/s^2."""
@@ -49,7 +50,7 @@ void imufitCorrect(float acc[3], float gyr[3], float mag[3]) {{
 def _sensor(sensor: SensorAffine) -> str:
     upper = sensor.name.upper()
     said = sensor.parameters or ("nothing in the model: readings pass as they are",)
-    comment = "\n".join(f"// {line}" for line in (f"{NAMES[sensor.name]}, {sensor.unit}", *said))
+    comment = "\n".join(f"// {line}" for line in (f"{SENSOR_NAMES[sensor.name]}, {sensor.unit}", *said))
     shown = {"acc": (1.0 / GRAVITY, "g"), "gyr": (180.0 / np.pi, "deg/s"), "mag": (0.01, "gauss")}
     factor, unit = shown[sensor.name]
     offsets = ", ".join(f"{value:.6g}" for value in factor * sensor.offset)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from imufit.export.affine import NAMES, Affine, Array, SensorAffine
+from imufit.export.affine import Affine, Array, SensorAffine
+from imufit.log.contents import SENSOR_NAMES
 
 
 def c_float(value: float) -> str:
@@ -44,7 +45,7 @@ def c_header(model: Affine) -> str:
 def _sensor(sensor: SensorAffine) -> str:
     name = sensor.name
     said = sensor.parameters or ("nothing in the model: readings pass as they are",)
-    comment = "\n".join(f" * {line}" for line in (f"{NAMES[name]}, {sensor.unit}", *said))
+    comment = "\n".join(f" * {line}" for line in (f"{SENSOR_NAMES[name]}, {sensor.unit}", *said))
     terms = [
         " + ".join(f"imufit_{name}_matrix[{i}][{j}] * {axis}" for j, axis in enumerate("xyz"))
         + f" + imufit_{name}_offset[{i}]"

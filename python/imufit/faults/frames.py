@@ -19,6 +19,7 @@ from imufit import _imufit
 from imufit.faults import axes
 from imufit.faults.samples import SENSORS, Samples, samples
 from imufit.faults.units import DEG, TOLERANCE, USUAL, WrongUnit, wrong_unit
+from imufit.log.contents import SENSOR_NAMES
 from imufit.log.metadata import Metadata
 from imufit.results.data_fault import DataFault
 
@@ -34,7 +35,6 @@ MIN_ROWS: Final = 200
 EXCITED: Final = {"acc": 1.0, "gyr": 0.05, "mag": 3.0}
 """RMS of the ideal readings, m/s^2, rad/s and uT, from which on they say something."""
 
-NAMES: Final = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}
 KINDS: Final = ("reference", "axes", "frame", "mount")
 """What is named first where the log cannot tell."""
 FRAMES: Final = ("NED", "ENU", "NWU")
@@ -382,7 +382,7 @@ def _axes_words(sensor: str, match: Match, declared: float, alike: Sequence[Read
             what += ": gravity instead of specific force, or a reference whose vertical axis points the other way"
     else:
         shown = axes.in_words(sensor, match.matrix)
-        what = f"The axes of the {NAMES[sensor]} are exchanged or turned round{handed}: {shown}"
+        what = f"The axes of the {SENSOR_NAMES[sensor]} are exchanged or turned round{handed}: {shown}"
     text = f"{what}. Read so, the residual falls {_falls(sensor, declared, match.share)}."
     remedy = f"Put them right with --map '{axes.mapping(sensor, match.matrix)}'"
     other = next((way.remedy for way in alike if way.kind == "frame"), "")

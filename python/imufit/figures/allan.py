@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.figures import quantity, style
+from imufit.log.contents import SENSOR_NAMES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_NAMES = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}
 
 
 class ChannelLike(Protocol):
@@ -77,7 +76,7 @@ def allan_figure(channels: Sequence[ChannelLike]) -> Figure:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.legend(frameon=False, fontsize=8, ncols=3, loc="best")
-        style.title(axes, f"The {_NAMES.get(sensor, sensor)} at rest", 9.5)
+        style.title(axes, f"The {SENSOR_NAMES.get(sensor, sensor)} at rest", 9.5)
         axes.set_xlabel("averaging time, s", fontsize=9)
         axes.set_ylabel(f"Allan deviation, {shown}", fontsize=9)
         style.tidy(axes)

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.figures import quantity, style
+from imufit.log.contents import SENSOR_NAMES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-_NAMES = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}
 
 
 class SpectrumLike(Protocol):
@@ -86,7 +85,7 @@ def _sensor(axes: Axes, sensor: str, spectra: Sequence[SpectrumLike]) -> None:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.legend(frameon=False, fontsize=8, ncols=3, loc="best")
-    name = _NAMES.get(sensor, sensor)
+    name = SENSOR_NAMES.get(sensor, sensor)
     style.title(
         axes,
         f"The {name}'s residual peaks at {quantity.number(peak_frequency, 2)} Hz"

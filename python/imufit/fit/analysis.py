@@ -17,7 +17,7 @@ from imufit.fit.surveyed_log import SurveyedLog, survey
 from imufit.fit.users_effects import check_users_effects
 from imufit.log import LogSource
 from imufit.log.several import name_of
-from imufit.model.catalogue import COLUMN, find_effect
+from imufit.model.catalogue import COLUMN, find_effect, rounding
 from imufit.model.sensor_model import SensorModel
 from imufit.progress import Progress
 from imufit.results import DataFault
@@ -27,7 +27,10 @@ Array = NDArray[np.float64]
 FIELD_REFERENCE = "mag.field_reference"
 """Fitted along, unnamed, wherever the reference field was estimated from the log itself."""
 
-OWN = frozenset({"acc.bias", "gyr.bias", "ref.alignment", "ref.tilt", FIELD_REFERENCE})
+ROUNDING = tuple(rounding(sensor) for sensor in ("acc", "gyr", "mag"))
+"""Fitted along, unnamed, wherever the steps of the readings are coarse."""
+
+OWN = frozenset({"acc.bias", "gyr.bias", "ref.alignment", "ref.tilt", FIELD_REFERENCE, *ROUNDING})
 """What each log has for itself: zeros come with switching on, mount, table and field with setting up.
 
 All other effects are the sensor's, and the same in every log."""
@@ -118,9 +121,10 @@ class Analysis:
             reasons = [each.refusal(effect) for each in surveyed]
             if None not in reasons:
                 raise InputError(f"effect {effect.id} cannot be fitted: {reasons[0]}", file=surveyed[0].log.path)
-        unnamed: tuple[str, ...] = ()
-        if any(each.facts.field_estimated for each in surveyed) and FIELD_REFERENCE not in model.effects:
-            unnamed = (FIELD_REFERENCE,)
+        unnamed = tuple(key for key in ROUNDING if any(key in each.effects for each in surveyed))
+        if any(each.facts.field_estimated for each in surveyed):
+            unnamed = (FIELD_REFERENCE, *unnamed)
+        unnamed = tuple(key for key in unnamed if key not in model.effects)
         fixed = {*model.effects, *unnamed}
         candidates = {key: each.effects[key] for each in surveyed for key in each.effects if key not in fixed}
         for each in surveyed:

@@ -20,6 +20,9 @@ from imufit.results import DataFault
 
 Values = Mapping[str, list[float]]
 
+LEFT_OF_STEP = 0.05
+"""Part of a coarse step that no effect explains, at least: readings that stand on one value are not free of noise."""
+
 
 @dataclass(frozen=True, eq=False)
 class LogEvidence:
@@ -85,6 +88,7 @@ class LogEvidence:
         raw = _empty(surveyed, fitted, candidates, found, [[] for _ in CHANNELS])
         passes.evidence(raw, facts, "taking evidence")
         step, raw_variance = _imufit.saturate(raw)
+        raw_variance = _not_below_steps(facts, raw_variance)
         slots = (*fitted, *candidates)
         faults = surveyed.faults
         if isinstance(passes, RestPasses):
@@ -98,11 +102,12 @@ class LogEvidence:
             effects = [slot for slot in slots if slot not in surveyed.probes]
             faults = (*faults, *time_faults(raw, raw_variance, _places(surveyed, effects), facts))
         filters = passes.autocovariance(raw, facts, step).filters()
-        floors = _floors(surveyed.log, raw_variance)
+        floors = _floors(surveyed.log, facts, raw_variance)
         white, variance = raw, raw_variance
         if any(filters):
             white = passes.evidence(raw.with_filters(filters), facts, "whitening the evidence")
             _, variance = _imufit.saturate(white)
+            variance = _not_below_steps(facts, variance)
         return cls(surveyed, slots, raw, white, raw_variance, variance, floors, filters, faults)
 
     def around(
@@ -178,7 +183,21 @@ def _check_samples(log: LogSource, fitted: Values, variance: list[float]) -> Non
             )
 
 
-def _floors(log: LogSource, variance: list[float]) -> list[float]:
-    """Noise floor of each channel: from the metadata, else what no effect of the catalogue explains."""
-    given = log.metadata.noise
-    return [given.get(channel[:3]) or float(np.sqrt(v)) for channel, v in zip(CHANNELS, variance, strict=True)]
+def _not_below_steps(facts: _imufit.Facts, variance: list[float]) -> list[float]:
+    """Keep the variance of readings that hardly ever change at what is left between their steps."""
+    steps = (step for sensor in facts.steps for step in sensor)
+    return [max(v, (LEFT_OF_STEP * step) ** 2) for v, step in zip(variance, steps, strict=True)]
+
+
+def _floors(log: LogSource, facts: _imufit.Facts, variance: list[float]) -> list[float]:
+    """Noise floor of each channel: from the metadata, else what no effect of the catalogue explains.
+
+    A data sheet states the noise before the converter: that of coarse steps adds to it, as far as it is there.
+    """
+    given = [log.metadata.noise.get(channel[:3]) for channel in CHANNELS]
+    steps = [step for sensor in facts.steps for step in sensor]
+    rounded = [
+        noise and float(np.sqrt(max(noise**2, min(noise**2 + step**2 / 12.0, v)))) if step > 0.0 else noise
+        for noise, step, v in zip(given, steps, variance, strict=True)
+    ]
+    return [noise or float(np.sqrt(v)) for noise, v in zip(rounded, variance, strict=True)]

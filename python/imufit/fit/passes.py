@@ -15,7 +15,9 @@ from imufit.faults import row_faults
 from imufit.fit.column_noise import ColumnNoise
 from imufit.fit.commanded import CommandedAttitude
 from imufit.fit.range_end import RangeEnd
+from imufit.fit.readings_seen import ReadingsSeen
 from imufit.log import Chunk, LogSource
+from imufit.log.contents import SENSOR_NAMES
 from imufit.progress import Progress
 
 CHUNK_ROWS = 65536
@@ -24,7 +26,7 @@ SURVEY_MARGIN = 4096
 MASKS = ("ref_exact", "movement")
 """Columns that say how to use a row; they are no covariates."""
 
-CHANNELS = tuple(f"{sensor}_{axis}" for sensor in ("acc", "gyr", "mag") for axis in "xyz")
+CHANNELS = tuple(f"{sensor}_{axis}" for sensor in SENSOR_NAMES for axis in "xyz")
 UNITS = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
 
 BLOCKS = 48
@@ -129,7 +131,7 @@ class Passes:
         names = ["temp", *self.covariates]
         known = np.zeros(len(names))
         noise = [ColumnNoise() for _ in names]
-        read = {sensor: np.zeros(3) for sensor in ("acc", "gyr", "mag")}
+        readings = ReadingsSeen()
         for arrays in self.chunks(SURVEY_MARGIN, "surveying"):
             core = slice(arrays["begin"], arrays["end"])
             if arrays["ref_q"] is not None:
@@ -138,9 +140,7 @@ class Passes:
                 if column is not None:
                     known[k] += _held_count(column[core])
                     noise[k].add(column[core])
-            for sensor in read:
-                if arrays[sensor] is not None:
-                    read[sensor] += np.isfinite(arrays[sensor][core]).sum(axis=0)
+            readings.add(arrays, core)
             survey.add(arrays)
         if reference == 0:
             raise InputError(
@@ -154,13 +154,18 @@ class Passes:
             self.empty += [f"Column {name} has no value in any row." for name in empty]
             self.covariates = [name for name in self.covariates if name not in empty]
             return self.survey()
+        if still := readings.still(MIN_ROWS):
+            # Such readings have no noise to weigh them by, and tell no more than that they are less than a step.
+            self.empty += [
+                f"Every reading of the {SENSOR_NAMES[sensor]} is the same: it is left out." for sensor in still
+            ]
+            self._left_out += [(sensor, 0, log.n) for sensor in still]
+            return self.survey()
         facts = survey.finish()
         if not facts.sensors:
             raise InputError("no sensor of the log has a sample", file=log.path)
-        for sensor, rows in read.items():
-            dead = [f"{sensor}_{axis}" for axis, count in zip("xyz", rows, strict=True) if count == 0]
-            if 0 < len(dead) < 3:
-                self.empty.append(f"{' and '.join(dead)} has no value in any row: {sensor} is left out.")
+        for sensor, dead in readings.dead():
+            self.empty.append(f"{' and '.join(dead)} has no value in any row: {sensor} is left out.")
         return facts, dict(zip(names, known / log.n, strict=True))
 
     def ranges(self) -> tuple[dict[str, float], dict[str, float]]:
@@ -176,7 +181,7 @@ class Passes:
         for sensor, end in ends.items():
             known = told[sensor]
             value = known if isinstance(known, int | float) and known > 0.0 else end.end()
-            if value is not None:
+            if value is not None and value > 0.0:
                 found[sensor] = float(value)
         return found, {sensor: end.largest for sensor, end in ends.items() if end.largest > 0.0}
 

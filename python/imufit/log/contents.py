@@ -20,10 +20,10 @@ _UNITS: Final = {
     **dict.fromkeys(GROUPS["ref_p"], "m"),
     "ref_angle": "rad",
 }
+SENSOR_NAMES: Final = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}
+"""What the sensors are called in a sentence."""
 _WANTED: Final = {
-    "acc": "accelerometer",
-    "gyr": "gyroscope",
-    "mag": "magnetometer",
+    **SENSOR_NAMES,
     "temp": "temperature",
     "ref_q": "reference attitude",
     "pose": "pose labels",

@@ -27,6 +27,11 @@ def column_effects(names: Iterable[str], sensors: Iterable[str]) -> dict[str, _i
     return {effect_id: effect for effect_id, effect in found.items() if effect is not None}
 
 
+def rounding(sensor: str) -> str:
+    """Return the id of what the coarse steps of a sensor's converter do: fitted along, and never named."""
+    return f"{sensor}.rounding"
+
+
 def find_effect(effect_id: str) -> _imufit.Effect:
     """Return the effect with this id.
 
@@ -40,7 +45,7 @@ def find_effect(effect_id: str) -> _imufit.Effect:
     InputError
         There is none; the message names the nearest.
     """
-    effect = effects().get(effect_id) or (_imufit.find_effect(effect_id) if COLUMN in effect_id else None)
+    effect = effects().get(effect_id) or _imufit.find_effect(effect_id)
     if effect is None:
         near = difflib.get_close_matches(effect_id, list(effects()), n=1, cutoff=0.4)
         remedy = f"Did you mean {near[0]}?" if near else "imufit explain lists all effects."

@@ -10,6 +10,7 @@ pub mod normal_equations;
 pub mod profile;
 pub mod reference_width;
 pub mod rests;
+pub mod rounding;
 pub mod survey;
 pub mod travel;
 pub mod whitening;

@@ -15,6 +15,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::bins::{Bins, CovariateSamples};
 use crate::reference_width::{self, SampledRow, SampledRows};
+use crate::rounding::SensorSteps;
 use crate::travel::Travel;
 
 /// Rows looked at more closely, at most.
@@ -61,6 +62,8 @@ pub struct Survey {
     travel: Option<Travel>,
     /// Power of the vibration at some rows.
     shaking: Vec<f64>,
+    /// Steps of each sensor.
+    rounding: [SensorSteps; 3],
 }
 
 /// A sensor's reading at a row and its change from two rows before to two rows after; NaN where not known.
@@ -106,6 +109,7 @@ impl Survey {
             samples: vec![Vec::new(); axes],
             travel: given.rig.clone().map(Travel::new),
             shaking: Vec::new(),
+            rounding: Default::default(),
             given,
         }
     }
@@ -126,18 +130,20 @@ impl Survey {
         self.t_last = window.t[window.end - 1];
         for sensor in Sensor::ALL {
             let Some(y) = window.reading(sensor) else { continue };
-            let mut last: Option<f64> = None;
-            for i in core
-                .clone()
-                .filter(|i| y[3 * i..3 * i + 3].iter().all(|v| v.is_finite()))
-            {
+            let at = |i: usize| [y[3 * i], y[3 * i + 1], y[3 * i + 2]];
+            let mut last: [Option<usize>; 2] = [None; 2];
+            for i in core.clone().filter(|i| at(*i).iter().all(|v| v.is_finite())) {
                 self.counts[sensor.index()] += 1;
-                if let Some(before) = last
-                    && self.sampled(window.offset + i, SAMPLES)
+                let row = window.offset + i;
+                if let [first, Some(second)] = last
+                    && self.sampled(row, SAMPLES)
                 {
-                    self.sensor_steps[sensor.index()].push(window.t[i] - before);
+                    self.sensor_steps[sensor.index()].push(window.t[i] - window.t[second]);
+                    let part = row as f64 / self.given.n.max(1) as f64;
+                    let readings = [at(first.unwrap_or(second)), at(second), at(i)];
+                    self.rounding[sensor.index()].add(part, readings);
                 }
-                last = Some(window.t[i]);
+                last = [last[1], Some(i)];
             }
         }
         let passed = window.t[window.len() - 1] - window.t[0];
@@ -258,6 +264,7 @@ impl Survey {
         let rate_noise = self.attitude_width.derivative_noise(attitude_columns);
         let force_noise = attitude_noise * self.given.gravity.norm()
             + position_columns.map_or(0.0, |s| self.position_width.derivative_noise(s));
+        let steps = std::mem::take(&mut self.rounding).map(SensorSteps::finish);
         let facts = LogFacts {
             n: self.given.n,
             t_start: self.t_first,
@@ -286,13 +293,14 @@ impl Survey {
                 self.force_noise_shares(),
                 self.attitude_width.noise_shares(attitude_columns),
             ],
-            shaking_varies: vibration::varies(&mut self.shaking, dt),
+            shaking_varies: vibration::varies(&mut self.shaking, dt, steps[Sensor::Acc.index()]),
             column_noise: [force_noise, rate_noise, attitude_noise * field.norm()],
             position_origin: self.origin.unwrap_or_default(),
             attitude_columns,
             position_columns,
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),
             ranges: [None; 3],
+            steps,
             rig: self.travel.take().map(|t| t.finish(self.attitude_width.noise())),
             covariates: self.given.covariates.clone(),
             rests: false,

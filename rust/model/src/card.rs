@@ -37,6 +37,8 @@ pub enum Stage {
     Gain,
     /// Adds to the reading whatever the quantity is.
     Offset,
+    /// Leaves only whole steps of the converter.
+    Rounding,
     /// Cuts off the reading at the end of the sensor's range.
     Range,
 }

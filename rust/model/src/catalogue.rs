@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::effect::Effect;
 use crate::effects::{
     bias, covariate, current, drift, earth_rate, field, g_sensitivity, iron, lever_arm, misalignment, nonlinearity,
-    reference, rig, saturation, scale, temperature, timing, vibration, warmup,
+    reference, rig, rounding, saturation, scale, temperature, timing, vibration, warmup,
 };
 use crate::sensor::Sensor;
 
@@ -56,6 +56,12 @@ pub fn built_in() -> Vec<Arc<dyn Effect>> {
     ]
 }
 
+/// Effects that are fitted along and never named.
+pub fn unnamed() -> Vec<Arc<dyn Effect>> {
+    let rounding = |sensor| Arc::new(rounding::rounding(sensor)) as Arc<dyn Effect>;
+    Sensor::ALL.into_iter().map(rounding).collect()
+}
+
 /// The effect of a log's own column from its id such as `mag.column:motor_current`.
 pub fn column_effect(id: &str) -> Option<Arc<dyn Effect>> {
     let (sensor, column) = id.split_once(".column:")?;
@@ -63,10 +69,11 @@ pub fn column_effect(id: &str) -> Option<Arc<dyn Effect>> {
     (!column.is_empty()).then(|| Arc::new(covariate::column(sensor, column)) as Arc<dyn Effect>)
 }
 
-/// The built-in effect with this id.
+/// The built-in effect with this id, one that is never named among them.
 pub fn find(id: &str) -> Option<Arc<dyn Effect>> {
     built_in()
         .into_iter()
+        .chain(unnamed())
         .find(|e| e.card().id == id)
         .or_else(|| column_effect(id))
 }

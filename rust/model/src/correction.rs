@@ -169,8 +169,8 @@ fn parts_of(sensor: Sensor, effects: &[(Arc<dyn Effect>, Vec<f64>)], log: &Log) 
     let mut parts = Vec::new();
     for (effect, parameters) in effects {
         let acts = effect.sensors().contains(&sensor) && parameters.iter().any(|v| *v != 0.0);
-        // What was cut off is lost, and time is set right by itself.
-        let elsewhere = matches!(effect.card().stage, Stage::Time | Stage::Range);
+        // What was cut off or rounded is lost, and time is set right by itself.
+        let elsewhere = matches!(effect.card().stage, Stage::Time | Stage::Rounding | Stage::Range);
         if !acts || elsewhere || of_reference(effect.as_ref()) {
             continue;
         }

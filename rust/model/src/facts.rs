@@ -74,6 +74,8 @@ pub struct LogFacts {
     pub reference_dt: f64,
     /// Where the range of each sensor ends, if readings are cut off there; m/s^2, rad/s, uT.
     pub ranges: [Option<f64>; 3],
+    /// Step between readings of each sensor along each axis where it is coarse against the noise, 0 elsewhere; m/s^2, rad/s, uT.
+    pub steps: [[f64; 3]; 3],
     /// The one-axis rig that moves the sensor; `None` where the log names no rig axis.
     pub rig: Option<Rig>,
     /// True where rests stand in for a reference attitude that the log does not have.
@@ -139,6 +141,7 @@ impl LogFacts {
             shaking_varies: true,
             reference_dt: dt,
             ranges: [None; 3],
+            steps: [[0.0; 3]; 3],
             rig: None,
             rests: false,
             kinematics: KinematicsMemory::default(),
@@ -187,6 +190,7 @@ impl LogFacts {
             shaking_varies: true,
             reference_dt: dt,
             ranges: [None; 3],
+            steps: [[0.0; 3]; 3],
             rig: None,
             rests: true,
             kinematics: KinematicsMemory::default(),

@@ -355,7 +355,7 @@ impl SensorModel {
     }
 
     /// Modelled readings of one sensor and the columns of its three channels, stage after stage. Columns are made of the smooth
-    /// quantity; `detail` joins it before readings are cut off.
+    /// quantity; `detail` joins it before readings are rounded and cut off.
     fn predict(
         &self,
         rows: Rows,
@@ -374,9 +374,10 @@ impl SensorModel {
             Stage::Input,
             Stage::Gain,
             Stage::Offset,
+            Stage::Rounding,
             Stage::Range,
         ] {
-            if let (Stage::Range, Some(detail)) = (stage, detail) {
+            if let (Stage::Rounding, Some(detail)) = (stage, detail) {
                 x.add(detail, 1.0);
             }
             let mut after: Option<Triple> = None;

@@ -17,15 +17,14 @@ const GAP: f64 = 5.0;
 
 /// Weights with which the samples around a row make the value of the quartic through them there.
 fn quartic() -> [f64; 2 * HALF_WIDTH + 1] {
-    let offset = |j: usize| (j as f64 - HALF_WIDTH as f64) / WEIGHT_WIDTH;
-    let gauss = |j: usize| (-0.5 * offset(j).powi(2)).exp();
-    let moment = |power: i32| -> f64 { (0..=2 * HALF_WIDTH).map(|j| gauss(j) * offset(j).powi(power)).sum() };
-    let moments = Matrix3::from_fn(|i, k| moment(2 * (i + k) as i32));
-    let weights = moments.cholesky().map_or(Vector3::x(), |c| c.solve(&Vector3::x()));
-    std::array::from_fn(|j| {
-        let square = offset(j).powi(2);
-        gauss(j) * (weights.x + weights.y * square + weights.z * square * square)
-    })
+    let shapes: [Vector3<f64>; 2 * HALF_WIDTH + 1] = std::array::from_fn(|j| {
+        let square = ((j as f64 - HALF_WIDTH as f64) / WEIGHT_WIDTH).powi(2);
+        Vector3::new(1.0, square, square * square)
+    });
+    let gauss = shapes.map(|shape| (-0.5 * shape.y).exp());
+    let moments: Matrix3<f64> = shapes.iter().zip(gauss).map(|(s, g)| s * s.transpose() * g).sum();
+    let solved = moments.cholesky().map_or(Vector3::x(), |c| c.solve(&Vector3::x()));
+    std::array::from_fn(|j| gauss[j] * solved.dot(&shapes[j]))
 }
 
 /// What a sample differs from the quartic through it and the samples around it; `None` where one is missing.
@@ -87,8 +86,9 @@ const LEAST_FACTOR: f64 = 1.5;
 /// Part of the samples that count for themselves: the quartic leaves neighbours alike.
 const INDEPENDENT: f64 = 0.5;
 
-/// True if the power of the vibration at some rows is larger at some times than at others.
-pub fn varies(power: &mut [f64], dt: f64) -> bool {
+/// True if the power of the vibration at some rows is larger at some times than at others. `steps`: coarse steps of the axes, m/s^2; readings
+/// that go to and fro between two of them are not shaken.
+pub fn varies(power: &mut [f64], dt: f64, steps: [f64; 3]) -> bool {
     if power.len() < 10 {
         return false;
     }
@@ -97,7 +97,8 @@ pub fn varies(power: &mut [f64], dt: f64) -> bool {
     let (low, high) = (power[tenth], power[power.len() - 1 - tenth]);
     let samples = 3.0 * (2.0 * (REACH / dt).clamp(1.0, MOST_ROWS as f64) + 1.0);
     let scatter = (2.0 / (INDEPENDENT * samples)).sqrt();
-    (high / low).ln() > LEAST_FACTOR.ln().max(SPREAD * scatter)
+    let rounding: f64 = steps.iter().map(|step| step * step).sum();
+    high > rounding && (high / low).ln() > LEAST_FACTOR.ln().max(SPREAD * scatter)
 }
 
 #[cfg(test)]
@@ -132,9 +133,10 @@ mod tests {
     fn shaking_varies_if_its_power_does_beyond_the_scatter_of_a_mean() {
         // Rank k of a thousand: a spread of a factor of 1.3 is chance where 21 rows count, one of 4 is not.
         let power = |factor: f64| -> Vec<f64> { (0..1000).map(|k| factor.powf(f64::from(k) / 800.0)).collect() };
-        assert!(!varies(&mut power(1.3), 0.02));
-        assert!(varies(&mut power(4.0), 0.02));
-        assert!(!varies(&mut [1.0, 100.0], 0.02));
-        assert!(!varies(&mut [], 0.02));
+        assert!(!varies(&mut power(1.3), 0.02, [0.0; 3]));
+        assert!(varies(&mut power(4.0), 0.02, [0.0; 3]));
+        assert!(!varies(&mut power(4.0), 0.02, [2.0; 3]));
+        assert!(!varies(&mut [1.0, 100.0], 0.02, [0.0; 3]));
+        assert!(!varies(&mut [], 0.02, [0.0; 3]));
     }
 }

@@ -91,7 +91,7 @@ impl PyEffect {
         stepped || matches!(card.stage, Stage::Reference | Stage::Time | Stage::Range)
     }
 
-    /// Stage at which it acts: reference, time, input, gain, offset or range.
+    /// Stage at which it acts: reference, time, input, gain, offset, rounding or range.
     #[getter]
     fn stage(&self) -> &'static str {
         match self.0.card().stage {
@@ -100,6 +100,7 @@ impl PyEffect {
             Stage::Input => "input",
             Stage::Gain => "gain",
             Stage::Offset => "offset",
+            Stage::Rounding => "rounding",
             Stage::Range => "range",
         }
     }
@@ -196,6 +197,12 @@ impl PyFacts {
     #[getter]
     fn field(&self) -> [f64; 3] {
         self.facts.field.into()
+    }
+
+    /// Steps between readings of each sensor and axis where they are coarse against the noise, 0 elsewhere; (3, 3), m/s^2, rad/s, uT.
+    #[getter]
+    fn steps(&self) -> [[f64; 3]; 3] {
+        self.facts.steps
     }
 
     /// True if `field` was estimated from this log, so that it has to be fitted along.

@@ -13,6 +13,7 @@ pub mod misalignment;
 pub mod nonlinearity;
 pub mod reference;
 pub mod rig;
+pub mod rounding;
 pub mod saturation;
 pub mod scale;
 pub mod temperature;

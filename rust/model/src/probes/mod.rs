@@ -223,10 +223,7 @@ impl Effect for Probe {
     }
 
     fn shown_by_bins(&self) -> bool {
-        matches!(
-            self.kind,
-            Kind::Rate | Kind::Other(Motion::Force) | Kind::Other(Motion::Rate)
-        )
+        matches!(self.kind, Kind::Rate | Kind::Other(Motion::Force | Motion::Rate))
     }
 
     fn not_testable(&self, _: &LogFacts) -> Option<String> {

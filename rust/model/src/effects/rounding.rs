@@ -1,0 +1,88 @@
+//! Coarse steps of a converter: what is left between them follows the reading, and is no noise.
+
+use std::f64::consts::{PI, TAU};
+
+use super::Words;
+use crate::card::{Card, Found, Parameter, Stage};
+use crate::effect::{Columns, Effect, EffectError, Rows};
+use crate::facts::LogFacts;
+use crate::sensor::Sensor;
+
+/// Harmonics of the sawtooth; noise of a tenth of a step leaves no more of it.
+const HARMONICS: usize = 3;
+/// With it the weak prior of a parameter (a hundredth of the weight of three times its typical size) has a spread of one: the amplitude
+/// that the sawtooth has without noise.
+const TYPICAL: f64 = 1.0 / 30.0;
+
+/// What rounding leaves of the readings of one sensor, fitted along without a name wherever its steps are coarse against the noise.
+///
+/// Less the reading itself, a rounded one is a sawtooth of it, whose harmonics noise weakens (Widrow and Kollar 2008, Quantization noise,
+/// ch. 4 and 5): `sum_k a_k q / (pi k) sin(2 pi k x / q + phi_k)`, with the phases open, since zeros shift it against the steps.
+pub struct Rounding {
+    card: Card,
+    sensor: [Sensor; 1],
+}
+
+/// Id of [`rounding`] of a sensor.
+pub fn id(sensor: Sensor) -> String {
+    format!("{}.rounding", sensor.prefix())
+}
+
+/// `acc.rounding`, `gyr.rounding`, `mag.rounding`.
+pub fn rounding(sensor: Sensor) -> Rounding {
+    let words = Words {
+        name: "coarse steps",
+        physics: "the converter tells only steps that are larger than the noise, which then does not average them out",
+        formula: "harmonics of a sawtooth over x with the step as its period",
+        signature: "a residual that goes up and down with the reading itself, once a step",
+        mistaken_for: "a bias or a scale that is smaller than a step, in a sensor that hardly moves",
+        confirm: "let the sensor lie still: the readings stand on one or two values",
+    };
+    let names = (1..=HARMONICS).flat_map(|k| ["sin", "cos"].map(|f| (k, f)));
+    let parameters = names
+        .flat_map(|(k, f)| ["x", "y", "z"].map(|axis| format!("{f}{k}{axis}")))
+        .map(|name| Parameter {
+            name,
+            unit: "1".to_string(),
+            typical: Some(TYPICAL),
+            found: Found::Steps,
+        });
+    Rounding {
+        card: words.card(id(sensor), Stage::Rounding, parameters.collect()),
+        sensor: [sensor],
+    }
+}
+
+impl Effect for Rounding {
+    fn card(&self) -> &Card {
+        &self.card
+    }
+
+    fn sensors(&self) -> &[Sensor] {
+        &self.sensor
+    }
+
+    fn not_testable(&self, facts: &LogFacts) -> Option<String> {
+        let sensor = self.sensor[0];
+        let coarse = facts.steps[sensor.index()].iter().any(|step| *step > 0.0);
+        (!facts.sensors[sensor.index()] || !coarse)
+            .then(|| format!("the steps of the {} are fine against its noise", sensor.name()))
+    }
+
+    fn columns(&self, rows: &Rows, sensor: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
+        for (axis, step) in rows.facts.steps[sensor.index()].into_iter().enumerate() {
+            if step <= 0.0 {
+                continue;
+            }
+            for k in 0..HARMONICS {
+                let order = (k + 1) as f64;
+                let size = step / (PI * order);
+                let angle = |x: &f64| TAU * order * x / step;
+                let x = rows.x.axis(axis).iter();
+                out.set(6 * k + axis, axis, x.clone().map(|x| size * angle(x).sin()));
+                out.set(6 * k + 3 + axis, axis, x.map(|x| size * angle(x).cos()));
+            }
+        }
+        Ok(())
+    }
+}
