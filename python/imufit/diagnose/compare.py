@@ -217,7 +217,7 @@ def notes(evidence: LogEvidence) -> tuple[str, ...]:
         if any(steps):
             out.append(
                 f"Readings of {sensor} come in steps of {max(steps):.3g} {UNITS[sensor]}, coarse against the noise; "
-                "what rounding does to them is fitted along."
+                "where they move, what rounding does to them is fitted along."
             )
     if facts.field_estimated and "mag" in facts.sensors:
         out.append("The reference field was estimated from this log and is fitted along.")

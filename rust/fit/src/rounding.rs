@@ -8,6 +8,8 @@ const REPEATED: f64 = 0.43;
 const EVEN: f64 = 0.28;
 /// Rows with a new reading below which nothing is told of a part; a sensor with fewer in the whole log hardly ever changes.
 const FEWEST: usize = 50;
+/// An axis whose readings change from value to value less often stands still, and what rounding does to it is a constant.
+const SEVERAL: usize = 5;
 /// Readings of one step lie together within this part of their range: figures of a table are rounded.
 const SAME: f64 = 1e-7;
 /// Gaps are whole steps within this part of one.
@@ -45,8 +47,8 @@ impl SensorSteps {
         }
     }
 
-    /// Step of each axis where it is coarse; 0 elsewhere.
-    pub fn finish(mut self) -> [f64; 3] {
+    /// Step of each axis where it is coarse, 0 elsewhere; and whether its readings are spread over several.
+    pub fn finish(mut self) -> ([f64; 3], [bool; 3]) {
         let gaps: [Vec<f64>; 3] = std::array::from_fn(|axis| gaps(&mut self.values[axis]));
         let hardly_changes = self.seen.iter().sum::<usize>() < FEWEST && self.values[0].len() >= FEWEST;
         let coarse: [bool; 3] = std::array::from_fn(|axis| {
@@ -69,7 +71,8 @@ impl SensorSteps {
         });
         // A reading that never changes says nothing of its step: that of the others.
         let largest = steps.into_iter().fold(0.0, f64::max);
-        std::array::from_fn(|axis| if gaps[axis].is_empty() { largest } else { steps[axis] })
+        let steps = std::array::from_fn(|axis| if gaps[axis].is_empty() { largest } else { steps[axis] });
+        (steps, std::array::from_fn(|axis| gaps[axis].len() >= SEVERAL))
     }
 }
 
@@ -91,7 +94,7 @@ mod tests {
         for i in 2..n {
             steps.add(i as f64 / n as f64, [reading(i - 2), reading(i - 1), reading(i)]);
         }
-        steps.finish()
+        steps.finish().0
     }
 
     fn near(found: [f64; 3], expected: [f64; 3]) -> bool {

@@ -264,7 +264,8 @@ impl Survey {
         let rate_noise = self.attitude_width.derivative_noise(attitude_columns);
         let force_noise = attitude_noise * self.given.gravity.norm()
             + position_columns.map_or(0.0, |s| self.position_width.derivative_noise(s));
-        let steps = std::mem::take(&mut self.rounding).map(SensorSteps::finish);
+        let found = std::mem::take(&mut self.rounding).map(SensorSteps::finish);
+        let (steps, steps_crossed) = (found.map(|(steps, _)| steps), found.map(|(_, crossed)| crossed));
         let facts = LogFacts {
             n: self.given.n,
             t_start: self.t_first,
@@ -301,6 +302,7 @@ impl Survey {
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),
             ranges: [None; 3],
             steps,
+            steps_crossed,
             rig: self.travel.take().map(|t| t.finish(self.attitude_width.noise())),
             covariates: self.given.covariates.clone(),
             rests: false,

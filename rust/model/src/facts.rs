@@ -76,6 +76,8 @@ pub struct LogFacts {
     pub ranges: [Option<f64>; 3],
     /// Step between readings of each sensor along each axis where it is coarse against the noise, 0 elsewhere; m/s^2, rad/s, uT.
     pub steps: [[f64; 3]; 3],
+    /// True where the readings of an axis are spread over several such steps.
+    pub steps_crossed: [[bool; 3]; 3],
     /// The one-axis rig that moves the sensor; `None` where the log names no rig axis.
     pub rig: Option<Rig>,
     /// True where rests stand in for a reference attitude that the log does not have.
@@ -142,6 +144,7 @@ impl LogFacts {
             reference_dt: dt,
             ranges: [None; 3],
             steps: [[0.0; 3]; 3],
+            steps_crossed: [[false; 3]; 3],
             rig: None,
             rests: false,
             kinematics: KinematicsMemory::default(),
@@ -191,6 +194,7 @@ impl LogFacts {
             reference_dt: dt,
             ranges: [None; 3],
             steps: [[0.0; 3]; 3],
+            steps_crossed: [[false; 3]; 3],
             rig: None,
             rests: true,
             kinematics: KinematicsMemory::default(),

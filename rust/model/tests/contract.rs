@@ -99,6 +99,7 @@ fn every_built_in_effect_keeps_the_contract() {
         reference_dt: 0.01,
         ranges: [None; 3],
         steps: [[0.0; 3]; 3],
+        steps_crossed: [[false; 3]; 3],
         rig: Some(rig(&t, &attitude)),
         rests: false,
         kinematics: KinematicsMemory::default(),

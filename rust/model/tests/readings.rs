@@ -106,6 +106,7 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
         reference_dt: 0.01,
         ranges: [None; 3],
         steps: [[0.0; 3]; 3],
+        steps_crossed: [[false; 3]; 3],
         rig: None,
         rests: false,
         kinematics: KinematicsMemory::default(),

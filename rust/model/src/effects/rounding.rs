@@ -53,6 +53,15 @@ pub fn rounding(sensor: Sensor) -> Rounding {
     }
 }
 
+/// Step of each axis where it is coarse and the reading moves; a constant would be taken for the rounding of it, however large.
+fn steps(facts: &LogFacts, sensor: Sensor) -> [Option<f64>; 3] {
+    let s = sensor.index();
+    std::array::from_fn(|axis| {
+        let moves = facts.steps_crossed[s][axis] && !facts.silent_axes[s][axis];
+        Some(facts.steps[s][axis]).filter(|step| *step > 0.0 && moves)
+    })
+}
+
 impl Effect for Rounding {
     fn card(&self) -> &Card {
         &self.card
@@ -64,16 +73,14 @@ impl Effect for Rounding {
 
     fn not_testable(&self, facts: &LogFacts) -> Option<String> {
         let sensor = self.sensor[0];
-        let coarse = facts.steps[sensor.index()].iter().any(|step| *step > 0.0);
+        let coarse = steps(facts, sensor).iter().any(Option::is_some);
         (!facts.sensors[sensor.index()] || !coarse)
             .then(|| format!("the steps of the {} are fine against its noise", sensor.name()))
     }
 
     fn columns(&self, rows: &Rows, sensor: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
-        for (axis, step) in rows.facts.steps[sensor.index()].into_iter().enumerate() {
-            if step <= 0.0 {
-                continue;
-            }
+        for (axis, step) in steps(rows.facts, sensor).into_iter().enumerate() {
+            let Some(step) = step else { continue };
             for k in 0..HARMONICS {
                 let order = (k + 1) as f64;
                 let size = step / (PI * order);
