@@ -18,6 +18,7 @@ from pathlib import Path
 
 from imufit.grade import SETS, BlindGrade, PowerCurve, grade, power_curve
 from imufit.results import Table
+from marked import write_between
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PAGE, PICTURE = DOCS / "blind.md", DOCS / "pictures" / "blind_power.png"
@@ -146,9 +147,7 @@ def main() -> None:
         found = {"seed": given.seed, **result.to_dict(), "power": None if curve is None else curve.to_dict()}
         given.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     if given.write:
-        page = PAGE.read_text(encoding="utf-8")
-        head, _, rest = page.partition(BEGIN)
-        PAGE.write_text(f"{head}{BEGIN}\n\n{text}\n\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+        write_between(PAGE, BEGIN, END, text)
         if curve is not None:
             curve.plot().savefig(PICTURE, dpi=90)
 

@@ -34,6 +34,7 @@ from imufit import Log, SensorModel, _imufit
 from imufit.fit import Fit
 from imufit.grade import draw
 from imufit.grade.wilson import interval
+from marked import write_between
 
 Array = np.ndarray
 SETS = ("one", "small", "one-realistic", "nothing")
@@ -190,8 +191,7 @@ def main() -> None:
     text = "\n".join(lines)
     print(f"\n{text}")
     if given.write:
-        head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-        PAGE.write_text(f"{head}{BEGIN}\n\n{text}\n\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+        write_between(PAGE, BEGIN, END, text)
 
 
 if __name__ == "__main__":

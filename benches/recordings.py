@@ -22,6 +22,7 @@ from confirmed import CHANCE, Climbed, Climber, Found, Part, Sensor, halves
 from halves_of_poses import Calibrated, calibrated
 from imufit.figures import quantity
 from imufit.results import Parameter, Table
+from marked import write_between
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER, PAGE = ROOT / ".." / "shared" / "data", ROOT / "docs" / "recordings.md"
@@ -252,9 +253,7 @@ def main() -> None:
     if given.json:
         given.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     if given.write:
-        page = PAGE.read_text(encoding="utf-8")
-        head, _, rest = page.partition(BEGIN)
-        PAGE.write_text(f"{head}{BEGIN}\n\n{text}\n\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+        write_between(PAGE, BEGIN, END, text)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from imufit.fit.surveyed_log import SurveyedLog, survey
 from imufit.fit.users_effects import check_users_effects
 from imufit.log import LogSource
 from imufit.log.several import name_of
-from imufit.model.catalogue import COLUMN, find_effect, rounding
+from imufit.model.catalogue import COLUMN, find_effect, unnamed_effects
 from imufit.model.sensor_model import SensorModel
 from imufit.progress import Progress
 from imufit.results import DataFault
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 FIELD_REFERENCE = "mag.field_reference"
 """Fitted along, unnamed, wherever the reference field was estimated from the log itself."""
 
-ROUNDING = tuple(rounding(sensor) for sensor in ("acc", "gyr", "mag"))
+ROUNDING = tuple(unnamed_effects())
 """Fitted along, unnamed, wherever the steps of the readings are coarse."""
 
 OWN = frozenset({"acc.bias", "gyr.bias", "ref.alignment", "ref.tilt", FIELD_REFERENCE, *ROUNDING})

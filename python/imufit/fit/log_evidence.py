@@ -190,14 +190,16 @@ def _not_below_steps(facts: _imufit.Facts, variance: list[float]) -> list[float]
 
 
 def _floors(log: LogSource, facts: _imufit.Facts, variance: list[float]) -> list[float]:
-    """Noise floor of each channel: from the metadata, else what no effect of the catalogue explains.
-
-    A data sheet states the noise before the converter: that of coarse steps adds to it, as far as it is there.
-    """
+    """Noise floor of each channel: from the metadata, else what no effect of the catalogue explains."""
     given = [log.metadata.noise.get(channel[:3]) for channel in CHANNELS]
-    steps = [step for sensor in facts.steps for step in sensor]
-    rounded = [
-        noise and float(np.sqrt(max(noise**2, min(noise**2 + step**2 / 12.0, v)))) if step > 0.0 else noise
-        for noise, step, v in zip(given, steps, variance, strict=True)
-    ]
-    return [noise or float(np.sqrt(v)) for noise, v in zip(rounded, variance, strict=True)]
+    steps = (step for sensor in facts.steps for step in sensor)
+    return [_floor(*channel) for channel in zip(given, steps, variance, strict=True)]
+
+
+def _floor(given: float | None, step: float, variance: float) -> float:
+    """Noise floor of one channel: a data sheet states it before the converter, whose coarse steps may add theirs."""
+    if not given:
+        return float(np.sqrt(variance))
+    if step == 0.0:
+        return given
+    return float(np.sqrt(max(given**2, min(given**2 + step**2 / 12.0, variance))))

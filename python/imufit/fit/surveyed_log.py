@@ -14,7 +14,7 @@ from imufit.fit.data_faults import data_faults
 from imufit.fit.passes import MIN_COVERAGE, Passes
 from imufit.fit.rest_passes import passes_of
 from imufit.log import LogSource
-from imufit.model.catalogue import column_effects, effects, find_effect, rounding
+from imufit.model.catalogue import column_effects, effects, unnamed_effects
 from imufit.model.sensor_model import SensorModel
 from imufit.progress import Progress
 from imufit.results import DataFault
@@ -68,11 +68,11 @@ class SurveyedLog:
             for key, effect in column_effects(own, facts.sensors).items()
             if (effect.sensors[0], effect.column) not in named
         }
-        steps = {rounding(sensor): find_effect(rounding(sensor)) for sensor in facts.sensors}
-        offered: dict[str, Any] = {**effects(), **columns, **steps}
+        unnamed = unnamed_effects()
+        offered: dict[str, Any] = {**effects(), **columns, **unnamed}
         reasons = {key: _refusal(effect, passes, facts, coverage) for key, effect in offered.items()}
         testable = {key: effect for key, effect in offered.items() if reasons[key] is None}
-        refused = {key: reason for key, reason in reasons.items() if reason is not None and key not in steps}
+        refused = {key: reason for key, reason in reasons.items() if reason is not None and key not in unnamed}
         probes = {effect.id: effect for effect in _imufit.probes(facts)}
         return cls(passes, facts, coverage, testable, refused, probes, faults)
 

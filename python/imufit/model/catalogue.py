@@ -27,9 +27,9 @@ def column_effects(names: Iterable[str], sensors: Iterable[str]) -> dict[str, _i
     return {effect_id: effect for effect_id, effect in found.items() if effect is not None}
 
 
-def rounding(sensor: str) -> str:
-    """Return the id of what the coarse steps of a sensor's converter do: fitted along, and never named."""
-    return f"{sensor}.rounding"
+def unnamed_effects() -> dict[str, _imufit.Effect]:
+    """Effects that are fitted along and never named, by id: what the coarse steps of a converter do."""
+    return {effect.id: effect for effect in _imufit.unnamed_effects()}
 
 
 def find_effect(effect_id: str) -> _imufit.Effect:
@@ -45,7 +45,8 @@ def find_effect(effect_id: str) -> _imufit.Effect:
     InputError
         There is none; the message names the nearest.
     """
-    effect = effects().get(effect_id) or _imufit.find_effect(effect_id)
+    known = {**effects(), **unnamed_effects()}
+    effect = known.get(effect_id) or (_imufit.find_effect(effect_id) if COLUMN in effect_id else None)
     if effect is None:
         near = difflib.get_close_matches(effect_id, list(effects()), n=1, cutoff=0.4)
         remedy = f"Did you mean {near[0]}?" if near else "imufit explain lists all effects."

@@ -8,22 +8,36 @@ const REPEATED: f64 = 0.43;
 const EVEN: f64 = 0.28;
 /// Rows with a new reading below which nothing is told of a part; a sensor with fewer in the whole log hardly ever changes.
 const FEWEST: usize = 50;
-/// An axis whose readings change from value to value less often stands still, and what rounding does to it is a constant.
+/// An axis with fewer gaps between its values stands still, and what rounding does to it is a constant.
 const SEVERAL: usize = 5;
-/// Readings of one step lie together within this part of their range: figures of a table are rounded.
+/// Readings of one step lie together within this part of their size: figures of a table are rounded.
 const SAME: f64 = 1e-7;
 /// Gaps are whole steps within this part of one.
 const WHOLE: f64 = 0.05;
+
+/// What was seen of a part of the log.
+#[derive(Clone, Copy, Debug, Default)]
+struct Part {
+    /// Rows with a new reading.
+    rows: usize,
+    /// For each axis on how many of them it repeats its reading, and on how many it goes on as the two before did.
+    repeated: [usize; 3],
+    even: [usize; 3],
+}
+
+impl Part {
+    /// True if so many readings of an axis repeat, or go on evenly, that its steps count.
+    fn is_coarse(&self, axis: usize) -> bool {
+        let rows = self.rows as f64;
+        self.repeated[axis] as f64 >= REPEATED * rows || self.even[axis] as f64 >= EVEN * rows
+    }
+}
 
 /// Readings of one sensor, sampled.
 #[derive(Clone, Debug, Default)]
 pub struct SensorSteps {
     values: [Vec<f64>; 3],
-    /// For each part and axis how many readings are those before, and how many go on as the two before.
-    repeated: [[usize; 3]; PARTS],
-    even: [[usize; 3]; PARTS],
-    /// For each part how many rows were looked at.
-    seen: [usize; PARTS],
+    parts: [Part; PARTS],
 }
 
 impl SensorSteps {
@@ -39,26 +53,22 @@ impl SensorSteps {
         if repeated == [true; 3] {
             return;
         }
-        let part = ((part * PARTS as f64) as usize).min(PARTS - 1);
-        self.seen[part] += 1;
+        let part = &mut self.parts[((part * PARTS as f64) as usize).min(PARTS - 1)];
+        part.rows += 1;
         for k in 0..3 {
-            self.repeated[part][k] += usize::from(repeated[k]);
-            self.even[part][k] += usize::from(same(third[k] - 2.0 * second[k] + first[k], k));
+            part.repeated[k] += usize::from(repeated[k]);
+            part.even[k] += usize::from(same(third[k] - 2.0 * second[k] + first[k], k));
         }
     }
 
     /// Step of each axis where it is coarse, 0 elsewhere; and whether its readings are spread over several.
     pub fn finish(mut self) -> ([f64; 3], [bool; 3]) {
         let gaps: [Vec<f64>; 3] = std::array::from_fn(|axis| gaps(&mut self.values[axis]));
-        let hardly_changes = self.seen.iter().sum::<usize>() < FEWEST && self.values[0].len() >= FEWEST;
+        let rows: usize = self.parts.iter().map(|part| part.rows).sum();
+        let hardly_changes = rows < FEWEST && self.values[0].len() >= FEWEST;
         let coarse: [bool; 3] = std::array::from_fn(|axis| {
-            let counts = self.repeated.iter().zip(&self.even).zip(&self.seen);
-            let mut known = counts.filter(|(_, seen)| **seen >= FEWEST);
-            let often = |count: usize, seen: usize, share: f64| count as f64 >= share * seen as f64;
-            let many = |repeated: &[usize; 3], even: &[usize; 3], seen: usize| {
-                often(repeated[axis], seen, REPEATED) || often(even[axis], seen, EVEN)
-            };
-            hardly_changes || known.any(|((repeated, even), seen)| many(repeated, even, *seen))
+            let mut told = self.parts.iter().filter(|part| part.rows >= FEWEST);
+            hardly_changes || told.any(|part| part.is_coarse(axis))
         });
         let steps: [f64; 3] = std::array::from_fn(|axis| {
             let step = gaps[axis].iter().copied().min_by(f64::total_cmp).unwrap_or_default();

@@ -69,11 +69,10 @@ pub fn column_effect(id: &str) -> Option<Arc<dyn Effect>> {
     (!column.is_empty()).then(|| Arc::new(covariate::column(sensor, column)) as Arc<dyn Effect>)
 }
 
-/// The built-in effect with this id, one that is never named among them.
+/// The built-in effect with this id.
 pub fn find(id: &str) -> Option<Arc<dyn Effect>> {
     built_in()
         .into_iter()
-        .chain(unnamed())
         .find(|e| e.card().id == id)
         .or_else(|| column_effect(id))
 }

@@ -312,6 +312,12 @@ fn built_in_effects() -> Vec<PyEffect> {
     catalogue::built_in().into_iter().map(PyEffect).collect()
 }
 
+/// Effects that are fitted along and never named, in the order of the sensors.
+#[pyfunction]
+fn unnamed_effects() -> Vec<PyEffect> {
+    catalogue::unnamed().into_iter().map(PyEffect).collect()
+}
+
 /// Dependences without a name that a log with these facts can be asked about.
 #[pyfunction]
 fn probes(facts: &PyFacts) -> Vec<PyEffect> {
@@ -386,6 +392,7 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<PyEffect>()?;
     m.add_class::<PyFacts>()?;
     m.add_function(wrap_pyfunction!(built_in_effects, m)?)?;
+    m.add_function(wrap_pyfunction!(unnamed_effects, m)?)?;
     m.add_function(wrap_pyfunction!(probes, m)?)?;
     m.add_function(wrap_pyfunction!(find_effect, m)?)?;
     m.add_function(wrap_pyfunction!(python_effect, m)?)?;

@@ -23,11 +23,6 @@ pub struct Rounding {
     sensor: [Sensor; 1],
 }
 
-/// Id of [`rounding`] of a sensor.
-pub fn id(sensor: Sensor) -> String {
-    format!("{}.rounding", sensor.prefix())
-}
-
 /// `acc.rounding`, `gyr.rounding`, `mag.rounding`.
 pub fn rounding(sensor: Sensor) -> Rounding {
     let words = Words {
@@ -48,7 +43,11 @@ pub fn rounding(sensor: Sensor) -> Rounding {
             found: Found::Steps,
         });
     Rounding {
-        card: words.card(id(sensor), Stage::Rounding, parameters.collect()),
+        card: words.card(
+            format!("{}.rounding", sensor.prefix()),
+            Stage::Rounding,
+            parameters.collect(),
+        ),
         sensor: [sensor],
     }
 }
