@@ -12,6 +12,9 @@ from recording import DATA, recording
 
 FILES = sorted(DATA.rglob("*.parquet")) if DATA.is_dir() else []
 
+TRUE_NOTES = {"phone_qualisys": ("the norm of mag is",)}
+"""What is unusual of a folder's recordings and rightly said: the phone's magnetometer is raw, its offset hundreds of uT."""
+
 
 def test_the_recordings_are_there() -> None:
     recording("README.md")
@@ -24,7 +27,7 @@ def test_recording_is_read(path: Path) -> None:
     assert np.all(np.diff(log.t) > 0.0)
     assert log.metadata.extra["license"]
     for note in log.notes:
-        assert "repeated time stamps" in note
+        assert any(true in note for true in TRUE_NOTES.get(path.parent.name, ())) or "repeated time stamps" in note
     stream = open_log(path, stream=True)
     assert (stream.n, stream.columns, stream.notes) == (log.n, log.columns, log.notes)
     np.testing.assert_array_equal(np.concatenate([chunk.core.t for chunk in stream.chunks(9999, 10)]), log.t)
