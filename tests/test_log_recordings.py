@@ -13,7 +13,7 @@ from recording import DATA, recording
 FILES = sorted(DATA.rglob("*.parquet")) if DATA.is_dir() else []
 
 TRUE_NOTES = {"phone_qualisys": ("the norm of mag is",)}
-"""Rightly said of a folder's recordings: the phone's magnetometer is raw, hundreds of uT off."""
+"""What is unusual of a folder's recordings and rightly said: the phone's magnetometer is raw, hundreds of uT off."""
 
 
 def test_the_recordings_are_there() -> None:

@@ -9,6 +9,7 @@ import pytest
 from cli_stand_in import run, strict_json
 from engine import swaying
 from imufit import Diagnosis, InputError, Log, SensorModel, simulate
+from imufit.model.effect import forget
 from imufit.simulate import Noise, SensorNoise
 
 
@@ -59,6 +60,31 @@ def test_biases_that_differ_between_logs_are_no_alarm_and_are_listed():
         assert log["ratio"] == pytest.approx(1.0, abs=0.03)
     # The file holds the mean, the best guess for the next time the sensor is switched on.
     assert min(biases) < fit.model.parameters["gyr.bias"]["x"] < max(biases)
+
+
+@pytest.mark.parametrize("scope", ["sensor", "log"])
+def test_a_users_effect_has_one_value_for_all_logs_or_one_for_each_as_it_says(scope):
+    @imufit.effect("gyr.fan", parameters={"z": "rad/s/A"}, typical=0.01, needs=["fan"], scope=scope)
+    def fan(w):
+        return np.outer(w.column("fan"), [0.0, 0.0, 1.0])
+
+    sizes, logs = (0.01, -0.02), []
+    for k, size in enumerate(sizes):
+        log = handheld({}, k)
+        current = np.sin(0.7 * log.t)
+        gyr = log.gyr + np.outer(size * current, [0.0, 0.0, 1.0])
+        logs.append(replace(log, gyr=gyr, covariates={**log.covariates, "fan": current}))
+    try:
+        fit = SensorModel(["gyr.fan"]).fit(logs)
+        found = [[p.value for p in own.parameters if p.effect == "gyr.fan"] for own in fit.by_log]
+    finally:
+        forget("gyr.fan")
+    if scope == "sensor":
+        assert found == [[], []]
+        assert fit.ratio > 1.05
+    else:
+        assert np.ravel(found) == pytest.approx(sizes, abs=1e-3)
+        assert fit.ratio == pytest.approx(1.0, abs=0.03)
 
 
 def warming(way: float, seed: int) -> Log:

@@ -102,7 +102,7 @@ def test_smoothed_reference_has_lost_rate() -> None:
     q = poses_of("reference_smoothed")
     step = 0.01
     rate = rate_of(q, step)
-    gyro = columns("reference_smoothed", "gyr_")[1:-1]
+    gyro = columns("reference_smoothed", "gyro_")[1:-1]
     band = lab.signal.firwin(61, 4.0, fs=100.0)
     low = [lab.signal.fftconvolve(x, band[:, None], mode="valid") for x in (gyro, rate)]
     second = np.gradient(np.gradient(low[0], step, axis=0), step, axis=0)
@@ -114,7 +114,7 @@ def test_smoothed_reference_has_lost_rate() -> None:
 def test_fast_reference_clock_makes_the_reference_late() -> None:
     """Near the end of the log the reference lags the gyro by k times the time."""
     rate = rate_of(poses_of("reference_clock_fast"), 0.01)
-    gyro = columns("reference_clock_fast", "gyr_")[1:-1]
+    gyro = columns("reference_clock_fast", "gyro_")[1:-1]
     band = lab.signal.firwin(31, 6.0, fs=100.0)[:, None]
     rate, gyro = (lab.signal.fftconvolve(x, band, mode="valid") for x in (rate, gyro))
     slope = np.gradient(gyro, 0.01, axis=0)
@@ -155,7 +155,7 @@ def test_rows_depend_on_the_seed_only() -> None:
 def test_gyro_bias_is_the_stated_one() -> None:
     """The mean of gyro less reference rate is the bias; means over 2 s scatter by about 0.3 deg/s."""
     name = "gyro_bias_with_scattered_zero"
-    excess = columns(name, "gyr_")[1:-1] - rate_of(poses_of(name), 0.01)
+    excess = columns(name, "gyro_")[1:-1] - rate_of(poses_of(name), 0.01)
     np.testing.assert_allclose(excess.mean(axis=0), [-0.19, 0.08, 0.05], atol=1e-3)
     scatter = excess[199:-199].reshape(-1, 200, 3).mean(axis=1).std(axis=0)
     assert np.all(np.abs(scatter / lab.DEGREE - 0.3) < 0.12)
@@ -188,7 +188,7 @@ def test_hard_iron_of_300_microtesla() -> None:
 def test_lever_arm_can_be_told_to_two_millimetres() -> None:
     """A plain local-polynomial estimate from the log alone finds x within 2 mm."""
     name = "lever_arm_beside_lively_reference"
-    step, q, gyro = 1.0 / 120.0, poses_of(name), columns(name, "gyr_")
+    step, q, gyro = 1.0 / 120.0, poses_of(name), columns(name, "gyro_")
     window = {"window_length": 15, "polyorder": 5, "axis": 0, "delta": step}
     linear_part = lab.signal.savgol_filter(columns(name, "ref_p"), deriv=2, **window)
     force = lab.to_body(q, linear_part - np.array([0.0, 0.0, lab.GRAVITY]))
@@ -219,15 +219,15 @@ def test_shaken_row_has_the_stated_translation() -> None:
 
 def test_broken_gyro_rows_are_broken() -> None:
     """The motion leaves the range, the counts wrap, the bus dies, the axis stands still."""
-    clipped = np.abs(columns("gyro_soft_clip", "gyr_"))
+    clipped = np.abs(columns("gyro_soft_clip", "gyro_"))
     assert clipped.max() < lab.FULL_SCALE + 1e-6
     assert np.mean(clipped > 0.95 * lab.FULL_SCALE) > 0.02
-    wrapped = columns("gyro_wrapped_int16", "gyr_")
+    wrapped = columns("gyro_wrapped_int16", "gyro_")
     assert np.abs(wrapped).max() <= lab.FULL_SCALE
     assert np.sum(np.abs(np.diff(wrapped, axis=0)) > 1.8 * lab.FULL_SCALE) > 20
-    readings = np.hstack([columns("dead_bus_zeros", p) for p in ("acc_", "gyr_", "mag_")])
+    readings = np.hstack([columns("dead_bus_zeros", p) for p in ("acc_", "gyro_", "mag_")])
     assert 0.02 < np.mean(np.all(readings == 0.0, axis=1)) < 0.2
-    assert np.ptp(columns("gyro_axis_pinned", "gyr_")[:, 1]) == 0.0
+    assert np.ptp(columns("gyro_axis_pinned", "gyro_")[:, 1]) == 0.0
 
 
 def test_play_operator_has_slack_and_memory() -> None:
@@ -269,7 +269,7 @@ def test_mount_follows_its_equation_and_rings() -> None:
 def test_vibration_shifts_the_gyro() -> None:
     """Means over 0.5 s of the gyro excess follow the variance of the accelerometer in the same windows."""
     name = "drone_vibration_rectification"
-    excess = (columns(name, "gyr_")[1:-1] - rate_of(poses_of(name), 0.005))[99:-99]
+    excess = (columns(name, "gyro_")[1:-1] - rate_of(poses_of(name), 0.005))[99:-99]
     acc = columns(name, "acc_")[100:-100]
     blocks = len(excess) // 100
     shift = excess[: blocks * 100].reshape(blocks, 100, 3).mean(axis=1)
@@ -291,7 +291,7 @@ def test_six_poses_show_bias_and_scale() -> None:
             level = frame.loc[frame["pose"] == f"+{axis}", f"acc_{other}"].mean()
             assert level == pytest.approx(row.effects["acc.bias"][other], abs=0.01)
     step = np.diff(frame["t"], append=np.nan)[:-1]
-    turn = (frame[["gyr_x", "gyr_y", "gyr_z"]].to_numpy()[:-1] * step[:, None]).sum(axis=0)
+    turn = (frame[["gyro_x", "gyro_y", "gyro_z"]].to_numpy()[:-1] * step[:, None]).sum(axis=0)
     np.testing.assert_allclose(turn, [0.0, -1.5 * np.pi, 1.5 * np.pi], atol=0.02)
 
 
@@ -299,7 +299,7 @@ def test_error_sizes_outside_the_catalogue() -> None:
     """Line and tone have 3.5 times the RMS of the noise; the zero jumps 31 times by ten times the noise."""
     excess_of = {}
     for name in ("mains_line", "swept_tone", "zero_jumps"):
-        excess = columns(name, "gyr_")[1:-1] - rate_of(poses_of(name), 0.005)
+        excess = columns(name, "gyro_")[1:-1] - rate_of(poses_of(name), 0.005)
         excess_of[name] = excess
     noise = lab.MEMS.gyr
     for name in ("mains_line", "swept_tone"):
@@ -315,7 +315,7 @@ def test_error_sizes_outside_the_catalogue() -> None:
 def test_noise_above_the_stated_one() -> None:
     """The gyro noise is 12 times the stated noise."""
     name = "stated_noise_too_small"
-    excess = columns(name, "gyr_")[1:-1] - rate_of(poses_of(name), 0.01)
+    excess = columns(name, "gyro_")[1:-1] - rate_of(poses_of(name), 0.01)
     assert excess.std() / made(name).metadata["noise"]["gyr"] == pytest.approx(12.0, rel=0.1)
 
 

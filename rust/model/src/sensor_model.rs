@@ -207,6 +207,8 @@ impl SensorModel {
             for triple in [
                 &mut ideal.omega,
                 &mut ideal.alpha,
+                &mut ideal.alpha_rate,
+                &mut ideal.snap,
                 &mut ideal.f,
                 &mut ideal.f_rate,
                 &mut ideal.m,
@@ -286,6 +288,8 @@ impl SensorModel {
             facts.silent_axes.iter().any(|s| s.contains(&true)).then(|| Ideal {
                 omega: ideal.omega.without(gyr),
                 alpha: ideal.alpha.without(gyr),
+                alpha_rate: ideal.alpha_rate.without(gyr),
+                snap: ideal.snap.without(acc),
                 f: ideal.f.without(acc),
                 m: ideal.m.without(mag),
                 ..ideal.clone()
