@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from case import Case
+from motion_and_reference import multiply
 from numpy.typing import NDArray
 from scipy import signal
 
@@ -42,21 +43,6 @@ TOLERANCES: dict[str, dict[str, dict[str, float]]] = {
 
 
 # ------------------------------------------------------------------------------------------------ quaternions
-
-
-def multiply(p: Array, q: Array) -> Array:
-    """Return the Hamilton product of two arrays of quaternions, scalar first."""
-    pw, px, py, pz = np.moveaxis(p, -1, 0)
-    qw, qx, qy, qz = np.moveaxis(q, -1, 0)
-    return np.stack(
-        [
-            pw * qw - px * qx - py * qy - pz * qz,
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-        ],
-        axis=-1,
-    )
 
 
 def from_vector(v: Array) -> Array:
@@ -295,9 +281,9 @@ def resample(t: Array, nodes: Array, poses: Columns) -> Columns:
 def table(t: Array, readings: Columns, poses: Columns | None, position: bool = True) -> pd.DataFrame:
     """Put times, readings and poses into the columns of the contract."""
     columns: Columns = {"t": t}
-    for sensor, prefix in (("acc", "acc"), ("gyr", "gyr"), ("mag", "mag")):
+    for sensor in ("acc", "gyr", "mag"):
         if sensor in readings:
-            columns |= {f"{prefix}_{axis}": readings[sensor][:, i] for i, axis in enumerate("xyz")}
+            columns |= {f"{sensor}_{axis}": readings[sensor][:, i] for i, axis in enumerate("xyz")}
     if poses is not None:
         columns |= {f"ref_q{axis}": poses["q"][:, i] for i, axis in enumerate("wxyz")}
         if position:
