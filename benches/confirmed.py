@@ -17,8 +17,8 @@ from pathlib import Path
 import imufit
 import numpy as np
 from imufit import InputError, Ladder, Log, SensorModel
-from imufit.fit import Fit
-from imufit.fit.analysis import OWN
+from imufit.loop import Fit
+from imufit.model.catalogue import each_log_has_its_own
 from imufit.results import Parameter
 
 NOT_CAUSES = ("movement", "ref_exact", "encoder_deg", "still_", "dmp_")
@@ -153,7 +153,7 @@ def fitted(model: SensorModel, there: Fit) -> tuple[Parameter, ...]:
 
 def comparable(effect: str, here: Part, there: Part) -> bool:
     """Zeros, mounts and tables are one recording's; all else is the sensor's."""
-    own = effect in OWN or any(name in effect for name in OF_A_RECORDING)
+    own = each_log_has_its_own(effect) or any(name in effect for name in OF_A_RECORDING)
     return not own or here.files == there.files
 
 

@@ -31,9 +31,9 @@ from pathlib import Path
 
 import numpy as np
 from imufit import Log, SensorModel, _imufit
-from imufit.fit import Fit
 from imufit.grade import draw
 from imufit.grade.wilson import interval
+from imufit.loop import Fit
 from marked import write_between
 
 Array = np.ndarray

@@ -142,6 +142,8 @@ def diagnosis(verdict="missing"):
         Candidate(
             effect,
             p,
+            1.0 - p,
+            -math.log(p),
             after,
             1.52,
             after,

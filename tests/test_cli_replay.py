@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from cli_stand_in import run, strict_json
+from imufit import SensorModel
 from imufit.cli.names import FILTERS
 from imufit.log import Log
-from imufit.model import SensorModel
 from imufit.replay import replay
 
 METHODS = ("accel", "gyro", "complementary", "kalman")

@@ -59,14 +59,16 @@ def test_index_links_every_page():
 @pytest.mark.parametrize(
     ("file", "constant", "words"),
     [
-        ("rust/inference/src/selection.rs", "ALPHA", "(Bonferroni) is at most {}, and"),
-        ("rust/inference/src/verdict.rs", "NAMED_SHARE", "takes at least {:.0%} of its gain and"),
-        ("rust/inference/src/verdict.rs", "LOOK_AHEAD", "up to {}, re-ranked"),
-        ("rust/inference/src/held_out.rs", "FOLDS", "{} folds, each of"),
-        ("rust/inference/src/dependence.rs", "CONTRASTS", "degree {} over the bins"),
-        ("rust/inference/src/screening.rs", "HALVES_CHANCE", "more than {} standard deviations of chance"),
+        ("rust/inference/src/search.rs", "ODDS", "exceeds ln(number of candidates) + {}."),
+        ("rust/inference/src/search.rs", "LARGEST_GAIN", "no gain above {}"),
+        ("rust/inference/src/verdict.rs", "NAMED_SHARE", "named effects have at least {:.0%} of the evidence"),
+        ("rust/inference/src/verdict.rs", "NOISE", "no more than {} that is the same"),
+        ("rust/inference/src/stack.rs", "ATTENUATION", "too small by {} times the noise's part"),
+        ("rust/inference/src/saturated.rs", "COMMON", "as much as {} samples of the whole"),
+        ("rust/inference/src/held_out.rs", "FOLDS", "over {} folds"),
+        ("rust/inference/src/bins.rs", "CONTRASTS", "up to degree {},"),
         ("rust/fit/src/bins.rs", "BINS", "up to {} bins"),
-        ("rust/fit/src/whitening.rs", "MAX_ORDER", "filter** of order 0 to {}"),
+        ("rust/fit/src/whitening.rs", "MAX_ORDER", "filter of at most {} taps"),
         ("rust/model/src/bandwidth.rs", "TOLERANCE", "{}\\,\\sigma_{{\\text{{ref}}}}"),
         ("python/imufit/fit/passes.py", "BLOCKS", "B = {} blocks"),
         ("python/imufit/diagnose/revise.py", "MATTERS", "at least {:.1%} off the held-out error"),
@@ -78,7 +80,7 @@ def test_method_states_the_constants_of_the_code(file, constant, words):
     assert found, f"{file} has no {constant} any more"
     value = float(found[1])
     number = int(value) if value.is_integer() else value
-    spelt = {5: "five", 10: "ten", 12: "Twelve"}.get(number, number)
+    spelt = {2: "twice", 5: "five", 12: "twelve"}.get(number, number)
     text = " ".join((ROOT / "docs" / "method.md").read_text(encoding="utf-8").split()).replace(" %", "%")
     shapes = [number] if ":" in words else [number, spelt]
     assert any(words.format(shape) in text for shape in shapes), (

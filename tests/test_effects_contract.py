@@ -131,6 +131,67 @@ def test_a_broken_effect_does_not_spoil_the_ranking_of_the_others_unnoticed(log,
         SensorModel().fit(log)
 
 
+LIES = {
+    "reads a derivative": (
+        {"reach": "row"},
+        lambda w: w.alpha,
+        r"gyr\.lie.*reach is the row, but it reads a derivative",
+    ),
+    "counts from the start": (
+        {"reach": "row"},
+        lambda w: (w.t - w.t_start)[:, None] * np.ones(3),
+        r"gyr\.lie.*reads the time since the start",
+    ),
+    "no constant": ({"affine": "offset"}, fan, r"gyr\.lie.*column x is not what its trait affine says"),
+    "gain of another": (
+        {"affine": "scale", "stage": "gain"},
+        lambda w: w.f,
+        r"gyr\.lie.*column x is not what its trait",
+    ),
+}
+
+
+@pytest.mark.parametrize("lie", LIES)
+def test_a_trait_that_the_columns_deny_is_refused(checked, user_effect, lie):
+    traits, function, problem = LIES[lie]
+    names = ["x", "y", "z"] if "affine" in traits else ["k"]
+
+    @user_effect("gyr.lie", parameters=names, **traits)
+    def columns(w):
+        return function(w) if len(names) == 1 else np.einsum("ni,ij->nij", function(w), np.eye(3))
+
+    with pytest.raises(ValueError, match=problem):
+        checked("gyr.lie", [0.1] * len(names))
+
+
+def test_a_trait_that_the_columns_bear_out_is_kept(checked, user_effect):
+    @user_effect("gyr.gain", parameters=["xy", "zx"], stage="gain", affine="matrix", reach="row")
+    def gain(w):
+        columns = np.zeros((w.t.size, 3, 2))
+        columns[:, 0, 0], columns[:, 2, 1] = w.x[:, 1], w.x[:, 0]
+        return columns
+
+    checked("gyr.gain", [0.1, -0.2])
+    assert (find_effect("gyr.gain").affine, find_effect("gyr.gain").reach) == ("matrix", "row")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"scope": "fleet"}, "scope is 'fleet'.*sensor, log"),
+        ({"reach": "reference"}, "reach is 'reference'"),
+        ({"sign": "negative"}, "sign is 'negative'"),
+        ({"affine": "cubic"}, "affine is 'cubic'"),
+        ({"affine": "offset"}, "affine offset has other parameters. Call them x, y, z"),
+        ({"affine": "scale"}, "affine scale at stage offset. Use stage gain"),
+        ({"affine": "offset", "needs": ["fan"]}, "what needs a column is not a constant offset"),
+    ],
+)
+def test_a_trait_that_cannot_be_is_refused_in_words(user_effect, wrong, said):
+    with pytest.raises(InputError, match=said):
+        user_effect("gyr.odd", parameters=["k"], **wrong)
+
+
 class OwnError(RuntimeError):
     pass
 

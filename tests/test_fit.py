@@ -217,8 +217,8 @@ def test_comparing_with_another_log_keeps_the_parameters():
     ("spoil", "problem"),
     [
         (lambda log: log.rows(0, 150), "150 rows are too few for a fit.*at least 200"),
-        (lambda log: replace(log, ref_q=None, ref_p=None), "no reference attitude"),
-        (lambda log: replace(log, ref_q=np.full_like(log.ref_q, np.nan)), "no reference attitude"),
+        (lambda log: replace(log, ref_q=None, ref_p=None), "gyr.bias.* no reference attitude"),
+        (lambda log: replace(log, ref_q=np.full_like(log.ref_q, np.nan)), "gyr.bias.* no reference attitude"),
         (lambda log: replace(log, acc=None, gyr=None, mag=None), "no sensor of the log has a sample"),
         (
             lambda log: replace(log, acc=np.full_like(log.acc, np.nan), gyr=None, mag=None),
@@ -250,6 +250,13 @@ def test_a_log_that_cannot_be_fitted_is_refused_in_words(spoil, problem):
     if "gyr" not in problem:
         with pytest.raises(InputError, match=problem):
             ladder(log)
+
+
+def test_a_moving_log_without_reference_is_judged_by_the_length_of_the_field_alone():
+    log = replace(swaying(duration=20.0, noise=1.0), ref_q=None, ref_p=None)
+    answer = ladder(log).diagnosis
+    assert {each.sensor: each.judged for each in answer.judged} == {"acc": False, "gyr": False, "mag": True}
+    assert answer.sentence.startswith("mag: nothing missing; acc, gyr: not judged")
 
 
 def test_an_effect_on_a_sensor_without_samples_cannot_be_fitted():

@@ -87,7 +87,7 @@ def test_beside_what_cannot_be_told_apart_the_rest_is_added():
 
 def test_of_two_things_that_cannot_be_told_apart_none_is_added():
     log = static(0.1, (0.6, 0.5, 0.2))
-    answer = ladder(replace(log, gyr=log.gyr + np.array([0.01, -0.02, 0.005])))
+    answer = ladder(replace(log, gyr=log.gyr + np.array([0.002, -0.004, 0.001])))
     assert answer.model == ()
     assert answer.verdict == "ambiguous"
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from imufit import Log, SensorModel
-from imufit.diagnose import diagnose, ladder
+from imufit import Log, SensorModel, ladder
+from imufit.diagnose import diagnose
 from imufit.errors import InputError
 from imufit.simulate import Noise, simulate
 from scipy.spatial.transform import Rotation

@@ -28,13 +28,11 @@ if TYPE_CHECKING:
     from imufit import results as results
     from imufit import tune as tune
     from imufit._imufit import __version__
-    from imufit.diagnose.ladder import ladder
     from imufit.errors import InputError
-    from imufit.fit import Fit
     from imufit.log import Log, LogStream, open_log, read
+    from imufit.loop import Fit, SensorModel, ladder
     from imufit.model.catalogue import catalogue, explain, load_effects
     from imufit.model.effect import Window, effect
-    from imufit.model.sensor_model import SensorModel
     from imufit.results import Addition, Comparison, Diagnosis, EffectCard, Ladder, Parameter
 else:
     from importlib import import_module
@@ -63,11 +61,10 @@ else:
     )
     _HOMES = {
         "_imufit": ("__version__",),
-        "diagnose": ("ladder",),
         "errors": ("InputError",),
-        "fit": ("Fit",),
         "log": ("Log", "LogStream", "open_log", "read"),
-        "model": ("SensorModel", "Window", "catalogue", "effect", "explain", "load_effects"),
+        "loop": ("Fit", "SensorModel", "ladder"),
+        "model": ("Window", "catalogue", "effect", "explain", "load_effects"),
         "results": ("Addition", "Comparison", "Diagnosis", "EffectCard", "Ladder", "Parameter"),
     }
 

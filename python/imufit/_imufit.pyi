@@ -1,7 +1,7 @@
 """Types of the compiled module. One section for each file of the binding; tests compare it with the module."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypedDict, final
+from typing import Any, ClassVar, Literal, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +12,21 @@ _Chunk = dict[str, Any]
 
 __all__ = [
     "Autocovariance",
+    "Candidate",
+    "Disagreement",
     "Effect",
     "Evidence",
     "Facts",
     "Filter",
+    "Finding",
+    "Kind",
     "LineDecoder",
     "PoseJudge",
     "Problem",
     "Profile",
+    "Status",
     "Survey",
+    "Verdict",
     "WireDecoder",
     "WireEncoder",
     "__version__",
@@ -31,7 +37,6 @@ __all__ = [
     "best_trial",
     "block_scatter",
     "built_in_effects",
-    "concerns_reference",
     "convert_frame",
     "correct_readings",
     "euler_from_quaternion",
@@ -268,6 +273,17 @@ class Effect:
     @property
     def column(self) -> str | None: ...
     @property
+    def centred_column(self) -> str | None: ...
+    @property
+    def scope(self) -> Literal["sensor", "log"]: ...
+    @property
+    def reach(self) -> Literal["row", "reference", "neighbours", "history"]: ...
+    @property
+    def affine(self) -> Literal["offset", "scale", "matrix"] | None: ...
+    @property
+    def reference_part(self) -> Literal["mount", "level", "time", "bandwidth", "field", "drive"] | None: ...
+    def fitted_along(self, facts: Facts) -> bool: ...
+    @property
     def parameters(self) -> list[tuple[str, str, float | None]]: ...
     @property
     def strongly_curved(self) -> bool: ...
@@ -319,6 +335,10 @@ class Facts:
     def position_smoothing(self) -> tuple[int, int] | None: ...
     @property
     def reference_noise(self) -> tuple[float, float]: ...
+    @property
+    def ideal_noise(self) -> list[float]: ...
+    @property
+    def sensor_dt(self) -> list[float]: ...
     def with_ranges(self, acc: float | None = None, gyr: float | None = None) -> Facts: ...
     def with_bins_of(self, others: Sequence[Facts]) -> Facts: ...
     def with_means(
@@ -336,6 +356,7 @@ def python_effect(
     words: dict[str, str],
     stage: str,
     needs: Sequence[str],
+    traits: Mapping[str, str],
     function: Callable[..., object],
 ) -> Effect: ...
 
@@ -349,7 +370,6 @@ def correct_readings(
     covariate_means: Sequence[float | None],
     temperature_mean: float | None = None,
 ) -> tuple[list[_Array | None], list[int]]: ...
-def concerns_reference(effect: Effect) -> bool: ...
 
 # --- fit: nine channels, acc gyr mag by x y z
 
@@ -425,7 +445,7 @@ def facts_at_rest(
 ) -> Facts: ...
 def rest_channels() -> list[str]: ...
 
-# --- inference: slots are effects in the order of the evidence; p-values are adjusted for all candidates tried
+# --- inference: slots are effects in the order of the evidence
 
 class _Estimate(TypedDict):
     parameters: list[int]
@@ -436,48 +456,108 @@ class _Estimate(TypedDict):
     folds: _Array
     training: float
 
-class _Screened(TypedDict):
-    slot: int
-    p_value: float
-    gain: float
-    gain_error: float
-    held_out_before: float
-    held_out_after: float
-    expected_ratio: float
-    testable: bool
-    stable: bool
-    agreed: bool
-    passed: bool
-    parameters: list[tuple[float, float]]
+@final
+class Kind:
+    ADEQUATE: ClassVar[Kind]
+    MISSING: ClassVar[Kind]
+    AMBIGUOUS: ClassVar[Kind]
+    UNKNOWN: ClassVar[Kind]
+    @property
+    def word(self) -> Literal["adequate", "missing", "ambiguous", "unknown"]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self, /) -> int: ...
+    def __int__(self, /) -> int: ...
 
-class _Dependence(TypedDict):
-    channel: str
-    covariate: str
-    log: int | None
-    gain: float
-    p_value: float
-    shape: str
-    held_out: tuple[float, float] | None
-    probe: int | None
+@final
+class Status:
+    PASSED: ClassVar[Status]
+    NOT_SIGNIFICANT: ClassVar[Status]
+    NOT_TESTABLE: ClassVar[Status]
+    TOO_LARGE: ClassVar[Status]
+    OTHER_SIGN: ClassVar[Status]
+    @property
+    def words(self) -> str: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self, /) -> int: ...
+    def __int__(self, /) -> int: ...
 
-class _Disagreement(TypedDict):
-    slot: int
-    log: int
-    own: list[tuple[float, float]]
-    others: list[tuple[float, float]]
-    p_value: float
-    wild: bool
+@final
+class Candidate:
+    @property
+    def slot(self) -> int: ...
+    @property
+    def status(self) -> Status: ...
+    @property
+    def ln_bayes(self) -> float: ...
+    @property
+    def probability(self) -> float: ...
+    @property
+    def parameters(self) -> list[tuple[float, float]]: ...
+    @property
+    def detectable(self) -> list[float]: ...
+    @property
+    def gain(self) -> float: ...
+    @property
+    def gain_error(self) -> float: ...
+    @property
+    def held_out_before(self) -> float: ...
+    @property
+    def held_out_after(self) -> float: ...
 
-class _Verdict(TypedDict):
-    verdict: str
-    best: int | None
-    rivals: list[int]
-    path: list[int]
-    correlations: list[tuple[int, int, float]]
-    screened: list[_Screened]
-    unexplained: list[_Dependence]
-    disagreements: list[_Disagreement]
-    spoilt: bool
+@final
+class Finding:
+    @property
+    def channel(self) -> str: ...
+    @property
+    def covariate(self) -> str: ...
+    @property
+    def log(self) -> int | None: ...
+    @property
+    def ln_bayes(self) -> float: ...
+    @property
+    def drop(self) -> float: ...
+    @property
+    def channels(self) -> list[int]: ...
+    @property
+    def shape(self) -> str: ...
+    @property
+    def probe(self) -> int | None: ...
+
+@final
+class Disagreement:
+    @property
+    def slot(self) -> int: ...
+    @property
+    def log(self) -> int: ...
+    @property
+    def own(self) -> list[tuple[float, float]]: ...
+    @property
+    def others(self) -> list[tuple[float, float]]: ...
+    @property
+    def ln_bayes(self) -> float: ...
+    @property
+    def wild(self) -> bool: ...
+
+@final
+class Verdict:
+    @property
+    def kind(self) -> Kind: ...
+    @property
+    def best(self) -> int | None: ...
+    @property
+    def rivals(self) -> list[int]: ...
+    @property
+    def candidates(self) -> list[Candidate]: ...
+    @property
+    def correlations(self) -> list[tuple[int, int, float]]: ...
+    @property
+    def findings(self) -> list[Finding]: ...
+    @property
+    def disagreements(self) -> list[Disagreement]: ...
+    @property
+    def spoilt(self) -> bool: ...
 
 class _ChannelResidual(TypedDict):
     channel: str
@@ -505,20 +585,32 @@ class _Residual(TypedDict):
 class Problem:
     def __new__(
         cls,
-        logs: Sequence[tuple[Evidence, Evidence, Sequence[float], Sequence[float], Sequence[int]]],
+        logs: Sequence[
+            tuple[Evidence, Evidence, Sequence[float], Sequence[Sequence[float]], Sequence[float], Sequence[int]]
+        ],
         own: Sequence[bool],
     ) -> Problem: ...
     @property
     def blocks(self) -> int: ...
     def places(self, log: int) -> list[int]: ...
     def estimate(self, slots: Sequence[int]) -> _Estimate: ...
-    def diagnose(self, model: Sequence[int], candidates: Sequence[int], probes: Sequence[int] = ...) -> _Verdict: ...
+    def diagnose(
+        self,
+        model: Sequence[int],
+        candidates: Sequence[int],
+        probes: Sequence[int] = ...,
+        fitted: Sequence[tuple[int, float]] = ...,
+        column_noise: Sequence[tuple[int, float]] = ...,
+        seen: Sequence[tuple[int | None, int, float, str]] = ...,
+    ) -> Verdict: ...
+    def ln_evidence(self, slots: Sequence[int]) -> float: ...
+    def zero_noise(self, slots: Sequence[int]) -> list[tuple[int, int, float, float, float]]: ...
     def revisions(
         self, model: Sequence[int], members: Sequence[int], candidates: Sequence[int]
     ) -> list[tuple[int, int | None]]: ...
     def residual(self, step: _Numbers, log: int = 0) -> _Residual: ...
 
-def saturate(evidence: Evidence) -> tuple[_Array, list[float]]: ...
+def saturate(evidence: Evidence) -> tuple[_Array, list[float], list[list[float]]]: ...
 
 # --- calibration: sides are numbered +x -x +y -y +z -z; m/s^2, rad/s, rad
 

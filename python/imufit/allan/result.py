@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from imufit.allan.terms import TERMS, Term, basis, dominant
@@ -18,6 +17,7 @@ from imufit.results.json_value import json_value
 from imufit.results.table import html, page
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -270,6 +270,8 @@ class Allan:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Table with one row for each channel and averaging time: channel, tau, deviation, low, high, freedom."""
+        import pandas as pd  # noqa: PLC0415  heavy, and only needed here
+
         frames = [
             pd.DataFrame(
                 {

@@ -7,8 +7,8 @@ from imufit.calibrate.calibrate import calibrate
 from imufit.calibrate.calibration import Calibration, SensorCalibration
 from imufit.calibrate.guide import Advice, PoseGuide
 from imufit.calibrate.live import calibrate_live
-from imufit.calibrate.poses import Pose, find_poses
 from imufit.calibrate.wizard import Stage, Wizard
+from imufit.rests.poses import Pose, find_poses
 
 __all__ = [
     "Advice",

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.calibrate.calibration import AXES, SensorCalibration, named, off_diagonal, rms
-from imufit.calibrate.poses import SAME_DIRECTION, UP, Pose
 from imufit.calibrate.temperature import Temperature
 from imufit.errors import InputError
+from imufit.rests.poses import SAME_DIRECTION, UP, Pose
 
 if TYPE_CHECKING:
     from imufit._imufit import _Solution

@@ -11,10 +11,12 @@ from imufit import _imufit
 from imufit.calibrate import accelerometer, checks, gyroscope
 from imufit.calibrate.calibration import Calibration, SensorCalibration
 from imufit.calibrate.magnetometer import fit_magnetometer
-from imufit.calibrate.poses import Found, Pose, distinct, find_poses, repeated
 from imufit.calibrate.temperature import Temperature
 from imufit.errors import InputError
-from imufit.model.sensor_model import SensorModel
+from imufit.loop import SensorModel
+from imufit.rests.poses import Found, Pose, distinct, find_poses, repeated
+from imufit.rests.turns import find_turns
+from imufit.rests.unit import check_unit
 
 if TYPE_CHECKING:
     from imufit.log import Log
@@ -109,7 +111,7 @@ class _Session:
         failures: list[InputError] = []
         temperature: Temperature | None = None
         if self.poses and ("acc" in wanted or "gyr" in wanted):
-            checks.check_unit(self.used or self.poses, self.gravity, self.file)
+            check_unit(self.used or self.poses, self.gravity, self.file)
         for name in wanted:
             mean = np.nan if temperature is None or temperature.mean is None else temperature.mean
             try:
@@ -204,7 +206,7 @@ class _Session:
         if len(self.logs) > 1 or self.logs[0].gyr is None or len(poses) < 8:
             return plain
         # Headings from the gyro between the poses: then a tilt of the table does not pass for misalignment.
-        turns = gyroscope.find_turns(self.logs[0], poses, self.found[0].gyr_noise, self.gravity)
+        turns = find_turns(self.logs[0], poses, self.found[0].gyr_noise, self.gravity)
         gyr = gyroscope.fit_gyroscope([turns], poses)
         matrix = np.eye(3) if gyr is None else gyr.matrix
         found = gyroscope.table_attitudes(turns, poses, matrix)
@@ -234,6 +236,7 @@ class _Session:
 
     def _gyroscope(self, acc: SensorCalibration | None, mean: float) -> SensorCalibration | None:
         turns, rests = [], []
+        correct = None if acc is None else acc.correct
         for index, (log, found) in enumerate(zip(self.logs, self.found, strict=True)):
             if log.gyr is None or log.acc is None:
                 continue
@@ -241,6 +244,6 @@ class _Session:
             every = find_poses(log, index, settings=self.settings, labelled_only=False) if found.labelled else found
             resting = [pose for pose in every.poses if pose.used]
             if resting:
-                turns.append(gyroscope.find_turns(log, resting, every.gyr_noise, self.gravity, acc, mean))
+                turns.append(find_turns(log, resting, every.gyr_noise, self.gravity, correct, mean))
                 rests += resting
         return gyroscope.fit_gyroscope(turns, rests) if rests else None

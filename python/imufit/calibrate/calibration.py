@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.calibrate.poses import Pose
 from imufit.errors import InputError
 from imufit.figures import quantity
 from imufit.log.contents import SENSOR_NAMES
-from imufit.model.sensor_model import SensorModel
+from imufit.loop import SensorModel
+from imufit.rests.poses import Pose
 from imufit.results.json_value import json_value
 from imufit.results.parameter import by_effect, parameter_frame, parameter_table
 from imufit.results.table import Table, html, page

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.calibrate.poses import SAME_DIRECTION, SIDES
+from imufit.rests.poses import SAME_DIRECTION, SIDES
 
 Array = NDArray[np.float64]
 

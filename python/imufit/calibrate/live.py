@@ -9,11 +9,11 @@ from typing import Any, Final
 
 from imufit.calibrate.calibrate import calibrate
 from imufit.calibrate.calibration import Calibration
-from imufit.calibrate.poses import SIDES
 from imufit.calibrate.wizard import Stage, Wizard
 from imufit.errors import InputError
 from imufit.log import Log, read
 from imufit.record import LiveConverter, record
+from imufit.rests.poses import SIDES
 
 PATIENCE: Final = 300.0
 """Time without anything new after which a live calibration is given up, s."""

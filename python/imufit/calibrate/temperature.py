@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from imufit._imufit import _Solution
-    from imufit.calibrate.poses import Pose
+    from imufit.rests.poses import Pose
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from imufit.calibrate.free_turning import ENOUGH, FreeTurning
 from imufit.calibrate.guide import PoseGuide
-from imufit.calibrate.poses import SIDES
+from imufit.rests.poses import SIDES
 
 Array = NDArray[np.float64]
 Batch = Mapping[str, Array]

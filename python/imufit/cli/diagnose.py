@@ -41,7 +41,7 @@ def diagnose(
     and a log that disagrees is named.
 
     A LOG without reference attitude is judged by its rests, the turns between them and the length of the magnetic
-    field, and the answer says what that cannot tell.
+    field; six poses labelled in the column pose are enough. The answer says what that cannot tell.
     """
     keep_inputs([*logs, model], [json_file, html_file, plot_file])
     output = Output(json_file)

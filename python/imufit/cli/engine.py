@@ -70,7 +70,7 @@ def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
 
 def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     """Repeat diagnose and add until nothing is missing."""
-    from imufit.diagnose.ladder import ladder  # noqa: PLC0415
+    from imufit.loop import ladder  # noqa: PLC0415
 
     return ladder(logs, model=model, progress=progress)
 

@@ -9,15 +9,15 @@ from imufit.model.catalogue import find_effect
 from imufit.results import Addition
 
 if TYPE_CHECKING:
-    from imufit.fit import Fit
+    from imufit.fit import FittedStack
 
 
-def add(fit: Fit, effect_id: str, expected: float | None = None) -> Addition:
+def add(fit: FittedStack, effect_id: str, expected: float | None = None) -> Addition:
     """Add an effect to a fitted model and refit.
 
     Parameters
     ----------
-    fit : Fit
+    fit : FittedStack
         Where to start from.
     effect_id : str
         The effect.

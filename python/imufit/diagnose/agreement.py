@@ -2,40 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Collection, Sequence
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from imufit import _imufit
 from imufit.fit.analysis import Analysis
 from imufit.log.several import name_of
 from imufit.model.catalogue import find_effect
 from imufit.results import Diagnosis, Disagreement, Parameter, Without
 
 if TYPE_CHECKING:
-    from imufit.fit import Fit
+    from imufit.fit import FittedStack
 
 
-def disagreements(analysis: Analysis, found: Sequence[Mapping[str, Any]]) -> tuple[Disagreement, ...]:
+def disagreements(analysis: Analysis, found: Sequence[_imufit.Disagreement]) -> tuple[Disagreement, ...]:
     """Name logs and effects of what the evidence says of disagreeing logs.
 
     Parameters
     ----------
     analysis : Analysis
         The evidence.
-    found : sequence of mapping
-        Its words: slot, log, parameters by that log and by the others.
+    found : sequence of _imufit.Disagreement
+        What it says: slot, log, parameters by that log and by the others.
     """
     out = []
     for item in found:
-        key = analysis.slots[item["slot"]]
-        log = item["log"]
+        key = analysis.slots[item.slot]
+        log = item.log
         out.append(
             Disagreement(
                 name_of(analysis.logs[log].surveyed.log, log),
                 key,
-                _named(analysis, key, item["own"]),
-                _named(analysis, key, item["others"]),
-                item["p_value"],
-                item["wild"],
+                _named(analysis, key, item.own),
+                _named(analysis, key, item.others),
+                float(np.exp(-item.ln_bayes)),
+                item.wild,
             )
         )
     return tuple(out)
@@ -52,30 +55,30 @@ def _named(analysis: Analysis, key: str, steps: Sequence[tuple[float, float]]) -
 
 
 def answers_without(
-    fit: Fit, found: Sequence[Mapping[str, Any]], diagnose: Callable[[Fit], Diagnosis]
+    fit: FittedStack, found: Sequence[_imufit.Disagreement], diagnose: Callable[[FittedStack], Diagnosis]
 ) -> tuple[Without, ...]:
     """Ask again without the logs that disagree wildly; of logs that all do, ask each alone.
 
     Parameters
     ----------
-    fit : Fit
+    fit : FittedStack
         To all logs.
     found : sequence of mapping
         As for :func:`disagreements`.
     diagnose : callable
         Asks the question of a fit.
     """
-    return _without(fit, {item["log"] for item in found if item["wild"]}, diagnose)
+    return _without(fit, {item.log for item in found if item.wild}, diagnose)
 
 
 def answers_without_faulty(
-    fit: Fit, files: Collection[str], diagnose: Callable[[Fit], Diagnosis]
+    fit: FittedStack, files: Collection[str], diagnose: Callable[[FittedStack], Diagnosis]
 ) -> tuple[Without, ...]:
     """Ask again without the logs whose data are at fault; nothing where all are, or where there is only one.
 
     Parameters
     ----------
-    fit : Fit
+    fit : FittedStack
         To all logs.
     files : collection of str
         What the logs at fault are called.
@@ -86,7 +89,9 @@ def answers_without_faulty(
     return _without(fit, faulty, diagnose) if 0 < len(faulty) < len(fit.logs) else ()
 
 
-def _without(fit: Fit, spoiling: Collection[int], diagnose: Callable[[Fit], Diagnosis]) -> tuple[Without, ...]:
+def _without(
+    fit: FittedStack, spoiling: Collection[int], diagnose: Callable[[FittedStack], Diagnosis]
+) -> tuple[Without, ...]:
     everything = range(len(fit.logs))
     rest = [log for log in everything if log not in spoiling]
     names = [name_of(log, k) for k, log in enumerate(fit.logs)]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from imufit.errors import InputError
+from imufit.fit.apply import apply
 from imufit.log import Log
 from imufit.progress import Progress, silent
 from imufit.replay import Replay, replay
@@ -23,7 +24,7 @@ from imufit.results.attitude import PARTS, AttitudeBins, AttitudeComparison, Att
 
 if TYPE_CHECKING:
     from imufit.log import LogSource
-    from imufit.model import SensorModel
+    from imufit.model import EffectStack
 
 Array = NDArray[np.float64]
 
@@ -47,13 +48,13 @@ CAUSES = {
 
 
 def attitude_comparison(
-    model: SensorModel, log: LogSource, filter_name: str = FILTER, progress: Progress = silent
+    model: EffectStack, log: LogSource, filter_name: str = FILTER, progress: Progress = silent
 ) -> AttitudeComparison | None:
     """Run a filter over a log without and with a model applied, and say what its error goes with.
 
     Parameters
     ----------
-    model : SensorModel
+    model : EffectStack
         Effects to take out of the readings; a delay of the reference and a turned field are undone as well.
     log : Log or LogStream
         With reference attitude. A log that stays on disk is not judged.
@@ -102,34 +103,36 @@ def attitude_comparison(
     )
 
 
-def corrected(model: SensorModel, log: Log) -> Log:
-    """Return a log with the model's effects taken out of the readings, its delay out of the reference.
+def corrected(model: EffectStack, log: Log) -> Log:
+    """Return a log with the model's effects taken out of the readings, its delay and its skew out of the reference.
 
     Parameters
     ----------
-    model : SensorModel
+    model : EffectStack
         With fitted parameters.
     log : Log
         With reference attitude.
     """
-    result = model.apply(log)
-    if "ref.delay" in model.effects and result.ref_q is not None:
-        result = replace(result, ref_q=_shifted(result.t, result.ref_q, model.parameters["ref.delay"]["tau"]))
-    field = result.metadata.mag_reference
-    if "mag.field_reference" in model.effects and field is not None:
-        change = model.parameters["mag.field_reference"]
-        true_field = (field[0] + change["x"], field[1] + change["y"], field[2] + change["z"])
-        result = replace(result, metadata=replace(result.metadata, mag_reference=true_field))
+    result = apply(model, log)
+    lateness = np.zeros(len(log.t))
+    for effect, _ in model.stack():
+        values, field = model.parameters[effect.id], result.metadata.mag_reference
+        if effect.reference_part == "time":
+            lateness += values.get("tau", 0.0) + values.get("k", 0.0) * (log.t - log.t[0])
+        elif effect.reference_part == "field" and field is not None:
+            true_field = (field[0] + values["x"], field[1] + values["y"], field[2] + values["z"])
+            result = replace(result, metadata=replace(result.metadata, mag_reference=true_field))
+    if result.ref_q is not None and np.any(lateness):
+        result = replace(result, ref_q=_read_at(result.t + lateness, result.t, result.ref_q))
     return result
 
 
-def _shifted(t: Array, q: Array, tau: float) -> Array:
-    """Attitude as it is recorded `tau` later; NaN beyond the ends and beside gaps."""
+def _read_at(at: Array, t: Array, q: Array) -> Array:
+    """Attitude as it is recorded at the stamps `at`; NaN beyond the ends and beside gaps."""
     known = np.flatnonzero(np.isfinite(q).all(axis=1))
     shifted = np.full_like(q, np.nan)
     if known.size < 2:
         return shifted
-    at = t + tau
     inside = np.isfinite(q).all(axis=1) & (at >= t[known[0]]) & (at <= t[known[-1]])
     between = Slerp(t[known], Rotation.from_quat(q[known][:, [1, 2, 3, 0]]))
     shifted[inside] = between(at[inside]).as_quat()[:, [3, 0, 1, 2]]

@@ -20,9 +20,9 @@ from imufit.progress import Progress
 from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
 
 if TYPE_CHECKING:
-    from imufit.fit import Fit
+    from imufit.fit import FittedStack
     from imufit.log import LogSource
-    from imufit.model import SensorModel
+    from imufit.model import EffectStack
 
 Array = NDArray[np.float64]
 
@@ -35,12 +35,12 @@ OFF_FLOOR = 1.2
 """Stated noise is doubted where what nothing explains differs from it by this factor."""
 
 
-def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
+def compare(fit: FittedStack, log: LogSource | None, progress: Progress) -> Comparison:
     """Hold a fitted model against a log (default: its own, of several the worst), the parameters as they are.
 
     Parameters
     ----------
-    fit : Fit
+    fit : FittedStack
         The fitted model.
     log : Log or LogStream, optional
         The log; None is the fit's own.
@@ -55,12 +55,12 @@ def compare(fit: Fit, log: LogSource | None, progress: Progress) -> Comparison:
     return _with_attitude(found, fit.model_of(own), fit.logs[own], progress)
 
 
-def compare_model(model: SensorModel, log: LogSource, progress: Progress) -> Comparison:
+def compare_model(model: EffectStack, log: LogSource, progress: Progress) -> Comparison:
     """Hold a model against a log, its parameters as they are.
 
     Parameters
     ----------
-    model : SensorModel
+    model : EffectStack
         The model.
     log : Log or LogStream
         With reference attitude.
@@ -73,7 +73,7 @@ def compare_model(model: SensorModel, log: LogSource, progress: Progress) -> Com
     return _with_attitude(found, model, log, progress)
 
 
-def _with_attitude(found: Comparison, model: SensorModel, log: LogSource, progress: Progress) -> Comparison:
+def _with_attitude(found: Comparison, model: EffectStack, log: LogSource, progress: Progress) -> Comparison:
     return replace(found, attitude=attitude_comparison(model, log, progress=progress))
 
 

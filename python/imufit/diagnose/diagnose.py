@@ -8,56 +8,46 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from imufit import _imufit
+from imufit._imufit import Kind, Status, Verdict
 from imufit.diagnose import sentences, without_reference
 from imufit.diagnose.agreement import answers_without, answers_without_faulty, disagreements
-from imufit.diagnose.better_explained import with_better_explained
+from imufit.diagnose.column_noise import column_noise
 from imufit.diagnose.compare import notes
-from imufit.diagnose.fast_changes import with_fast_changes
-from imufit.diagnose.measured_columns import with_measured_columns
-from imufit.diagnose.rivals import correlations_with_best
-from imufit.diagnose.unusual_size import with_unusual_size
-from imufit.fit.analysis import OWN, Analysis, Estimate, pooled
+from imufit.diagnose.fast_changes import Seen, fast_changes
+from imufit.diagnose.judged import above_stated_noise, judged
+from imufit.diagnose.noise_budget import noise_budget
+from imufit.fit.analysis import Analysis, pooled
 from imufit.fit.log_evidence import LogEvidence
 from imufit.fit.passes import CHANNELS
 from imufit.fit.rest_passes import RestPasses
 from imufit.log.several import name_of
-from imufit.model.catalogue import card_of
+from imufit.model.catalogue import card_of, each_log_has_its_own
 from imufit.results import Candidate, DataFault, Diagnosis, LogParameters, Parameter, Rival, Unexplained
-from imufit.results.diagnosis import NOT_TESTABLE
+from imufit.results.diagnosis import PASSED
 
 if TYPE_CHECKING:
-    from imufit.fit import Fit
+    from imufit.fit import FittedStack
 
 Array = NDArray[np.float64]
 
-ALPHA = 0.003
 MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
-CLEARLY_WORSE = 0.1
-"""Share of the drop in held-out error by which a fit must stay behind the best one to be out."""
-TOLD = 12.0
-"""... and sum of squares, in units of the noise. If the other one is true, a fit gains that much once in 3000 times."""
-LEFT = 1.0
-"""... or, if it stays behind in every part of the log, times what the best one leaves above the noise floor."""
-NEVER_AHEAD = 4.0 * TOLD
-"""In every part of the log is: in each, or by so much as a whole and in none ahead for certain."""
-NEAR = 0.5
-"""Share of the best one's gain from which on a fit may show that another candidate explains more."""
+NEAR = 0.8
+"""Share of the best one's log Bayes factor from which on a fit may show that another candidate explains more."""
 BESIDE = 10.0
 """An effect is named beside a fault of the data only if it explains this many times more."""
 POWER = 0.84
-"""Standard errors beyond the threshold at which an effect is seen with 80 % power."""
+"""Standard errors beyond the size that is seen as often as not at which an effect is seen with 80 % power."""
 
 
-def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
-    """Rank every effect that is not in the model by held-out error, and decide.
+def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
+    """Rank every effect that is not in the model by its evidence, and decide.
 
     Parameters
     ----------
-    fit : Fit
+    fit : FittedStack
         The model and the evidence of its log.
     excluded : sequence of str
         Candidates that are not to be considered.
@@ -66,30 +56,18 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
     if any(fault.spoils for fault in analysis.faults):
         return _spoilt(fit, analysis.faults)
     ids = analysis.slots
-    slots = [slot for slot in analysis.candidate_slots if ids[slot] not in excluded]
-    result: Mapping[str, Any] = analysis.problem.diagnose(analysis.fitted_slots, slots, analysis.probe_slots)
-    result = _decided_by_fits(fit, with_unusual_size(analysis, result, slots))
-    result = with_measured_columns(analysis, result)
-    result = with_better_explained(analysis, result)
-    result = with_fast_changes(analysis, fit.estimate.step, fit.ratio, result)
+    result = _decided(fit, excluded)
     confounded: dict[str, list[Rival]] = {}
-    for first, second, correlation in result["correlations"]:
+    for first, second, correlation in result.correlations:
         if correlation < MIN_CORRELATION:
             continue
         confounded.setdefault(ids[first], []).append(Rival(ids[second], correlation))
         confounded.setdefault(ids[second], []).append(Rival(ids[first], correlation))
-    tested = max(sum(item["testable"] for item in result["screened"]), 1)
     candidates = [
-        _candidate(
-            item,
-            analysis.candidates[ids[item["slot"]]],
-            confounded.get(ids[item["slot"]], []),
-            tested,
-            analysis,
-        )
-        for item in result["screened"]
+        _candidate(item, analysis.candidates[ids[item.slot]], confounded.get(ids[item.slot], []), analysis)
+        for item in result.candidates
     ]
-    largest = max((c.gain for c in candidates if c.status == "passed"), default=0.0)
+    largest = max((c.gain for c in candidates if c.status == PASSED), default=0.0)
     # A fault is one log's, an effect explains something in all of them.
     largest /= len(analysis.logs)
     faults = tuple(replace(fault, spoils=fault.gain * BESIDE > largest) for fault in analysis.faults)
@@ -97,30 +75,31 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         return _spoilt(fit, faults)
     by_id = {candidate.effect: candidate for candidate in candidates}
     cards = {key: card_of(analysis.candidates[key]) for key in by_id}
-    best = None if result["best"] is None else ids[result["best"]]
-    rivals = tuple(ids[slot] for slot in result["rivals"])
-    word = result["verdict"]
-    unexplained = _unexplained(analysis, fit.estimate.step, result["unexplained"])
-    named = best if word in ("missing", "ambiguous") else None
-    disagrees = disagreements(analysis, result["disagreements"])
-    without = answers_without(fit, result["disagreements"], diagnose) if result["spoilt"] else ()
+    best = None if result.best is None else ids[result.best]
+    rivals = tuple(ids[slot] for slot in result.rivals)
+    word = result.kind.word
+    unexplained = _unexplained(analysis, fit.estimate.step, result.findings)
+    disagrees = disagreements(analysis, result.disagreements)
+    without = answers_without(fit, result.disagreements, diagnose) if result.spoilt else ()
     doubtful = next((candidate for candidate in candidates if candidate.status in sentences.DOUBTS), None)
     sentence = sentences.verdict(
         word, by_id[best] if best else None, cards[best] if best else None, rivals, unexplained, doubtful
     )
     unshown = without_reference.untold(fit)
-    if word == "adequate" and "rests" in without_reference.evidence_of(analysis):
+    if result.kind == Kind.ADEQUATE and "rests" in without_reference.evidence_of(analysis):
         sentence = without_reference.adequate(fit.ratio, [candidate.effect for candidate in unshown])
-    elif word == "adequate" and fit.ratio > sentences.OFF_FLOOR:
+    elif result.kind == Kind.ADEQUATE and fit.ratio > sentences.OFF_FLOOR:
         sentence = sentences.above_floor(fit.ratio)
-    sentence = sentences.with_disagreements(sentence, disagrees, spoilt=result["spoilt"])
+    sentence = sentences.with_disagreements(sentence, disagrees, spoilt=result.spoilt)
+    sensors = judged(analysis)
+    sentence = sentences.with_judged(sentence, sensors, adequate=result.kind == Kind.ADEQUATE)
     experiment = None
-    if word == "ambiguous" and best is not None:
+    if result.kind == Kind.AMBIGUOUS and best is not None:
         experiment = sentences.experiment(cards[best], [cards[rival] for rival in rivals])
     return Diagnosis(
         verdict=word,
-        best=named,
-        ambiguous_with=rivals if word == "ambiguous" else (),
+        best=best if result.kind in (Kind.MISSING, Kind.AMBIGUOUS) else None,
+        ambiguous_with=rivals if result.kind == Kind.AMBIGUOUS else (),
         candidates=(*candidates, *unshown),
         unexplained=unexplained,
         model=analysis.model.effects,
@@ -132,10 +111,71 @@ def diagnose(fit: Fit, excluded: Sequence[str] = ()) -> Diagnosis:
         without=without,
         data_faults=faults,
         evidence=without_reference.evidence_of(analysis),
+        judged=sensors,
+        noise=noise_budget(analysis),
     )
 
 
-def _spoilt(fit: Fit, faults: tuple[DataFault, ...]) -> Diagnosis:
+def _decided(fit: FittedStack, excluded: Sequence[str]) -> Verdict:
+    """Ask the evidence; where rows or fits have more to say, ask again with what these say."""
+    analysis = fit.analysis
+    slots = [slot for slot in analysis.candidate_slots if analysis.slots[slot] not in excluded]
+    asked = analysis.fitted_slots, slots, analysis.probe_slots
+    noise = column_noise(analysis)
+    result = analysis.problem.diagnose(*asked, column_noise=noise)
+    fitted = _fitted_alone(fit, result)
+    seen = _above_stated(analysis)
+    if result.best is None:
+        seen += fast_changes(analysis, fit.estimate.step)
+    if fitted or seen:
+        result = analysis.problem.diagnose(*asked, fitted=fitted, column_noise=noise, seen=seen)
+    return result
+
+
+def _above_stated(analysis: Analysis) -> list[Seen]:
+    """Name the channels that stand far above their stated noise, whatever that goes with."""
+    several = len(analysis.logs) > 1
+    return [
+        (log if several else None, index, 0.5 * ratio**2, f"it stands at {ratio:.1f} times its stated noise")
+        for log, evidence in enumerate(analysis.logs)
+        if not isinstance(evidence.passes, RestPasses)
+        for index, ratio in above_stated_noise(evidence).items()
+    ]
+
+
+def _fitted_alone(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
+    """Log evidences of the best candidate and others like it, each from a fit of its own, by slot.
+
+    Columns taken at one point say little of a delay as long as a turn takes, or of play in a drive; a late sensor and
+    a sluggish one have the same column. What the columns set apart by far needs no fit, unless they depend on a search.
+    """
+    analysis = fit.analysis
+    ids = analysis.slots
+    best = result.best
+    if best is None or not analysis.candidates[ids[best]].strongly_curved:
+        return []
+    items = {item.slot: item for item in result.candidates}
+    alike = {second for _, second, correlation in result.correlations if correlation >= MIN_CORRELATION}
+    near = {slot for slot in alike if items[slot].ln_bayes >= NEAR * items[best].ln_bayes}
+    close = [
+        slot
+        for slot, item in items.items()
+        if item.status != Status.NOT_TESTABLE
+        and analysis.candidates[ids[slot]].strongly_curved
+        and (slot == best or slot in result.rivals or slot in near or ids[slot] in analysis.found)
+    ]
+    if len(close) < 2:
+        return []
+    return [(slot, _evidence_of(fit, ids[slot])) for slot in close]
+
+
+def _evidence_of(fit: FittedStack, effect: str) -> float:
+    """Return the log evidence of the model with one more effect, around its best parameters."""
+    analysis, _ = fit.analysis.solved_for(fit.model.with_effect(effect), fit.own, only=())
+    return analysis.problem.ln_evidence(analysis.fitted_slots)
+
+
+def _spoilt(fit: FittedStack, faults: tuple[DataFault, ...]) -> Diagnosis:
     """Name the faults of the data that explain what is missing, and no effect."""
     spoiling = [fault for fault in faults if fault.spoils]
     return Diagnosis(
@@ -155,78 +195,7 @@ def _spoilt(fit: Fit, faults: tuple[DataFault, ...]) -> Diagnosis:
     )
 
 
-def _decided_by_fits(fit: Fit, result: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Where columns taken at one point mislead, let fits decide between the best candidate and others of that kind.
-
-    A drive with play and a late reference look alike while a rig goes back and forth at one speed, and their columns
-    say little of how well they do at their full size. A late sensor and a sluggish one have the same column. One of
-    them is out if its fit stays clearly behind, or leaves something that the best one explains. What the columns tell
-    apart by far needs no fit, unless they depend on a search: of a delay as long as a turn takes they show only a part.
-    """
-    analysis = fit.analysis
-    ids = analysis.slots
-    best = result["best"]
-    if best is None or not analysis.candidates[ids[best]].strongly_curved:
-        return result
-    items = {item["slot"]: dict(item) for item in result["screened"]}
-    alike = [slot for slot, correlation in correlations_with_best(result).items() if correlation >= MIN_CORRELATION]
-    near = [slot for slot in alike if items[slot]["passed"] and items[slot]["gain"] >= NEAR * items[best]["gain"]]
-    close = [
-        slot
-        for slot, item in items.items()
-        if item["testable"]
-        and analysis.candidates[ids[slot]].strongly_curved
-        and (slot == best or slot in result["rivals"] or slot in near or ids[slot] in analysis.found)
-    ]
-    if len(close) < 2:
-        return result
-    fits = {slot: _with(fit, ids[slot], [ids[other] for other in close if other != slot]) for slot in close}
-    for slot in close:
-        items[slot]["held_out_after"] = fits[slot][1].held_out
-    won = min(close, key=lambda slot: fits[slot][1].held_out)
-    best_fit = fits[won][1]
-    lost = [
-        slot
-        for slot, (fitted, estimate) in fits.items()
-        if slot != won and (_stays_behind(estimate, best_fit, fit.ratio) or _leaves(fitted, ids[won]))
-    ]
-    if best not in lost:
-        won = best
-    # Explaining more than a candidate that passed, by fits, is as significant.
-    items[won] |= {"passed": True, "p_value": min(items[won]["p_value"], items[best]["p_value"])}
-    rivals = [slot for slot in result["rivals"] if slot not in (won, *lost)]
-    word = "missing" if result["verdict"] == "ambiguous" and not rivals else result["verdict"]
-    rest = [items[item["slot"]] for item in result["screened"] if item["slot"] != won]
-    return {**result, "best": won, "rivals": rivals, "screened": [items[won], *rest], "verdict": word}
-
-
-def _with(fit: Fit, effect: str, others: Sequence[str]) -> tuple[Analysis, Estimate]:
-    """Fit one candidate, with the columns of some others around it."""
-    return fit.analysis.solved_for(fit.model.with_effect(effect), fit.own, only=others)
-
-
-def _stays_behind(estimate: Estimate, best: Estimate, before: float) -> bool:
-    """Return whether a fit is behind by more than chance, and clearly or everywhere: see the constants above."""
-    behind = estimate.folds - best.folds
-    # What one part alone tells may be its own doing: shaking that does not fit the filter, a reference that jumps.
-    if np.sum(behind) - np.max(behind) < TOLD:
-        return False
-    worse = estimate.held_out - best.held_out
-    # By so much the ratio of a whole model may stand above one; the sum of squares is about the number of samples.
-    chance = 2.0 / np.sqrt(2.0 * np.sum(best.folds))
-    never_ahead = np.all(behind > -TOLD) and np.sum(behind) >= NEVER_AHEAD
-    everywhere = (np.all(behind > 0.0) or never_ahead) and worse >= LEFT * (best.held_out - 1.0 - chance)
-    return bool(everywhere) or worse > CLEARLY_WORSE * (before - best.held_out)
-
-
-def _leaves(analysis: Analysis, other: str) -> bool:
-    """Return whether a fit of one candidate leaves something that another one explains."""
-    return analysis.problem.diagnose(analysis.fitted_slots, [analysis.slots.index(other)])["best"] is not None
-
-
-def _candidate(
-    item: Mapping[str, Any], effect: _imufit.Effect, rivals: list[Rival], tested: int, analysis: Analysis
-) -> Candidate:
+def _candidate(item: _imufit.Candidate, effect: _imufit.Effect, rivals: list[Rival], analysis: Analysis) -> Candidate:
     found = analysis.found.get(effect.id)
     searched = {} if found is None else dict(zip((name for name, _, _ in effect.parameters), found.trial, strict=True))
     grid = {name: searched[name] for name in effect.searched if name in searched}
@@ -238,26 +207,29 @@ def _candidate(
         )
 
     # Of one log after the other, where each has its own.
-    by_log = np.asarray(item["parameters"]).reshape(-1, len(effect.parameters), 2)
+    by_log = np.asarray(item.parameters).reshape(-1, len(effect.parameters), 2)
     parameters = named(*pooled(by_log[..., 0], by_log[..., 1]))
-    threshold = -float(stdtrit(analysis.problem.blocks - 1, ALPHA / tested / 2)) + POWER
+    # Of logs that have their own, the one that would show it first.
+    sizes = np.asarray(item.detectable).reshape(-1, len(effect.parameters)).min(axis=0)
     detectable = {
-        p.name: (threshold * p.standard_error, p.unit)
-        for p in parameters
-        if item["testable"] and np.isfinite(p.standard_error) and p.standard_error > 0
+        p.name: (float(size) + POWER * p.standard_error, p.unit)
+        for p, size in zip(parameters, sizes, strict=True)
+        if item.status != Status.NOT_TESTABLE and np.isfinite(size) and p.standard_error > 0.0
     }
     candidate = Candidate(
         effect=effect.id,
-        p_value=item["p_value"],
-        expected_ratio=item["expected_ratio"],
-        held_out_before=item["held_out_before"],
-        held_out_after=item["held_out_after"],
-        gain=item["gain"],
-        gain_error=item["gain_error"],
+        p_value=float(np.exp(-max(item.ln_bayes, 0.0))),
+        probability=item.probability,
+        ln_bayes=item.ln_bayes,
+        expected_ratio=item.held_out_after,
+        held_out_before=item.held_out_before,
+        held_out_after=item.held_out_after,
+        gain=item.gain,
+        gain_error=item.gain_error,
         parameters=parameters,
         confounded_with=tuple(sorted(rivals, key=lambda rival: -rival.correlation)),
         explanation="",
-        status=_status(item),
+        status=item.status.words,
         minimal_detectable=detectable,
         logs=_own_parameters(analysis, effect.id, [named(at[:, 0], at[:, 1]) for at in by_log]),
     )
@@ -268,7 +240,7 @@ def _own_parameters(
     analysis: Analysis, effect_id: str, values: Sequence[tuple[Parameter, ...]]
 ) -> tuple[LogParameters, ...]:
     """Parameters of an effect by log, where there are several logs and each has its own."""
-    if len(analysis.logs) == 1 or effect_id not in OWN:
+    if len(analysis.logs) == 1 or not each_log_has_its_own(effect_id):
         return ()
     logs = analysis.having(effect_id)
     return tuple(
@@ -276,21 +248,7 @@ def _own_parameters(
     )
 
 
-def _status(item: Mapping[str, Any]) -> str:
-    if not item["testable"]:
-        return NOT_TESTABLE
-    if item["passed"]:
-        return "passed"
-    if not item["agreed"]:
-        return "logs disagree"
-    if not item["stable"]:
-        return "differs between halves"
-    if item["other_sign"]:
-        return "negative delay"
-    return "not significant" if item["plausible"] else "implausible size"
-
-
-def _unexplained(analysis: Analysis, step: Any, found: Sequence[Mapping[str, Any]]) -> tuple[Unexplained, ...]:
+def _unexplained(analysis: Analysis, step: Any, found: Sequence[_imufit.Finding]) -> tuple[Unexplained, ...]:
     """Dependences that nothing in the catalogue explains, with their share of the excess and where in time it lies."""
     if not found:
         return ()
@@ -298,48 +256,38 @@ def _unexplained(analysis: Analysis, step: Any, found: Sequence[Mapping[str, Any
     return tuple(_dependence(analysis, residuals, item) for item in found)
 
 
-def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item: Mapping[str, Any]) -> Unexplained:
+def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item: _imufit.Finding) -> Unexplained:
     """Say what one dependence is worth in the log where it is worth most."""
 
     def share(log: int) -> float:
         panels = residuals[log]["panels"]
-        same = (p["share"] for p in panels if (p["channel"], p["covariate"]) == (item["channel"], item["covariate"]))
+        same = (p["share"] for p in panels if (p["channel"], p["covariate"]) == (item.channel, item.covariate))
         return max(float(next(same, 0.0)), _share(analysis.logs[log], residuals[log], item))
 
-    concerned = range(len(residuals)) if item["log"] is None else [item["log"]]
-    having = [log for log in concerned if any(c["channel"] == item["channel"] for c in residuals[log]["channels"])]
+    concerned = range(len(residuals)) if item.log is None else [item.log]
+    having = [log for log in concerned if any(c["channel"] == item.channel for c in residuals[log]["channels"])]
     log = max(having, key=share)
     facts = analysis.logs[log].facts
-    edges = analysis.logs[log].passes.edges(facts)
-    first, last = next(c["stretch"] for c in residuals[log]["channels"] if c["channel"] == item["channel"])
-    return Unexplained(
-        item["channel"], item["covariate"], share(log), item["shape"], float(edges[first]), float(edges[last])
-    )
+    first, last = next(c["stretch"] for c in residuals[log]["channels"] if c["channel"] == item.channel)
+    spans = analysis.logs[log].passes.spans(facts)[first:last]
+    begin, end = float(spans[:, 0].min()), float(spans[:, 1].max())
+    return Unexplained(item.channel, item.covariate, share(log), item.shape, begin, end)
 
 
-def _share(evidence: LogEvidence, residual: Mapping[str, Any], item: Mapping[str, Any]) -> float:
-    """Return what a dependence explains of the excess of its channel in a log, bins or not.
-
-    Of columns of their own the error with them tells, of all axes of the sensor together. Of block means the whitened
-    gain does: what changes so slowly is whitened by the filter's gain at no frequency.
-    """
-    k = CHANNELS.index(item["channel"]) if item["channel"] in CHANNELS else None
-    # A channel without any noise stands on one value.
-    if k is None or evidence.floors[k] == 0.0:
-        return 0.0
+def _share(evidence: LogEvidence, residual: Mapping[str, Any], item: _imufit.Finding) -> float:
+    """Return what a dependence explains of the excess of its channels in a log."""
     excess = {
-        each["index"]: each["n"] * ((each["rms"] / evidence.floors[each["index"]]) ** 2 - 1.0)
+        each["index"]: each["n"] * (each["rms"] ** 2 - evidence.floors[each["index"]] ** 2)
         for each in residual["channels"]
-        if evidence.floors[each["index"]] > 0.0
+        if each["index"] in item.channels and evidence.floors[each["index"]] > 0.0
     }
-    if item["held_out"] is not None:
-        before, after = item["held_out"]
-        drop = (before**2 - after**2) * sum(each["n"] for each in residual["channels"])
-        of = sum(excess.get(axis, 0.0) for axis in range(k - k % 3, k - k % 3 + 3))
-    else:
-        drop = item["gain"] * evidence.variance[k] / (evidence.slow_gain(k) * evidence.floors[k] ** 2)
-        of = excess.get(k, 0.0)
-    return float(np.clip(drop / of, 0.0, 1.0)) if of > 0.0 else 0.0
+    if item.channel not in CHANNELS or not excess:
+        return 0.0
+    # The drop is one of the whitened residual; what changes slowly passes whitening with its gain at zero frequency.
+    k = CHANNELS.index(item.channel)
+    drop = item.drop * evidence.variance[k] / max(evidence.slow_gain(k), 1e-9)
+    total = sum(excess.values())
+    return float(np.clip(drop / total, 0.0, 1.0)) if total > 0.0 else 0.0
 
 
 def _notes(analysis: Analysis) -> tuple[str, ...]:

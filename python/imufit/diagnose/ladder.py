@@ -2,37 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from typing import Any
+from collections.abc import Collection
 
 from imufit.diagnose.add import add
 from imufit.diagnose.attitude import attitude_comparison
 from imufit.diagnose.compare import comparison
 from imufit.diagnose.diagnose import diagnose
 from imufit.diagnose.revise import Swap, matters, revise
-from imufit.diagnose.without_reference import refuse_rests
-from imufit.fit import Fit
-from imufit.log.several import Logs
-from imufit.model import SensorModel
+from imufit.diagnose.without_reference import evidence_of
+from imufit.fit import FittedStack
 from imufit.progress import Progress, silent
-from imufit.results import Addition, Candidate, Diagnosis, Ladder, Revision, Step
+from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
+from imufit.results.diagnosis import PASSED
 
 MAX_STEPS = 12
 TOLD = 2.0
 """Standard errors that at least one parameter of an addition must be away from zero."""
-IRON = frozenset({"mag.hard_iron", "mag.soft_iron"})
-FIELD_VARIES = "the field varies in space"
 
 
-def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | None = None) -> Ladder:
+def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
     """Repeat diagnose and add until nothing is missing, or until the log cannot tell what is.
 
     Parameters
     ----------
-    log : Log, LogStream or a sequence of them
-        With reference attitude; several logs are of one sensor.
-    model : SensorModel, optional
-        Where to start from; default: the ideal sensor.
+    start : FittedStack
+        Where to start from: of logs with reference attitude, or with rests that stand in for one.
     progress : callable, optional
         Called with (rows done, rows in all, what is being done).
 
@@ -44,10 +38,8 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
     Raises
     ------
     InputError
-        The log has no usable reference, or an effect of the model cannot be tested on it.
+        The log has no usable reference.
     """
-    start = Fit.of(model or SensorModel(), log, progress)
-    refuse_rests(start.analysis, "the ladder")
     climb = Climb(start)
     climb.up()
     tried: set[Swap] = set()
@@ -57,6 +49,7 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
         climb = climb.again(revision)
         climb.up()
     fit, diagnosis, worst = climb.fit, climb.diagnosis, start.worst
+    whole = evidence_of(start.analysis) == "reference"
     return Ladder(
         steps=tuple(climb.steps),
         model=fit.model.effects,
@@ -65,8 +58,8 @@ def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | Non
         ratio_end=fit.ratio,
         attitude=attitude_comparison(fit.model_of(worst), fit.logs[worst], progress=progress or silent),
         diagnosis=diagnosis,
-        comparison_start=comparison(start.analysis, start.estimate.step, worst),
-        comparison_end=comparison(fit.analysis, fit.estimate.step, worst),
+        comparison_start=comparison(start.analysis, start.estimate.step, worst) if whole else None,
+        comparison_end=comparison(fit.analysis, fit.estimate.step, worst) if whole else None,
         first=climb.first,
         fit=fit,
         sentence=_sentence(start.ratio, fit.ratio, climb.steps, diagnosis),
@@ -79,14 +72,14 @@ class Climb:
 
     Parameters
     ----------
-    start : Fit
+    start : FittedStack
         Where it starts from.
     first : Diagnosis, optional
         What is missing there, if that is known.
 
     Attributes
     ----------
-    fit : Fit
+    fit : FittedStack
         The model so far.
     steps : list of Step
         Effects added so far.
@@ -96,7 +89,7 @@ class Climb:
         What was missing at the start.
     """
 
-    def __init__(self, start: Fit, first: Diagnosis | None = None) -> None:
+    def __init__(self, start: FittedStack, first: Diagnosis | None = None) -> None:
         self.start = self.fit = start
         self.steps: list[Step] = []
         self.first = self.diagnosis = first or diagnose(start)
@@ -136,12 +129,12 @@ class Climb:
         self.steps.append(step)
 
 
-def next_effect(fit: Fit, diagnosis: Diagnosis, futile: Collection[str] = ()) -> str | None:
+def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] = ()) -> str | None:
     """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well.
 
     Parameters
     ----------
-    fit : Fit
+    fit : FittedStack
         The model so far.
     diagnosis : Diagnosis
         What was found on top of it.
@@ -153,47 +146,20 @@ def next_effect(fit: Fit, diagnosis: Diagnosis, futile: Collection[str] = ()) ->
     if diagnosis.verdict == "ambiguous":
         effect = _beside_the_unsure(fit)
         return None if effect in futile else effect
-    passed = [c for c in diagnosis.candidates if c.status == "passed" and c.effect not in futile]
+    passed = [c for c in diagnosis.candidates if c.status == PASSED and c.effect not in futile]
     if diagnosis.verdict == "unknown":
-        # Beside what nothing explains, only effects that matter are taken up, and no iron of the sensor where the field
-        # itself is another from place to place.
-        varies = any(u.shape == FIELD_VARIES for u in diagnosis.unexplained)
-        passed = [
-            c for c in passed if matters(c.held_out_before, c.held_out_after) and not (varies and c.effect in IRON)
-        ]
-        passed = _beside_the_unexplained(fit, passed) if passed else []
+        # Beside what nothing explains, only effects that matter are taken up.
+        passed = [c for c in passed if matters(c.held_out_before, c.held_out_after)]
     return passed[0].effect if passed else None
 
 
-def _beside_the_unexplained(fit: Fit, passed: list[Candidate]) -> list[Candidate]:
-    """Return those that still pass beside the columns of what nothing explains, the largest one of each sensor.
-
-    A gain that follows the rate looks like a gain, too, but beside it there is none.
-    """
-    analysis = fit.analysis
-    fitted = list(analysis.fitted_slots)
-    found = analysis.problem.diagnose(fitted, list(analysis.candidate_slots), analysis.probe_slots)["unexplained"]
-    largest: dict[str, Mapping[str, Any]] = {}
-    for item in found:
-        sensor = item["channel"][:3]
-        if item["probe"] is not None and item["gain"] > largest.get(sensor, {"gain": 0.0})["gain"]:
-            largest[sensor] = item
-    if not largest:
-        return passed
-    slots = {analysis.slots.index(c.effect): c for c in passed}
-    probes = [item["probe"] for item in largest.values()]
-    beside = analysis.problem.diagnose([*fitted, *probes], list(slots))["screened"]
-    still = {item["slot"] for item in beside if item["passed"]}
-    return [candidate for slot, candidate in slots.items() if slot in still]
-
-
-def _beside_the_unsure(fit: Fit) -> str | None:
+def _beside_the_unsure(fit: FittedStack) -> str | None:
     """Return what stands out once one of the effects that cannot be told apart is in the model, whichever it is."""
     analysis = fit.analysis
     model, candidates = list(analysis.fitted_slots), list(analysis.candidate_slots)
     while True:
         result = analysis.problem.diagnose(model, candidates)
-        best, rivals = result["best"], result["rivals"]
+        best, rivals = result.best, result.rivals
         if best is None or not rivals:
             return None if best is None else analysis.slots[best]
         model.append(best)

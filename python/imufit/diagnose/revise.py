@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from imufit.results import Revision
 
 if TYPE_CHECKING:
-    from imufit.fit import Fit
+    from imufit.fit import FittedStack
 
 MATTERS = 0.002
 """Share of the held-out error that counts: less is no reason to add beside something unknown, to swap, or to keep."""
@@ -16,7 +16,7 @@ Swap = tuple[str | None, str | None]
 """An effect and what takes its place, if anything."""
 
 
-def revise(fit: Fit, added: Sequence[str], tried: set[Swap]) -> Revision | None:
+def revise(fit: FittedStack, added: Sequence[str], tried: set[Swap]) -> Revision | None:
     """Return the first swap or drop that a fit confirms.
 
     The evidence proposes, to first order; the fit of the other stack decides: a swap must lower the held-out error, a
@@ -24,7 +24,7 @@ def revise(fit: Fit, added: Sequence[str], tried: set[Swap]) -> Revision | None:
 
     Parameters
     ----------
-    fit : Fit
+    fit : FittedStack
         The model with all that was added.
     added : sequence of str
         Effects that may be taken out again: what the user began with stays.

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from imufit.figures import quantity
-from imufit.results import Candidate, DataFault, Disagreement, EffectCard, Parameter, Unexplained
+from imufit.results import Candidate, DataFault, Disagreement, EffectCard, Judged, Parameter, Unexplained
+from imufit.results.judged import left_out
 
 
 def _capital(text: str) -> str:
@@ -104,6 +105,17 @@ def above_floor(ratio: float) -> str:
         f"No effect is missing for certain, but the residual stands at {ratio:.2f} times the noise: the noise is "
         "stronger or more coloured than stated, or something is left that goes with nothing in the log."
     )
+
+
+def with_judged(text: str, sensors: Sequence[Judged], *, adequate: bool) -> str:
+    """Put in front which sensors an adequate answer is about, where others were not judged; behind any other answer."""
+    missing = left_out(sensors)
+    if not missing:
+        return text
+    if not adequate:
+        return f"{text} {missing[0].upper()}{missing[1:]}."
+    judged = ", ".join(item.sensor for item in sensors if item.judged)
+    return f"{judged}: nothing missing; {missing}. {text}" if judged else f"{missing[0].upper()}{missing[1:]}. {text}"
 
 
 def spoilt(faults: Sequence[DataFault]) -> str:

@@ -11,8 +11,6 @@ FEWEST_ROWS = 1000
 """Fewer tell no tone from noise."""
 SLOWEST = 24
 """Periods in the log; the means of blocks show slower swings."""
-FASTEST = 0.1
-"""Part of the sampling rate above which shaking is vibration, not motion, and no error of the sensor."""
 AROUND = ((64, 10), (256, 40), (1024, 160))
 """To which line of the spectrum on each side how many lines tell the noise around: few where it still rises steeply."""
 
@@ -52,7 +50,8 @@ def strongest(t: Array, residual: Array) -> tuple[float, float, float] | None:
         floor[first:last] = median_filter(power[: last + lines], 2 * lines + 1)[first:last]
         first = last
     floor[first:] = median_filter(power, 2 * AROUND[-1][1] + 1)[first:]
-    low, high = SLOWEST, int(FASTEST * places)
+    # The last lines have no lobe of their own.
+    low, high = SLOWEST, len(power) - 3
     ratio = np.log(2.0) * power[low:high] / np.maximum(floor[low:high], np.finfo(float).tiny)
     at = int(np.argmax(ratio))
     line = low + at

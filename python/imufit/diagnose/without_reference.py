@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from imufit.diagnose.sentences import OFF_FLOOR
 from imufit.errors import InputError
 from imufit.fit.rest_passes import NEEDS_REFERENCE, RestPasses
@@ -13,7 +15,7 @@ from imufit.results import Candidate
 from imufit.results.diagnosis import NOT_TESTABLE
 
 if TYPE_CHECKING:
-    from imufit.fit import Fit
+    from imufit.fit import FittedStack
     from imufit.fit.analysis import Analysis
     from imufit.fit.log_evidence import LogEvidence
 
@@ -73,13 +75,17 @@ def notes(evidence: LogEvidence) -> tuple[str, ...]:
             f"{rests.rests} rests in {rests.attitudes} attitudes, at which the specific force is as long as "
             f"gravity{zero}"
         )
+    if rests.labels:
+        told.append(
+            f"{rests.labels} labelled poses, whose axis points up to within {np.degrees(rests.placement):.1f} deg"
+        )
     if rests.turns:
         told.append(f"{rests.turns} turns from rest to rest, along which the rate carries the direction of gravity")
     if "mag" in rests.sensors:
         told.append("the length of the magnetic field, which is the same everywhere and is fitted along")
     out = [f"The log has no reference attitude. It is judged by {'; '.join(told)}."]
     limits = []
-    if "acc" in rests.sensors:
+    if "acc" in rests.sensors and not rests.labels:
         limits.append(
             "Of acc.misalignment only the change of the angles between the axes shows at rest; how the sensor sits on "
             "its body does not, nor whether the table is level."
@@ -94,12 +100,12 @@ def notes(evidence: LogEvidence) -> tuple[str, ...]:
     return (*evidence.surveyed.log.notes, *out, *limits, *rests.notes)
 
 
-def untold(fit: Fit) -> tuple[Candidate, ...]:
+def untold(fit: FittedStack) -> tuple[Candidate, ...]:
     """Return the effects that only a reference would show, as candidates that cannot be tested.
 
     Parameters
     ----------
-    fit : Fit
+    fit : FittedStack
         The model and the evidence of its logs.
     """
     analysis = fit.analysis
@@ -113,6 +119,8 @@ def _untold(effect_id: str, ratio: float) -> Candidate:
     return Candidate(
         effect=effect_id,
         p_value=1.0,
+        probability=0.0,
+        ln_bayes=0.0,
         expected_ratio=ratio,
         held_out_before=ratio,
         held_out_after=ratio,

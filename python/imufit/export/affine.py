@@ -11,15 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from imufit import _imufit
 from imufit.errors import InputError
-from imufit.model.sensor_model import SensorModel
+from imufit.loop import SensorModel
+from imufit.model.catalogue import effects
 
 Array = NDArray[np.float64]
 
 UNITS = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
-OFFSETS = ("acc.bias", "gyr.bias", "mag.hard_iron")
-GAINS = ("acc.scale", "acc.misalignment", "gyr.scale", "gyr.misalignment", "mag.soft_iron")
-ON_TEMPERATURE = tuple(f"{sensor}.{part}_temperature" for sensor in UNITS for part in ("bias", "scale"))
 
 
 @dataclass(frozen=True)
@@ -109,31 +108,38 @@ def affine(model: SensorModel) -> Affine:
     InputError
         There is none, or a gain has no inverse.
     """
-    if not any(effect in (*OFFSETS, *GAINS, *ON_TEMPERATURE) for effect in model.effects):
+    if not any(_is_constant(effect) or _is_on_temperature(effect) for effect, _ in model.stack()):
+        known = [effect for effect in effects().values() if _is_constant(effect)]
+        named = ", ".join(effect.id for effect in sorted(known, key=lambda effect: effect.affine != "offset"))
         raise InputError(
-            "the model has no constant gain or offset to export",
-            remedy=f"One of these is needed: {', '.join((*OFFSETS, *GAINS))}.",
+            "the model has no constant gain or offset to export", remedy=f"One of these is needed: {named}."
         )
-    left_out = tuple(e for e in model.effects if e not in (*OFFSETS, *GAINS, *ON_TEMPERATURE))
+    left_out = tuple(e.id for e, _ in model.stack() if not (_is_constant(e) or _is_on_temperature(e)))
     errors = {e: v for e, v in model.standard_errors.items() if e not in left_out}
     return Affine({name: _sensor(model, name) for name in UNITS}, tuple(_on_temperature(model)), left_out, errors)
 
 
+def _is_constant(effect: _imufit.Effect) -> bool:
+    return effect.affine is not None and effect.column is None
+
+
+def _is_on_temperature(effect: _imufit.Effect) -> bool:
+    return effect.affine is not None and effect.column == "temp"
+
+
 def _sensor(model: SensorModel, name: str) -> SensorAffine:
     gain, bias = np.eye(3), np.zeros(3)
-    gains = [effect for effect in model.effects if effect in GAINS and effect.startswith(name)]
+    of_sensor = [effect for effect, _ in model.stack() if _is_constant(effect) and effect.sensors == [name]]
+    gains = [effect.id for effect in of_sensor if effect.affine != "offset"]
     for effect in gains:
         for element, value in model.parameters[effect].items():
             # Scale names its elements x, y, z; matrices xx, xy, ...
             gain["xyz".index(element[0]), "xyz".index(element[-1])] += value
-    for effect in model.effects:
-        if effect in OFFSETS and effect.startswith(name):
-            bias += [model.parameters[effect][axis] for axis in "xyz"]
+    for offset in (effect.id for effect in of_sensor if effect.affine == "offset"):
+        bias += [model.parameters[offset][axis] for axis in "xyz"]
     if abs(np.linalg.det(gain)) <= 1e-9 * np.abs(gain).max() ** 3:
         raise InputError(f"{' and '.join(gains)} cannot be undone: the gain has no inverse", remedy="Check the model.")
-    lines = [
-        _line(model, effect) for effect in model.effects if effect in (*OFFSETS, *GAINS) and effect.startswith(name)
-    ]
+    lines = [_line(model, effect.id) for effect in of_sensor]
     return SensorAffine(name, np.asarray(np.linalg.inv(gain), dtype=np.float64), bias, tuple(lines))
 
 
@@ -151,9 +157,9 @@ def _line(model: SensorModel, effect: str) -> str:
 
 
 def _on_temperature(model: SensorModel) -> list[str]:
-    effects = [effect for effect in model.effects if effect in ON_TEMPERATURE]
-    if not effects:
+    drifts = [effect.id for effect, _ in model.stack() if _is_on_temperature(effect)]
+    if not drifts:
         return []
     mean = model.constants.get("temperature_mean")
     at = "the mean temperature of the fitted log" if mean is None else f"T_ref = {mean:.6g} degC"
-    return [f"Holds at {at}; away from it the model adds, per K:", *(_line(model, effect) for effect in effects)]
+    return [f"Holds at {at}; away from it the model adds, per K:", *(_line(model, drift) for drift in drifts)]

@@ -11,7 +11,7 @@ from imufit.export.arduino import arduino
 from imufit.export.c_header import c_header
 from imufit.export.imufusion import imufusion
 from imufit.export.json_text import json_text
-from imufit.model.sensor_model import SensorModel
+from imufit.loop import SensorModel
 
 FORMS: Mapping[str, Callable[[Affine], str]] = {
     "c-header": c_header,

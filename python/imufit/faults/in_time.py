@@ -1,14 +1,14 @@
-"""Faults that change in the course of a log: clocks that drift apart, a mount that shifts.
+"""A fault that happens in the course of a log: a mount that shifts.
 
-How late the reference is, and how the sensors are turned against it, belong to a set-up and are the same all along. The
-evidence is kept in blocks of time, so either can be asked for in every block. With the columns of the whole catalogue
-fitted along (nothing that an effect could explain is left), a lateness that grows in a line is a drift of the clocks,
-and a turn that all sensors share and that differs before and after one instant is a knock. Either is named if
+How the sensors are turned against the reference belongs to a set-up and is the same all along. The evidence is kept in
+blocks of time, so the turn can be asked for in every block. With the columns of the whole catalogue fitted along
+(nothing that an effect could explain is left), a turn that all sensors share and that differs before and after one
+instant is a knock. It is named if
 
 - it is significant by the delete-block jackknife, all instants counted that were tried (Hotelling's T^2, as for
   effects);
 - it explains nearly all of what a free value in each block would: neither a value that wanders, nor a line taken for a
-  step or a step for a line (each explains three quarters of the other).
+  step (which explains three quarters of it).
 """
 
 from __future__ import annotations
@@ -23,12 +23,13 @@ from scipy.special import fdtrc
 
 from imufit import _imufit
 from imufit.figures import quantity
+from imufit.model.catalogue import find_effect
 from imufit.results.data_fault import DataFault
 
 Array = NDArray[np.float64]
 
 ALPHA: Final = 1e-4
-"""Chance of naming either in a log that has none, all instants together."""
+"""Chance of naming a knock in a log that has none, all instants together."""
 SHARE: Final = 0.85
 """Part of the drop that a free value in each block would bring."""
 MIN_GAIN: Final = 40.0
@@ -36,9 +37,8 @@ MIN_GAIN: Final = 40.0
 MIN_BLOCKS: Final = 20
 EDGE: Final = 3
 """Blocks before the first and after the last instant tried."""
-MIN_DRIFT: Final = 5e-6
 MIN_TURN: Final = 1e-3
-"""Smallest drift of a clock and smallest turn, rad, that are named."""
+"""Smallest turn, rad, that is named."""
 _RANK: Final = 1e-8
 
 
@@ -94,7 +94,7 @@ class Blocks:
 def time_faults(
     evidence: _imufit.Evidence, variance: list[float], places: Mapping[str, range], facts: _imufit.Facts
 ) -> list[DataFault]:
-    """Name a drift of the clocks and a knock.
+    """Name a knock.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def time_faults(
         Of each channel's residual, the whole catalogue fitted; NaN for a channel that the log has not.
     places : mapping
         Parameters of every effect by its id. Dependences without a name, whose columns come after theirs, are not among
-        them: a delay that drifts would be what is looked for.
+        them.
     facts : Facts
         Of the log.
     """
@@ -113,28 +113,10 @@ def time_faults(
     if len(blocks.equations) < MIN_BLOCKS:
         return []
     basis = _basis(blocks.equations.sum(axis=0))
-    found = []
-    if "ref.delay" in places:
-        found += _drift(_Course.of(blocks, basis, places["ref.delay"]), facts)
-    if not found and "ref.alignment" in places:
-        found += _knock(_Course.of(blocks, basis, places["ref.alignment"]), facts)
-    return found
-
-
-def _drift(course: _Course, facts: _imufit.Facts) -> list[DataFault]:
-    answer = _asked(course, course.blocks.middle - 0.5 * (facts.t_start + facts.t_end))
-    if answer is None or answer.p_value > ALPHA or abs(answer.values[0]) < MIN_DRIFT:
+    parts = {find_effect(key).reference_part: place for key, place in places.items()}
+    if "mount" not in parts:
         return []
-    drift, error = float(answer.values[0]), float(answer.errors[0])
-    late = 1e3 * abs(drift) * (facts.t_end - facts.t_start)
-    word = "slow" if drift > 0.0 else "fast"
-    evidence = (
-        f"The clock of the reference runs {word} against that of the sensors by {1e6 * abs(drift):.0f} ± "
-        f"{1e6 * error:.1g} ppm: over the log it {'falls behind' if drift > 0.0 else 'gains'} by {late:.3g} ms."
-    )
-    remedy = "Stamp sensors and reference with one clock, or stretch the times of the reference by that factor."
-    span = facts.t_start, facts.t_end
-    return [DataFault("clock_drift", "ref", None, *span, facts.n, evidence, remedy, gain=answer.gain)]
+    return _knock(_Course.of(blocks, basis, parts["mount"]), facts)
 
 
 def _knock(course: _Course, facts: _imufit.Facts) -> list[DataFault]:
@@ -258,7 +240,7 @@ def _asked(question: _Course, course: Array) -> _Answer | None:
     """Fit a course over the blocks and judge it; None where it explains too little."""
     values, gain, rank = question.solved(course)
     count = len(course)
-    # The cheaper questions first: most logs have neither fault.
+    # The cheaper questions first: most logs have no knock.
     if rank == 0 or gain < MIN_GAIN or gain < SHARE * question.free_gain():
         return None
     left_out = question.left_out(course)

@@ -1,5 +1,5 @@
 """A stack of effects fitted to a log."""
 
-from imufit.fit.fit import Fit
+from imufit.fit.fitted_stack import FittedStack
 
-__all__ = ["Fit"]
+__all__ = ["FittedStack"]

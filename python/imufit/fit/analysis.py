@@ -17,23 +17,12 @@ from imufit.fit.surveyed_log import SurveyedLog, survey
 from imufit.fit.users_effects import check_users_effects
 from imufit.log import LogSource
 from imufit.log.several import name_of
-from imufit.model.catalogue import COLUMN, find_effect, unnamed_effects
-from imufit.model.sensor_model import SensorModel
+from imufit.model.catalogue import each_log_has_its_own, effects, find_effect, unnamed_effects
+from imufit.model.effect_stack import EffectStack
 from imufit.progress import Progress
 from imufit.results import DataFault
 
 Array = NDArray[np.float64]
-
-FIELD_REFERENCE = "mag.field_reference"
-"""Fitted along, unnamed, wherever the reference field was estimated from the log itself."""
-
-ROUNDING = tuple(unnamed_effects())
-"""Fitted along, unnamed, wherever the steps of the readings are coarse."""
-
-OWN = frozenset({"acc.bias", "gyr.bias", "ref.alignment", "ref.tilt", FIELD_REFERENCE, *ROUNDING})
-"""What each log has for itself: zeros come with switching on, mount, table and field with setting up.
-
-All other effects are the sensor's, and the same in every log."""
 
 MAX_ITERATIONS = 6
 MAX_SEARCHES = 3
@@ -74,7 +63,7 @@ class Analysis:
     ----------
     logs : tuple of LogEvidence
         Evidence of each log.
-    model : SensorModel
+    model : EffectStack
         The effects and the parameters that all logs share.
     own : tuple of dict
         For each log the parameters that it has for itself, the unnamed effects among them.
@@ -91,7 +80,7 @@ class Analysis:
     """
 
     logs: tuple[LogEvidence, ...]
-    model: SensorModel
+    model: EffectStack
     own: tuple[dict[str, list[float]], ...]
     unnamed: tuple[str, ...]
     candidates: dict[str, _imufit.Effect]
@@ -101,13 +90,13 @@ class Analysis:
 
     @classmethod
     def of(
-        cls, model: SensorModel, logs: Sequence[LogSource], progress: Progress, *, keep_constants: bool = False
+        cls, model: EffectStack, logs: Sequence[LogSource], progress: Progress, *, keep_constants: bool = False
     ) -> Analysis:
         """Survey logs of one sensor, find their noise and take their evidence around a model.
 
         Parameters
         ----------
-        model : SensorModel
+        model : EffectStack
             Effects and parameters to take the evidence around.
         logs : sequence of LogSource
             The logs.
@@ -121,10 +110,8 @@ class Analysis:
             reasons = [each.refusal(effect) for each in surveyed]
             if None not in reasons:
                 raise InputError(f"effect {effect.id} cannot be fitted: {reasons[0]}", file=surveyed[0].log.path)
-        unnamed = tuple(key for key in ROUNDING if any(key in each.effects for each in surveyed))
-        if any(each.facts.field_estimated for each in surveyed):
-            unnamed = (FIELD_REFERENCE, *unnamed)
-        unnamed = tuple(key for key in unnamed if key not in model.effects)
+        along = {key for each in surveyed for key, effect in each.effects.items() if effect.fitted_along(each.facts)}
+        unnamed = tuple(key for key in (*effects(), *unnamed_effects()) if key in along - {*model.effects})
         fixed = {*model.effects, *unnamed}
         candidates = {key: each.effects[key] for each in surveyed for key in each.effects if key not in fixed}
         for each in surveyed:
@@ -141,7 +128,7 @@ class Analysis:
 
     def around(
         self,
-        model: SensorModel,
+        model: EffectStack,
         own: Sequence[Values],
         *,
         with_candidates: bool = True,
@@ -189,7 +176,7 @@ class Analysis:
         known = {key for each in logs for key in each.slots}
         effects = [key for key in self.model.effects if key in known]
         values = {key: at for key, at in self.model.parameters.items() if key in known}
-        model = SensorModel(effects, values, constants=self.model.constants)
+        model = type(self.model)(effects, values, constants=self.model.constants)
         unnamed = tuple(key for key in self.unnamed if key in known)
         candidates = {key: effect for key, effect in self.candidates.items() if key in known}
         own = tuple(self.own[k] for k in chosen)
@@ -236,7 +223,7 @@ class Analysis:
     def having(self, effect_id: str) -> list[int]:
         """Return the logs with parameters of an effect for themselves; the first stands for all where it is shared."""
         known = [k for k, each in enumerate(self.logs) if effect_id in each.slots]
-        return known if effect_id in OWN else known[:1]
+        return known if each_log_has_its_own(effect_id) else known[:1]
 
     def estimate(self) -> Estimate:
         """Fit the model's effects (and the unnamed ones) to the evidence."""
@@ -249,7 +236,7 @@ class Analysis:
     def _present(self, slot: int) -> list[float]:
         """Values that the evidence was taken around, of one log after the other where each has its own."""
         key = self.slots[slot]
-        if key in OWN:
+        if each_log_has_its_own(key):
             return [value for log in self.having(key) for value in self.own[log][key]]
         return self.model.stack()[slot][1]
 
@@ -284,7 +271,7 @@ class Analysis:
                 values[k] = min(max(values[k], low), high)
         return values
 
-    def moved_to(self, estimate: Estimate) -> tuple[SensorModel, tuple[dict[str, list[float]], ...]]:
+    def moved_to(self, estimate: Estimate) -> tuple[EffectStack, tuple[dict[str, list[float]], ...]]:
         """Return the model with estimated parameters, and those that each log has for itself.
 
         In the model, what each log has for itself stands with its mean.
@@ -293,10 +280,11 @@ class Analysis:
         own: tuple[dict[str, list[float]], ...] = tuple({} for _ in self.logs)
         for slot, key in enumerate(self.slots[: len(self.fitted_slots)]):
             effect = find_effect(key)
-            logs = self.having(key) if key in OWN else [0]
+            own_values = effect.scope == "log"
+            logs = self.having(key) if own_values else [0]
             values = estimate.values[slot].reshape(len(logs), -1)
             spread = estimate.errors[slot].reshape(len(logs), -1)
-            if key in OWN:
+            if own_values:
                 for log, at in zip(logs, values, strict=True):
                     own[log][key] = [float(value) for value in at]
             if slot >= len(self.model.effects):
@@ -313,11 +301,11 @@ class Analysis:
             "covariate_means": {
                 name: mean
                 for name, mean in means.items()
-                if any(key.endswith(COLUMN + name) for key in self.model.effects)
+                if any(effect.centred_column == name for effect, _ in self.model.stack())
             },
         }
         kept = {key: value for key, value in constants.items() if value is not None and value != {}}
-        return SensorModel(self.model.effects, parameters, constants=kept, standard_errors=errors), own
+        return type(self.model)(self.model.effects, parameters, constants=kept, standard_errors=errors), own
 
     def own_step(self, log: int, step: Array) -> Array:
         """Return a step of all parameters as one of the parameters of one log's evidence."""
@@ -349,7 +337,7 @@ class Analysis:
 
     def solved_for(
         self,
-        model: SensorModel,
+        model: EffectStack,
         own: Sequence[Values],
         *,
         with_candidates: bool = True,
@@ -421,10 +409,10 @@ def pooled(values: Array, errors: Array) -> tuple[Array, Array]:
 
 
 def _with_own(
-    logs: Sequence[SurveyedLog], model: SensorModel, unnamed: Sequence[str], known: Sequence[Values]
+    logs: Sequence[SurveyedLog], model: EffectStack, unnamed: Sequence[str], known: Sequence[Values]
 ) -> tuple[dict[str, list[float]], ...]:
     """Values that each log has for itself: those known, else the model's, else zero."""
-    starts = {key: values for key, values in model.parameters.items() if key in OWN}
+    starts = {key: values for key, values in model.parameters.items() if each_log_has_its_own(key)}
     out = []
     for each, values in zip(logs, known, strict=True):
         own = {key: list(starts[key].values()) for key in starts if each.refusal(find_effect(key)) is None}
@@ -433,7 +421,7 @@ def _with_own(
     return tuple(out)
 
 
-def _fitted(each: SurveyedLog, model: SensorModel, unnamed: Sequence[str], own: Values) -> dict[str, list[float]]:
+def _fitted(each: SurveyedLog, model: EffectStack, unnamed: Sequence[str], own: Values) -> dict[str, list[float]]:
     """Effects that are fitted to one log, with their parameters."""
     named = {effect.id: own.get(effect.id, values) for effect, values in model.stack() if each.refusal(effect) is None}
     return named | {key: own[key] for key in unnamed if key in own}
@@ -444,16 +432,21 @@ def _probes(logs: Sequence[SurveyedLog]) -> tuple[str, ...]:
 
 
 def _problem(
-    logs: Sequence[LogEvidence], model: SensorModel, unnamed: Sequence[str], candidates: Collection[str]
+    logs: Sequence[LogEvidence], model: EffectStack, unnamed: Sequence[str], candidates: Collection[str]
 ) -> _imufit.Problem:
     slots = {key: slot for slot, key in enumerate([*model.effects, *unnamed, *candidates])}
+    known = {key: effect for each in logs for key, effect in each.surveyed.columns.items()}
+    known |= {effect.id: effect for effect, _ in model.stack()}
     return _imufit.Problem(
-        [(each.white, each.raw, each.variance, each.floors, [slots[key] for key in each.slots]) for each in logs],
-        [key in OWN for key in slots],
+        [
+            (each.white, each.raw, each.variance, each.loudness, each.floors, [slots[key] for key in each.slots])
+            for each in logs
+        ],
+        [known[key].scope == "log" for key in slots],
     )
 
 
-def _started(logs: Sequence[SurveyedLog], model: SensorModel, own: Sequence[Values]) -> SensorModel:
+def _started(logs: Sequence[SurveyedLog], model: EffectStack, own: Sequence[Values]) -> EffectStack:
     """Find where to start for effects of the model that need a search and have no values yet."""
     for effect, values in model.stack():
         if not any(values) and any(effect.search(each.facts) for each in logs):

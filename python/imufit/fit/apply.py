@@ -15,19 +15,18 @@ from imufit.log import Log, LogSource
 from imufit.log.log import concatenate
 
 if TYPE_CHECKING:
-    from imufit.model.sensor_model import SensorModel
+    from imufit.model.effect_stack import EffectStack
 
 READ_ROWS = 65536
 SENSORS = ("acc", "gyr", "mag")
-ALIGNMENT = "ref.alignment"
 
 
-def apply(model: SensorModel, log: LogSource) -> Log:
+def apply(model: EffectStack, log: LogSource) -> Log:
     """Return the log with corrected readings; see :meth:`imufit.SensorModel.apply`.
 
     Parameters
     ----------
-    model : SensorModel
+    model : EffectStack
         Effects and parameters.
     log : Log or LogStream
         Readings; a reference is not needed.
@@ -38,7 +37,7 @@ def apply(model: SensorModel, log: LogSource) -> Log:
     (chunk,) = whole.chunks(whole.n)
     covariates = covariate_names(whole)
     means = model.constants.get("covariate_means", {})
-    kept = [(effect, values) for effect, values in model.stack() if not _imufit.concerns_reference(effect)]
+    kept = [(effect, values) for effect, values in model.stack() if effect.reference_part is None]
     try:
         readings, lost = _imufit.correct_readings(
             chunk_arrays(chunk, covariates),
@@ -56,25 +55,24 @@ def apply(model: SensorModel, log: LogSource) -> Log:
     acc, gyr, mag = (
         getattr(whole, name) if values is None else values for name, values in zip(SENSORS, readings, strict=True)
     )
-    if ALIGNMENT in model.effects:
-        mount = Rotation.from_rotvec([model.parameters[ALIGNMENT][axis] for axis in "xyz"])
+    for turned in (effect.id for effect, _ in model.stack() if effect.reference_part == "mount"):
+        mount = Rotation.from_rotvec([model.parameters[turned][axis] for axis in "xyz"])
         acc, gyr, mag = (None if x is None else np.ascontiguousarray(mount.apply(x)) for x in (acc, gyr, mag))
-        notes.append(f"{ALIGNMENT}: readings turned into the axes of the body that the reference describes")
+        notes.append(f"{turned}: readings turned into the axes of the body that the reference describes")
     return replace(whole, acc=acc, gyr=gyr, mag=mag, notes=(*whole.notes, *notes))
 
 
-def _left_alone(model: SensorModel, log: Log) -> list[str]:
+def _left_alone(model: EffectStack, log: Log) -> list[str]:
     """Say which effects of the model did nothing to the readings, and which means had to be taken from the log."""
     notes = []
-    of_reference = [effect.id for effect, _ in model.stack() if _imufit.concerns_reference(effect)]
-    of_reference = [key for key in of_reference if key != ALIGNMENT]
+    of_reference = [effect.id for effect, _ in model.stack() if effect.reference_part not in (None, "mount")]
     if of_reference:
         notes.append(f"{' and '.join(of_reference)} left alone: of the reference, not of the readings")
     for sensor in SENSORS:
-        of_sensor = [key for key in model.effects if key.startswith(f"{sensor}.") and key not in of_reference]
+        of_sensor = [e.id for e, _ in model.stack() if e.sensors == [sensor] and e.reference_part is None]
         if of_sensor and getattr(log, sensor) is None:
             notes.append(f"{' and '.join(of_sensor)} left alone: the log has no {sensor}")
-    on_temperature = [key for key in model.effects if key.endswith("_temperature")]
+    on_temperature = [effect.id for effect, _ in model.stack() if effect.centred_column == "temp"]
     if on_temperature and "temperature_mean" not in model.constants and log.temp is not None:
         notes.append(f"{' and '.join(on_temperature)}: the model has no temperature_mean, the log's own was taken")
     return notes

@@ -38,6 +38,8 @@ class LogEvidence:
         As it stands, and whitened.
     raw_variance, variance : list of float
         Of the residual of each channel that no effect explains, as it stands and whitened.
+    loudness : list of list of float
+        (channels, blocks) variance of each block over that of its channel, whitened.
     floors : list of float
         Noise floor of each channel.
     filters : list of list of float
@@ -52,6 +54,7 @@ class LogEvidence:
     white: _imufit.Evidence
     raw_variance: list[float]
     variance: list[float]
+    loudness: list[list[float]]
     floors: list[float]
     filters: list[list[float]]
     faults: tuple[DataFault, ...] = ()
@@ -87,7 +90,7 @@ class LogEvidence:
         candidates = [key for key in surveyed.columns if key not in fitted]
         raw = _empty(surveyed, fitted, candidates, found, [[] for _ in CHANNELS])
         passes.evidence(raw, facts, "taking evidence")
-        step, raw_variance = _imufit.saturate(raw)
+        step, raw_variance, loudness = _imufit.saturate(raw)
         raw_variance = _not_below_steps(facts, raw_variance)
         slots = (*fitted, *candidates)
         faults = surveyed.faults
@@ -96,7 +99,8 @@ class LogEvidence:
             # The noise that metadata state is that of a reading, not of a mean.
             floors = [float(np.sqrt(v)) for v in noise]
             _check_samples(surveyed.log, fitted, noise)
-            return cls(surveyed, slots, raw, raw, noise, noise, floors, [[] for _ in CHANNELS], faults)
+            even = [[1.0] * passes.blocks for _ in CHANNELS]
+            return cls(surveyed, slots, raw, raw, noise, noise, even, floors, [[] for _ in CHANNELS], faults)
         _check_samples(surveyed.log, fitted, raw_variance)
         if not any(fault.spoils for fault in faults):
             effects = [slot for slot in slots if slot not in surveyed.probes]
@@ -106,9 +110,9 @@ class LogEvidence:
         white, variance = raw, raw_variance
         if any(filters):
             white = passes.evidence(raw.with_filters(filters), facts, "whitening the evidence")
-            _, variance = _imufit.saturate(white)
+            _, variance, loudness = _imufit.saturate(white)
             variance = _not_below_steps(facts, variance)
-        return cls(surveyed, slots, raw, white, raw_variance, variance, floors, filters, faults)
+        return cls(surveyed, slots, raw, white, raw_variance, variance, loudness, floors, filters, faults)
 
     def around(
         self, fitted: Values, candidates: Sequence[str], found: Mapping[str, Found], *, lean: bool = False

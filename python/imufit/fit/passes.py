@@ -215,9 +215,10 @@ class Passes:
         """Blocks of time that the evidence is kept in."""
         return BLOCKS
 
-    def edges(self, facts: _imufit.Facts) -> NDArray[np.float64]:
-        """Return the times at which blocks begin and end, (blocks + 1,), s."""
-        return np.linspace(facts.t_start, facts.t_end, self.blocks + 1)
+    def spans(self, facts: _imufit.Facts) -> NDArray[np.float64]:
+        """Return the times at which each block begins and ends, (blocks, 2), s."""
+        edges = np.linspace(facts.t_start, facts.t_end, self.blocks + 1)
+        return np.column_stack([edges[:-1], edges[1:]])
 
     def lacking(self, effect: _imufit.Effect) -> str | None:
         """Return why nothing can be told of an effect's sensor, though the log has it; None otherwise."""

@@ -68,7 +68,8 @@ class RestPasses(Passes):
                 file=log.path,
                 remedy=(
                     "Add the reference, or ref_angle with the metadata rig_axis; or record the sensor lying still in "
-                    f"at least {FEWEST_RESTS} attitudes, two seconds each, with turns between."
+                    f"at least {FEWEST_RESTS} attitudes, two seconds each, with turns between, or on all six sides, "
+                    "labelled in the column pose."
                 ),
             )
         columns = {"temp": log.temp, **{name: log.covariates[name] for name in self.covariates}}
@@ -93,9 +94,9 @@ class RestPasses(Passes):
         """Groups of rests that the evidence is kept in."""
         return self.rests.blocks
 
-    def edges(self, facts: _imufit.Facts) -> NDArray[np.float64]:
-        """Return the times at which blocks begin and end, s."""
-        return self.rests.edges
+    def spans(self, facts: _imufit.Facts) -> NDArray[np.float64]:
+        """Return the times at which each block begins and ends, (blocks, 2), s."""
+        return self.rests.spans
 
     def lacking(self, effect: _imufit.Effect) -> str | None:
         """Return why nothing can be told of an effect's sensor, though the log has it; None otherwise."""
@@ -138,14 +139,14 @@ class RestPasses(Passes):
         out = []
         for channel, expected in enumerate(self.rests.expected):
             known = [v for v in (scatter[channel], left[channel]) if np.isfinite(v)]
-            if channel == _TURN:
+            if channel in (_TURN, _POSE):
                 known.append(expected)
             counted = raw.count(channel) > 0
             out.append(float(max(known)) if known and counted else float(expected) if counted else np.nan)
         return out
 
 
-_TURN = _imufit.rest_channels().index("turn")
+_TURN, _POSE = (_imufit.rest_channels().index(name) for name in ("turn", "acc_pose"))
 
 
 def passes_of(log: LogSource, progress: Progress) -> Passes:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.calibrate.checks import check_unit
-from imufit.calibrate.gyroscope import find_turns
-from imufit.calibrate.poses import Pose, distinct, find_poses
+from imufit import _imufit
+from imufit.fit.labelled_rests import all_sides, labelled, placement
+from imufit.rests import SIDES, UP, Pose, check_unit, distinct, find_poses, find_turns
 
 if TYPE_CHECKING:
     from imufit.log import Log
@@ -24,7 +24,12 @@ MOST_STRETCHES = 2000
 BLOCKS = 20
 """Groups of rests that are left out in turn."""
 FEWEST_RESTS = 8
-"""Fewer rests leave no blocks to judge by."""
+"""Fewer rests leave no blocks to judge by, unless labels tell what each of six reads."""
+PARTS = 4
+"""Blocks that each of fewer labelled rests is cut into. Six rests make 24 blocks, two for each held-out fold.
+
+The first part of every rest comes first, then the second: either half of the blocks sees all sides, and so does what
+is left when a fold and the blocks beside it are out."""
 LEAST_SPREAD = np.radians(10.0)
 """A field whose direction in the body varies by less than this (rad, root mean square) shows nothing of the sensor."""
 MOST_FIELD_ROWS = 4000
@@ -35,6 +40,7 @@ FIELD_BLOCKS = 20
 CLEAR = 8.0
 """Specific forces of different poses are told apart from this many times their noise on."""
 EDGES = 60
+_POSE = _imufit.rest_channels().index("acc_pose")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +53,12 @@ class RestReadings:
         As `_imufit.Evidence.add_rests` takes it.
     blocks : int
         Blocks of time: groups of rests, or equal parts of the log where only the field counts.
-    edges : (blocks + 1,) array
-        Times at which blocks begin and end, s.
-    rests, attitudes, turns : int
-        How many were found; attitudes differ by more than 8 degrees.
+    spans : (blocks, 2) array
+        Times at which each block begins and ends, s.
+    rests, attitudes, turns, labels : int
+        How many were found; attitudes differ by more than 8 degrees, labels are those that stand in for a reference.
+    placement : float
+        How far a labelled side is off the vertical, rad; NaN without labels.
     sensors : tuple of str
         Sensors that something is told of.
     field : float or None
@@ -67,10 +75,12 @@ class RestReadings:
 
     arrays: dict[str, Any]
     blocks: int
-    edges: Array
+    spans: Array
     rests: int
     attitudes: int
     turns: int
+    labels: int
+    placement: float
     sensors: tuple[str, ...]
     field: float | None
     expected: list[float]
@@ -92,18 +102,28 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
     notes: list[str] = []
     poses, gyr_noise = _poses(log, notes)
     field_rows = _field_rows(log, notes)
-    blocks = min(BLOCKS, len(poses)) if poses else FIELD_BLOCKS
-    of_pose = np.arange(len(poses)) * blocks // max(len(poses), 1)
+    parts = PARTS if len(poses) < FEWEST_RESTS else 1
+    blocks = min(BLOCKS, len(poses)) * parts if poses else FIELD_BLOCKS
+    of_pose = np.arange(len(poses)) * (blocks // parts) // max(len(poses), 1)
     edges = _edges(log, poses, of_pose, blocks, field_rows)
+    spans = np.column_stack([edges[:-1], edges[1:]]) if parts == 1 or not poses else _parts(poses, parts)
+    # A fold holds few whole rests that follow each other if these belong to one part after the other.
+    of_whole = of_pose + len(poses) * (np.arange(len(poses)) % parts)
     table = _Table(log, covariates)
-    rest, pieces = _stretches(log, poses)
+    rest, part, pieces = _stretches(log, poses, parts)
     stills = table.means(pieces)
     poses, gyr_noise = _as_they_scatter(poses, gyr_noise, rest, pieces, stills)
     expected = _expected(poses, pieces)
+    upright = [k for k, pose in enumerate(poses) if pose.label] if all_sides(poses) else []
+    off = np.nan
+    if upright:
+        off = placement([poses[k] for k in upright], float(log.metadata.gravity))
+        expected[_POSE] = off**2 + expected[0] / float(log.metadata.gravity) ** 2
     turns: list[tuple[int, int, int, int, float, int]] = []
     path = np.zeros(0, dtype=np.intp)
-    if poses and log.gyr is not None:
-        turns, path = _turns(log, poses, gyr_noise, of_pose, notes)
+    # A few turns do not tell how far off turns are, and would pull at the accelerometer's parameters.
+    if len(poses) >= FEWEST_RESTS and log.gyr is not None:
+        turns, path = _turns(log, poses, gyr_noise, of_whole, notes)
     known = (bool(poses), bool(poses) and bool(np.isfinite(stills["gyr"]).any()), field_rows.size > 0)
     sensors = [sensor for sensor, told in zip(("acc", "gyr", "mag"), known, strict=True) if told]
     field = None
@@ -115,17 +135,20 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
         "path": table.rows(path, filled=True),
         "field": table.rows(field_rows),
         "rest": rest.tolist(),
-        "block": [int(of_pose[k]) for k in rest],
+        "block": (of_pose[rest] + part * len(poses)).tolist(),
+        "labelled": [(k, UP[str(poses[k].label)].tolist(), int(of_whole[k])) for k in upright],
         "turns": turns,
         "field_block": np.clip(np.searchsorted(edges, log.t[field_rows], side="right") - 1, 0, blocks - 1).tolist(),
     }
     return RestReadings(
         arrays=arrays,
         blocks=blocks,
-        edges=edges,
+        spans=spans,
         rests=len(poses),
         attitudes=distinct(np.array([pose.direction for pose in poses])) if poses else 0,
         turns=len(turns),
+        labels=len(upright),
+        placement=off,
         sensors=tuple(sensors),
         field=field,
         expected=expected.tolist(),
@@ -227,14 +250,15 @@ def _poses(log: Log, notes: list[str]) -> tuple[list[Pose], float]:
         poses, noise = [pose for pose in found.poses if pose.used], found.gyr_noise
         if poses:
             check_unit(poses, float(log.metadata.gravity), log.path or "log")
-    if len(poses) >= FEWEST_RESTS:
+    poses = labelled(log, poses)
+    if len(poses) >= FEWEST_RESTS or all_sides(poses):
         return poses, noise
     sensors = " and ".join(name for name in ("acc", "gyr") if getattr(log, name) is not None)
     if sensors:
         notes.append(
             f"{len(poses)} {'rest is' if len(poses) == 1 else 'rests are'} too few to judge {sensors} by without a "
             f"reference: lay the sensor down in at least {FEWEST_RESTS}, better {BLOCKS}, different attitudes for two "
-            "seconds each."
+            f"seconds each, or on all six sides and label these ({' '.join(SIDES)} in the column pose)."
         )
     return [], noise
 
@@ -289,23 +313,30 @@ def _expected(poses: Sequence[Pose], pieces: Sequence[NDArray[np.intp]]) -> NDAr
     return expected
 
 
-def _stretches(log: Log, poses: Sequence[Pose]) -> tuple[NDArray[np.intp], list[NDArray[np.intp]]]:
-    """Return the number of its rest and rows of each stretch; all are about as long, a short rest is one."""
+def _stretches(
+    log: Log, poses: Sequence[Pose], blocks: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp], list[NDArray[np.intp]]]:
+    """Return the number of its rest, of its block within the rest, and the rows of each stretch.
+
+    All are about as long; a short rest is one stretch, or one for each of its blocks.
+    """
     total = sum(pose.t_end - pose.t_start for pose in poses)
     length = max(STRETCH, total / MOST_STRETCHES)
     rest: list[int] = []
+    block: list[int] = []
     pieces: list[NDArray[np.intp]] = []
     for k, pose in enumerate(poses):
         rows = _pose_rows(pose)
-        parts = max(1, int((pose.t_end - pose.t_start) / length))
+        parts = blocks * max(1, int((pose.t_end - pose.t_start) / (length * blocks)))
         time = log.t[rows] - pose.t_start
         number = np.minimum((time / (pose.t_end - pose.t_start) * parts).astype(np.intp), parts - 1)
         for part in range(parts):
             chosen = rows[number == part]
             if chosen.size:
                 rest.append(k)
+                block.append(part * blocks // parts)
                 pieces.append(chosen)
-    return np.array(rest, dtype=np.intp), pieces
+    return np.array(rest, dtype=np.intp), np.array(block, dtype=np.intp), pieces
 
 
 def _turns(
@@ -364,7 +395,7 @@ def _edges(
 ) -> Array:
     """Return times at which blocks begin: between rests, or such that each has as many rows of the field."""
     first, last_time = float(log.t[0]), float(log.t[-1])
-    if poses:
+    if blocks <= len(poses):
         last = [k for k in range(len(poses) - 1) if of_pose[k] != of_pose[k + 1]]
         inner = [0.5 * (poses[k].t_end + poses[k + 1].t_start) for k in last]
     elif field_rows.size:
@@ -372,6 +403,14 @@ def _edges(
     else:
         inner = np.linspace(first, last_time, blocks + 1)[1:-1].tolist()
     return np.array([first, *inner, last_time])
+
+
+def _parts(poses: Sequence[Pose], parts: int) -> Array:
+    """Return when each part of each rest begins and ends, (parts * rests, 2), s: the first part of all rests first."""
+    begin, end = (np.array([getattr(pose, name) for pose in poses]) for name in ("t_start", "t_end"))
+    shares = np.arange(parts + 1)[:, None] / parts
+    times = begin + shares * (end - begin)
+    return np.column_stack([times[:-1].ravel(), times[1:].ravel()])
 
 
 def _samples(

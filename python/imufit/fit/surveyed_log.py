@@ -15,7 +15,7 @@ from imufit.fit.passes import MIN_COVERAGE, Passes
 from imufit.fit.rest_passes import passes_of
 from imufit.log import LogSource
 from imufit.model.catalogue import column_effects, effects, unnamed_effects
-from imufit.model.sensor_model import SensorModel
+from imufit.model.effect_stack import EffectStack
 from imufit.progress import Progress
 from imufit.results import DataFault
 
@@ -105,13 +105,13 @@ def _refusal(effect: _imufit.Effect, passes: Passes, facts: _imufit.Facts, cover
 
 
 def survey(
-    model: SensorModel, logs: Sequence[LogSource], progress: Progress, *, keep_constants: bool
+    model: EffectStack, logs: Sequence[LogSource], progress: Progress, *, keep_constants: bool
 ) -> list[SurveyedLog]:
     """Make the first pass over every log; what is a matter of the sensor is taken from all of them together.
 
     Parameters
     ----------
-    model : SensorModel
+    model : EffectStack
         Effects that are not asked about but fitted.
     logs : sequence of LogSource
         Logs of one sensor.

@@ -10,6 +10,7 @@ from imufit.grade.one import hidden_in
 from imufit.grade.puzzle import Puzzle
 from imufit.simulate import Course, Line, Mixture, Wandering
 from imufit.simulate.environment import Temperature, covariate, stream
+from imufit.simulate.injections import effect_of_column
 
 DURATION = 120.0
 SCENARIOS = ("turntable", "poses", "arm", "handheld")
@@ -43,7 +44,7 @@ def columns(blind_set: str, seed: int) -> Puzzle:
         drawn_courses = courses(rng, simulation_seed + attempt)
         names = [name for name in drawn_courses if name != "temp"]
         column, sensor = names[seed % len(names)], ("acc", "gyr", "mag")[seed % 3]
-        effect = "mag.current" if (sensor, column) == ("mag", "motor_current") else f"{sensor}.column:{column}"
+        effect = effect_of_column(sensor, column)
         options = {"courses": drawn_courses, "noise": everyday(), "frame": frame_of(rng), "duration": DURATION}
         setting = Setting(SCENARIOS[seed % len(SCENARIOS)], simulation_seed + attempt, options)
         try:

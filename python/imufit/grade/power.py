@@ -12,7 +12,7 @@ from imufit.grade.blind_grade import share
 from imufit.grade.drawing import SCENARIOS, ImpossibleError, Setting, drawn, effects, rng_of
 from imufit.grade.one import TWINS, settings
 from imufit.grade.protocol import side_by_side
-from imufit.model import SensorModel
+from imufit.loop import SensorModel
 from imufit.progress import Progress
 from imufit.simulate import simulate
 from imufit.simulate.environment import stream

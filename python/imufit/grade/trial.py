@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from imufit.diagnose import ladder
 from imufit.grade.mark import Answer, Marks, marked
 from imufit.grade.puzzle import Puzzle
 from imufit.grade.sets import draw
-from imufit.model import SensorModel
+from imufit.loop import SensorModel, ladder
 from imufit.results import Diagnosis, Ladder
 from imufit.simulate import Simulation
 

@@ -7,8 +7,8 @@ import numpy as np
 from imufit.grade.drawing import SCENARIOS, TOLD, ImpossibleError, Setting, effects, log_uniform, parameters_of, rng_of
 from imufit.grade.one import settings
 from imufit.grade.puzzle import Puzzle
-from imufit.simulate import simulate
-from imufit.simulate.separation import LATE, Separation
+from imufit.simulate import injection, simulate
+from imufit.simulate.separation import Separation
 
 ATTEMPTS = 40
 
@@ -36,7 +36,7 @@ def two(blind_set: str, seed: int) -> Puzzle:
 
 
 def _pair(setting: Setting, first: str, second: str, rng: np.random.Generator) -> dict[str, dict[str, float]]:
-    if first in LATE and second in LATE:
+    if injection(first).late and injection(second).late:
         raise ImpossibleError("two effects that are both a time")
     try:
         study = setting.study([first, second])

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from imufit.log.assemble import fields_of, time_of
@@ -15,6 +14,9 @@ from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import TimeScan
 from imufit.log.unit_check import HEAD, check_units
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def fields_from_frame(df: pd.DataFrame, mapping: Mapping[str, str] | None, metadata: Metadata) -> dict[str, Any]:
@@ -54,6 +56,8 @@ def fields_from_frame(df: pd.DataFrame, mapping: Mapping[str, str] | None, metad
 
 def _column(column: pd.Series[Any]) -> NDArray[Any]:
     """Give (n,) float64 for anything numeric, (n,) objects for everything else; always a copy."""
+    import pandas as pd  # noqa: PLC0415  heavy, and only needed here
+
     if pd.api.types.is_numeric_dtype(column.dtype) and not pd.api.types.is_complex_dtype(column.dtype):
         return column.to_numpy(dtype=np.float64, na_value=np.nan, copy=True)
     cells = np.empty(len(column), dtype=object)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
@@ -20,6 +19,9 @@ from imufit.log.frame import fields_from_frame
 from imufit.log.metadata import Metadata
 from imufit.log.npz import write_npz
 from imufit.log.parquet import write_parquet
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 Text = NDArray[np.object_]
@@ -175,6 +177,8 @@ class Log:
 
     def to_dataframe(self) -> pd.DataFrame:
         """All columns as a pandas table."""
+        import pandas as pd  # noqa: PLC0415  heavy, and only needed here
+
         return pd.DataFrame(self.table())
 
     def write(self, path: str | Path) -> None:

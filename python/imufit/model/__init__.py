@@ -1,7 +1,7 @@
-"""The sensor model: a stack of named effects on top of ideal readings."""
+"""Effects, and a stack of them on top of ideal readings."""
 
 from imufit.model.catalogue import catalogue, explain, find_effect, load_effects
 from imufit.model.effect import Window, effect
-from imufit.model.sensor_model import SensorModel
+from imufit.model.effect_stack import EffectStack
 
-__all__ = ["SensorModel", "Window", "catalogue", "effect", "explain", "find_effect", "load_effects"]
+__all__ = ["EffectStack", "Window", "catalogue", "effect", "explain", "find_effect", "load_effects"]

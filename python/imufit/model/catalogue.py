@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import runpy
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 from imufit import _imufit
@@ -15,9 +16,19 @@ from imufit.results import EffectCard
 COLUMN = ".column:"
 
 
+@cache
+def _built_in() -> dict[str, _imufit.Effect]:
+    return {effect.id: effect for effect in _imufit.built_in_effects()}
+
+
+@cache
+def _unnamed() -> dict[str, _imufit.Effect]:
+    return {effect.id: effect for effect in _imufit.unnamed_effects()}
+
+
 def effects() -> dict[str, _imufit.Effect]:
     """Built-in effects, then the user's, by id."""
-    return {**{effect.id: effect for effect in _imufit.built_in_effects()}, **registered()}
+    return {**_built_in(), **registered()}
 
 
 def column_effects(names: Iterable[str], sensors: Iterable[str]) -> dict[str, _imufit.Effect]:
@@ -29,7 +40,23 @@ def column_effects(names: Iterable[str], sensors: Iterable[str]) -> dict[str, _i
 
 def unnamed_effects() -> dict[str, _imufit.Effect]:
     """Effects that are fitted along and never named, by id: what the coarse steps of a converter do."""
-    return {effect.id: effect for effect in _imufit.unnamed_effects()}
+    return dict(_unnamed())
+
+
+def each_log_has_its_own(effect_id: str) -> bool:
+    """Return whether the parameters of an effect belong to one log's set-up, not to the sensor.
+
+    Parameters
+    ----------
+    effect_id : str
+        Id such as ``gyr.bias``.
+
+    Raises
+    ------
+    InputError
+        There is no such effect.
+    """
+    return find_effect(effect_id).scope == "log"
 
 
 def find_effect(effect_id: str) -> _imufit.Effect:

@@ -16,6 +16,15 @@ from imufit.errors import InputError
 Array = NDArray[np.float64]
 
 SENSORS = ("acc", "gyr", "mag")
+SCOPES = ("sensor", "log")
+REACHES = ("row", "neighbours", "history")
+SIGNS = ("any", "rather_positive", "positive")
+AFFINE = {
+    "offset": ("offset", {"x", "y", "z"}),
+    "scale": ("gain", {"x", "y", "z"}),
+    "matrix": ("gain", {row + column for row in "xyz" for column in "xyz"}),
+}
+"""Parts of a gain and an offset, each with the stage and the parameters that it can have."""
 
 _registered: dict[str, _imufit.Effect] = {}
 
@@ -88,6 +97,10 @@ def effect(
     mistaken_for: str = "",
     confirm: str = "",
     stage: str = "offset",
+    scope: str = "sensor",
+    reach: str = "neighbours",
+    affine: str | None = None,
+    sign: str = "any",
 ) -> Callable[[F], F]:
     """Make an effect out of a function that returns d reading / d parameters, fitted and ranked like a built-in one.
 
@@ -104,12 +117,24 @@ def effect(
     typical : float or mapping of str to float, optional
         Size that the parameters typically have, in their units.
     needs : sequence of str, optional
-        Columns of the log without which the effect is not offered.
+        Columns of the log without which the effect is not offered; ``temp`` is the temperature.
     name, formula, signature, mistaken_for, confirm : str, optional
         More words for the effect's card.
     stage : str, optional
         ``offset`` (adds to the reading, default), ``gain`` (acts on the sensor's quantity ``w.x``) or ``input``
         (changes the quantity that reaches the sensing element).
+    scope : str, optional
+        Whose property the parameters are: ``sensor`` (the same in all logs of one sensor, default) or ``log`` (each
+        log has its own, as it has its own bias and mount).
+    reach : str, optional
+        Which rows of the log decide what the effect adds to one row: ``row`` (that one alone), ``neighbours`` (those
+        around it besides, as for ``w.alpha``; default) or ``history`` (those since the start, as for ``w.t_start``).
+        Live rows can only be corrected for ``row``.
+    affine : str, optional
+        ``offset`` (a constant on each axis, parameters x, y, z), ``scale`` (each axis times ``w.x`` of its own) or
+        ``matrix`` (``w.x`` times elements named xx, xy, ...): `imufit export` writes such an effect.
+    sign : str, optional
+        ``any`` (default), ``rather_positive`` (never named first with a negative value) or ``positive``.
 
     Returns
     -------
@@ -134,6 +159,12 @@ def effect(
     units = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters, "1")
     if not units:
         raise InputError(f"effect {effect_id} has no parameter", remedy="Name at least one with its unit.")
+    for key, given, allowed in (("scope", scope, SCOPES), ("reach", reach, REACHES), ("sign", sign, SIGNS)):
+        if given not in allowed:
+            raise InputError(f"effect {effect_id}: {key} is {given!r}", remedy=f"Use one of {', '.join(allowed)}.")
+    if affine is not None:
+        _check_affine(effect_id, affine, stage, set(units), needs)
+    traits = {"scope": scope, "reach": reach, "sign": sign, **({} if affine is None else {"affine": affine})}
     sizes = dict(typical) if isinstance(typical, Mapping) else dict.fromkeys(units, typical)
 
     def decorate(function: F) -> F:
@@ -147,11 +178,27 @@ def effect(
         }
         columns = [(key, unit, sizes.get(key)) for key, unit in units.items()]
         _registered[effect_id] = _imufit.python_effect(
-            effect_id, prefix, columns, words, stage, list(needs), _call(effect_id, function, len(columns))
+            effect_id, prefix, columns, words, stage, list(needs), traits, _call(effect_id, function, len(columns))
         )
         return function
 
     return decorate
+
+
+def _check_affine(effect_id: str, affine: str, stage: str, parameters: set[str], needs: Sequence[str]) -> None:
+    """Refuse what cannot be a constant part of a gain and an offset."""
+    if affine not in AFFINE:
+        raise InputError(f"effect {effect_id}: affine is {affine!r}", remedy=f"Use one of {', '.join(AFFINE)}.")
+    own_stage, names = AFFINE[affine]
+    if needs:
+        raise InputError(
+            f"effect {effect_id}: what needs a column is not a constant {affine}", remedy="Leave affine out."
+        )
+    if stage != own_stage:
+        raise InputError(f"effect {effect_id}: affine {affine} at stage {stage}", remedy=f"Use stage {own_stage}.")
+    if not (parameters <= names if affine == "matrix" else parameters == names):
+        wanted = "among xx, xy, ..., zz" if affine == "matrix" else "x, y, z"
+        raise InputError(f"effect {effect_id}: affine {affine} has other parameters", remedy=f"Call them {wanted}.")
 
 
 def _call(effect_id: str, function: Function, count: int) -> Callable[[dict[str, Any]], Array]:

@@ -12,28 +12,17 @@ from imufit.log import Log
 from imufit.log.columns import GROUPS
 
 if TYPE_CHECKING:
-    from imufit.model.sensor_model import SensorModel
+    from imufit.loop import SensorModel
 
 Array = NDArray[np.float64]
 Batch = dict[str, Array]
 
-NOW: Final = frozenset(
-    {
-        "bias",
-        "scale",
-        "misalignment",
-        "bias_temperature",
-        "scale_temperature",
-        "quadratic",
-        "cubic",
-        "scale_asymmetry",
-        "g_sensitivity",
-        "hard_iron",
-        "soft_iron",
-        "current",
-    }
-)
-"""Effects of a sensor that depend on nothing but the present row; the others need the rows around it."""
+LACKING: Final = {
+    "reference": "the reference attitude",
+    "neighbours": "the rows around a row",
+    "history": "all rows since the start",
+}
+"""What live rows lack, by the reach of an effect that needs it."""
 
 
 class LiveCorrection:
@@ -51,25 +40,23 @@ class LiveCorrection:
     """
 
     def __init__(self, model: SensorModel) -> None:
-        for effect in model.effects:
-            sensor, _, kind = effect.partition(".")
-            if sensor in ("ref", "rig") or kind in NOW or kind.startswith("column:"):
-                continue
-            raise InputError(
-                f"{effect} needs the rows around a row, which live rows do not have",
-                remedy="Take a model without it here, or record and use imufit apply.",
-            )
-        of_temperature = [effect for effect in model.effects if effect.endswith("_temperature")]
-        if of_temperature and "temperature_mean" not in model.constants:
-            raise InputError(
-                f"{of_temperature[0]} needs temperature_mean, which the model does not hold", remedy="Fit it anew."
-            )
-        known = model.constants.get("covariate_means", {})
-        for effect in model.effects:
-            column = "motor_current" if effect == "mag.current" else effect.partition(".column:")[2]
-            if effect.partition(".column:")[1] and column not in known:
+        means = model.constants.get("covariate_means", {})
+        self._warmth_known = "temperature_mean" in model.constants
+        for effect, _ in model.stack():
+            # What is wrong with the reference is not taken out of readings; a mount turns each row by itself.
+            if effect.reference_part is None and effect.reach != "row":
                 raise InputError(
-                    f"{effect} needs the mean of {column}, which the model does not hold", remedy="Fit it anew."
+                    f"{effect.id} needs {LACKING[effect.reach]}, which live rows do not have",
+                    remedy="Take a model without it here, or record and use imufit apply.",
+                )
+            column = effect.centred_column
+            if column == "temp" and not self._warmth_known:
+                raise InputError(
+                    f"{effect.id} needs temperature_mean, which the model does not hold", remedy="Fit it anew."
+                )
+            if column not in (None, "temp") and column not in means:
+                raise InputError(
+                    f"{effect.id} needs the mean of {column}, which the model does not hold", remedy="Fit it anew."
                 )
         self._model = model
 
@@ -90,7 +77,9 @@ class LiveCorrection:
             for name in ("acc", "gyr", "mag")
             if all(axis in rest for axis in GROUPS[name])
         }
-        log = Log(t=t, temp=rest.get("temp"), covariates={k: v for k, v in rest.items() if k != "temp"}, **groups)
+        # Without the mean of the fitted log a temperature would count from the mean of this batch.
+        temp = rest.get("temp") if self._warmth_known else None
+        log = Log(t=t, temp=temp, covariates={k: v for k, v in rest.items() if k != "temp"}, **groups)
         corrected = self._model.apply(log)
         out = dict(batch)
         for name in groups:

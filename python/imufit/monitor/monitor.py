@@ -19,7 +19,7 @@ from imufit.record.live_rows import LiveRows
 from imufit.results.json_value import json_value
 
 if TYPE_CHECKING:
-    from imufit.model.sensor_model import SensorModel
+    from imufit.loop import SensorModel
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
@@ -34,6 +33,7 @@ from imufit.replay.tilt_comparison import compare_tilt, tilt_errors
 from imufit.results.tilt import TiltComparison
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -240,6 +240,8 @@ class Replay:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Table of n rows: `t` (s), `columns`, and with a reference ``F_total_deg F_heading_deg F_inclination_deg``."""
+        import pandas as pd  # noqa: PLC0415  heavy, and only needed here
+
         columns = {"t": self.log.t, **self.columns()}
         if self.log.ref_q is not None:
             for name in self.attitude:

@@ -10,8 +10,10 @@ from imufit.results.data_fault import DataFault
 from imufit.results.diagnosis import Candidate, Diagnosis, Rival, Unexplained
 from imufit.results.disagreement import Disagreement, Without
 from imufit.results.effect_card import EffectCard
+from imufit.results.judged import Judged
 from imufit.results.ladder import Ladder, Revision, Step
 from imufit.results.log_parameters import LogParameters
+from imufit.results.noise_part import NoisePart
 from imufit.results.parameter import Parameter
 from imufit.results.recording import Recording, RecordingClock, RecordingGap
 from imufit.results.table import Table
@@ -29,9 +31,11 @@ __all__ = [
     "Diagnosis",
     "Disagreement",
     "EffectCard",
+    "Judged",
     "Ladder",
     "LogParameters",
     "Mark",
+    "NoisePart",
     "Panel",
     "Parameter",
     "Recording",

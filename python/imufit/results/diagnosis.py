@@ -10,7 +10,9 @@ from imufit.figures import quantity
 from imufit.results.data_fault import DataFault, fault_table
 from imufit.results.disagreement import Disagreement, Without, disagreement_table
 from imufit.results.json_value import json_fields, json_value
+from imufit.results.judged import Judged
 from imufit.results.log_parameters import LogParameters, log_table, logs_json
+from imufit.results.noise_part import NoisePart, noise_table
 from imufit.results.parameter import Parameter, by_name, in_words
 from imufit.results.table import Table, html, page
 
@@ -26,6 +28,8 @@ VERDICTS = {
 }
 
 
+PASSED = "passed"
+"""Status of an effect that is there, or explains as much as one that is."""
 NOT_TESTABLE = "not testable here"
 """Status of an effect that a log cannot show."""
 
@@ -62,7 +66,11 @@ class Candidate:
     effect : str
         Its id.
     p_value : float
-        Adjusted for all candidates tried.
+        Bound on the chance of such evidence without the effect: one over its Bayes factor, at most 1.
+    probability : float
+        Probability that the effect is there beside the others that are; rivals share it.
+    ln_bayes : float
+        Log Bayes factor on top of the model.
     expected_ratio : float
         Expected residual over noise floor with the effect.
     held_out_before, held_out_after : float
@@ -76,7 +84,7 @@ class Candidate:
     explanation : str
         The physics and the figures in a sentence.
     status : str
-        ``passed``, ``not significant`` or ``not testable here``.
+        ``passed``, ``not significant``, ``not testable here``, ``implausible size`` or ``negative delay``.
     minimal_detectable : dict
         Smallest detectable (value, unit) by parameter.
     logs : tuple of LogParameters
@@ -85,6 +93,8 @@ class Candidate:
 
     effect: str
     p_value: float
+    probability: float
+    ln_bayes: float
     expected_ratio: float
     held_out_before: float
     held_out_after: float
@@ -108,6 +118,8 @@ class Candidate:
             "parameters": by_name(self.parameters),
             "confounded_with": [rival.to_dict() for rival in self.confounded_with],
             "explanation": self.explanation,
+            "probability": json_value(self.probability),
+            "ln_bayes": json_value(self.ln_bayes),
             "gain": json_value(self.gain),
             "gain_error": json_value(self.gain_error),
             "status": self.status,
@@ -147,7 +159,7 @@ class Candidate:
     def __str__(self) -> str:
         return (
             f"{self.effect}: held-out error {quantity.ratio(self.held_out_before)} -> "
-            f"{quantity.ratio(self.held_out_after)}, p {quantity.p_value(self.p_value)}. {self.explanation}"
+            f"{quantity.ratio(self.held_out_after)}, probability {quantity.share(self.probability)}. {self.explanation}"
         )
 
 
@@ -220,6 +232,10 @@ class Diagnosis:
     evidence : str
         What the logs are judged by: ``reference`` (attitude in every row), ``rests`` (the weaker evidence of rests,
         turns between them and the length of the field, for logs without a reference) or ``reference and rests``.
+    judged : tuple of Judged
+        Every sensor of the logs: whether it was judged, and why not.
+    noise : tuple of NoisePart
+        The noise floor of each channel as a sum of parts.
     """
 
     verdict: str
@@ -236,6 +252,8 @@ class Diagnosis:
     without: tuple[Without, ...] = ()
     data_faults: tuple[DataFault, ...] = ()
     evidence: str = "reference"
+    judged: tuple[Judged, ...] = ()
+    noise: tuple[NoisePart, ...] = ()
 
     @property
     def best_candidate(self) -> Candidate | None:
@@ -256,6 +274,8 @@ class Diagnosis:
             "notes": list(self.notes),
             "data_faults": [fault.to_dict() for fault in self.data_faults],
             "evidence": self.evidence,
+            "judged": {item.sensor: item.to_dict() for item in self.judged},
+            "noise": [part.to_dict() for part in self.noise],
             **logs_json(self.logs),
             **({"disagrees": [item.to_dict() for item in self.disagrees]} if self.logs else {}),
             **({"without": [item.to_dict() for item in self.without]} if self.without else {}),
@@ -268,6 +288,7 @@ class Diagnosis:
         columns = [
             "effect",
             "status",
+            "probability",
             "p_value",
             "held_out_before",
             "held_out_after",
@@ -306,7 +327,7 @@ class Diagnosis:
             (
                 item.effect,
                 f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}",
-                quantity.p_value(item.p_value),
+                quantity.share(item.probability),
                 in_words(item.parameters, 2) if item.status == "passed" else "-",
                 item.smallest_detectable,
                 ", ".join(str(rival) for rival in item.confounded_with[:2]) or "-",
@@ -314,7 +335,7 @@ class Diagnosis:
             )
             for item in self.candidates[:limit]
         )
-        header = ("effect", "held-out error", ">p", "predicted", "smallest detectable", "rivals", "status")
+        header = ("effect", "held-out error", ">probability", "predicted", "smallest detectable", "rivals", "status")
         return Table("Candidates, best first", header, rows)
 
     def unexplained_table(self) -> Table:
@@ -347,6 +368,7 @@ class Diagnosis:
             self.disagreement_table(),
             self.log_table(),
             fault_table(self.data_faults),
+            noise_table(self.noise),
         )
 
     def sentences(self) -> list[str]:

@@ -25,7 +25,7 @@ class Disagreement:
     value, others : tuple of Parameter
         By this log, and by the others together.
     p_value : float
-        Chance of such a difference, adjusted for all logs asked.
+        Bound on the chance of such a difference: one over the Bayes factor of a value of its own.
     wild : bool
         Whether the difference is so large that the effect can't be called one of the sensor.
     """

@@ -102,7 +102,7 @@ class Ladder:
     diagnosis : Diagnosis
         After the last step.
     comparison_start, comparison_end : Comparison or None
-        First and last model against the log.
+        First and last model against the log; None where rests stand in for a reference.
     first : Diagnosis or None
         Before the first step.
     fit : Any

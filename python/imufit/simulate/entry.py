@@ -13,6 +13,7 @@ from imufit.simulate.sensor import Setup, Situation
 
 Parameters = Mapping[str, float]
 Stage = Literal["rig", "reference", "mounting", "place", "time", "gain", "disturbance", "range"]
+Late = Literal["delay", "lag"]
 
 THREE = ("x", "y", "z")
 SIX = ("xy", "xz", "yx", "yz", "zx", "zy")
@@ -46,6 +47,8 @@ class Injection:
     positive : whether the scaled parameters are positive by their meaning.
     column : the covariate that it needs, if any.
     vibration : whether it needs a vibrating environment.
+    late : how it comes late by its one parameter, a time in which it is not linear; None for all others.
+    trials : values to try for the parameters inside it, by the length of the log (s).
     """
 
     id: str
@@ -57,6 +60,8 @@ class Injection:
     positive: bool = False
     column: str | None = None
     vibration: bool = False
+    late: Late | None = None
+    trials: Callable[[float], list[dict[str, float]]] = lambda _length: [{}]
 
     def direction(self, rng: np.random.Generator, run: Run) -> dict[str, float]:
         """Draw parameters of about typical size and either sign, none of them negligible.

@@ -14,7 +14,7 @@ import numpy as np
 from imufit.simulate.environment import stream
 from imufit.simulate.motion import Array
 from imufit.simulate.simulation import Simulation
-from imufit.simulate.truth import quaternion_from_matrix, rotation_from_vector
+from imufit.simulate.truth import rotation_from_vector
 
 SENSORS = ("acc", "gyr", "mag")
 
@@ -148,31 +148,6 @@ def _clipped(log: Simulation, _rng: np.random.Generator) -> Simulation:
     return _with(log, gyr=np.clip(gyr, -end, end))
 
 
-def _drifting(log: Simulation, rng: np.random.Generator) -> Simulation:
-    """Let the clock of the reference run fast or slow against that of the sensors, by 200 to 500 ppm."""
-    drift = rng.choice([-1.0, 1.0]) * rng.uniform(200e-6, 500e-6)
-    middle = 0.5 * (log.t[0] + log.t[-1])
-    then = log.t + drift * (log.t - middle)
-    now, other = log.trajectory.at(log.t), log.trajectory.at(then)
-    recorded = _matrices(log.ref_q)
-    error = np.swapaxes(now.rotation, 1, 2) @ recorded
-    position = None if log.ref_p is None else log.ref_p + other.position - now.position
-    joint = log.trajectory.rig_joint
-    angle = None if log.ref_angle is None or joint is None else joint.angle.at(then).value
-    return _with(log, ref_q=quaternion_from_matrix(other.rotation @ error), ref_p=position, ref_angle=angle)
-
-
-def _matrices(q: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of unit quaternions, scalar first."""
-    w, x, y, z = q.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
-
-
 def _knocked(log: Simulation, rng: np.random.Generator) -> Simulation:
     """Turn the sensors in their mount by two to four degrees at one instant."""
     axis = rng.normal(size=3)
@@ -202,7 +177,6 @@ FAULTS: Mapping[str, Fault] = {
         Fault("duplicate", "a block of samples is repeated", _repeated, ("duplicate",)),
         Fault("backlog", "the first rows have the times of their arrival", _backlog, ("backlog",)),
         Fault("clipped", "readings are pinned at the end of a range", _clipped, ("clipped",)),
-        Fault("clock_drift", "the clocks of reference and sensors differ in rate", _drifting, ("clock_drift",)),
         Fault("knock", "the mount shifts at one instant", _knocked, ("knock",)),
     )
 }

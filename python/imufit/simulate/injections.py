@@ -55,7 +55,7 @@ def _disturbances() -> list[Injection]:
         entry("mag.hard_iron", three(5.0), _constant),
         entry("gyr.g_sensitivity", dict.fromkeys(NINE, 2e-4), lambda s, p: s.force @ matrix(p).T),
         entry("gyr.scale_asymmetry", three(0.005), lambda s, p: vector(p) * np.abs(s.input)),
-        entry("mag.current", three(1.0), lambda s, p: times(s.current, p)),
+        replace(entry("mag.current", three(1.0), lambda s, p: times(s.current, p)), column="motor_current"),
     ]
     for sensor in SENSORS:
         u, x = unit[sensor], full[sensor]
@@ -71,14 +71,22 @@ def _disturbances() -> list[Injection]:
             entry(f"{sensor}.quadratic", three(0.01 / x), lambda s, p: vector(p) * s.input**2),
             entry(f"{sensor}.cubic", three(0.01 / x**2), lambda s, p: vector(p) * s.input**3),
         ]
-    entries.append(
-        entry("acc.vibration_rectification", three(0.02), lambda s, p: times(s.vibration_power, p), vibration=True)
-    )
+    # The simulated shaking is a tenth of a drone's: the gyroscope's c makes up for that.
+    entries += [
+        entry(
+            f"{sensor}.vibration_rectification", three(size), lambda s, p: times(s.vibration_power, p), vibration=True
+        )
+        for sensor, size in (("acc", 0.02), ("gyr", 1e-4))
+    ]
     warmup = entry("gyr.warmup", three(0.01), lambda s, p: times(np.exp(-s.since / p["tau"]), p))
     entries.append(
-        replace(warmup, inner=lambda rng, run: {"tau": float(rng.uniform(0.08, 0.25) * (run.stop - run.start))})
+        replace(
+            warmup,
+            inner=lambda rng, run: {"tau": float(rng.uniform(0.08, 0.25) * (run.stop - run.start))},
+            trials=lambda length: [{"tau": length * part} for part in (0.08, 0.15, 0.3, 0.6, 1.5)],
+        )
     )
-    return [replace(e, column="motor_current") if e.id == "mag.current" else e for e in entries]
+    return entries
 
 
 def _gains() -> list[Injection]:
@@ -106,10 +114,14 @@ def _times_and_ranges() -> list[Injection]:
 
     for sensor in SENSORS:
         late = attribute(sensor, "delay", "tau")
-        entries.append(Injection(f"{sensor}.delay", {"tau": 0.01}, (sensor,), "time", late, positive=True))
+        entries.append(
+            Injection(f"{sensor}.delay", {"tau": 0.01}, (sensor,), "time", late, positive=True, late="delay")
+        )
     for sensor in ("acc", "gyr"):
         slow, limit = attribute(sensor, "lag", "tau"), attribute(sensor, "limit", "range")
-        entries.append(Injection(f"{sensor}.lowpass", {"tau": 0.01}, (sensor,), "time", slow, positive=True))
+        entries.append(
+            Injection(f"{sensor}.lowpass", {"tau": 0.01}, (sensor,), "time", slow, positive=True, late="lag")
+        )
         entries.append(Injection(f"{sensor}.saturation", {"range": 1.0}, (sensor,), "range", limit, positive=True))
     return entries
 
@@ -123,7 +135,15 @@ def _tilt(setup: Setup, p: Parameters, _run: Run) -> None:
 
 
 def _late_reference(setup: Setup, p: Parameters, _run: Run) -> None:
-    setup.reference_delay = p["tau"]
+    setup.recorder = replace(setup.recorder, delay=p["tau"])
+
+
+def _drifting_reference(setup: Setup, p: Parameters, run: Run) -> None:
+    setup.recorder = replace(setup.recorder, skew=p["k"], start=run.start)
+
+
+def _smoothed_reference(setup: Setup, p: Parameters, _run: Run) -> None:
+    setup.recorder = replace(setup.recorder, smoothing=p["c"])
 
 
 def _field(setup: Setup, p: Parameters, _run: Run) -> None:
@@ -141,7 +161,9 @@ def _references() -> list[Injection]:
     return [
         Injection("ref.alignment", three(0.02), SENSORS, "mounting", _alignment),
         Injection("ref.tilt", {"x": 0.02, "y": 0.02}, ("acc", "mag"), "mounting", _tilt),
-        Injection("ref.delay", {"tau": 0.01}, SENSORS, "reference", _late_reference, positive=True),
+        Injection("ref.delay", {"tau": 0.01}, SENSORS, "reference", _late_reference, positive=True, late="delay"),
+        Injection("ref.skew", {"k": 1e-4}, SENSORS, "reference", _drifting_reference),
+        Injection("ref.lowpass", {"c": 1e-4}, SENSORS, "reference", _smoothed_reference, positive=True),
         Injection("mag.field_reference", three(2.0), ("mag",), "reference", _field),
         Injection("gyr.earth_rate", {"north": 5e-5, "vertical": 5e-5}, ("gyr",), "disturbance", _earth_rate),
     ]
@@ -174,7 +196,11 @@ def _rigs() -> list[Injection]:
     return [
         Injection("rig.backlash", {"width": 5e-3}, SENSORS, "rig", _backlash, positive=True),
         Injection("rig.flexure", {"k": 5e-3}, SENSORS, "rig", _flexure),
-        replace(periodic, inner=lambda rng, _run: {"N": float(rng.integers(8, 25))}),
+        replace(
+            periodic,
+            inner=lambda rng, _run: {"N": float(rng.integers(8, 25))},
+            trials=lambda _length: [{"N": float(order)} for order in range(4, 26)],
+        ),
     ]
 
 
@@ -182,6 +208,20 @@ INJECTIONS: Mapping[str, Injection] = {
     entry.id: entry for entry in (*_gains(), *_disturbances(), *_times_and_ranges(), *_references(), *_rigs())
 }
 """The catalogue's effects by name, except `SENSOR.column:NAME`, of which each column has one: see `injection`."""
+
+
+def effect_of_column(sensor: str, column: str) -> str:
+    """Return the id of what a column does to a sensor: a name of its own where it has one, else `SENSOR.column:NAME`.
+
+    Parameters
+    ----------
+    sensor : str
+        ``acc``, ``gyr`` or ``mag``.
+    column : str
+        Name of the covariate.
+    """
+    named = (entry.id for entry in INJECTIONS.values() if (entry.sensors, entry.column) == ((sensor,), column))
+    return next(named, f"{sensor}.column:{column}")
 
 
 def injection(effect: str) -> Injection:
@@ -199,8 +239,8 @@ def injection(effect: str) -> Injection:
     prefix, _, column = effect.partition(":")
     sensor = prefix.removesuffix(".column")
     if column and sensor in SENSORS and sensor != prefix:
-        if (sensor, column) == ("mag", "motor_current"):
-            raise ValueError("the effect of motor_current on the magnetometer has a name of its own: mag.current")
+        if (named := effect_of_column(sensor, column)) != effect:
+            raise ValueError(f"the effect of {column} on {sensor} has a name of its own: {named}")
         typical = {"acc": 0.1, "gyr": 5e-3, "mag": 1.0}[sensor]
         apply = disturbance_of(sensor, lambda s, p: times(s.covariates[column], p))
         return Injection(effect, three(typical), (sensor,), "disturbance", apply, column=column)

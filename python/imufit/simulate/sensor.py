@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 from imufit.simulate.environment import Environment
 from imufit.simulate.motion import Array
 from imufit.simulate.noise import SensorNoise
+from imufit.simulate.recorder import Recorder
 from imufit.simulate.truth import Kinematics, Trajectory
 
 SENSORS = ("acc", "gyr", "mag")
@@ -108,6 +109,12 @@ class Rows:
             self._known[key] = (trajectory, trajectory.at(self.t - delay))
         return self._known[key][1]
 
+    def recorded(self, trajectory: Trajectory, recorder: Recorder) -> Kinematics:
+        """Return the motion as a recorder of the reference has it in each row."""
+        if recorder == Recorder(delay=recorder.delay):
+            return self.kinematics(trajectory, recorder.delay)
+        return recorder.poses(trajectory, self.t)
+
     def fine(self, before: float) -> Rows:
         """Return a grid with `lag_step` from `before` (s) ahead of the first row to the last one."""
         if before not in self._fine:
@@ -128,7 +135,7 @@ class Setup:
     trajectory : the motion that really happens.
     mount : (3, 3), sensor axes to the axes of the reference's body.
     base : (3, 3), by which the reference's frame is turned against the world: x_world = base x_reference.
-    reference_delay : time (s) by which the reference is late.
+    recorder : what records the reference, stamps and poses.
     """
 
     commanded: Trajectory
@@ -137,7 +144,7 @@ class Setup:
     trajectory: Trajectory
     mount: Array = field(default_factory=lambda: np.eye(3))
     base: Array = field(default_factory=lambda: np.eye(3))
-    reference_delay: float = 0.0
+    recorder: Recorder = field(default_factory=Recorder)
     sensors: dict[str, Sensor] = field(default_factory=lambda: {name: Sensor() for name in SENSORS})
 
     @classmethod
@@ -204,6 +211,6 @@ def readings(setup: Setup, rows: Rows, names: tuple[str, ...] = SENSORS) -> dict
 def discrepancy(setup: Setup, rows: Rows, names: tuple[str, ...] = SENSORS) -> dict[str, Array]:
     """Return the noise-free readings less the ideal ones for the motion that the reference reports, (n, 3) each."""
     reported = Setup.ideal(setup.commanded, setup.expected)
-    kinematics = rows.kinematics(setup.commanded, setup.reference_delay)
+    kinematics = rows.recorded(setup.commanded, setup.recorder)
     real = readings(setup, rows, names)
     return {name: real[name] - reported.input(name, kinematics, rows.t) for name in names}

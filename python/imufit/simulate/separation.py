@@ -15,7 +15,7 @@ from scipy.linalg import block_diag, solve_discrete_are
 from scipy.signal import lfilter, ss2tf
 
 from imufit.simulate.entry import Injection, Parameters
-from imufit.simulate.injections import INJECTIONS, injection
+from imufit.simulate.injections import INJECTIONS, effect_of_column, injection
 from imufit.simulate.motion import Array
 from imufit.simulate.noise import SensorNoise
 from imufit.simulate.scenarios import SCENARIOS
@@ -24,15 +24,6 @@ from imufit.simulate.study import Study
 
 APART = 36.0
 """A rival counts as distinguishable when it is six standard errors away (squared)."""
-
-UNTRIED = (
-    "acc.saturation",  # acts on single samples: never like an effect that acts all the time
-    "gyr.saturation",
-    "acc.lowpass",  # to first order the delay of the same sensor; tried against that and other delays only
-    "gyr.lowpass",
-)
-LATE = ("acc.delay", "gyr.delay", "mag.delay", "ref.delay", "acc.lowpass", "gyr.lowpass")
-"""Effects with one time each, which are not linear in it: they are fitted to each other by Newton's steps."""
 
 
 def whitening(
@@ -121,7 +112,7 @@ class Separation:
     def columns_of(self, effect: str, inner: Parameters | None = None) -> Array:
         """Return the change (m, k) for each parameter of an effect, at a tenth of its typical size."""
         entry = injection(effect)
-        chosen = self._inner(entry)[0] if inner is None else inner
+        chosen = entry.trials(self._length)[0] if inner is None else inner
         key = (effect, *map(float, chosen.values()))
         if key not in self._known:
             units = [self.signal(effect, p) for p in _units(entry, chosen)]
@@ -130,8 +121,9 @@ class Separation:
 
     @cached_property
     def _catalogue(self) -> list[str]:
-        others = [name for name in INJECTIONS if name not in UNTRIED]
-        others += [f"{s}.column:{c}" for s in SENSORS for c in self.columns if (s, c) != ("mag", "motor_current")]
+        others = [name for name, entry in INJECTIONS.items() if _is_rival(entry)]
+        of_columns = [effect_of_column(sensor, column) for sensor in SENSORS for column in self.columns]
+        others += [name for name in of_columns if name not in INJECTIONS]
         return [name for name in others if self._possible(injection(name))]
 
     def _possible(self, entry: Injection) -> bool:
@@ -147,16 +139,8 @@ class Separation:
             entry = injection(name)
             if name == effect or not touched & set(entry.sensors):
                 continue
-            for inner in self._inner(entry):
+            for inner in entry.trials(self._length):
                 yield name, self.columns_of(name, inner)
-
-    def _inner(self, entry: Injection) -> list[dict[str, float]]:
-        """Return the values tried for parameters inside an effect: time constants, periods."""
-        if entry.id == "gyr.warmup":
-            return [{"tau": self._length * part} for part in (0.08, 0.15, 0.3, 0.6, 1.5)]
-        if entry.id == "rig.periodic":
-            return [{"N": float(order)} for order in range(4, 26)]
-        return [{}]
 
     def distances(
         self, effect: str, parameters: Parameters, beside: Sequence[str] = (), least: float = 0.0
@@ -180,9 +164,10 @@ class Separation:
         for rival, design in self.rivals(effect):
             if rival not in beside:
                 found[rival] = min(found.get(rival, np.inf), _left(signal, [design, *along]))
-        if effect in LATE and not beside:
-            for rival in LATE:
-                if rival != effect and set(injection(rival).sensors) & set(injection(effect).sensors):
+        if injection(effect).late and not beside:
+            # None of them is linear in its time: they are fitted to each other by Newton's steps.
+            for rival in (name for name, entry in INJECTIONS.items() if entry.late and name != effect):
+                if set(injection(rival).sensors) & set(injection(effect).sensors):
                     found[rival] = min(found.get(rival, np.inf), self._late(signal, rival))
         return found
 
@@ -199,7 +184,7 @@ class Separation:
             if power == 0.0:
                 break
             tau += float((signal - now) @ slope) / power
-            if rival.endswith("lowpass"):
+            if injection(rival).late == "lag":
                 tau = max(tau, 1e-4)
             now = self.signal(rival, {"tau": tau})
             left = min(left, float(np.sum((signal - now) ** 2)))
@@ -211,6 +196,15 @@ class Separation:
         designs = list(self.rivals(effect))
         nearest = min(_left(signal, [design]) for _, design in designs)
         return float(signal @ signal), nearest, _left(signal, [design for _, design in designs])
+
+
+def _is_rival(entry: Injection) -> bool:
+    """Return whether an effect is held against all others.
+
+    What acts on single samples is never like an effect that acts all the time. A lag is to first order the delay of the
+    same sensor, and is held against delays only.
+    """
+    return entry.stage != "range" and entry.late != "lag"
 
 
 def _units(entry: Injection, inner: Parameters) -> Iterator[dict[str, float]]:

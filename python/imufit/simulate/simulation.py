@@ -160,7 +160,7 @@ def _recorded(study: Study, truth: Truth, rig_axis: str, noise_in_metadata: bool
         errors[name] = np.where(sampled[name][:, None], digits - calm, np.nan)
         sensors[name] = np.where(sampled[name][:, None], digits, np.nan)
 
-    reference = rows.kinematics(trajectory, setup.reference_delay)
+    reference = rows.recorded(trajectory, setup.recorder)
     rng = stream(seed, "noise of the reference")
     attitude = noisy_attitude(reference.rotation, noise, rng)
     position = reference.position + noise.position * rng.standard_normal((t.size, 3))
@@ -173,7 +173,7 @@ def _recorded(study: Study, truth: Truth, rig_axis: str, noise_in_metadata: bool
         temp=_temperature(study.environment, noise, seed, t) if "temp" in study.names else None,
         ref_q=quaternion_from_matrix(attitude),
         ref_p=position if kind.position else None,
-        ref_angle=None if joint is None else joint.angle.at(t - setup.reference_delay).value,
+        ref_angle=None if joint is None else setup.recorder.averaged(lambda then: joint.angle.at(then).value, t),
         pose=np.array([*LABELS, ""])[pose_labels(frame, now.rotation, now.omega)] if kind.poses else None,
         covariates={name: course.at(t) for name, course in study.environment.covariates.items()},
         metadata=_metadata(study, truth.scenario, rig_axis if kind.rig else None, noise_in_metadata),

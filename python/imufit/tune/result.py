@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from imufit.figures import quantity
@@ -15,6 +14,7 @@ from imufit.results.json_value import json_value
 from imufit.results.table import html, page
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -285,6 +285,8 @@ class Tuning:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Table of what changing one gain does: gain, value of the gain, factor, value in deg."""
+        import pandas as pd  # noqa: PLC0415  heavy, and only needed here
+
         frames = [
             pd.DataFrame(
                 {

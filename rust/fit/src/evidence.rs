@@ -169,7 +169,8 @@ type Blocks = BTreeMap<(usize, usize), ChannelBlock>;
 pub struct Evidence {
     /// What it was taken for.
     pub layout: Arc<Layout>,
-    blocks: Blocks,
+    /// Shared by copies, which questions of several models of one log keep.
+    blocks: Arc<Blocks>,
 }
 
 /// Rows of a sensor that can be used, within an evaluated window.
@@ -220,7 +221,7 @@ impl Evidence {
     pub fn new(layout: Arc<Layout>) -> Self {
         Self {
             layout,
-            blocks: Blocks::new(),
+            blocks: Arc::new(Blocks::new()),
         }
     }
 
@@ -250,6 +251,7 @@ impl Evidence {
     /// Adds finished rows of one channel. Rows with a column that is not known are no evidence.
     fn add_rows(&mut self, rows: &ChannelRows) {
         let bins = &self.layout.bins;
+        let blocks = Arc::make_mut(&mut self.blocks);
         let width = rows.columns.columns.len() + 1;
         let mut assigned = vec![Vec::new(); bins.names.len()];
         for (covariate, assigned) in assigned.iter_mut().enumerate() {
@@ -268,7 +270,7 @@ impl Evidence {
                 continue;
             }
             let key = (rows.block[i], rows.channel);
-            let target = self.blocks.entry(key).or_insert_with(|| ChannelBlock::new(width, bins));
+            let target = blocks.entry(key).or_insert_with(|| ChannelBlock::new(width, bins));
             target.n += 1;
             target.gram.ger(1.0, &row, &row, 1.0);
             target.sum += &row;
@@ -296,8 +298,9 @@ impl Evidence {
     }
 
     fn absorb(&mut self, part: Blocks) {
+        let blocks = Arc::make_mut(&mut self.blocks);
         for (key, block) in part {
-            match self.blocks.entry(key) {
+            match blocks.entry(key) {
                 std::collections::btree_map::Entry::Occupied(mut e) => e.get_mut().add(&block),
                 std::collections::btree_map::Entry::Vacant(e) => {
                     e.insert(block);
@@ -308,7 +311,7 @@ impl Evidence {
 
     /// Adds evidence of other rows taken for the same layout.
     pub fn merge(&mut self, other: Self) {
-        self.absorb(other.blocks);
+        self.absorb(Arc::unwrap_or_clone(other.blocks));
     }
 
     /// Evidence of a channel in a block; `None` where it has no sample.

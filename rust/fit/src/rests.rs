@@ -1,11 +1,12 @@
 //! What a log without a reference attitude tells of its sensors.
 //!
 //! At rest the specific force is as long as gravity and the rate is zero; from one rest to the next the integrated rate carries the
-//! direction of gravity along; the magnetic field is as long everywhere. Each of these is a row of evidence: a residual, and
+//! direction of gravity along; of a labelled pose the direction is known; the magnetic field is as long everywhere. Each of these is a row of evidence: a residual, and
 //! the columns of every effect projected as the residual is. The ideal readings that columns depend on are the readings
 //! themselves with the model undone: a vector along a reading, of the length that is known.
 
 mod field;
+mod pose;
 mod still;
 mod table;
 mod turn;
@@ -18,6 +19,7 @@ use imufit_model::sensor_model::{ChannelColumns, Evaluation, SensorModel};
 use imufit_model::triple::Triple;
 use imufit_model::window::Window;
 
+pub use self::pose::Labelled;
 pub use self::turn::Turn;
 
 /// Means over stretches of the rests of a log.
@@ -36,6 +38,8 @@ pub struct Rests<'a> {
     pub stills: Stills<'a>,
     /// Means over whole rests, where turns begin and end.
     pub poses: Window<'a>,
+    /// Those of them whose upward axis is known.
+    pub labelled: Vec<Labelled>,
     /// The rows of all turns, one turn after the other; every row has a rate.
     pub path: Window<'a>,
     /// Turns from one rest to the next.
@@ -73,6 +77,10 @@ impl Rests<'_> {
             let mut rows = self.still_rows(FORCE_NORM, stills.force_norm(model), &stills);
             rows.direction = Some(stills.force.direction.clone());
             out.push(rows);
+            if !self.labelled.is_empty() {
+                let poses = still::Still::new(&self.poses, model, facts)?;
+                out.push(pose::rows(&self.labelled, &poses, model));
+            }
             if facts.sensors[Sensor::Gyr.index()] {
                 for (axis, columns) in stills.rate(model, facts)?.into_iter().enumerate() {
                     out.push(self.still_rows(RATE + axis, columns, &stills));

@@ -78,6 +78,43 @@ fn around(window: &Window, sensor: Sensor, row: usize) -> (Vector3<f64>, Vector3
     (at(row), at(row + 2) - at(row - 2))
 }
 
+/// Rows of a window in which the attitude is known: sensors and reference may stand in rows of their own.
+struct Attitudes {
+    rows: Vec<usize>,
+    /// Median time between them, s.
+    spacing: f64,
+}
+
+impl Attitudes {
+    fn of(window: &Window) -> Self {
+        let known = |i: &usize| {
+            let of_row = |q: &[f64]| q[4 * i..4 * i + 4].iter().all(|v| v.is_finite());
+            window.attitude.is_some_and(of_row)
+        };
+        let rows: Vec<usize> = (0..window.len()).filter(known).collect();
+        let mut steps: Vec<f64> = rows
+            .windows(2)
+            .map(|pair| window.t[pair[1]] - window.t[pair[0]])
+            .collect();
+        Self {
+            spacing: median(&mut steps),
+            rows,
+        }
+    }
+
+    /// The attitude nearest in time to a row, no further away than the attitudes lie apart.
+    fn nearest(&self, window: &Window, row: usize) -> Option<UnitQuaternion<f64>> {
+        let after = self.rows.partition_point(|k| *k < row);
+        let around = [after.checked_sub(1), Some(after)].into_iter().flatten();
+        let away = |k: &usize| (window.t[*k] - window.t[row]).abs();
+        let near = around.filter_map(|k| self.rows.get(k).copied());
+        let nearest = near.min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let q = window.attitude.map(|q| &q[4 * nearest..4 * nearest + 4])?;
+        let close = nearest == row || away(&nearest) <= self.spacing;
+        close.then(|| UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3])))
+    }
+}
+
 /// Middle of a sample; NaN if empty.
 fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
@@ -146,6 +183,7 @@ impl Survey {
                 last = [last[1], Some(i)];
             }
         }
+        let attitudes = Attitudes::of(window);
         let passed = window.t[window.len() - 1] - window.t[0];
         let power = vibration::power(window, passed / (window.len().max(2) - 1) as f64);
         for i in core.clone() {
@@ -167,13 +205,12 @@ impl Survey {
                     sum.1 += 1;
                 }
             }
-            if let (Some(q), Some(m)) = (window.attitude, window.reading(Sensor::Mag)) {
-                let (q, m) = (&q[4 * i..4 * i + 4], Vector3::new(m[3 * i], m[3 * i + 1], m[3 * i + 2]));
-                if q.iter().all(|v| v.is_finite()) && m.iter().all(|v| v.is_finite()) {
-                    let q = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
-                    self.field.0 += q * m;
-                    self.field.1 += 1;
-                }
+            if let Some(m) = window.reading(Sensor::Mag).map(|m| &m[3 * i..3 * i + 3])
+                && m.iter().all(|v| v.is_finite())
+                && let Some(q) = attitudes.nearest(window, i)
+            {
+                self.field.0 += q * Vector3::new(m[0], m[1], m[2]);
+                self.field.1 += 1;
             }
             if let (Some(travel), Some(q)) = (self.travel.as_mut(), window.attitude) {
                 let q = &q[4 * i..4 * i + 4];
@@ -296,6 +333,12 @@ impl Survey {
             ],
             shaking_varies: vibration::varies(&mut self.shaking, dt, steps[Sensor::Acc.index()]),
             column_noise: [force_noise, rate_noise, attitude_noise * field.norm()],
+            ideal_noise: [
+                attitude_noise * self.given.gravity.norm()
+                    + position_smoothing.map_or(0.0, |s| self.position_width.derivative_noise(s)),
+                self.attitude_width.derivative_noise(attitude_smoothing),
+                attitude_noise * field.norm(),
+            ],
             position_origin: self.origin.unwrap_or_default(),
             attitude_columns,
             position_columns,

@@ -1,21 +1,15 @@
-//! Do the logs agree about an effect? Each log in turn is given a value of its own, and the same tests that ask whether an effect
-//! is there ask whether that value differs from the one of the other logs.
+//! Do the logs agree about an effect? A log that disagrees is better predicted with a value of its own.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use imufit_fit::normal_equations::NormalEquations;
+use nalgebra::{Cholesky, DMatrix};
 
-use crate::held_out;
-use crate::jackknife;
-use crate::problem::{Problem, Question};
-use crate::screening;
+use crate::asked::{Asked, Prior};
+use crate::problem::indices;
+use crate::search::{self, Search};
+use crate::stack::Stack;
 
-/// Logs whose values of an effect differ by chance more often than this are taken to agree.
-const ALPHA: f64 = 0.003;
-/// Variance, in units of what is plausible, below which the difference of two logs counts as seen by both of them.
-const SEEN: f64 = 0.25;
 /// A difference of this much of the effect, squared, is no property of the sensor.
 const WILD: f64 = 0.5;
-/// Above this p-value nothing more needs to be asked.
-const CLEARLY_CHANCE: f64 = 0.01;
 
 /// A log that has another value of an effect than the others.
 #[derive(Clone, Debug)]
@@ -28,172 +22,147 @@ pub struct Disagreement {
     pub own: Vec<(f64, f64)>,
     /// The same by the other logs.
     pub others: Vec<(f64, f64)>,
-    /// Chance of such a difference, adjusted for all that were asked.
-    pub p_value: f64,
+    /// Log Bayes factor of a value of its own.
+    pub ln_bayes: f64,
     /// True if the difference is so large that the effect can't be called one of the sensor.
     pub wild: bool,
 }
 
-/// One log against the others.
-struct Compared {
-    /// The question in which the log has a value of its own.
-    question: Question,
-    /// Directions (of those of the effect) in which both sides see the difference.
-    seen: DMatrix<f64>,
-    p_value: f64,
+/// Equations of each log over all parameters; empty for one log, which has nobody to disagree with.
+pub fn by_log(search: &Search) -> Vec<NormalEquations> {
+    let problem = search.criterion.problem;
+    let all: Vec<usize> = (0..problem.plausible.len()).collect();
+    let logs = problem.parts.len();
+    (0..if logs > 1 { logs } else { 0 })
+        .map(|log| problem.equations.of_log(log, &all))
+        .collect()
 }
 
-/// Compares a log with the others that share the `m` parameters before the last `own` ones of a question.
-fn compared(question: &Question, first: usize, m: usize, log: usize) -> Option<Compared> {
-    let free = question.with_own(log, first, &DMatrix::identity(m, m));
-    let covariance = free.total().solve(&free.precision)?.covariance();
-    let p = free.model;
-    let eigen = covariance.view((p, p), (m, m)).into_owned().symmetric_eigen();
-    let kept: Vec<usize> = (0..m).filter(|k| eigen.eigenvalues[*k] < SEEN).collect();
-    if kept.is_empty() {
-        return None;
+/// Logs that disagree about an effect beside the `members`, the one with most evidence first; of two logs both are named.
+pub fn disagreements(
+    search: &Search,
+    equations: &[NormalEquations],
+    members: &[usize],
+    slot: usize,
+) -> Vec<Disagreement> {
+    let criterion = search.criterion;
+    let problem = criterion.problem;
+    if equations.len() < 2 || problem.own[slot] {
+        return Vec::new();
     }
-    let seen = eigen.eigenvectors.select_columns(&kept);
-    let question_of_log = question.with_own(log, first, &seen);
-    if !jackknife::possible(&question_of_log) {
-        return None;
-    }
-    let mut p_value = screening::wald(&question_of_log, &question_of_log.total(), 1.0);
-    if p_value <= CLEARLY_CHANCE {
-        let base = held_out::held_out(question);
-        let (gain, _) = held_out::gain(&base, &held_out::held_out(&question_of_log));
-        p_value = if gain > 0.0 {
-            screening::p_value(&question_of_log)
-        } else {
-            1.0
-        };
-    }
-    Some(Compared {
-        question: question_of_log,
-        seen,
-        p_value,
-    })
-}
-
-impl Compared {
-    /// Parameters of the effect by this log and by the others, and whether they differ wildly.
-    fn told(&self, first: usize, directions: &DMatrix<f64>, whole: &DVector<f64>) -> Option<Told> {
-        let (p, m, r) = (self.question.model, directions.ncols(), self.seen.ncols());
-        let solved = self.question.total().solve(&self.question.precision)?;
-        let covariance = solved.covariance();
-        let own_covariance = covariance.view((p, p), (r, r)).into_owned();
-        let inverse = Cholesky::new(own_covariance.clone())?;
-        // How much more the blocks scatter than whitened noise does.
-        let scatter = jackknife::jackknife(&self.question, 1)
-            .map_or(1.0, |j| (inverse.solve(&j.covariance).trace() / r as f64).max(1.0));
-        let difference = solved.solution.rows(p, r).into_owned();
-        let size = |v: &DVector<f64>| v.dot(&inverse.solve(v));
-        let wild = size(&difference) > WILD * size(&self.seen.tr_mul(whole));
-        let shared = DMatrix::from_fn(m, p + r, |i, j| f64::from(u8::from(j == first + i)));
-        let mut with_own = shared.clone();
-        with_own.columns_mut(p, r).copy_from(&self.seen);
-        let values = |pick: &DMatrix<f64>| -> Vec<(f64, f64)> {
-            let to = directions * pick;
-            let (value, spread) = (&to * &solved.solution, &to * &covariance * to.transpose());
-            let error = |j: usize| (scatter * spread[(j, j)].max(0.0)).sqrt();
-            (0..value.len()).map(|j| (value[j], error(j))).collect()
-        };
-        Some(Told {
-            own: values(&with_own),
-            others: values(&shared),
-            wild,
-        })
-    }
-}
-
-struct Told {
-    own: Vec<(f64, f64)>,
-    others: Vec<(f64, f64)>,
-    wild: bool,
-}
-
-/// An effect that logs disagree about.
-#[derive(Clone, Debug)]
-pub struct Differing {
-    /// Its slot.
-    pub slot: usize,
-    /// Held-out gain where each log that disagrees has a value of its own, in units of the noise variance.
-    pub gain: f64,
-    /// The logs that disagree.
-    pub logs: Vec<Disagreement>,
-}
-
-impl Differing {
-    /// True if a log differs so much that the effect can't be called one of the sensor.
-    pub fn wild(&self) -> bool {
-        self.logs.iter().any(|d| d.wild)
-    }
-}
-
-/// Logs that disagree about the effect of a slot on top of a model: the one that stands out most first, then whether the others
-/// agree without it. Of two logs that differ both are named. `asked` is how many effects are asked about. `None` where all agree,
-/// or nothing can be told.
-pub fn differing(problem: &Problem, model: &[usize], slot: usize, asked: usize) -> Option<Differing> {
-    if problem.parts.len() < 2 || problem.own[slot] {
-        return None;
-    }
-    let candidate = screening::parameters_of(problem.slots.get(slot));
-    if problem.known_values(&candidate).is_some() {
-        return None;
-    }
-    let directions = problem.directions(model, &candidate);
-    let (first, m) = (model.len(), directions.ncols());
-    let mut question = problem.question(model, &candidate, &directions);
-    let whole = question.solve(&question.total()).filter(|_| m > 0)?;
-    let whole = whole.rows(first, m).into_owned();
-    question.model = first + m;
-    let mut left: Vec<usize> = (0..problem.parts.len())
+    let others: Vec<usize> = members.iter().copied().filter(|m| *m != slot).collect();
+    let in_model = search.model.contains(&slot);
+    let with: Vec<usize> = others.iter().copied().chain((!in_model).then_some(slot)).collect();
+    let Some(stack) = search.stack(&with) else {
+        return Vec::new();
+    };
+    let having: Vec<usize> = (0..problem.parts.len())
         .filter(|log| problem.parts[*log].slots.contains(&slot))
         .collect();
-    let mut logs = Vec::new();
-    while left.len() > 1 {
-        // Of two logs each differs as much from the other.
-        let pair = left.len() == 2;
-        let tested = if pair { &left[..1] } else { &left[..] };
-        let answers: Vec<(usize, Compared)> = tested
-            .iter()
-            .filter_map(|log| Some((*log, compared(&question, first, m, *log)?)))
-            .collect();
-        let tried = (answers.len() * asked.max(1)) as f64;
-        let Some((log, most)) = answers.into_iter().min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value)) else {
-            break;
-        };
-        let p_value = (most.p_value * tried).min(1.0);
-        let told = most.told(first, &directions, &whole).filter(|_| p_value <= ALPHA);
-        let Some(Told { own, others, wild }) = told else {
-            break;
-        };
-        let mut named = |log: usize, own: Vec<(f64, f64)>, others: Vec<(f64, f64)>| {
-            logs.push(Disagreement {
-                slot,
-                log,
-                own,
-                others,
-                p_value,
-                wild,
-            });
-        };
-        left.retain(|other| *other != log);
-        named(log, own.clone(), others.clone());
-        if pair {
-            for other in &left {
-                named(*other, others.clone(), own.clone());
-            }
-        }
-        question = most.question;
-        question.model = question.precision.len();
-        if pair {
-            break;
-        }
+    if having.len() < 2 {
+        return Vec::new();
     }
-    (!logs.is_empty()).then(|| Differing {
+    let least = search::threshold(having.len() * search.candidates.len().max(1));
+    let found = having.iter().filter_map(|log| {
+        let asked = own_columns(search, equations, slot, *log)?;
+        let ln = stack.ln_bayes(&asked);
+        (ln >= least).then_some((*log, ln, asked))
+    });
+    let Some((log, ln_bayes, asked)) = found.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        return Vec::new();
+    };
+    // Beside the model alone: what else is there may be there only because the logs differ.
+    let Some((own, rest, wild)) = search
+        .stack_without(&[], slot)
+        .and_then(|stack| values(search, &stack, slot, &asked))
+    else {
+        return Vec::new();
+    };
+    let named = |log: usize, own: &[(f64, f64)], others: &[(f64, f64)]| Disagreement {
         slot,
-        gain: held_out::gain(&screening::base(problem, model), &held_out::held_out(&question)).0,
-        logs,
+        log,
+        own: own.to_vec(),
+        others: others.to_vec(),
+        ln_bayes,
+        wild,
+    };
+    let mut out = vec![named(log, &own, &rest)];
+    // Of two logs each differs as much from the other.
+    if let [first, second] = having[..] {
+        let other = if first == log { second } else { first };
+        out.push(named(other, &rest, &own));
+    }
+    out
+}
+
+/// Columns of an effect in one log alone.
+fn own_columns(search: &Search, equations: &[NormalEquations], slot: usize, log: usize) -> Option<Asked> {
+    let criterion = search.criterion;
+    let parameters = indices(&criterion.problem.slots, &[slot]);
+    if criterion.problem.known_values(&parameters).is_some() {
+        return None;
+    }
+    let of_log = &equations[log];
+    let cross = of_log.gram.select_columns(&parameters);
+    let sums = (criterion.modes.iter().enumerate())
+        .filter(|(_, modes)| modes.log == log)
+        .map(|(c, modes)| (c, modes.sums.select_columns(&parameters)))
+        .collect();
+    Some(Asked {
+        information: cross.select_rows(&parameters),
+        score: of_log.right.select_rows(&parameters),
+        cross,
+        sums,
+        prior: Prior::Normal(parameters.iter().map(|j| criterion.deviation(*j)).collect()),
+        trials: 0.0,
     })
+}
+
+/// Values of an effect with their standard errors: by the log itself, and by the others.
+type Values = (Vec<(f64, f64)>, Vec<(f64, f64)>, bool);
+
+/// Values of an effect by one log and by the others, and whether they differ wildly.
+fn values(search: &Search, stack: &Stack, slot: usize, own: &Asked) -> Option<Values> {
+    let shared = Asked::slot(search.criterion, slot);
+    let m = shared.score.len();
+    let parameters = indices(&search.criterion.problem.slots, &[slot]);
+    let deviation: Vec<f64> = parameters.iter().map(|j| search.criterion.deviation(*j)).collect();
+    let both = shared.beside(own, &own.cross.select_rows(&parameters));
+    let equations = stack.equations(&both)?;
+    let scale = |k: usize| deviation[k % m];
+    let scaled = DMatrix::from_fn(2 * m, 2 * m, |i, j| {
+        equations.information[(i, j)] * scale(i) * scale(j) + if i == j { 0.01 } else { 0.0 }
+    });
+    let factor = Cholesky::new(scaled)?;
+    let right = nalgebra::DVector::from_fn(2 * m, |k, _| equations.score[k] * scale(k));
+    let solved = factor.solve(&right);
+    let covariance = factor.inverse();
+    let present = &search.criterion.problem.slots[slot].parameters;
+    let error = |v: f64, k: usize| v.max(0.0).sqrt() * scale(k);
+    let of_others = (0..m).map(|k| (solved[k] * scale(k), error(covariance[(k, k)], k)));
+    let of_log = (0..m).map(|k| {
+        let variance = covariance[(k, k)] + covariance[(m + k, m + k)] + 2.0 * covariance[(k, m + k)];
+        ((solved[k] + solved[m + k]) * scale(k), error(variance, k))
+    });
+    // What the equations were taken at counts as well: only the rest is in the residual.
+    let held = |k: usize| if search.model.contains(&slot) { present[k] } else { 0.0 };
+    let size = |value: &dyn Fn(usize) -> f64| -> f64 {
+        (0..m)
+            .map(|k| value(k).powi(2) / covariance[(m + k, m + k)].max(f64::MIN_POSITIVE))
+            .sum()
+    };
+    let difference = size(&|k| solved[m + k]);
+    let common = size(&|k| solved[k] + held(k) / scale(k));
+    let whole = |values: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
+        values
+            .into_iter()
+            .enumerate()
+            .map(|(k, (v, e))| (v + held(k), e))
+            .collect()
+    };
+    Some((
+        whole(of_log.collect()),
+        whole(of_others.collect()),
+        difference > WILD * common,
+    ))
 }

@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::jackknife;
 use crate::problem::Problem;
+use crate::scatter::scatter;
+use crate::stack::{Criterion, Stack};
 
 /// Fitted steps of a model's parameters.
 #[derive(Clone, Debug)]
@@ -25,10 +26,10 @@ pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
     let precision = DVector::from_iterator(model.len(), model.iter().map(|j| 0.01 * problem.precision(*j)));
     let solved = total.solve(&precision)?;
     let inverse = solved.covariance();
-    let mut covariance = &inverse + &inverse * problem.drift_spread(model) * &inverse;
+    let mut covariance = &inverse + &inverse * spread(problem, model) * &inverse;
     // Where the blocks scatter more than whitened noise does, they are believed.
     let question = problem.question(model, &[], &DMatrix::zeros(0, 0));
-    if let Some(blocks) = jackknife::scatter(&question) {
+    if let Some(blocks) = scatter(&question) {
         for j in 0..model.len() {
             let ratio = blocks[j] / covariance[(j, j)];
             let factor = if ratio > SCATTER { ratio.sqrt() } else { 1.0 };
@@ -42,4 +43,19 @@ pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
         step: solved.solution,
         covariance,
     })
+}
+
+/// What the noise of the zeros adds to the covariance of the right-hand side, at its likeliest strength.
+fn spread(problem: &Problem, model: &[usize]) -> DMatrix<f64> {
+    let criterion = Criterion::new(problem);
+    let parameters: Vec<(usize, f64)> = model.iter().map(|j| (*j, 1.0 / problem.precision(*j).sqrt())).collect();
+    let mut sum = DMatrix::zeros(model.len(), model.len());
+    if let Some(stack) = Stack::new(&criterion, &parameters) {
+        for modes in &criterion.modes {
+            let own = modes.sums.select_columns(model);
+            let variance = modes.variance(stack.strength(modes.sensor()));
+            sum += own.tr_mul(&(DMatrix::from_diagonal(&variance) * &own));
+        }
+    }
+    sum
 }

@@ -1,22 +1,27 @@
-//! Which effect is missing: ranking by held-out error, a gate that survives correlated noise, rivals, and a verdict that may abstain.
+//! Which effect is missing: evidences of effects, of their rivals and of causes without a name, and a verdict that may abstain.
 //!
-//! All of it works on [`imufit_fit::evidence::Evidence`]; no function here sees a row of the log.
+//! One criterion answers every question: the marginal likelihood of the log. A question puts columns beside a stack of effects; its Bayes
+//! factor says how much better the log is predicted with them, every parameter integrated over what such sensors have, and the noise of the
+//! zeros over all its strengths. All of it works on [`imufit_fit::evidence::Evidence`]; no function here sees a row of the log.
 
 pub mod agreement;
-pub mod changes;
-pub mod confounding;
-pub mod dependence;
-pub mod drift;
+pub mod asked;
+pub mod bins;
+pub mod block_equations;
+pub mod block_sums;
+pub mod courses;
+pub mod dictionary;
 pub mod estimate;
 pub mod held_out;
-pub mod jackknife;
-pub mod orthonormal;
 pub mod part;
 pub mod problem;
 pub mod residual;
 pub mod revision;
 pub mod saturated;
-pub mod screening;
-pub mod selection;
-pub mod together;
+pub mod scatter;
+pub mod search;
+pub mod similarity;
+pub mod stack;
+pub mod varying;
 pub mod verdict;
+pub mod zeros;

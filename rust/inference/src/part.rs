@@ -13,6 +13,8 @@ pub struct Part {
     pub raw: Evidence,
     /// Variance of the whitened residual of each channel.
     pub variance: [f64; CHANNELS],
+    /// Variance of each block over that of its channel (channels x blocks).
+    pub loudness: Vec<Vec<f64>>,
     /// Noise floor of each channel.
     pub floors: [f64; CHANNELS],
     /// For each slot of the evidence its slot among those of all logs.
@@ -23,10 +25,12 @@ impl Part {
     /// The only log of a question: its slots are those of the question.
     pub fn alone(white: Evidence, raw: Evidence, variance: [f64; CHANNELS], floors: [f64; CHANNELS]) -> Self {
         let slots = (0..white.layout.model.slots().len()).collect();
+        let loudness = vec![vec![1.0; white.layout.blocks]; CHANNELS];
         Self {
             white,
             raw,
             variance,
+            loudness,
             floors,
             slots,
         }
@@ -36,6 +40,12 @@ impl Part {
     pub fn weights(&self) -> [f64; CHANNELS] {
         self.variance
             .map(|v| if v > 0.0 && v.is_finite() { 1.0 / v } else { 0.0 })
+    }
+
+    /// Weight of each channel in whitened equations of one block.
+    pub fn block_weights(&self, block: usize) -> [f64; CHANNELS] {
+        let weights = self.weights();
+        std::array::from_fn(|channel| weights[channel] / self.loudness[channel][block])
     }
 
     /// Weight of each channel in equations as they stand: residuals are then in units of the noise floor.

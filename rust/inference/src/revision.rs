@@ -1,17 +1,13 @@
-//! Swaps and drops: whether each effect of a model is still needed beside the others, or another one does better in its place.
+//! Drops and exchanges: whether each effect of a model is still needed beside the others, or another one does better in its place.
 //!
-//! Effects are added one at a time, each when the others were still missing: what stood in for one of these is needless later, or less
-//! apt than another. Each is taken out in turn, to first order, and asked to come back in competition with all candidates.
+//! Effects are added one at a time, each when the others were still missing. Each is taken out in turn, to first order, and asked to come
+//! back in competition with all candidates.
 
 use imufit_model::card::Found;
 
-use crate::held_out;
 use crate::problem::Problem;
-use crate::screening::Weighed;
-use crate::selection::{indices, judge, passes, promising, significant, weigh_all};
-
-/// Another effect does better if it gains so many standard errors more.
-const BETTER: f64 = 2.0;
+use crate::search::Search;
+use crate::stack::Criterion;
 
 /// An effect of the model that need not be there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,31 +33,20 @@ pub fn revisions(problem: &Problem, model: &[usize], members: &[usize], candidat
 }
 
 fn revision(problem: &Problem, model: &[usize], slot: usize, candidates: &[usize]) -> Option<Revision> {
-    let slots = problem.slots.as_slice();
     let without = problem.taken_out(slot);
+    let criterion = Criterion::new(&without);
     let others: Vec<usize> = model.iter().copied().filter(|s| *s != slot).collect();
     let offered: Vec<usize> = candidates.iter().copied().chain([slot]).collect();
-    let (mut weighed, tried) = weigh_all(&without, slots, &others, &offered);
-    let fitted = indices(slots, &others);
-    let at = weighed.iter().position(|w| w.so_far().slot == slot)?;
-    let own = weighed.swap_remove(at);
-    let ahead = |w: &Weighed| {
-        let (gain, error) = held_out::gain(own.held_out(), w.held_out());
-        promising(w.so_far()) && gain > BETTER * error
-    };
-    let mut better: Vec<Weighed> = weighed.into_iter().filter(ahead).collect();
-    better.sort_by(|a, b| b.so_far().gain.total_cmp(&a.so_far().gain));
-    let by = better
-        .into_iter()
-        .map(|w| judge(&without, slots, &fitted, w))
-        .find(|s| passes(s, s.p_value * tried))
-        .map(|s| s.slot);
-    if by.is_some() {
-        return Some(Revision { slot, by });
+    let search = Search::new(&criterion, &others, &offered);
+    let weighed = search.weigh_all(&search.stack(&[])?, &[]);
+    let own = weighed.iter().find(|w| w.slot == slot)?;
+    let best = weighed.iter().find(|w| search.there(w));
+    match best {
+        Some(best) if best.slot != slot && best.ln_bayes > own.ln_bayes + search.threshold => Some(Revision {
+            slot,
+            by: Some(best.slot),
+        }),
+        _ if own.ln_bayes < search.threshold => Some(Revision { slot, by: None }),
+        _ => None,
     }
-    let needed = promising(own.so_far()) && {
-        let judged = judge(&without, slots, &fitted, own);
-        significant(&judged, judged.p_value * tried)
-    };
-    (!needed).then_some(Revision { slot, by: None })
 }

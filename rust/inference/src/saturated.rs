@@ -7,7 +7,8 @@ use imufit_fit::normal_equations::NormalEquations;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::{DMatrix, DVector};
 
-use crate::screening::parameters_of;
+use crate::block_equations::{add_channel, sum};
+use crate::problem::parameters_of;
 
 /// All effects fitted at once.
 #[derive(Clone, Debug)]
@@ -16,6 +17,28 @@ pub struct Saturated {
     pub step: DVector<f64>,
     /// Residual variance per channel; NaN without samples.
     pub variance: [f64; CHANNELS],
+    /// Variance of each block over that of its channel (channels x blocks): noise that grows with the motion or with time counts for less
+    /// where it is loud.
+    pub loudness: Vec<Vec<f64>>,
+}
+
+/// Samples that the variance of a channel is worth beside a block's own: a block of a few rows is as loud as the others until it shows more.
+const COMMON: f64 = 50.0;
+
+/// Variance of each block over that of its channel.
+fn loudness(evidence: &Evidence, step: &DVector<f64>, variance: &[f64; CHANNELS]) -> Vec<Vec<f64>> {
+    let of = |channel: usize, block: usize| {
+        let (square, n) = block_square(evidence, block, channel, step);
+        let own = square / variance[channel];
+        if own.is_finite() {
+            (COMMON + own) / (COMMON + n as f64)
+        } else {
+            1.0
+        }
+    };
+    (0..CHANNELS)
+        .map(|channel| (0..evidence.layout.blocks).map(|block| of(channel, block)).collect())
+        .collect()
 }
 
 /// Sum of squared residuals and number of samples of one channel at a parameter step.
@@ -44,31 +67,6 @@ pub fn contrast(layout: &Layout, channel: usize, step: &DVector<f64>) -> DVector
     let mut v: Vec<f64> = active.iter().map(|p| -step[*p]).collect();
     v.push(1.0);
     DVector::from_vec(v)
-}
-
-/// Equations of one block over all parameters, each channel weighted.
-pub fn assemble(evidence: &Evidence, block: usize, weights: &[f64; CHANNELS]) -> NormalEquations {
-    let mut out = NormalEquations::zeros(evidence.layout.model.parameters());
-    for channel in 0..CHANNELS {
-        let weight = weights[channel];
-        let Some(b) = evidence.get(block, channel) else {
-            continue;
-        };
-        if !(weight > 0.0 && weight.is_finite()) {
-            continue;
-        }
-        let active = &evidence.layout.model.active()[channel];
-        let last = active.len();
-        for (i, p) in active.iter().enumerate() {
-            for (j, q) in active.iter().enumerate() {
-                out.gram[(*p, *q)] += weight * b.gram[(i, j)];
-            }
-            out.right[*p] += weight * b.gram[(i, last)];
-        }
-        out.square += weight * b.gram[(last, last)];
-        out.n += b.n as f64;
-    }
-    out
 }
 
 /// Mean square of the residual of a block in the channel where it is largest.
@@ -115,6 +113,13 @@ fn fitted(evidence: &Evidence) -> Vec<usize> {
 pub fn fit_all(evidence: &Evidence) -> Option<Saturated> {
     let p = evidence.layout.model.parameters();
     let fitted = fitted(evidence);
+    let sums: Vec<_> = (0..CHANNELS).map(|channel| sum(evidence, channel, |_| 1.0)).collect();
+    let place = |parameter: &usize| fitted.iter().position(|j| j == parameter);
+    let of_channel = |active: &Vec<usize>| -> Vec<(usize, usize)> {
+        let pairs = active.iter().enumerate();
+        pairs.filter_map(|(k, j)| place(j).map(|place| (place, k))).collect()
+    };
+    let chosen: Vec<_> = evidence.layout.model.active().iter().map(of_channel).collect();
     let mut step = DVector::zeros(p);
     let mut variance = [f64::NAN; CHANNELS];
     for _ in 0..3 {
@@ -132,11 +137,13 @@ pub fn fit_all(evidence: &Evidence) -> Option<Saturated> {
                 0.0
             }
         });
-        let mut total = NormalEquations::zeros(p);
-        for block in 0..evidence.layout.blocks {
-            total.add(&assemble(evidence, block, &weights), 1.0);
+        let mut total = NormalEquations::zeros(fitted.len());
+        for (channel, sum) in sums.iter().enumerate() {
+            if let Some((gram, n)) = sum {
+                add_channel(&mut total, gram, *n, &chosen[channel], weights[channel]);
+            }
         }
-        let solved = total.selected(&fitted).solve(&DVector::zeros(fitted.len()))?.solution;
+        let solved = total.solve(&DVector::zeros(fitted.len()))?.solution;
         for (j, value) in fitted.iter().zip(solved.iter()) {
             step[*j] = *value;
         }
@@ -146,5 +153,10 @@ pub fn fit_all(evidence: &Evidence) -> Option<Saturated> {
         let own = freedom(evidence, channel);
         *v = if n > own + 10 { sum / (n - own) as f64 } else { f64::NAN };
     }
-    Some(Saturated { step, variance })
+    let loudness = loudness(evidence, &step, &variance);
+    Some(Saturated {
+        step,
+        variance,
+        loudness,
+    })
 }

@@ -1,40 +1,20 @@
-//! Adequate, missing, ambiguous or unknown: the only place where this is decided.
+//! Adequate, missing, ambiguous or unknown: decided here, once, from evidences alone.
 
-use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use imufit_model::rest_channels;
-use imufit_model::sensor::{CHANNELS, Sensor};
-use imufit_model::sensor_model::Slot;
+use imufit_model::sensor::Sensor;
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::agreement::{self, Differing, Disagreement};
-use crate::confounding;
-use crate::dependence::{self, Dependence};
+use crate::agreement::{self, Disagreement};
+use crate::asked::Asked;
+use crate::bins::{self, Covariate};
+use crate::dictionary::{self, Origin, Unnamed};
 use crate::held_out::{self, HeldOut};
-use crate::problem::Problem;
-use crate::screening::{self, Plausible, Screened};
-use crate::selection::{ALPHA, best_of, explains, indices, passes, screen_all, shares, significant};
-use crate::{changes, together};
-
-/// A named effect must explain this share of what depends on anything in its sensors, or the answer is "unknown".
-const NAMED_SHARE: f64 = 0.8;
-/// Share of the best one's gain that may be left of how a reading depends on the very quantity that it measures: more means that
-/// its response is bent in a way that the catalogue lacks.
-const BENT_OTHERWISE: f64 = 0.1;
-/// The same if effects of one sensor have been taken to bend its response, as a series takes terms to follow any shape.
-const BENT_IN_SERIES: f64 = 0.02;
-/// Gains that seem too small by more than this part, because what they multiply is noisy, would show as dependences.
-const ATTENUATED: f64 = 1e-4;
-/// From how many effects on these are a series.
-const SERIES: usize = 3;
-/// A rival recovers at least this share of the best candidate's gain.
-const RIVAL_SHARE: f64 = 0.5;
-/// What logs disagree about spoils the answer if it explains this much more than the best candidate.
-const CLEARLY_MORE: f64 = 1.1;
-/// One dependence without a name is the cause if it alone explains this much more than all effects that would be named together.
-const ALONE: f64 = 1.05;
-/// Steps looked ahead to see whether named effects together explain the residual.
-const LOOK_AHEAD: usize = 10;
+use crate::problem::{Problem, indices};
+use crate::search::{self, Search, Weighed};
+use crate::similarity;
+use crate::stack::{Criterion, Stack};
 
 /// The four answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,16 +29,85 @@ pub enum Kind {
     Unknown,
 }
 
-impl Kind {
-    /// The word used in results.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Adequate => "adequate",
-            Self::Missing => "missing",
-            Self::Ambiguous => "ambiguous",
-            Self::Unknown => "unknown",
-        }
-    }
+/// Whether sensors can have what a candidate's parameters say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Plausible {
+    /// They can.
+    Yes,
+    /// With the other sign: it can be a rival, but is never named first.
+    OtherSign,
+    /// A parameter lies far beyond what such sensors have.
+    TooLarge,
+    /// A parameter has a sign that it cannot have.
+    No,
+}
+
+/// What became of a candidate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// It is there, or explains as much as one that is.
+    Passed,
+    /// The log shows that it is not there, or does not determine it.
+    NotSignificant,
+    /// The log cannot show it.
+    NotTestable,
+    /// It would have to be larger than sensors have it.
+    TooLarge,
+    /// It would have to have the other sign.
+    OtherSign,
+}
+
+/// An effect that is not in the model.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// Its slot.
+    pub slot: usize,
+    /// What became of it.
+    pub status: Status,
+    /// Log Bayes factor on top of the model alone.
+    pub ln_bayes: f64,
+    /// Probability that it is there, beside the others that are.
+    pub probability: f64,
+    /// Parameters and standard errors.
+    pub parameters: Vec<(f64, f64)>,
+    /// Size from which on each parameter would be seen in such a log as often as not.
+    pub detectable: Vec<f64>,
+    /// Held-out gain in units of the noise variance, and its standard error.
+    pub gain: (f64, f64),
+    /// Held-out residual over noise floor without and with it.
+    pub held_out: (f64, f64),
+}
+
+/// A dependence that no effect of the catalogue explains.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// Channel index.
+    pub channel: usize,
+    /// The covariate.
+    pub covariate: String,
+    /// The log concerned; `None` for all.
+    pub log: Option<usize>,
+    /// Log Bayes factor beside the named effects.
+    pub ln_bayes: f64,
+    /// Whitened square that it explains beside them, in units of the noise variance.
+    pub drop: f64,
+    /// Indices of the channels in which it explains that.
+    pub channels: Vec<usize>,
+    /// How the channel depends on the covariate.
+    pub shape: String,
+    /// Slot of the probe that shows it, if one does.
+    pub probe: Option<usize>,
+}
+
+/// What Gram matrices do not hold, and passes over the rows have found.
+#[derive(Clone, Debug, Default)]
+pub struct Known {
+    /// Log evidences of candidates whose columns say little of their full size, each from a fit of its own: these decide among them.
+    pub fitted: Vec<(usize, f64)>,
+    /// Share of noise in the column of the log that a candidate reads.
+    pub column_noise: Vec<(usize, f64)>,
+    /// Lines of the spectrum and random telegraph noise of a residual.
+    pub seen: Vec<Finding>,
 }
 
 /// Answer to "which effect is missing?"
@@ -66,245 +115,163 @@ impl Kind {
 pub struct Verdict {
     /// The answer.
     pub kind: Kind,
-    /// Slot of the best candidate that passed.
+    /// Slot of the effect that stands out.
     pub best: Option<usize>,
-    /// Slots of candidates that explain the data as well.
+    /// Slots of effects that explain the data as well.
     pub rivals: Vec<usize>,
-    /// Every candidate, best held-out gain first, those that passed before those that did not.
-    pub screened: Vec<Screened>,
-    /// p-values adjusted for all candidates tried, in the order of `screened`.
-    pub adjusted: Vec<f64>,
-    /// Correlation of each passing candidate's signal with the others': (slot, slot, correlation).
+    /// Every candidate: those that are there first, then by evidence.
+    pub candidates: Vec<Candidate>,
+    /// How much effects look like the best one: (slot, slot, correlation).
     pub correlations: Vec<(usize, usize, f64)>,
-    /// Dependences that no named effect explains.
-    pub unexplained: Vec<Dependence>,
-    /// Slots that forward selection would add, one after the other.
-    pub path: Vec<usize>,
-    /// Logs that disagree about the best candidate, about an effect of the model, or about one that only some of them show.
+    /// Dependences that no named effect explains, most evidence first.
+    pub findings: Vec<Finding>,
+    /// Logs that disagree about an effect.
     pub disagreements: Vec<Disagreement>,
     /// True if they differ so much that there is no answer for all of them.
     pub spoilt: bool,
 }
 
-/// What logs disagree about, and whether that spoils the answer: a candidate that would bring more than the best one does, if
-/// each log had a value of its own, or an effect of the model. If nothing of that kind, what logs disagree about besides all
-/// that was found (`stack`).
-fn disagreements(
-    problem: &Problem,
-    model: &[usize],
-    stack: &[usize],
-    candidates: &[usize],
-    best: Option<&Screened>,
-) -> (Vec<Disagreement>, bool) {
-    if problem.parts.len() < 2 {
-        return (Vec::new(), false);
-    }
-    let slots = problem.slots.as_slice();
-    let without = |slot: usize| -> Vec<usize> { model.iter().copied().filter(|s| *s != slot).collect() };
-    let of_model: Vec<Differing> = model
-        .par_iter()
-        .filter_map(|slot| agreement::differing(problem, &indices(slots, &without(*slot)), *slot, model.len()))
-        .collect();
-    let differing = |on: &[usize]| -> Vec<Differing> {
-        let fitted = indices(slots, on);
-        let asked: Vec<usize> = candidates.iter().copied().filter(|s| !on.contains(s)).collect();
-        asked
-            .par_iter()
-            .filter_map(|slot| agreement::differing(problem, &fitted, *slot, asked.len()))
-            .collect()
-    };
-    // Only the one that explains most: candidates that look like it would all be named.
-    let most = |found: Vec<Differing>| {
-        let wild = found.into_iter().filter(|d| d.wild() && d.gain > 0.0);
-        wild.max_by(|a, b| a.gain.total_cmp(&b.gain))
-    };
-    let own = best.and_then(|best| best.differing.clone());
-    let wanted = best.map_or(0.0, |best| CLEARLY_MORE * best.gain);
-    // What logs disagree about in the model leaves traces that other effects could explain log by log.
-    let offered = of_model.is_empty().then(|| most(differing(model))).flatten();
-    let more = offered.filter(|d| d.gain > wanted);
-    let spoilt = more.is_some() || of_model.iter().any(Differing::wild);
-    let mut found: Vec<Disagreement> = of_model.into_iter().flat_map(|d| d.logs).collect();
-    found.extend(more.or(own).map_or_else(Vec::new, |d| d.logs));
-    if found.is_empty() && stack.len() > model.len() {
-        found = most(differing(stack)).map_or_else(Vec::new, |d| d.logs);
-    }
-    (found, spoilt)
+/// Share of all that is explained in the sensors of the best effect that named effects must have, or the answer is "unknown".
+const NAMED_SHARE: f64 = 0.8;
+
+/// A course is told of the channels in which it explains this part, at least, of what it explains in the one that shows it most.
+const SHOWN: f64 = 0.1;
+/// Two columns may differ by this many times their noise (in variance) and still count as the same.
+const NOISE: f64 = 2.0;
+/// Log odds by which a cause without a name is less likely than one of the catalogue, before the log is seen.
+const UNNAMED: f64 = 5.0;
+
+/// Everything that is asked of one problem.
+struct Inquiry<'a> {
+    search: Search<'a>,
+    unnamed: Vec<Unnamed>,
+    threshold: f64,
 }
 
-/// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from. What
-/// nothing of these explains is asked of the slots `probes`, which are never named.
-pub fn decide(problem: &Problem, model: &[usize], candidates: &[usize], probes: &[usize]) -> Verdict {
-    let slots = problem.slots.as_slice();
-    let (mut screened, mut adjusted) = screen_all(problem, slots, model, candidates);
-    let single = settle(problem, model, candidates, probes, &screened, &adjusted, &[]);
-    let best_gain = single.best.map_or(0.0, |b| gain_of(&screened, b));
-    let hidden = |(s, a): (&Screened, &f64)| {
-        significant(s, *a) && s.plausible == Plausible::Yes && !s.stable && s.gain > best_gain
-    };
-    let doubtful = single.kind == Kind::Unknown || screened.iter().zip(&adjusted).any(hidden);
-    let mut settled = single;
-    if doubtful {
-        let members = together::find(problem, slots, model, candidates);
-        if !members.is_empty() {
-            let several = settle(problem, model, candidates, probes, &screened, &adjusted, &members);
-            if several.kind != Kind::Unknown {
-                settled = several;
-                put_first(slots, &mut screened, &mut adjusted, members);
+impl Inquiry<'_> {
+    /// Unnamed causes beside a stack: log Bayes factor of each of those with columns of their own.
+    fn beside(&self, stack: &Stack) -> Vec<f64> {
+        self.exceeding(stack, self.threshold, &Sensor::ALL)
+    }
+
+    /// The same, worked out in full only where they may exceed some value, and not at all where none of some sensors shows them.
+    fn exceeding(&self, stack: &Stack, least: f64, sensors: &[Sensor]) -> Vec<f64> {
+        let of = |unnamed: &Unnamed| {
+            let shown = sensors_of(self.search.criterion.problem, &unnamed.origin);
+            if !shown.iter().any(|s| sensors.contains(s)) {
+                return 0.0;
             }
-        }
+            let most = stack.at_most(&unnamed.asked);
+            if most < least {
+                most
+            } else {
+                stack.ln_bayes(&unnamed.asked)
+            }
+        };
+        self.unnamed.par_iter().map(of).collect()
     }
-    Verdict {
-        kind: settled.kind,
-        best: settled.best,
-        rivals: settled.rivals,
-        screened,
-        adjusted,
-        correlations: settled.correlations,
-        unexplained: settled.unexplained,
-        path: settled.path,
-        disagreements: settled.disagreements,
-        spoilt: settled.spoilt,
-    }
-}
 
-fn gain_of(screened: &[Screened], slot: usize) -> f64 {
-    screened.iter().find(|s| s.slot == slot).map_or(0.0, |s| s.gain)
-}
-
-/// Puts effects first that pass beside one another: what each brings alone stays, how sure it is comes from beside the others.
-fn put_first(slots: &[Slot], screened: &mut Vec<Screened>, adjusted: &mut Vec<f64>, members: Vec<Screened>) {
-    let tried = shares(slots, screened.iter());
-    for member in members.into_iter().rev() {
-        if let Some(at) = screened.iter().position(|s| s.slot == member.slot) {
-            let alone = screened.remove(at);
-            adjusted.remove(at);
-            adjusted.insert(0, (member.p_value * tried).min(1.0));
-            let (gain, gain_error) = (alone.gain, alone.gain_error);
-            let (held_out, expected_ratio) = (alone.held_out, alone.expected_ratio);
-            screened.insert(
-                0,
-                Screened {
-                    gain,
-                    gain_error,
-                    held_out,
-                    expected_ratio,
-                    ..member
-                },
-            );
+    /// Courses in time beside a stack.
+    fn courses(&self, stack: &Stack, least: f64) -> Vec<(Unnamed, f64)> {
+        if self.unnamed.is_empty() {
+            Vec::new()
+        } else {
+            dictionary::courses(stack, least)
         }
     }
 }
 
-/// An answer on the way to the verdict.
-struct Settled {
-    kind: Kind,
-    best: Option<usize>,
-    rivals: Vec<usize>,
-    correlations: Vec<(usize, usize, f64)>,
-    unexplained: Vec<Dependence>,
-    path: Vec<usize>,
-    disagreements: Vec<Disagreement>,
-    spoilt: bool,
-}
-
-/// What the screening says if the candidates `chosen`, which pass beside one another, are taken together; if there are none, the best
-/// one that passes alone is taken.
-fn settle(
+/// Decides what is missing from the model made of the slots `model`, with the slots `candidates` to choose from; `probes` are never named.
+/// `known` is what rows say besides. `None` if the equations cannot be solved.
+pub fn decide(
     problem: &Problem,
     model: &[usize],
     candidates: &[usize],
     probes: &[usize],
-    screened: &[Screened],
-    adjusted: &[f64],
-    chosen: &[Screened],
-) -> Settled {
-    let slots = problem.slots.as_slice();
-    let passing: Vec<&Screened> = screened
-        .iter()
-        .zip(adjusted)
-        .filter(|(s, a)| passes(s, **a))
-        .map(|(s, _)| s)
+    known: &Known,
+) -> Option<Verdict> {
+    let fitted = &known.fitted;
+    let criterion = Criterion::new(problem);
+    let search = Search::new(&criterion, model, candidates);
+    let unnamed = if probes.is_empty() {
+        Vec::new()
+    } else {
+        dictionary::fixed(&criterion, probes)
+    };
+    let threshold = search::threshold(unnamed.len()) + UNNAMED;
+    let mut inquiry = Inquiry {
+        search,
+        unnamed,
+        threshold,
+    };
+    let alone = inquiry.search.stack(&[])?;
+    let weighed = inquiry.search.weigh_all(&alone, &[]);
+    let before = inquiry.beside(&alone);
+    // What explains most, and cannot be so large, has a cause that nobody knows: a lesser effect in its place would be a wrong name.
+    let too_large = outdone(&weighed);
+    let (mut members, left) = if too_large {
+        (Vec::new(), before.clone())
+    } else {
+        named(&inquiry)?
+    };
+    let search = &inquiry.search;
+    let stack = search.stack(&members)?;
+    let mut unexplained: Vec<(usize, f64)> = (0..left.len())
+        .into_par_iter()
+        .filter(|k| left[*k] >= threshold)
+        .map(|k| {
+            (
+                k,
+                left[k].min(dictionary::varying(search, &stack, &members, &inquiry.unnamed[k])),
+            )
+        })
+        .filter(|(_, ln)| *ln >= threshold)
         .collect();
-    let first = chosen.first().or_else(|| passing.first().copied());
-    let best = first.map(|s| s.slot);
-    let others: Vec<usize> = chosen.iter().skip(1).map(|s| s.slot).collect();
-
-    let mut path = Vec::new();
-    let mut stack = model.to_vec();
-    let mut next = best;
-    let mut ready = others.iter().copied();
-    while let Some(slot) = next {
-        path.push(slot);
-        stack.push(slot);
-        if path.len() >= LOOK_AHEAD {
-            break;
-        }
-        next = ready.next().or_else(|| {
-            let left: Vec<usize> = candidates.iter().copied().filter(|c| !stack.contains(c)).collect();
-            best_of(problem, slots, &stack, &left)
-        });
+    for (course, ln) in inquiry.courses(&stack, threshold) {
+        unexplained.push((inquiry.unnamed.len(), ln));
+        inquiry.unnamed.push(course);
     }
-
-    // Rates that are noisy leave a gain in the residual, which is no dependence. (A specific force is hardly ever as noisy.)
-    let gyroscope = |slot: &usize| slots[*slot].effect.sensors() == [Sensor::Gyr];
-    let attenuated = problem.attenuated(ATTENUATED).into_iter().map(|(slot, _)| slot);
-    let attenuated = attenuated.filter(|slot| gyroscope(slot) && !stack.contains(slot));
-    let beside_noise: Vec<usize> = stack.iter().copied().chain(attenuated).collect();
-    let fitted = indices(slots, &beside_noise);
-    let channels: Vec<usize> = (0..CHANNELS).collect();
-    let base = screening::base(problem, &fitted);
-    let asked = [
-        (dependence::test(problem, &fitted, &base, &channels), ALPHA),
-        (dependence::test_probes(problem, &beside_noise, probes), ALPHA),
-        (changes::test(problem, &fitted), changes::CAUTION * ALPHA),
-        (
-            changes::test_memories(problem, &fitted),
-            changes::CAUTION_WITH_MEMORIES * ALPHA,
-        ),
-    ];
-    let mut unexplained: Vec<Dependence> = asked
-        .into_iter()
-        .flat_map(|((found, tried), alpha)| found.into_iter().filter(move |d| d.p_value * tried as f64 <= alpha))
-        .collect();
-    like_with_like(slots, &mut unexplained);
-    unexplained.sort_by(|a, b| b.on_channel.total_cmp(&a.on_channel));
-
-    let beside: Vec<usize> = model.iter().chain(&others).copied().collect();
-    let (rivals, correlations) = best.map_or_else(Default::default, |best| {
-        rivals_of(problem, slots, &beside, candidates, screened, adjusted, best)
-    });
-
-    let (disagreements, spoilt) = disagreements(problem, model, &stack, candidates, first);
+    unexplained.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let search = &inquiry.search;
+    // What people see is the error: the effect that lowers it most comes first.
+    let error = |slot: &usize| (*slot, held_out_of(search, Some(*slot)).ratio);
+    let least = members.iter().map(error).min_by(|a, b| a.1.total_cmp(&b.1));
+    let mut best = least.map(|(member, _)| member);
+    let mut rivals = best.map_or_else(|| Some(Vec::new()), |best| rivals_of(search, &members, best, known))?;
+    if let Some(first) = best.filter(|best| fitted.iter().any(|(slot, _)| slot == best)) {
+        let can = |slot: usize| weighed.iter().any(|w| w.slot == slot && w.plausible == Plausible::Yes);
+        let possible = fitted.iter().filter(|(slot, _)| can(*slot) || *slot == first);
+        let most = possible.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        rivals.retain(|r| !fitted.iter().any(|(slot, _)| slot == r));
+        rivals.extend(
+            (fitted.iter())
+                .filter(|(slot, ln)| *slot != most.0 && *ln >= most.1 - search.threshold)
+                .map(|(slot, _)| *slot),
+        );
+        members.iter_mut().filter(|m| **m == first).for_each(|m| *m = most.0);
+        best = Some(most.0);
+    }
+    let impossible = too_large
+        || (search.weigh_all(&stack, &members).iter())
+            .any(|w| w.testable && w.plausible == Plausible::TooLarge && w.ln_bayes >= search.threshold);
+    let disagreements = disagreements(search, &members, &weighed);
+    // What one log has alone spoils the answer only if there is no other. Of two logs nobody can say which is wrong.
+    let spoilt = (disagreements.first())
+        .is_some_and(|d| d.wild && (problem.parts.len() == 2 || best.is_none_or(|b| b == d.slot)));
     let kind = match best {
         _ if spoilt => Kind::Unknown,
-        None if unexplained.is_empty() && !screened.iter().zip(adjusted).any(|(s, a)| significant(s, *a)) => {
-            Kind::Adequate
-        }
+        None if unexplained.is_empty() && known.seen.is_empty() && !impossible => Kind::Adequate,
         None => Kind::Unknown,
         Some(first) => {
-            let sensors = slots[first].effect.sensors();
-            let concerned = unexplained
-                .iter()
-                .filter(|d| told_of(problem, d).iter().any(|s| sensors.contains(s)));
-            let left = left_by(concerned);
-            let gain = if chosen.is_empty() {
-                gain_of(screened, first)
-            } else {
-                let alone = screening::base(problem, &indices(slots, model));
-                held_out::gain(&alone, &base).0
-            };
-            let series = (path.iter()).filter(|s| slots[**s].effect.sensors().iter().any(|s| sensors.contains(s)));
-            let mut before = beside_noise.clone();
-            before.retain(|slot| !path.contains(slot));
-            let alone = better_alone(problem, &before, &base, &unexplained);
-            let bent = left_by(unexplained.iter().filter(|d| of_own_quantity(problem, d, sensors)));
-            let allowed = if series.count() >= SERIES {
-                BENT_IN_SERIES
-            } else {
-                BENT_OTHERWISE
-            };
-            if alone || bent > allowed * gain || gain < NAMED_SHARE * (gain + left) {
+            let sensors = problem.slots[first].effect.sensors();
+            let concerned = unexplained.iter().filter(|(k, _)| {
+                let of = sensors_of(problem, &inquiry.unnamed[*k].origin);
+                of.iter().any(|s| sensors.contains(s))
+            });
+            let most = concerned.map(|(_, ln)| *ln).fold(0.0, f64::max);
+            let named = search.evidence(&members);
+            let better = before.iter().copied().fold(0.0, f64::max);
+            if named < NAMED_SHARE * (named + most) || better - threshold > named {
                 Kind::Unknown
             } else if rivals.is_empty() {
                 Kind::Missing
@@ -313,117 +280,384 @@ fn settle(
             }
         }
     };
-    Settled {
+    let candidates = shown(search, &weighed, &members, best, &rivals);
+    let correlations = correlations(problem, model, best, &candidates);
+    let found = unexplained
+        .iter()
+        .flat_map(|(k, ln)| told(problem, &stack, &inquiry.unnamed[*k], *ln));
+    let mut findings: Vec<Finding> = known.seen.iter().cloned().chain(found).collect();
+    findings.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
+    let findings = strongest(findings);
+    Some(Verdict {
         kind,
         best,
         rivals,
+        candidates,
         correlations,
-        unexplained,
-        path,
+        findings,
         disagreements,
         spoilt,
-    }
-}
-
-/// Gives probes that bins show too the worth of these: bins lose some of what columns of their own have, and would come after them
-/// where another covariate is the cause.
-fn like_with_like(slots: &[Slot], found: &mut [Dependence]) {
-    let binned: Vec<(usize, String, f64)> = (found.iter())
-        .filter(|d| d.probe.is_none())
-        .map(|d| (d.channel, d.covariate.clone(), d.on_channel))
-        .collect();
-    for each in found.iter_mut() {
-        if each.probe.is_some_and(|probe| slots[probe].effect.shown_by_bins()) {
-            let same = (binned.iter()).find(|(channel, name, _)| *channel == each.channel && *name == each.covariate);
-            each.on_channel = same.map_or(each.on_channel, |(_, _, gain)| each.on_channel.min(*gain));
-        }
-    }
-}
-
-/// True if one dependence without a name explains more on top of the slots `model` than all that leads to the error `left`.
-fn better_alone(problem: &Problem, model: &[usize], left: &HeldOut, unexplained: &[Dependence]) -> bool {
-    let slots = problem.slots.as_slice();
-    let fitted = indices(slots, model);
-    let before = screening::base(problem, &fitted);
-    let (together, _) = held_out::gain(&before, left);
-    unexplained.iter().filter_map(|d| d.probe).any(|probe| {
-        let weighed = screening::weigh(problem, &fitted, &before, probe, &indices(slots, &[probe]));
-        weighed.so_far().gain > ALONE * together
     })
 }
 
-/// What dependences are worth together: on each channel the one that brings most, since others there may be the same thing again.
-fn left_by<'a>(found: impl Iterator<Item = &'a Dependence>) -> f64 {
-    let mut most: BTreeMap<(Option<usize>, usize), f64> = BTreeMap::new();
-    for each in found {
-        let gain = most.entry((each.log, each.channel)).or_insert(0.0);
-        *gain = gain.max(each.gain);
-    }
-    most.values().sum()
+/// True if the candidate with most evidence would have to be larger than sensors have it.
+fn outdone(weighed: &[Weighed]) -> bool {
+    let can = |w: &&Weighed| w.testable && matches!(w.plausible, Plausible::Yes | Plausible::TooLarge);
+    let most = weighed
+        .iter()
+        .filter(can)
+        .max_by(|a, b| a.ln_bayes.total_cmp(&b.ln_bayes));
+    most.is_some_and(|w| w.plausible == Plausible::TooLarge)
 }
 
-/// True if a channel of one of the sensors depends on the very quantity that it measures: its response is bent.
-fn of_own_quantity(problem: &Problem, found: &Dependence, sensors: &[Sensor]) -> bool {
-    let axis = ["x", "y", "z"][found.channel % 3];
-    let own = match told_of(problem, found)[..] {
-        [Sensor::Acc] => format!("f_{axis}"),
-        [Sensor::Gyr] => format!("omega_{axis}"),
-        _ => return false,
-    };
-    found.covariate == own && told_of(problem, found).iter().any(|s| sensors.contains(s))
-}
-
-/// Sensors that the channel of a dependence tells of.
-fn told_of(problem: &Problem, found: &Dependence) -> Vec<Sensor> {
-    let part = problem.parts.get(found.log.unwrap_or(0));
-    if part.is_some_and(|part| part.white.layout.facts.rests) {
-        rest_channels::sensors(found.channel).to_vec()
-    } else {
-        vec![Sensor::ALL[found.channel / 3]]
-    }
-}
-
-/// Candidates that explain as well as the best what is left beside a model, and how much passing ones look like it.
-fn rivals_of(
-    problem: &Problem,
-    slots: &[Slot],
-    beside: &[usize],
-    candidates: &[usize],
-    screened: &[Screened],
-    adjusted: &[f64],
-    best: usize,
-) -> (Vec<usize>, Vec<(usize, usize, f64)>) {
-    let fitted = indices(slots, beside);
-    let own = indices(slots, &[best]);
-    let tried = shares(slots, screened.iter());
-    let passing = |(s, a): &(&Screened, &f64)| passes(s, **a);
-    let alone = (screened.iter().zip(adjusted).find(passing)).is_some_and(|(s, _)| s.slot == best);
-    let others: Vec<Screened>;
-    let compared: Vec<&Screened> = if alone {
-        let all = screened.iter().zip(adjusted);
-        all.filter(|(s, a)| explains(s, **a)).map(|(s, _)| s).collect()
-    } else {
-        // Beside other effects a candidate is worth something else than alone.
-        let left: Vec<usize> = candidates.iter().copied().filter(|c| !beside.contains(c)).collect();
-        let (all, adjusted) = screen_all(problem, slots, beside, &left);
-        let all = all.into_iter().zip(adjusted).filter(|(s, a)| explains(s, *a));
-        others = all.map(|(s, _)| s).collect();
-        others.iter().collect()
-    };
-    let Some(first) = compared.iter().find(|s| s.slot == best) else {
-        return Default::default();
-    };
-    let beta: Vec<f64> = first.parameters.iter().map(|p| p.0).collect();
-    let (mut rivals, mut correlations) = (Vec::new(), Vec::new());
-    for other in compared.iter().filter(|s| s.slot != best) {
-        let theirs = indices(slots, &[other.slot]);
-        let c = confounding::correlation(problem, &fitted, &own, &beta, &theirs);
-        correlations.push((best, other.slot, c));
-        if other.gain >= RIVAL_SHARE * first.gain
-            && confounding::p_value_given(problem, &fitted, &theirs, &own) * tried * slots[other.slot].chances() > ALPHA
-        {
-            rivals.push(other.slot);
+/// Effects that are there, and the log Bayes factors of unnamed causes beside them.
+fn named(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>)> {
+    let search = &inquiry.search;
+    let mut members = search.find()?;
+    // What varies from block to block is no property of the sensor.
+    loop {
+        let stack = search.stack(&members)?;
+        let least = members
+            .par_iter()
+            .map(|m| (*m, search.varying(&stack, &members, *m)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        match least {
+            Some((member, ln)) if ln < search.threshold => members.retain(|m| *m != member),
+            _ => break,
         }
     }
-    (rivals, correlations)
+    // A named effect must be there beside the likeliest unnamed cause too, not only in its place.
+    loop {
+        let stack = search.stack(&members)?;
+        let left = inquiry.beside(&stack);
+        match stands_in(inquiry, &members, &stack, &left) {
+            Some(unneeded) => members.retain(|m| *m != unneeded),
+            None => return Some((members, left)),
+        }
+    }
+}
+
+/// What a log disagrees with the others about, by most evidence, be the effect in the model, there, or there in one log alone. The others
+/// are asked again without it.
+fn disagreements(search: &Search, members: &[usize], weighed: &[Weighed]) -> Vec<Disagreement> {
+    let equations = agreement::by_log(search);
+    let there = |w: &&Weighed| w.testable && w.ln_bayes >= search.threshold && !members.contains(&w.slot);
+    let in_part = weighed.iter().filter(there).map(|w| w.slot);
+    let asked = search.model.iter().chain(members).copied().chain(in_part);
+    asked
+        .map(|slot| agreement::disagreements(search, &equations, members, slot))
+        .filter(|found| !found.is_empty())
+        .max_by(|a, b| a[0].ln_bayes.total_cmp(&b[0].ln_bayes))
+        .unwrap_or_default()
+}
+
+/// A member that is not there any more once the likeliest unnamed cause is: Bayes factors beside one another follow from those of
+/// each with and without the other.
+fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) -> Option<usize> {
+    let search = &inquiry.search;
+    members.iter().copied().find(|member| {
+        let others: Vec<usize> = members.iter().copied().filter(|m| m != member).collect();
+        let Some(without) = search.stack(&others) else {
+            return false;
+        };
+        let own = search.weigh(&without, *member).map_or(0.0, |w| w.ln_bayes);
+        let replaced = |instead: f64, beside: f64| {
+            let likelier = instead - inquiry.threshold > own - search.threshold;
+            instead >= inquiry.threshold && likelier && beside + own - instead < search.threshold
+        };
+        // What has less evidence than the member takes no place.
+        let least = (own - search.threshold + inquiry.threshold).max(inquiry.threshold);
+        let sensors = search.criterion.problem.slots[*member].effect.sensors();
+        let instead = inquiry.exceeding(&without, least, sensors);
+        let fixed = (0..left.len()).any(|k| {
+            let steady = || dictionary::varying(search, &without, &others, &inquiry.unnamed[k]).min(instead[k]);
+            replaced(instead[k], left[k]) && replaced(steady(), left[k])
+        });
+        fixed
+            || inquiry
+                .courses(&without, least)
+                .iter()
+                .any(|(course, instead)| replaced(*instead, stack.ln_bayes(&course.asked) - course.asked.trials))
+    })
+}
+
+/// Candidates in whose presence the best one is no longer there, or whose columns differ from its by no more than their own noise.
+fn rivals_of(search: &Search, members: &[usize], best: usize, known: &Known) -> Option<Vec<usize>> {
+    let others: Vec<usize> = members.iter().copied().filter(|m| *m != best).collect();
+    let rest = search.stack(&others)?;
+    let weighed = search.weigh_all(&rest, members);
+    let own = search.weigh(&rest, best)?;
+    let possible = |w: &&Weighed| {
+        let sign = matches!(w.plausible, Plausible::Yes | Plausible::OtherSign);
+        w.testable && sign && w.ln_bayes >= search.threshold
+    };
+    let rivals = weighed.iter().filter(possible).filter(|w| {
+        let with: Vec<usize> = others.iter().copied().chain([w.slot]).collect();
+        let beside = search.stack(&with).and_then(|stack| search.weigh(&stack, best));
+        let alike = search.fit(&rest, best) - search.fit(&rest, w.slot) <= search.threshold;
+        let replaced = alike && beside.is_some_and(|b| b.ln_bayes < search.threshold);
+        replaced || same_but_noise(search, &others, &own, w.slot, known)
+    });
+    Some(rivals.map(|w| w.slot).collect())
+}
+
+/// True if the columns of two effects differ by no more than their own noise: a thermometer that is noisier than an ammeter says nothing
+/// of which of the two moves a zero.
+fn same_but_noise(search: &Search, others: &[usize], best: &Weighed, slot: usize, known: &Known) -> bool {
+    let noise = |slot: usize| {
+        known
+            .column_noise
+            .iter()
+            .find(|(s, _)| *s == slot)
+            .map_or(0.0, |(_, v)| *v)
+    };
+    let noise = noise(best.slot) + noise(slot);
+    if noise == 0.0 {
+        return false;
+    }
+    let problem = search.criterion.problem;
+    let slots = problem.slots.as_slice();
+    let fitted = search.columns(others);
+    let beta: Vec<f64> = best.parameters.iter().map(|p| p.0).collect();
+    let (own, theirs) = (indices(slots, &[best.slot]), indices(slots, &[slot]));
+    let correlation = similarity::correlation(problem, &fitted, &own, &beta, &theirs);
+    1.0 - correlation * correlation <= NOISE * noise
+}
+
+/// Sensors whose readings show an unnamed cause.
+fn sensors_of(problem: &Problem, origin: &Origin) -> Vec<Sensor> {
+    match origin {
+        Origin::Probe(slot) => problem.slots[*slot].effect.sensors().to_vec(),
+        Origin::Bins(parts) => vec![Sensor::ALL[parts[0].0 / 3]],
+        Origin::Course(places, _) => vec![Sensor::ALL[problem.sums[places[0]].channel / 3]],
+    }
+}
+
+/// Held-out error of the model, alone or with a candidate.
+fn held_out_of(search: &Search, candidate: Option<usize>) -> HeldOut {
+    let problem = search.criterion.problem;
+    let model = indices(&problem.slots, &search.model);
+    let own = candidate.map_or_else(Vec::new, |slot| indices(&problem.slots, &[slot]));
+    let question = match problem.known_values(&own) {
+        Some(values) => problem.question_given(&model, &own, &values),
+        None => problem.question(&model, &own, &DMatrix::identity(own.len(), own.len())),
+    };
+    held_out::held_out(&question)
+}
+
+/// What is shown of every candidate.
+fn shown(
+    search: &Search,
+    weighed: &[Weighed],
+    members: &[usize],
+    best: Option<usize>,
+    rivals: &[usize],
+) -> Vec<Candidate> {
+    let base = held_out_of(search, None);
+    let stack = search.stack(members);
+    let mut found: Vec<Candidate> = weighed
+        .par_iter()
+        .map(|w| {
+            let with = held_out_of(search, Some(w.slot));
+            let there = members.contains(&w.slot);
+            let status = if there || (rivals.contains(&w.slot) && w.plausible == Plausible::Yes) {
+                Status::Passed
+            } else if !w.testable {
+                Status::NotTestable
+            } else if w.ln_bayes < search.threshold {
+                Status::NotSignificant
+            } else {
+                match w.plausible {
+                    Plausible::TooLarge => Status::TooLarge,
+                    Plausible::OtherSign => Status::OtherSign,
+                    Plausible::Yes | Plausible::No => Status::NotSignificant,
+                }
+            };
+            let others: Vec<usize> = members.iter().copied().filter(|m| *m != w.slot).collect();
+            let of_others = if there { search.stack(&others) } else { None };
+            let beside = of_others.as_ref().or(stack.as_ref());
+            // Odds against one of so many that nobody has heard of yet.
+            let odds = beside
+                .and_then(|stack| search.weigh(stack, w.slot))
+                .map_or(0.0, |w| w.ln_bayes)
+                - search.trials();
+            Candidate {
+                slot: w.slot,
+                status,
+                ln_bayes: w.ln_bayes,
+                probability: if w.testable { 1.0 / (1.0 + (-odds).exp()) } else { 0.0 },
+                parameters: w.parameters.clone(),
+                detectable: beside.map_or_else(Vec::new, |stack| search.detectable(stack, w.slot)),
+                gain: held_out::gain(&base, &with),
+                held_out: (base.ratio, with.ratio),
+            }
+        })
+        .collect();
+    share(&mut found, best, rivals);
+    let rank = |c: &Candidate| {
+        (
+            Some(c.slot) != best,
+            c.status != Status::Passed,
+            c.status == Status::NotTestable,
+        )
+    };
+    found.sort_by(|a, b| rank(a).cmp(&rank(b)).then(b.ln_bayes.total_cmp(&a.ln_bayes)));
+    found
+}
+
+/// Lets the best effect and its rivals share the probability, each by its evidence.
+fn share(found: &mut [Candidate], best: Option<usize>, rivals: &[usize]) {
+    let concerned = |c: &&mut Candidate| Some(c.slot) == best || rivals.contains(&c.slot);
+    let most = found
+        .iter_mut()
+        .filter(concerned)
+        .map(|c| c.ln_bayes)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let of = |c: &Candidate| (c.ln_bayes - most).exp();
+    let total: f64 = found.iter_mut().filter(concerned).map(|c| of(c)).sum();
+    let all = found
+        .iter_mut()
+        .filter(concerned)
+        .map(|c| c.probability)
+        .fold(0.0, f64::max);
+    for candidate in found.iter_mut().filter(concerned) {
+        candidate.probability = all * of(candidate) / total.max(f64::MIN_POSITIVE);
+    }
+}
+
+/// How much candidates with evidence look like the best one.
+fn correlations(
+    problem: &Problem,
+    model: &[usize],
+    best: Option<usize>,
+    candidates: &[Candidate],
+) -> Vec<(usize, usize, f64)> {
+    let Some(first) = best.and_then(|b| candidates.iter().find(|c| c.slot == b)) else {
+        return Vec::new();
+    };
+    let slots = problem.slots.as_slice();
+    let beta: Vec<f64> = first.parameters.iter().map(|p| p.0).collect();
+    let (fitted, own) = (indices(slots, model), indices(slots, &[first.slot]));
+    let asked = candidates.iter().filter(|c| c.slot != first.slot && c.ln_bayes > 0.0);
+    asked
+        .map(|c| {
+            let theirs = indices(slots, &[c.slot]);
+            let correlation = similarity::correlation(problem, &fitted, &own, &beta, &theirs);
+            (first.slot, c.slot, correlation)
+        })
+        .collect()
+}
+
+/// The first finding of each channel over each covariate of a log: the others say the same in other words.
+fn strongest(findings: Vec<Finding>) -> Vec<Finding> {
+    let mut kept: Vec<Finding> = Vec::new();
+    for finding in findings {
+        let same = |k: &Finding| (k.channel, &k.covariate, k.log) == (finding.channel, &finding.covariate, finding.log);
+        if !kept.iter().any(same) {
+            kept.push(finding);
+        }
+    }
+    kept
+}
+
+/// An unnamed cause in words, channel by channel.
+fn told(problem: &Problem, stack: &Stack, unnamed: &Unnamed, ln_bayes: f64) -> Vec<Finding> {
+    let several = problem.parts.len() > 1;
+    let sums = &problem.sums;
+    let mut channels: Vec<usize> = unnamed.asked.sums.iter().map(|(c, _)| sums[*c].channel).collect();
+    channels.dedup();
+    let common = |channel: usize, covariate: String, log: Option<usize>, shape: String| Finding {
+        channel,
+        covariate,
+        log,
+        ln_bayes,
+        drop: stack.explained(&unnamed.asked),
+        channels: channels.clone(),
+        shape,
+        probe: None,
+    };
+    vec![match &unnamed.origin {
+        Origin::Bins(parts) => return by_shape(stack, &unnamed.asked, parts, &common),
+        Origin::Course(places, course) => {
+            let in_words = |place: usize| {
+                let sums = &problem.sums[place];
+                let facts = &problem.parts[sums.log].white.layout.facts;
+                let blocks = sums.count.len() as f64;
+                let block = (facts.t_end - facts.t_start) / blocks;
+                let words = course.words(|at| facts.t_start + block * at, blocks);
+                common(
+                    sums.channel,
+                    course.covariate().to_string(),
+                    several.then_some(sums.log),
+                    words,
+                )
+            };
+            return showing(stack, unnamed, places).into_iter().map(in_words).collect();
+        }
+        Origin::Probe(slot) => {
+            let equations = stack.equations(&unnamed.asked);
+            let certainties: Vec<f64> = equations.map_or_else(Vec::new, |e| {
+                (0..e.score.len())
+                    .map(|k| e.score[k].powi(2) / e.information[(k, k)].max(f64::MIN_POSITIVE))
+                    .collect()
+            });
+            let of = bins::of_probe(&problem.slots[*slot], &certainties);
+            Finding {
+                probe: Some(*slot),
+                ..common(of.channel, of.covariate, None, of.shape)
+            }
+        }
+    }]
+}
+
+/// What the bins of some channels show, those first that show it most.
+fn by_shape(
+    stack: &Stack,
+    asked: &Asked,
+    parts: &[(usize, Arc<Covariate>)],
+    common: &dyn Fn(usize, String, Option<usize>, String) -> Finding,
+) -> Vec<Finding> {
+    let Some(equations) = stack.equations(asked) else {
+        return Vec::new();
+    };
+    let m = equations.score.len();
+    let ridge = DMatrix::from_fn(m, m, |i, j| {
+        equations.information[(i, j)] * if i == j { 1.0 + 1e-6 } else { 1.0 }
+    });
+    let Some(shape) = ridge.cholesky().map(|factor| factor.solve(&equations.score)) else {
+        return Vec::new();
+    };
+    let width = m / parts.len();
+    let told = |(k, (channel, covariate)): (usize, &(usize, Arc<Covariate>))| {
+        let own = k * width..(k + 1) * width;
+        let square: f64 = own.clone().map(|j| shape[j] * equations.score[j]).sum();
+        let word = bins::shape_name(&shape.as_slice()[own]).to_string();
+        (square, common(*channel, covariate.name.clone(), covariate.log, word))
+    };
+    let mut all: Vec<(f64, Finding)> = parts.iter().enumerate().map(told).collect();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let most = all[0].0;
+    let shown = all.into_iter().filter(|(square, _)| *square >= SHOWN * most);
+    shown.map(|(_, finding)| finding).collect()
+}
+
+/// The channels (by their places among the sums) that show a course, the one that shows it most first.
+fn showing(stack: &Stack, unnamed: &Unnamed, places: &[usize]) -> Vec<usize> {
+    let Some(equations) = stack.equations(&unnamed.asked) else {
+        return vec![places[0]];
+    };
+    let Origin::Course(_, course) = &unnamed.origin else {
+        return vec![places[0]];
+    };
+    let width = course.parameters();
+    let square = |k: usize| -> f64 {
+        (k * width..(k + 1) * width)
+            .map(|j| equations.score[j].powi(2) / equations.information[(j, j)].max(f64::MIN_POSITIVE))
+            .sum()
+    };
+    let mut squares: Vec<(usize, f64)> = (0..places.len()).map(|k| (places[k], square(k))).collect();
+    squares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let most = squares[0].1;
+    let shown = squares.iter().filter(|(_, square)| *square >= SHOWN * most);
+    shown.map(|(place, _)| *place).collect()
 }

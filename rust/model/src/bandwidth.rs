@@ -163,6 +163,7 @@ impl Bandwidth {
             LocalReference::position(window, None)
         };
         let Some(mut reference) = reference else { return };
+        let lowest = reference.lowest();
         if self.spacing.is_none() {
             self.spacing = Some(reference.spacing()).filter(|s| *s > 0.0);
         }
@@ -201,8 +202,8 @@ impl Bandwidth {
                     }
                     value
                 };
-                let [weights, above] =
-                    [self.order, self.order + 1].map(|order| all.iter().map(|w| w[order]).collect::<Vec<f64>>());
+                let [weights, above] = [self.order, self.order + 1]
+                    .map(|order| all.iter().map(|w| w[order - lowest]).collect::<Vec<f64>>());
                 let value = combine(&weights);
                 sample.own_gain[k] = weights.iter().map(|w| w * w).sum();
                 sample.values[k] = value;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::effect::Effect;
 use crate::effects::{
     bias, covariate, current, drift, earth_rate, field, g_sensitivity, iron, lever_arm, misalignment, nonlinearity,
-    reference, rig, rounding, saturation, scale, temperature, timing, vibration, warmup,
+    reference, reference_lowpass, rig, rounding, saturation, scale, temperature, timing, vibration, warmup,
 };
 use crate::sensor::Sensor;
 
@@ -21,7 +21,7 @@ pub fn built_in() -> Vec<Arc<dyn Effect>> {
         Arc::new(drift::bias_drift(Sensor::Acc)),
         Arc::new(nonlinearity::quadratic(Sensor::Acc)),
         Arc::new(nonlinearity::cubic(Sensor::Acc)),
-        Arc::new(vibration::rectification()),
+        Arc::new(vibration::rectification(Sensor::Acc)),
         Arc::new(timing::delay(Sensor::Acc)),
         Arc::new(timing::lowpass(Sensor::Acc)),
         Arc::new(saturation::saturation(Sensor::Acc)),
@@ -35,6 +35,7 @@ pub fn built_in() -> Vec<Arc<dyn Effect>> {
         Arc::new(nonlinearity::quadratic(Sensor::Gyr)),
         Arc::new(nonlinearity::cubic(Sensor::Gyr)),
         Arc::new(nonlinearity::scale_asymmetry()),
+        Arc::new(vibration::rectification(Sensor::Gyr)),
         Arc::new(earth_rate::earth_rate()),
         Arc::new(warmup::warmup()),
         Arc::new(timing::delay(Sensor::Gyr)),
@@ -50,6 +51,8 @@ pub fn built_in() -> Vec<Arc<dyn Effect>> {
         Arc::new(reference::alignment()),
         Arc::new(reference::tilt()),
         Arc::new(reference::delay()),
+        Arc::new(reference::skew()),
+        Arc::new(reference_lowpass::lowpass()),
         Arc::new(rig::backlash()),
         Arc::new(rig::flexure()),
         Arc::new(rig::periodic()),

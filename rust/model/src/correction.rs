@@ -4,7 +4,7 @@
 //! and field as they are, their derivatives from local polynomials. Where the effects on one sensor read another one, the
 //! sensors are corrected in turn until nothing changes.
 
-mod dependence;
+pub(crate) mod dependence;
 mod newton;
 mod stack;
 mod surroundings;
@@ -14,7 +14,6 @@ use std::sync::Arc;
 
 use crate::card::Stage;
 use crate::effect::{Columns, Effect, EffectError};
-use crate::effects::field::FIELD_REFERENCE;
 use crate::facts::LogFacts;
 use crate::ideal::SensorTime;
 use crate::sensor::Sensor;
@@ -78,11 +77,6 @@ pub struct Corrected {
     pub readings: [Option<Triple>; 3],
     /// Samples of each sensor that became NaN because an effect could not be told there.
     pub lost: [usize; 3],
-}
-
-/// True for effects that say what is wrong with the reference: correcting a reading does not concern them.
-pub fn of_reference(effect: &dyn Effect) -> bool {
-    effect.card().stage == Stage::Reference || effect.card().id == FIELD_REFERENCE
 }
 
 /// Everything that stays while sensors are corrected.
@@ -171,7 +165,8 @@ fn parts_of(sensor: Sensor, effects: &[(Arc<dyn Effect>, Vec<f64>)], log: &Log) 
         let acts = effect.sensors().contains(&sensor) && parameters.iter().any(|v| *v != 0.0);
         // What was cut off or rounded is lost, and time is set right by itself.
         let elsewhere = matches!(effect.card().stage, Stage::Time | Stage::Rounding | Stage::Range);
-        if !acts || elsewhere || of_reference(effect.as_ref()) {
+        // Correcting a reading does not concern the reference.
+        if !acts || elsewhere || effect.card().traits.reference.is_some() {
             continue;
         }
         let lacking = |reason: String| CorrectionError::Lacking {

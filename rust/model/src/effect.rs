@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::card::Card;
+use crate::card::{Card, ReferencePart};
 use crate::facts::LogFacts;
 use crate::ideal::{Ideal, ReferenceChange};
 use crate::sensor::Sensor;
@@ -157,6 +157,17 @@ pub trait Effect: Send + Sync {
     /// The column of the log that it reads besides sensors and reference: `temp` or the name of a covariate.
     fn column(&self) -> Option<&str> {
         None
+    }
+
+    /// The column of the log that it counts from the mean of, `temp` or the name of a covariate: whoever takes the effect out of
+    /// another log has to know that mean.
+    fn centred_column(&self) -> Option<&str> {
+        None
+    }
+
+    /// True where it is fitted along whatever is asked, without being named: the field, if this log is all that is known of it.
+    fn fitted_along(&self, facts: &LogFacts) -> bool {
+        self.card().traits.reference == Some(ReferencePart::Field) && facts.field_estimated
     }
 
     /// Columns d reading / d parameter of `sensor`, at the given parameter values.

@@ -14,6 +14,10 @@ use crate::window::Window;
 /// Rows before a window that a whitening filter may look back on.
 pub const LOOKBACK: usize = 128;
 
+/// Largest rate at which the clock of a reference may run away from that of the sensors: beyond it windows end before the reference is
+/// reached. Quartz crystals are within 100 ppm of their frequency over all temperatures; ten times that is a ceramic resonator's.
+const LARGEST_SKEW: f64 = 1e-3;
+
 /// Facts of a log that its effects and its reference kinematics need: constants over all windows.
 #[derive(Clone, Debug)]
 #[allow(clippy::struct_excessive_bools)] // facts, not the states of a machine
@@ -54,6 +58,8 @@ pub struct LogFacts {
     pub position_smoothing: Option<Smoothing>,
     /// Noise of the ideal readings that columns are made of, from the reference; m/s^2, rad/s, uT.
     pub column_noise: [f64; 3],
+    /// Noise that the reference gives to the ideal readings which readings are compared with; m/s^2, rad/s, uT.
+    pub ideal_noise: [f64; 3],
     /// First reference position, m, from which others are counted; zero without one.
     pub position_origin: Vector3<f64>,
     /// How the attitude is differentiated for what enters columns, rates included.
@@ -133,6 +139,7 @@ impl LogFacts {
             temperature_course: None,
             attitude_smoothing: NARROWEST,
             position_smoothing: None,
+            ideal_noise: [0.0; 3],
             column_noise: [0.0; 3],
             position_origin: Vector3::zeros(),
             attitude_columns: NARROWEST,
@@ -184,6 +191,7 @@ impl LogFacts {
             attitude_smoothing: NARROWEST,
             position_smoothing: None,
             column_noise: [f64::INFINITY; 3],
+            ideal_noise: [0.0; 3],
             position_origin: Vector3::zeros(),
             attitude_columns: NARROWEST,
             position_columns: None,
@@ -212,7 +220,8 @@ impl LogFacts {
         let widest = widths.iter().flatten().map(|s| s.half_width).max().unwrap_or(0);
         let reach = 2.0 * (widest as f64 + 4.0) * (self.reference_dt / self.dt).max(1.0);
         let reach = if reach.is_finite() { reach as usize } else { 0 };
-        reach + crate::window::HOLD_ROWS + LOOKBACK
+        let skew = (LARGEST_SKEW * self.n as f64) as usize;
+        reach + skew + crate::window::HOLD_ROWS + LOOKBACK
     }
 
     /// Index of a covariate by its name.

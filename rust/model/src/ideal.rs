@@ -7,6 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::facts::LogFacts;
 use crate::kinematics_memory::{Differentiation, KinematicsRows};
 use crate::reference::{self, Kinematics, Widths};
+use crate::reference_clock::ReferenceClock;
 use crate::rig::{Play, RigError, Slack};
 use crate::sensor::Sensor;
 use crate::triple::Triple;
@@ -15,8 +16,12 @@ use crate::window::Window;
 /// What effects of the reference change before the ideal readings are taken.
 #[derive(Clone, Copy, Debug)]
 pub struct ReferenceChange {
-    /// The reference is late by this much, s: it is read at t + delay.
+    /// The reference is late by this much where the log begins, s: it is read at t + delay.
     pub delay: f64,
+    /// ... and by this much more per second.
+    pub skew: f64,
+    /// The reference was smoothed: it has lost this much, s^2, times the second derivative of the motion.
+    pub smoothing: f64,
     /// Turns vectors of the reference's body frame into the sensor's: x_sensor = alignment^-1 x.
     pub alignment: UnitQuaternion<f64>,
     /// Turns vectors of the recorded reference frame into the true one (a table that is not level).
@@ -40,6 +45,8 @@ impl Default for ReferenceChange {
     fn default() -> Self {
         Self {
             delay: 0.0,
+            skew: 0.0,
+            smoothing: 0.0,
             alignment: UnitQuaternion::identity(),
             tilt: UnitQuaternion::identity(),
             rig: RigError::default(),
@@ -49,11 +56,22 @@ impl Default for ReferenceChange {
 }
 
 impl ReferenceChange {
+    /// When the reference is read.
+    pub fn clock(&self, facts: &LogFacts) -> ReferenceClock {
+        ReferenceClock {
+            delay: self.delay,
+            skew: self.skew,
+            start: facts.t_start,
+        }
+    }
+
     /// Both changes, one after the other.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
             delay: self.delay + other.delay,
+            skew: self.skew + other.skew,
+            smoothing: self.smoothing + other.smoothing,
             alignment: self.alignment * other.alignment,
             tilt: self.tilt * other.tilt,
             rig: self.rig.and(other.rig),
@@ -72,6 +90,10 @@ pub struct Ideal {
     pub omega: Triple,
     /// Angular acceleration, rad/s^2.
     pub alpha: Triple,
+    /// Its time derivative in the body frame, rad/s^3.
+    pub alpha_rate: Triple,
+    /// Fourth derivative of the position in the body frame, m/s^4.
+    pub snap: Triple,
     /// Specific force, m/s^2.
     pub f: Triple,
     /// Its time derivative in the body frame.
@@ -114,7 +136,7 @@ pub struct Command {
 }
 
 /// Kinematics of the core rows of a window, worked out once for all passes over a log.
-fn kinematics(window: &Window, facts: &LogFacts, shift: f64) -> KinematicsRows {
+fn kinematics(window: &Window, facts: &LogFacts, clock: ReferenceClock) -> KinematicsRows {
     let how = Differentiation {
         attitude: Widths {
             value: facts.attitude_smoothing,
@@ -124,31 +146,36 @@ fn kinematics(window: &Window, facts: &LogFacts, shift: f64) -> KinematicsRows {
             value,
             columns: facts.position_columns.unwrap_or(value),
         }),
-        shift,
+        clock,
     };
     facts.kinematics.of(window, facts.n, how, || {
-        reference::kinematics(window, how.attitude, how.position, Some(facts.reference_dt), shift)
+        reference::kinematics(window, how.attitude, how.position, Some(facts.reference_dt), clock)
     })
 }
 
 impl Ideal {
     /// Ideal readings of the window's core rows.
     pub fn new(window: &Window, facts: &LogFacts, change: &ReferenceChange) -> Self {
-        let rows = kinematics(window, facts, change.delay);
+        Self::by_clock(window, facts, change, change.clock(facts))
+    }
+
+    /// The same with the reference read by another clock.
+    fn by_clock(window: &Window, facts: &LogFacts, change: &ReferenceChange, clock: ReferenceClock) -> Self {
+        let rows = kinematics(window, facts, clock);
         let mut ideal = Self::default();
         let mut rig = facts.rig.as_ref().map(|rig| {
             ideal.rig_axis = change.alignment.inverse_transform_vector(&rig.axis);
-            let first = window.t.get(window.begin).copied().unwrap_or_default() + change.delay;
+            let first = clock.at(window.t.get(window.begin).copied().unwrap_or_default());
             (rig, Play::new(rig, change.rig.width, first))
         });
         for (k, t) in rows.iter().copied().zip(&window.t[window.begin..window.end]) {
-            let moved = k.map(|k| match rig.as_mut() {
+            let moved = k.map(|k| k.sharpened(change.smoothing)).map(|k| match rig.as_mut() {
                 None => k,
-                Some((rig, play)) => ideal.moved_by_rig(k, t + change.delay, rig, play, change),
+                Some((rig, play)) => ideal.moved_by_rig(k, clock.at(*t), rig, play, change),
             });
             if moved.is_none() && rig.is_some() {
                 ideal.command.push(Command {
-                    t: t + change.delay,
+                    t: clock.at(*t),
                     angle: f64::NAN,
                     rate: f64::NAN,
                 });
@@ -187,6 +214,7 @@ impl Ideal {
             alpha: turn.inverse_transform_vector(&k.alpha)
                 + omega.cross(&rig.axis) * error_rate
                 + rig.axis * error_acceleration,
+            alpha_rate: turn.inverse_transform_vector(&k.alpha_rate),
             ..k
         }
     }
@@ -197,10 +225,8 @@ impl Ideal {
         if time == SensorTime::default() {
             return None;
         }
-        let before = |past: f64| {
-            let delay = change.delay - past;
-            Self::new(window, facts, &ReferenceChange { delay, ..*change })
-        };
+        let clock = change.clock(facts);
+        let before = |past: f64| Self::by_clock(window, facts, change, clock.before(past));
         let mut now = before(time.delay + time.lag);
         if time.lag == 0.0 {
             return Some(now);
@@ -222,10 +248,12 @@ impl Ideal {
         Some(now)
     }
 
-    const fn smooth(&mut self) -> [&mut Triple; 6] {
+    const fn smooth(&mut self) -> [&mut Triple; 8] {
         [
             &mut self.omega,
             &mut self.alpha,
+            &mut self.alpha_rate,
+            &mut self.snap,
             &mut self.f,
             &mut self.f_rate,
             &mut self.m,
@@ -281,6 +309,10 @@ impl Ideal {
         let m = attitude.inverse_transform_vector(&facts.field);
         self.omega.push(&omega);
         self.alpha.push(&alpha);
+        self.alpha_rate
+            .push(&change.alignment.inverse_transform_vector(&k.alpha_rate));
+        self.snap
+            .push(&attitude.inverse_transform_vector(&(change.tilt * k.snap)));
         self.f.push(&f);
         self.f_rate.push(&f_rate);
         self.m.push(&m);

@@ -7,23 +7,24 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
 use crate::reference::{Kinematics, Widths};
+use crate::reference_clock::ReferenceClock;
 use crate::window::Window;
 
 /// Kinematics of some rows; `None` where the reference does not tell.
 pub type KinematicsRows = Arc<Vec<Option<Kinematics>>>;
 
-/// Rows kept at most, about 200 bytes each; of a log with more nothing is kept.
+/// Rows kept at most, about 260 bytes each; of a log with more nothing is kept.
 const MOST_ROWS: usize = 1 << 20;
 
-/// How the reference is differentiated, and at which shift of time.
+/// How the reference is differentiated, and by which clock it is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Differentiation {
     /// Polynomials for the attitude.
     pub attitude: Widths,
     /// Polynomials for the position.
     pub position: Option<Widths>,
-    /// Time by which the reference is read later, s.
-    pub shift: f64,
+    /// When the reference is read.
+    pub clock: ReferenceClock,
 }
 
 /// A stretch of rows.
@@ -100,7 +101,7 @@ impl KinematicsMemory {
     fn keep(&self, how: Differentiation, place: (usize, usize), stretch: Stretch) {
         let Ok(mut kept) = self.0.lock() else { return };
         let new = stretch.rows.len();
-        // Other shifts are given up first, the one used longest ago before the others.
+        // Other clocks are given up first, the one used longest ago before the others.
         while kept.rows + new > MOST_ROWS {
             let Some(at) = kept.kinds.iter().position(|(kind, _)| *kind != how) else {
                 return;
@@ -135,8 +136,16 @@ mod tests {
             columns: NARROWEST,
         },
         position: None,
-        shift: 0.0,
+        clock: later(0.0),
     };
+
+    const fn later(delay: f64) -> ReferenceClock {
+        ReferenceClock {
+            delay,
+            skew: 0.0,
+            start: 0.0,
+        }
+    }
 
     #[test]
     fn what_is_known_is_not_worked_out_again_unless_the_reference_is_another() {
@@ -154,7 +163,17 @@ mod tests {
         };
         assert_eq!(asked(&q, HOW, &memory), 1);
         assert_eq!(asked(&q, HOW, &memory.clone()), 0);
-        assert_eq!(asked(&q, Differentiation { shift: 0.01, ..HOW }, &memory), 1);
+        assert_eq!(
+            asked(
+                &q,
+                Differentiation {
+                    clock: later(0.01),
+                    ..HOW
+                },
+                &memory
+            ),
+            1
+        );
         assert_eq!(asked(&q, HOW, &memory), 0);
         assert_eq!(asked(&other, HOW, &memory), 1);
     }
@@ -167,7 +186,7 @@ mod tests {
         let n = MOST_ROWS / 3;
         for k in 0..6 {
             let how = Differentiation {
-                shift: f64::from(k),
+                clock: later(f64::from(k)),
                 ..HOW
             };
             memory.of(&window(&t, &q), n, how, || vec![None; n]);

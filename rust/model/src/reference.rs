@@ -5,6 +5,9 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
+use crate::knots::{Knots, median_step};
+use crate::reference_clock::ReferenceClock;
+use crate::rotation_rates::{RotationRates, rates};
 use crate::smoothing::{self, Derivatives, LocalFit, Smoothing, Weights};
 use crate::window::Window;
 
@@ -21,77 +24,15 @@ pub struct Kinematics {
     pub acceleration: Vector3<f64>,
     /// Jerk in the reference frame, m/s^3.
     pub jerk: Vector3<f64>,
+    /// Derivative of `alpha` in the body frame, rad/s^3.
+    pub alpha_rate: Vector3<f64>,
+    /// Derivative of `jerk`, m/s^4.
+    pub snap: Vector3<f64>,
     /// What the narrower polynomials, which follow every detail of the motion and of the reference's noise, add to `omega`.
     pub omega_detail: Vector3<f64>,
     /// The same for `acceleration`.
     pub acceleration_detail: Vector3<f64>,
 }
-
-/// Times and row numbers of the rows that carry a reference, cut into segments without gaps.
-struct Knots {
-    t: Vec<f64>,
-    row: Vec<usize>,
-    segment: Vec<(usize, usize)>,
-}
-
-impl Knots {
-    fn new(window: &Window, known: impl Fn(usize) -> bool, spacing: Option<f64>) -> Self {
-        let row: Vec<usize> = (0..window.len())
-            .filter(|&i| known(i) && window.reference_exact.is_none_or(|e| e[i] > 0.5))
-            .collect();
-        let t: Vec<f64> = row.iter().map(|&i| window.t[i]).collect();
-        let widest = MAX_GAP * spacing.unwrap_or_else(|| median_step(&t));
-        let mut segment = vec![(0, 0); t.len()];
-        let mut first = 0;
-        for k in 0..t.len() {
-            if k + 1 == t.len() || t[k + 1] - t[k] > widest {
-                segment[first..=k].fill((first, k + 1));
-                first = k + 1;
-            }
-        }
-        Self { t, row, segment }
-    }
-
-    /// Range of knots for a fit around `at`; `None` where the reference does not reach far enough on both sides.
-    fn around(&self, at: f64, half_width: usize, hint: &mut usize) -> Option<(usize, usize, usize)> {
-        let n = self.t.len();
-        if n == 0 {
-            return None;
-        }
-        let mut k = (*hint).min(n - 1);
-        while k + 1 < n && self.t[k + 1] <= at {
-            k += 1;
-        }
-        while k > 0 && self.t[k] > at {
-            k -= 1;
-        }
-        *hint = k;
-        if k + 1 < n && self.t[k + 1] - at < at - self.t[k] {
-            k += 1;
-        }
-        let (first, last) = self.segment[k];
-        if k < first + half_width || k + half_width >= last {
-            return None;
-        }
-        // Between two segments the nearest knot may lie far away.
-        let reach = 0.75 * (self.t[k + 1.min(last - 1 - k)] - self.t[k - 1.min(k - first)]);
-        ((at - self.t[k]).abs() <= reach).then_some((k, k - half_width, k + half_width + 1))
-    }
-}
-
-/// Median step between times; zero if there are none.
-fn median_step(t: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-    let middle = steps.len() / 2;
-    if steps.is_empty() {
-        0.0
-    } else {
-        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
-    }
-}
-
-/// A gap in the reference is a step of more than this many median steps.
-const MAX_GAP: f64 = 4.5;
 
 /// Weights of the last fit, kept while the knots have the same spacing. Where they never have, weights are not worth having.
 #[derive(Default)]
@@ -107,8 +48,15 @@ struct WeightCache {
 const UNEVEN: usize = 4;
 
 impl WeightCache {
-    /// Value and derivatives around `at` of the polynomial through values at times `t`.
-    fn derivatives(&mut self, t: &[f64], at: f64, degree: usize, values: &[[f64; 3]]) -> Option<Derivatives> {
+    /// Derivatives from the order `lowest` on around `at` of the polynomial through values at times `t`.
+    fn derivatives(
+        &mut self,
+        t: &[f64],
+        at: f64,
+        degree: usize,
+        values: &[[f64; 3]],
+        lowest: usize,
+    ) -> Option<Derivatives> {
         let tolerance = 1e-9 * (t[t.len() - 1] - t[0]);
         let same =
             self.offsets.len() == t.len() && self.offsets.iter().zip(t).all(|(o, v)| (v - at - o).abs() <= tolerance);
@@ -121,9 +69,9 @@ impl WeightCache {
         self.offsets.extend(t.iter().map(|v| v - at));
         self.weights.clear();
         if self.uneven > UNEVEN {
-            return smoothing::derivatives(t, at, degree, values);
+            return smoothing::derivatives(t, at, degree, values, lowest);
         }
-        if !self.fit.prepare(t, at, degree) {
+        if !self.fit.prepare(t, at, degree, lowest) {
             return None;
         }
         self.fit.weights_into(&mut self.weights);
@@ -248,20 +196,25 @@ impl<'a> LocalReference<'a> {
         Some((first, last))
     }
 
-    /// Derivatives of the rotation vector around `at`, and the attitude it starts from.
+    /// Order of the first of the four derivatives: of a position the value is relative to an arbitrary origin.
+    pub fn lowest(&self) -> usize {
+        usize::from(self.attitudes.is_empty())
+    }
+
+    /// Value and first three derivatives of the rotation vector around `at`, and the attitude it starts from.
     pub fn rotation_derivatives(&mut self, at: f64, s: Smoothing) -> Option<(UnitQuaternion<f64>, Derivatives)> {
         let (centre, first, last) = self.rotations(at, s.half_width)?;
         let d = self
             .cache
-            .derivatives(&self.knots.t[first..last], at, s.degree, &self.values)?;
+            .derivatives(&self.knots.t[first..last], at, s.degree, &self.values, 0)?;
         Some((centre, d))
     }
 
-    /// Derivatives of the position around `at`; the value itself is relative to an arbitrary origin.
+    /// First to fourth derivative of the position around `at`.
     pub fn position_derivatives(&mut self, at: f64, s: Smoothing) -> Option<Derivatives> {
         let (first, last) = self.positions(at, s.half_width)?;
         self.cache
-            .derivatives(&self.knots.t[first..last], at, s.degree, &self.values)
+            .derivatives(&self.knots.t[first..last], at, s.degree, &self.values, 1)
     }
 
     /// A fit around `at` with its values, for judging how wide the polynomial may be.
@@ -273,26 +226,10 @@ impl<'a> LocalReference<'a> {
             self.positions(at, s.half_width)?
         };
         Some((
-            LocalFit::new(&self.knots.t[first..last], at, s.degree)?,
+            LocalFit::new(&self.knots.t[first..last], at, s.degree, usize::from(!of_attitude))?,
             self.values.clone(),
         ))
     }
-}
-
-/// omega and alpha from a rotation vector and its derivatives.
-fn rates(phi: Vector3<f64>, d: Vector3<f64>, dd: Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    // J_r = 1 - a [phi] + b [phi]^2 with a, b as series in s = |phi|^2 (|phi| is at most half a knot's turn).
-    let s = phi.norm_squared();
-    let a = 0.5 - s / 24.0 + s * s / 720.0 - s * s * s / 40320.0;
-    let b = 1.0 / 6.0 - s / 120.0 + s * s / 5040.0 - s * s * s / 362_880.0;
-    let s_rate = 2.0 * phi.dot(&d);
-    let a_rate = s_rate * (-1.0 / 24.0 + s / 360.0 - s * s / 13440.0);
-    let b_rate = s_rate * (-1.0 / 120.0 + s / 2520.0 - s * s / 120_960.0);
-    let jacobian = |v: &Vector3<f64>| v - a * phi.cross(v) + b * phi.cross(&phi.cross(v));
-    let omega = jacobian(&d);
-    let pd = phi.cross(&d);
-    let alpha = jacobian(&dd) - a_rate * pd + b_rate * phi.cross(&pd) + b * d.cross(&pd);
-    (omega, alpha)
 }
 
 /// Polynomials for one reference quantity.
@@ -304,13 +241,24 @@ pub struct Widths {
     pub columns: Smoothing,
 }
 
-/// Kinematics at `t[i] + shift` for each core row of the window; `None` in a row where the reference does not tell.
+/// Rates from a rotation vector and its first three derivatives.
+fn rates_of(d: &Derivatives) -> RotationRates {
+    let [phi, d, dd, ddd] = d.map(Vector3::from);
+    rates(phi, d, dd, ddd)
+}
+
+/// What the position's polynomial gives: acceleration, jerk and snap.
+fn above_velocity(d: &Derivatives) -> [Vector3<f64>; 3] {
+    [d[1], d[2], d[3]].map(Vector3::from)
+}
+
+/// Kinematics of each core row of the window, by a clock; `None` in a row where the reference does not tell.
 pub fn kinematics(
     window: &Window,
     attitude: Widths,
     position: Option<Widths>,
     spacing: Option<f64>,
-    shift: f64,
+    clock: ReferenceClock,
 ) -> Vec<Option<Kinematics>> {
     let mut rotation = LocalReference::attitude(window, spacing);
     let mut translation = position.and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w.value)));
@@ -322,41 +270,43 @@ pub fn kinematics(
         .and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w)));
     (window.begin..window.end)
         .map(|i| {
-            let at = window.t[i] + shift;
+            let at = clock.at(window.t[i]);
             let (centre, d) = rotation.as_mut()?.rotation_derivatives(at, attitude.value)?;
             let phi = Vector3::from(d[0]);
-            let (mut omega, mut alpha) = rates(phi, Vector3::from(d[1]), Vector3::from(d[2]));
+            let mut turning = rates_of(&d);
             let mut omega_detail = Vector3::zeros();
             if let Some((reference, width)) = smooth_rotation.as_mut() {
-                let (_, d) = reference.rotation_derivatives(at, *width)?;
-                let smooth = rates(Vector3::from(d[0]), Vector3::from(d[1]), Vector3::from(d[2]));
-                omega_detail = omega - smooth.0;
-                (omega, alpha) = smooth;
+                let smooth = rates_of(&reference.rotation_derivatives(at, *width)?.1);
+                omega_detail = turning.omega - smooth.omega;
+                turning = smooth;
             }
             let mut acceleration_detail = Vector3::zeros();
-            let (acceleration, jerk) = match translation.as_mut() {
-                None => (Vector3::zeros(), Vector3::zeros()),
+            let [acceleration, jerk, snap] = match translation.as_mut() {
+                None => [Vector3::zeros(); 3],
                 Some((reference, s)) => {
-                    let d = reference.position_derivatives(at, *s)?;
+                    let all = above_velocity(&reference.position_derivatives(at, *s)?);
                     match smooth_translation.as_mut() {
-                        None => (Vector3::from(d[2]), Vector3::from(d[3])),
+                        None => all,
                         Some((reference, width)) => {
-                            let smooth = reference.position_derivatives(at, *width)?;
-                            acceleration_detail = Vector3::from(d[2]) - Vector3::from(smooth[2]);
-                            (Vector3::from(smooth[2]), Vector3::from(smooth[3]))
+                            let smooth = above_velocity(&reference.position_derivatives(at, *width)?);
+                            acceleration_detail = all[0] - smooth[0];
+                            smooth
                         }
                     }
                 }
             };
-            let attitude = centre * UnitQuaternion::from_scaled_axis(phi);
+            // On the clock of the sensors.
+            let rate = clock.rate();
             Some(Kinematics {
-                attitude,
-                omega,
-                alpha,
-                acceleration,
-                jerk,
-                omega_detail,
-                acceleration_detail,
+                attitude: centre * UnitQuaternion::from_scaled_axis(phi),
+                omega: turning.omega * rate,
+                alpha: turning.alpha * rate.powi(2),
+                alpha_rate: turning.alpha_rate * rate.powi(3),
+                acceleration: acceleration * rate.powi(2),
+                jerk: jerk * rate.powi(3),
+                snap: snap * rate.powi(4),
+                omega_detail: omega_detail * rate,
+                acceleration_detail: acceleration_detail * rate.powi(2),
             })
         })
         .collect()
@@ -413,7 +363,10 @@ mod tests {
                 },
                 None,
                 None,
-                shift,
+                ReferenceClock {
+                    delay: shift,
+                    ..ReferenceClock::default()
+                },
             );
             for (i, k) in k.iter().enumerate().skip(5).take(n as usize - 10) {
                 let k = k.expect("inside");
@@ -432,7 +385,7 @@ mod tests {
                 },
                 None,
                 None,
-                0.0
+                ReferenceClock::default()
             )[3]
             .is_none()
         );
@@ -474,7 +427,7 @@ mod tests {
             },
             None,
             None,
-            0.0,
+            ReferenceClock::default(),
         );
         assert!((97..123).all(|i| k[i].is_none()));
         assert!(k[90].is_some() && k[130].is_some());

@@ -207,6 +207,8 @@ impl SensorModel {
             for triple in [
                 &mut ideal.omega,
                 &mut ideal.alpha,
+                &mut ideal.alpha_rate,
+                &mut ideal.snap,
                 &mut ideal.f,
                 &mut ideal.f_rate,
                 &mut ideal.m,
@@ -276,7 +278,9 @@ impl SensorModel {
             .map(|c| core.clone().map(|i| held(c, i)).collect())
             .collect();
         let position: Vec<Vector3<f64>> = window.position.map_or_else(Vec::new, |p| {
-            let at = |i: usize| Vector3::new(p[3 * i], p[3 * i + 1], p[3 * i + 2]);
+            // A reference in rows of its own has none in those of the readings.
+            let axes: [Vec<f64>; 3] = std::array::from_fn(|axis| p.iter().skip(axis).step_by(3).copied().collect());
+            let at = |i: usize| Vector3::from_fn(|axis, _| held(&axes[axis], i));
             core.clone().map(at).collect()
         });
         let vibration = window.reading(Sensor::Acc).map(|_| vibration::power(window, facts.dt));
@@ -286,6 +290,8 @@ impl SensorModel {
             facts.silent_axes.iter().any(|s| s.contains(&true)).then(|| Ideal {
                 omega: ideal.omega.without(gyr),
                 alpha: ideal.alpha.without(gyr),
+                alpha_rate: ideal.alpha_rate.without(gyr),
+                snap: ideal.snap.without(acc),
                 f: ideal.f.without(acc),
                 m: ideal.m.without(mag),
                 ..ideal.clone()

@@ -31,14 +31,15 @@ pub const NARROWEST: Smoothing = Smoothing {
 pub struct LocalFit {
     terms: usize,
     scale: f64,
+    lowest: usize,
     factor: [[f64; TERMS]; TERMS],
     basis: Vec<[f64; TERMS]>,
 }
 
-/// Value and first three derivatives with respect to time.
+/// Four derivatives with respect to time, each of the next higher order; order 0 is the value.
 pub type Derivatives = [[f64; 3]; 4];
 
-/// What each knot's value counts for in the value and the first three derivatives.
+/// What each knot's value counts for in the four derivatives.
 pub type Weights = Vec<[f64; 4]>;
 
 /// (2 k - 1) / k and (k - 1) / k of the recurrence of the Legendre polynomials.
@@ -53,13 +54,16 @@ const RECURRENCE: [(f64, f64); PRODUCTS] = {
     out
 };
 
-/// Derivatives of order 0 to 3 of the Legendre polynomials at u = 0.
-const AT_ZERO: [[f64; TERMS]; 4] = [
+/// Derivatives of order 0 to 4 of the Legendre polynomials at u = 0.
+const AT_ZERO: [[f64; TERMS]; 5] = [
     [1.0, 0.0, -0.5, 0.0, 0.375, 0.0, -0.3125, 0.0, 0.273_437_5],
     [0.0, 1.0, 0.0, -1.5, 0.0, 1.875, 0.0, -2.1875, 0.0],
     [0.0, 0.0, 3.0, 0.0, -7.5, 0.0, 13.125, 0.0, -19.6875],
     [0.0, 0.0, 0.0, 15.0, 0.0, -52.5, 0.0, 118.125, 0.0],
+    [0.0, 0.0, 0.0, 0.0, 105.0, 0.0, -472.5, 0.0, 1299.375],
 ];
+/// Highest order of the lowest of four derivatives.
+const HIGHEST_LOWEST: usize = AT_ZERO.len() - 4;
 
 /// Runs a function with the number of terms as a constant: the loops over terms, where all the time goes at uneven time stamps, are
 /// then unrolled.
@@ -193,8 +197,8 @@ fn products<const T: usize>(sums: &[[f64; LANES]; PRODUCTS]) -> [[f64; TERMS]; T
     out
 }
 
-/// Value and derivatives of the polynomial through values at knots, in one go: nothing is kept for other values.
-fn fitted<const T: usize>(t: &[f64], at: f64, scale: f64, values: &[[f64; 3]]) -> Option<Derivatives> {
+/// Four derivatives of the polynomial through values at knots, in one go: nothing is kept for other values.
+fn fitted<const T: usize>(t: &[f64], at: f64, scale: f64, values: &[[f64; 3]], lowest: usize) -> Option<Derivatives> {
     let mut sums = [[0.0; LANES]; PRODUCTS];
     let mut right = [[[0.0; LANES]; 3]; T];
     let per_scale = scale.recip();
@@ -218,20 +222,22 @@ fn fitted<const T: usize>(t: &[f64], at: f64, scale: f64, values: &[[f64; 3]]) -
             c[k] = right[k][axis].iter().sum();
         }
         solve::<T>(&factor, &mut c);
-        let mut unit = 1.0;
-        for order in 0..4 {
-            let value: f64 = (0..T).map(|k| AT_ZERO[order][k] * c[k]).sum();
-            out[order][axis] = value * unit;
+        let mut unit = if lowest == 0 { 1.0 } else { per_scale };
+        for (out, at_zero) in out.iter_mut().zip(&AT_ZERO[lowest..]) {
+            let value: f64 = (0..T).map(|k| at_zero[k] * c[k]).sum();
+            out[axis] = value * unit;
             unit *= per_scale;
         }
     }
     Some(out)
 }
 
-/// Value and derivatives around `at` of the polynomial through values at times `t`; `None` if these do not determine it.
-pub fn derivatives(t: &[f64], at: f64, degree: usize, values: &[[f64; 3]]) -> Option<Derivatives> {
+/// Derivatives of order `lowest` (0 or 1) and the three next ones around `at` of the polynomial through values at times `t`; `None` if these
+/// do not determine it.
+pub fn derivatives(t: &[f64], at: f64, degree: usize, values: &[[f64; 3]], lowest: usize) -> Option<Derivatives> {
     let (terms, scale) = terms_and_scale(t, at, degree)?;
-    with_terms!(terms, fitted(t, at, scale, values))
+    let lowest = lowest.min(HIGHEST_LOWEST);
+    with_terms!(terms, fitted(t, at, scale, values, lowest))
 }
 
 /// Number of terms, and the scale of time; `None` where there are too few knots.
@@ -296,18 +302,19 @@ fn combined<const T: usize>(basis: &[[f64; TERMS]], coefficients: &[[f64; 4]; TE
 }
 
 impl LocalFit {
-    /// Prepares the fit around `at` through knots at times `t`; `None` if the knots do not determine the polynomial.
-    pub fn new(t: &[f64], at: f64, degree: usize) -> Option<Self> {
+    /// Prepares the fit around `at` through knots at times `t`, for derivatives of order `lowest` (0 or 1) and the three next ones; `None`
+    /// if the knots do not determine the polynomial.
+    pub fn new(t: &[f64], at: f64, degree: usize, lowest: usize) -> Option<Self> {
         let mut fit = Self::default();
-        fit.prepare(t, at, degree).then_some(fit)
+        fit.prepare(t, at, degree, lowest).then_some(fit)
     }
 
     /// The same in place; false if the knots do not determine the polynomial.
-    pub fn prepare(&mut self, t: &[f64], at: f64, degree: usize) -> bool {
+    pub fn prepare(&mut self, t: &[f64], at: f64, degree: usize, lowest: usize) -> bool {
         let Some((terms, scale)) = terms_and_scale(t, at, degree) else {
             return false;
         };
-        (self.terms, self.scale) = (terms, scale);
+        (self.terms, self.scale, self.lowest) = (terms, scale, lowest.min(HIGHEST_LOWEST));
         self.factor = with_terms!(terms, gram(t, at, scale, &mut self.basis));
         let least = DETERMINED * t.len() as f64;
         with_terms!(terms, factorise(&mut self.factor, least))
@@ -327,9 +334,9 @@ impl LocalFit {
     /// The same in place.
     pub fn weights_into(&self, weights: &mut Weights) {
         let mut coefficients = [[0.0; 4]; TERMS];
-        let mut unit = 1.0;
+        let mut unit = if self.lowest == 0 { 1.0 } else { self.scale };
         for order in 0..4 {
-            let mut c = AT_ZERO[order];
+            let mut c = AT_ZERO[self.lowest + order];
             self.solve(&mut c);
             for (k, c) in c.iter().enumerate().take(self.terms) {
                 coefficients[k][order] = c / unit;
@@ -359,7 +366,7 @@ impl LocalFit {
     }
 }
 
-/// Applies weights to values: value and derivatives, each with three components.
+/// Applies weights to values: four derivatives, each with three components.
 pub fn apply(weights: &[[f64; 4]], values: &[[f64; 3]]) -> Derivatives {
     let mut out = [[0.0; 4]; 3];
     for (w, v) in weights.iter().zip(values) {
@@ -389,7 +396,7 @@ mod tests {
                 [1.0 + 2.0 * u + 3.0 * u * u, u * u * u, 4.0 * u]
             })
             .collect();
-        let fit = LocalFit::new(&t, at, 6).expect("determined");
+        let fit = LocalFit::new(&t, at, 6, 0).expect("determined");
         let d = apply(&fit.weights(), &values);
         for (got, want) in [
             (d[0][0], 1.0),
@@ -401,9 +408,29 @@ mod tests {
             assert!((got - want).abs() < 1e-7, "{got} {want}");
         }
         assert!(fit.residual(&values).0 < 1e-24);
-        let at_once = derivatives(&t, at, 6, &values).expect("determined");
+        let at_once = derivatives(&t, at, 6, &values, 0).expect("determined");
         for (a, b) in d.as_flattened().iter().zip(at_once.as_flattened()) {
             assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn the_fourth_derivative_comes_with_the_first_three() {
+        let t: Vec<f64> = (0..15).map(|i| f64::from(i) + 0.2 * f64::from(i * 7 % 5)).collect();
+        let values: Vec<[f64; 3]> = t.iter().map(|v| [(v - 7.0).powi(4), (v - 7.0).powi(6), 1.0]).collect();
+        let d = derivatives(&t, 7.5, 8, &values, 1).expect("determined");
+        let weighted = apply(&LocalFit::new(&t, 7.5, 8, 1).expect("determined").weights(), &values);
+        let wanted = [
+            [0.5, 3.0, 12.0, 24.0],
+            [6.0 / 32.0, 30.0 / 16.0, 120.0 / 8.0, 360.0 / 4.0],
+            [0.0; 4],
+        ];
+        for (axis, wanted) in wanted.iter().enumerate() {
+            for (order, want) in wanted.iter().enumerate() {
+                for got in [d[order][axis], weighted[order][axis]] {
+                    assert!((got - want).abs() < 1e-7, "{got} {want}");
+                }
+            }
         }
     }
 
@@ -422,6 +449,6 @@ mod tests {
 
     #[test]
     fn too_few_knots_are_refused() {
-        assert!(LocalFit::new(&[0.0, 0.1, 0.2], 0.1, 6).is_none());
+        assert!(LocalFit::new(&[0.0, 0.1, 0.2], 0.1, 6, 0).is_none());
     }
 }

@@ -96,6 +96,7 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
         attitude_smoothing: NARROWEST,
         position_smoothing: None,
         column_noise: [0.0; 3],
+        ideal_noise: [0.0; 3],
         position_origin: nalgebra::Vector3::zeros(),
         attitude_columns: NARROWEST,
         position_columns: None,
@@ -236,4 +237,54 @@ fn a_warm_up_fades_and_a_range_ends() {
     let cut = f.map(|x| x.clamp(-range, range) - x);
     assert!(cut.norm() > 1.0);
     near(&added(&swing, "acc.saturation", &[range]), 0, cut, 1e-7);
+}
+
+/// What all sensors would read of the swing with other courses of its angle and rate, less what they read of it as recorded.
+fn other_motion(swing: &Swing, angle: f64, rate: f64) -> [Vector3<f64>; 3] {
+    let field = Vector3::new(20.0, 3.0, 44.0);
+    let read = |angle: f64, rate: f64| {
+        let attitude = swing.start * UnitQuaternion::from_scaled_axis(swing.axis * angle);
+        let up = swing.frame.up() * 9.80665;
+        [
+            attitude.inverse_transform_vector(&up),
+            swing.axis * rate,
+            attitude.inverse_transform_vector(&field),
+        ]
+    };
+    let (now, t) = (read(angle, rate), time(ROW));
+    let recorded = read(Swing::angle(t), Swing::rate(t));
+    std::array::from_fn(|sensor| now[sensor] - recorded[sensor])
+}
+
+fn near_on_all(found: &[f64], expected: [Vector3<f64>; 3], tolerance: f64) {
+    let own = |sensor: usize| {
+        let mut out = vec![0.0; 9];
+        out[3 * sensor..3 * sensor + 3].copy_from_slice(&found[3 * sensor..3 * sensor + 3]);
+        out
+    };
+    assert_eq!(found.len(), 9, "the model could not be evaluated");
+    for (sensor, expected) in expected.into_iter().enumerate() {
+        assert!(
+            expected.norm() > 100.0 * tolerance,
+            "nothing to be seen on sensor {sensor}"
+        );
+        near(&own(sensor), sensor, expected, tolerance);
+    }
+}
+
+#[test]
+fn a_reference_on_another_clock_is_ever_later_and_turns_at_another_rate() {
+    let (swing, k) = (swing(Frame::Ned), 0.02);
+    let stamp = time(ROW) + k * (time(ROW) - time(0));
+    let expected = other_motion(&swing, Swing::angle(stamp), (1.0 + k) * Swing::rate(stamp));
+    near_on_all(&added(&swing, "ref.skew", &[k]), expected, 1e-6);
+}
+
+#[test]
+fn a_smoothed_reference_has_lost_its_second_derivative() {
+    let (swing, c) = (swing(Frame::Enu), 0.01);
+    // The angle is a sine of 2 rad/s: its second derivative is -4 times itself.
+    let (angle, rate) = (Swing::angle(time(ROW)), Swing::rate(time(ROW)));
+    let expected = other_motion(&swing, (1.0 + 4.0 * c) * angle, (1.0 + 4.0 * c) * rate);
+    near_on_all(&added(&swing, "ref.lowpass", &[c]), expected, 1e-5);
 }

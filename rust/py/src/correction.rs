@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use imufit_attitude::Frame;
-use imufit_model::correction::{CorrectionError, correct, of_reference};
+use imufit_model::correction::{CorrectionError, correct};
 use imufit_model::effect::{Effect, EffectError};
 use imufit_model::facts::LogFacts;
 use imufit_model::triple::Triple;
@@ -73,15 +73,8 @@ fn correct_readings<'py>(
     Ok((readings, corrected.lost))
 }
 
-/// True if an effect says what is wrong with the reference, so that correcting a reading does not concern it.
-#[pyfunction]
-fn concerns_reference(effect: &PyEffect) -> bool {
-    of_reference(effect.0.as_ref())
-}
-
 /// Registers this file's part of the module.
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(correct_readings, m)?)?;
-    m.add_function(wrap_pyfunction!(concerns_reference, m)?)?;
     Ok(())
 }

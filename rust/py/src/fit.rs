@@ -134,7 +134,7 @@ impl PyEvidence {
     }
 
     /// Adds what the rests of a log tell: `stills`, `poses`, `path` and `field` as chunks; `rest` and `block` of each
-    /// still; `turns` as (first row, one past the last, rest before, rest after, 1/noise, block); `field_block`.
+    /// still; `turns` as (first row, one past the last, rest before, rest after, 1/noise, block); `labelled` as (rest, axis that points up, block); `field_block`.
     fn add_rests(&mut self, py: Python<'_>, rests: &Bound<'_, PyDict>) -> PyResult<()> {
         let arrays = RestArrays::new(rests)?;
         let rests = arrays.rests(Some(self.0.layout.blocks))?;
@@ -293,7 +293,7 @@ impl PyAutocovariance {
         }
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
-        py.detach(|| self.0.add(&window, &evidence.0.layout, &step))
+        py.detach(|| self.0.add(&window, &evidence.0, &step))
             .map_err(from_effect)
     }
 

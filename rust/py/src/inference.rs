@@ -1,28 +1,35 @@
 //! Questions asked of the evidence.
 
 use imufit_inference::part::Part;
-use imufit_inference::problem::Problem;
-use imufit_inference::screening::{Plausible, parameters_of};
-use imufit_inference::{estimate, residual, revision, saturated, screening, selection, verdict};
+use imufit_inference::problem::{Problem, parameters_of};
+use imufit_inference::search::Search;
+use imufit_inference::stack::{self, Criterion};
+use imufit_inference::{estimate, held_out, residual, revision, saturated, verdict};
 use imufit_model::rest_channels;
 use imufit_model::sensor::CHANNELS;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::errors::value_error;
 use crate::fit::PyEvidence;
+use crate::verdict::PyVerdict;
 
-/// All effects fitted at once: (step (p,) of every parameter, residual variance of each of the nine channels).
+/// Step of every parameter, variance of each channel, variance of each block over that of its channel.
+type Saturated<'py> = (Bound<'py, PyArray1<f64>>, Vec<f64>, Vec<Vec<f64>>);
+
+/// All effects fitted at once: (step (p,) of every parameter, residual variance of each of the nine channels, variance of each block
+/// over that of its channel (channels, blocks)).
 #[pyfunction]
-fn saturate<'py>(py: Python<'py>, evidence: &PyEvidence) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<f64>)> {
+fn saturate<'py>(py: Python<'py>, evidence: &PyEvidence) -> PyResult<Saturated<'py>> {
     let fitted = py
         .detach(|| saturated::fit_all(&evidence.0))
         .ok_or_else(|| value_error("the normal equations cannot be solved: the log holds no usable samples"))?;
     Ok((
         PyArray1::from_slice(py, fitted.step.as_slice()),
         fitted.variance.to_vec(),
+        fitted.loudness,
     ))
 }
 
@@ -38,9 +45,16 @@ type LogEvidence<'py> = (
     PyRef<'py, PyEvidence>,
     PyRef<'py, PyEvidence>,
     Vec<f64>,
+    Vec<Vec<f64>>,
     Vec<f64>,
     Vec<usize>,
 );
+
+/// Log, channel index, standard deviation of a walk's step over a block and of the scatter, time of a block, s.
+type ZeroNoise = (usize, usize, f64, f64, f64);
+
+/// What rows show besides the evidence: log or None, channel index, log Bayes factor, shape.
+type Seen = (Option<usize>, usize, f64, String);
 
 /// Evidence of one log or of several of one sensor, whitened and not, ready to be asked.
 #[pyclass(name = "Problem", frozen, module = "imufit._imufit")]
@@ -54,8 +68,14 @@ impl PyProblem {
     #[new]
     fn new(py: Python<'_>, logs: Vec<LogEvidence<'_>>, own: Vec<bool>) -> PyResult<Self> {
         let mut parts = Vec::with_capacity(logs.len());
-        for (white, raw, variance, floors, slots) in logs {
+        for (white, raw, variance, loudness, floors, slots) in logs {
             let known = white.0.layout.model.slots().len();
+            let blocks = white.0.layout.blocks;
+            if loudness.len() != CHANNELS || loudness.iter().any(|of| of.len() != blocks) {
+                return Err(value_error(
+                    "loudness must have a number for every block of every channel",
+                ));
+            }
             if slots.len() != known || slots.iter().any(|s| *s >= own.len()) {
                 return Err(value_error(
                     "every slot of the evidence needs one among those of all logs",
@@ -65,6 +85,7 @@ impl PyProblem {
                 white: white.0.clone(),
                 raw: raw.0.clone(),
                 variance: nine("variance", &variance)?,
+                loudness,
                 floors: nine("floors", &floors)?,
                 slots,
             });
@@ -107,7 +128,7 @@ impl PyProblem {
         let (fitted, base) = py.detach(|| {
             (
                 estimate::estimate(&self.0, &parameters),
-                screening::base(&self.0, &parameters),
+                held_out::held_out(&self.0.question(&parameters, &[], &DMatrix::zeros(0, 0))),
             )
         });
         let fitted = fitted.ok_or_else(|| value_error("the normal equations cannot be solved"))?;
@@ -130,73 +151,78 @@ impl PyProblem {
     }
 
     /// Which effect is missing from the model of slots `model`, among the slots `candidates`; what none of them explains is
-    /// asked of the slots `probes`.
-    #[pyo3(signature = (model, candidates, probes=Vec::new()))]
-    fn diagnose<'py>(
+    /// asked of the slots `probes`. `fitted` holds log evidences of candidates from fits of their own, by slot; `column_noise` the share of
+    /// noise in the column that a candidate reads; `seen` what rows show besides: (log or None, channel index, log Bayes factor, shape).
+    #[pyo3(signature = (model, candidates, probes=Vec::new(), fitted=Vec::new(), column_noise=Vec::new(), seen=Vec::new()))]
+    #[allow(clippy::too_many_arguments)] // one name for each thing that is known
+    fn diagnose(
         &self,
-        py: Python<'py>,
+        py: Python<'_>,
         model: Vec<usize>,
         candidates: Vec<usize>,
         probes: Vec<usize>,
-    ) -> PyResult<Bound<'py, PyDict>> {
-        let v = py.detach(|| verdict::decide(&self.0, &model, &candidates, &probes));
-        let out = PyDict::new(py);
-        out.set_item("verdict", v.kind.word())?;
-        out.set_item("best", v.best)?;
-        out.set_item("rivals", &v.rivals)?;
-        out.set_item("path", &v.path)?;
-        out.set_item("correlations", &v.correlations)?;
-        let list = PyList::empty(py);
-        for (s, p) in v.screened.iter().zip(&v.adjusted) {
-            let item = PyDict::new(py);
-            item.set_item("slot", s.slot)?;
-            item.set_item("p_value", *p)?;
-            item.set_item("gain", s.gain)?;
-            item.set_item("gain_error", s.gain_error)?;
-            item.set_item("held_out_before", s.held_out.0)?;
-            item.set_item("held_out_after", s.held_out.1)?;
-            item.set_item("expected_ratio", s.expected_ratio)?;
-            item.set_item("testable", s.testable)?;
-            item.set_item("stable", s.stable)?;
-            let possible = matches!(s.plausible, Plausible::Yes | Plausible::OtherSign);
-            item.set_item("plausible", possible)?;
-            item.set_item("too_large", s.plausible == Plausible::TooLarge)?;
-            item.set_item("other_sign", s.plausible == Plausible::OtherSign)?;
-            item.set_item("agreed", s.agreed())?;
-            item.set_item("passed", selection::passes(s, *p))?;
-            item.set_item("parameters", s.parameters.clone())?;
-            list.append(item)?;
+        fitted: Vec<(usize, f64)>,
+        column_noise: Vec<(usize, f64)>,
+        seen: Vec<Seen>,
+    ) -> PyResult<PyVerdict> {
+        let slots = self.0.slots.len();
+        let pairs = fitted.iter().chain(&column_noise).map(|(slot, _)| slot);
+        if model
+            .iter()
+            .chain(&candidates)
+            .chain(&probes)
+            .chain(pairs)
+            .any(|s| *s >= slots)
+        {
+            return Err(value_error("there is no such slot"));
         }
-        out.set_item("screened", list)?;
-        let unexplained = PyList::empty(py);
-        for d in &v.unexplained {
-            let item = PyDict::new(py);
-            let rests = self.part(d.log.unwrap_or(0))?.0.raw.layout.facts.rests;
-            item.set_item("channel", rest_channels::name(d.channel, rests))?;
-            item.set_item("covariate", &d.covariate)?;
-            item.set_item("log", d.log)?;
-            item.set_item("gain", d.gain)?;
-            item.set_item("p_value", d.p_value)?;
-            item.set_item("shape", &d.shape)?;
-            item.set_item("held_out", d.held_out)?;
-            item.set_item("probe", d.probe)?;
-            unexplained.append(item)?;
+        if seen.iter().any(|(_, channel, _, _)| *channel >= CHANNELS) {
+            return Err(value_error("there is no such channel"));
         }
-        out.set_item("unexplained", unexplained)?;
-        let disagreements = PyList::empty(py);
-        for d in &v.disagreements {
-            let item = PyDict::new(py);
-            item.set_item("slot", d.slot)?;
-            item.set_item("log", d.log)?;
-            item.set_item("own", &d.own)?;
-            item.set_item("others", &d.others)?;
-            item.set_item("p_value", d.p_value)?;
-            item.set_item("wild", d.wild)?;
-            disagreements.append(item)?;
+        let seen = seen
+            .into_iter()
+            .map(|(log, channel, ln_bayes, shape)| verdict::Finding {
+                channel,
+                covariate: "t".to_string(),
+                log,
+                ln_bayes,
+                drop: 2.0 * ln_bayes,
+                channels: vec![channel],
+                shape,
+                probe: None,
+            });
+        let known = verdict::Known {
+            fitted,
+            column_noise,
+            seen: seen.collect(),
+        };
+        let found = py.detach(|| verdict::decide(&self.0, &model, &candidates, &probes, &known));
+        let found = found.ok_or_else(|| value_error("the normal equations cannot be solved"))?;
+        Ok(PyVerdict::new(&self.0, found))
+    }
+
+    /// Log of the marginal likelihood of all logs under the slots given, their parameters near their present values.
+    fn ln_evidence(&self, py: Python<'_>, slots: Vec<usize>) -> PyResult<f64> {
+        if slots.iter().any(|s| *s >= self.0.slots.len()) {
+            return Err(value_error("there is no such slot"));
         }
-        out.set_item("disagreements", disagreements)?;
-        out.set_item("spoilt", v.spoilt)?;
-        Ok(out)
+        let found = py.detach(|| {
+            let criterion = Criterion::new(&self.0);
+            Search::new(&criterion, &slots, &[]).stack(&[]).map(|stack| stack.ln_z)
+        });
+        found.ok_or_else(|| value_error("the normal equations cannot be solved"))
+    }
+
+    /// What zeros do beside the slots given at the likeliest strength: (log, channel index, standard deviation of a walk's step over a
+    /// block, that of the scatter of block means besides, both in the channel's unit, time of a block, s).
+    fn zero_noise(&self, py: Python<'_>, slots: Vec<usize>) -> PyResult<Vec<ZeroNoise>> {
+        if slots.iter().any(|s| *s >= self.0.slots.len()) {
+            return Err(value_error("there is no such slot"));
+        }
+        let parameters = parameters_of(slots.iter().map(|s| &self.0.slots[*s]));
+        let found = py.detach(|| stack::zero_noise(&self.0, &parameters));
+        let row = |z: &stack::ZeroNoise| (z.log, z.channel, z.walk, z.scatter, z.block);
+        Ok(found.iter().map(row).collect())
     }
 
     /// Slots among `members` of the model that are needless beside its others, or that one of the `candidates` had better

@@ -16,6 +16,7 @@ mod python_effect;
 mod replay_arguments;
 mod rests;
 mod trials;
+mod verdict;
 mod window;
 mod wire;
 
@@ -32,9 +33,11 @@ fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     filters::register(m)?;
     trials::register(m)?;
     model::register(m)?;
+    python_effect::register(m)?;
     correction::register(m)?;
     fit::register(m)?;
     rests::register(m)?;
     inference::register(m)?;
+    verdict::register(m)?;
     Ok(())
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use imufit_fit::bins::{Bins, CovariateSamples};
-use imufit_model::card::{Card, Found, Parameter, Stage};
+use imufit_model::card::{Affine, Found, Reach, ReferencePart, Scope, Stage};
 use imufit_model::catalogue;
 use imufit_model::contract;
 use imufit_model::effect::Effect;
@@ -12,8 +12,7 @@ use imufit_model::sensor::Sensor;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::errors::{from_effect, value_error};
-use crate::python_effect::PythonEffect;
+use crate::errors::from_effect;
 use crate::window::ChunkArrays;
 
 /// One effect of the catalogue, built in or a user's.
@@ -38,6 +37,63 @@ impl PyEffect {
     #[getter]
     fn column(&self) -> Option<String> {
         self.0.column().map(str::to_string)
+    }
+
+    /// The column of a log that it counts from the mean of: `temp`, a covariate, or None.
+    #[getter]
+    fn centred_column(&self) -> Option<String> {
+        self.0.centred_column().map(str::to_string)
+    }
+
+    /// Whose property its parameters are: `sensor`, or `log` where each log has its own.
+    #[getter]
+    fn scope(&self) -> &'static str {
+        match self.0.card().traits.scope {
+            Scope::Sensor => "sensor",
+            Scope::Log => "log",
+        }
+    }
+
+    /// Which rows decide what it adds to one: `row` (that one), `reference` (the reference there besides), `neighbours`
+    /// or `history` (all from the start on).
+    #[getter]
+    fn reach(&self) -> &'static str {
+        match self.0.card().traits.reach {
+            Reach::Row => "row",
+            Reach::Reference => "reference",
+            Reach::Neighbours => "neighbours",
+            Reach::History => "history",
+        }
+    }
+
+    /// Part of `reading = (I + M) x + b` that it is: `offset` (b), `scale` (the diagonal of M), `matrix` (elements of M);
+    /// None if it is none. Where it reads a `column`, for each unit of that.
+    #[getter]
+    fn affine(&self) -> Option<&'static str> {
+        self.0.card().traits.affine.map(|part| match part {
+            Affine::Offset => "offset",
+            Affine::Scale => "scale",
+            Affine::Matrix => "matrix",
+        })
+    }
+
+    /// Part of the reference that it says is wrong: `mount`, `level`, `time`, `field` or `drive`; None if it acts on the
+    /// readings.
+    #[getter]
+    fn reference_part(&self) -> Option<&'static str> {
+        self.0.card().traits.reference.map(|part| match part {
+            ReferencePart::Mount => "mount",
+            ReferencePart::Level => "level",
+            ReferencePart::Time => "time",
+            ReferencePart::Bandwidth => "bandwidth",
+            ReferencePart::Field => "field",
+            ReferencePart::Drive => "drive",
+        })
+    }
+
+    /// True where it is fitted along whatever is asked of a log, without being named.
+    fn fitted_along(&self, facts: &PyFacts) -> bool {
+        self.0.fitted_along(&facts.facts)
     }
 
     /// Its parameters: (name, unit, typical size or None).
@@ -265,6 +321,18 @@ impl PyFacts {
         (self.attitude_noise, self.position_noise)
     }
 
+    /// Noise that the reference gives to the ideal readings of accelerometer, gyroscope and magnetometer: m/s^2, rad/s, uT.
+    #[getter]
+    const fn ideal_noise(&self) -> [f64; 3] {
+        self.facts.ideal_noise
+    }
+
+    /// Median time between samples of accelerometer, gyroscope and magnetometer, s.
+    #[getter]
+    const fn sensor_dt(&self) -> [f64; 3] {
+        self.facts.sensor_dt
+    }
+
     /// The same facts with what is known of the end of the sensors' ranges, m/s^2 and rad/s.
     #[pyo3(signature = (acc=None, gyr=None))]
     fn with_ranges(&self, acc: Option<f64>, gyr: Option<f64>) -> Self {
@@ -333,60 +401,6 @@ fn find_effect(id: &str) -> Option<PyEffect> {
     catalogue::find(id).map(PyEffect)
 }
 
-/// An effect made of a Python function that returns d reading / d parameters, (n, 3, p), float64, in SI units.
-///
-/// `parameters` are (name, unit, typical size or None); `words` the words of its card; `needs` the covariates that it
-/// reads. `function` gets a dict: t, t_start (s), omega, alpha, f, m, x (n, 3), temperature (n,) or None,
-/// columns by name.
-#[pyfunction]
-#[pyo3(signature = (id, sensor, parameters, words, stage, needs, function))]
-fn python_effect(
-    id: String,
-    sensor: &str,
-    parameters: Vec<(String, String, Option<f64>)>,
-    words: &Bound<'_, PyDict>,
-    stage: &str,
-    needs: Vec<String>,
-    function: Py<PyAny>,
-) -> PyResult<PyEffect> {
-    let sensor = Sensor::from_prefix(sensor)
-        .ok_or_else(|| value_error(format!("sensor is {sensor:?}: pass acc, gyr or mag")))?;
-    let stage = match stage {
-        "input" => Stage::Input,
-        "gain" => Stage::Gain,
-        "offset" => Stage::Offset,
-        other => return Err(value_error(format!("stage is {other:?}: pass input, gain or offset"))),
-    };
-    let word =
-        |key: &str| -> PyResult<String> { words.get_item(key)?.map_or_else(|| Ok(String::new()), |v| v.extract()) };
-    let card = Card {
-        name: word("name")?,
-        physics: word("physics")?,
-        formula: word("formula")?,
-        signature: word("signature")?,
-        mistaken_for: word("mistaken_for")?,
-        confirm: word("confirm")?,
-        shares: 1.0,
-        id,
-        stage,
-        parameters: parameters
-            .into_iter()
-            .map(|(name, unit, typical)| Parameter {
-                name,
-                unit,
-                typical,
-                found: Found::Steps,
-            })
-            .collect(),
-    };
-    Ok(PyEffect(Arc::new(PythonEffect {
-        card,
-        sensor: [sensor],
-        needs,
-        function,
-    })))
-}
-
 /// Registers this file's part of the module.
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<PyEffect>()?;
@@ -395,6 +409,5 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(unnamed_effects, m)?)?;
     m.add_function(wrap_pyfunction!(probes, m)?)?;
     m.add_function(wrap_pyfunction!(find_effect, m)?)?;
-    m.add_function(wrap_pyfunction!(python_effect, m)?)?;
     Ok(())
 }

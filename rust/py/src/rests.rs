@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use imufit_attitude::Frame;
 use imufit_fit::bins::{Bins, CovariateSamples};
-use imufit_fit::rests::{Rests, Stills, Turn};
+use imufit_fit::rests::{Labelled, Rests, Stills, Turn};
 use imufit_model::facts::LogFacts;
 use imufit_model::sensor_model::SensorModel;
+use nalgebra::Vector3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -17,12 +18,16 @@ use crate::window::ChunkArrays;
 /// First row, one past the last, number of the rest before and after, inverse of the noise (1/rad), block.
 type TurnNumbers = (usize, usize, usize, usize, f64, usize);
 
-/// Borrowed arrays of the rests of a log: the chunks `stills`, `poses`, `path`, `field`; of each still its `rest` and `block`; `turns`; the `field_block` of each row of the field.
+/// Number of the rest, unit vector of the axis that points up, block.
+type LabelledNumbers = (usize, [f64; 3], usize);
+
+/// Borrowed arrays of the rests of a log: the chunks `stills`, `poses`, `path`, `field`; of each still its `rest` and `block`; `turns` and `labelled` rests; the `field_block` of each row of the field.
 pub struct RestArrays<'py> {
     chunks: [ChunkArrays<'py>; 4],
     rest: Vec<usize>,
     block: Vec<usize>,
     turns: Vec<TurnNumbers>,
+    labelled: Vec<LabelledNumbers>,
     field_block: Vec<usize>,
 }
 
@@ -40,6 +45,7 @@ impl<'py> RestArrays<'py> {
             rest: item("rest")?.extract()?,
             block: item("block")?.extract()?,
             turns: item("turns")?.extract()?,
+            labelled: item("labelled")?.extract()?,
             field_block: item("field_block")?.extract()?,
         })
     }
@@ -59,6 +65,10 @@ impl<'py> RestArrays<'py> {
         if !self.turns.iter().all(sound) {
             return Err(value_error("a turn lies outside the path, the poses or the blocks"));
         }
+        let sound = |l: &LabelledNumbers| l.0 < poses.len() && within(l.2) && l.1.iter().all(|v| v.is_finite());
+        if !self.labelled.iter().all(sound) {
+            return Err(value_error("a labelled rest lies outside the poses or the blocks"));
+        }
         if !self.block.iter().chain(&self.field_block).all(|b| within(*b)) {
             return Err(value_error("there is no such block"));
         }
@@ -72,6 +82,11 @@ impl<'py> RestArrays<'py> {
                 weight: *weight,
                 block: *block,
             });
+        let labelled = self.labelled.iter().map(|(rest, up, block)| Labelled {
+            rest: *rest,
+            up: Vector3::from(*up),
+            block: *block,
+        });
         Ok(Rests {
             stills: Stills {
                 means: stills,
@@ -79,6 +94,7 @@ impl<'py> RestArrays<'py> {
                 block: self.block.clone(),
             },
             poses,
+            labelled: labelled.collect(),
             path,
             turns: turns.collect(),
             field,

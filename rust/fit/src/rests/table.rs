@@ -43,6 +43,8 @@ impl<'a> Table<'a> {
         let ideal = Ideal {
             omega: readings(window, Sensor::Gyr),
             alpha: unknown(),
+            alpha_rate: unknown(),
+            snap: unknown(),
             f: readings(window, Sensor::Acc),
             f_rate: unknown(),
             m: readings(window, Sensor::Mag),

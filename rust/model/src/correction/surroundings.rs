@@ -95,7 +95,7 @@ pub fn derivative(x: &Triple, t: &[f64], width: Smoothing) -> Triple {
     let gap = HOLD_ROWS;
     let mut next = 0;
     for i in 0..t.len() {
-        let rate = samples.position_derivatives(t[i], width).map(|d| d[1]);
+        let rate = samples.position_derivatives(t[i], width).map(|d| d[0]);
         while next < rows.len() && rows[next] < i {
             next += 1;
         }
@@ -118,7 +118,7 @@ fn at_the_end(x: &Triple, t: &[f64], rows: &[usize], i: usize, next: usize, gap:
     }
     let times: Vec<f64> = near.iter().map(|k| t[*k]).collect();
     let values: Vec<[f64; 3]> = near.iter().map(|k| x.row(*k).into()).collect();
-    derivatives(&times, t[i], END.degree.min(near.len() - 1), &values).map(|d| d[1])
+    derivatives(&times, t[i], END.degree.min(near.len() - 1), &values, 1).map(|d| d[0])
 }
 
 /// The attitude of every row, the last known one held; NaN where none is near.

@@ -1,7 +1,7 @@
 //! A constant added to each axis.
 
-use super::{Linear, Needs, Words};
-use crate::card::{Stage, VECTOR, parameters};
+use super::{Linear, Needs, Words, affine};
+use crate::card::{Affine, Scope, Stage, Traits, VECTOR, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
@@ -40,11 +40,16 @@ pub fn bias(sensor: Sensor) -> Linear {
         ),
     };
     Linear {
-        card: words.card(
-            format!("{}.bias", sensor.prefix()),
-            Stage::Offset,
-            parameters(&VECTOR, sensor.unit(), typical),
-        ),
+        card: words
+            .card(
+                format!("{}.bias", sensor.prefix()),
+                Stage::Offset,
+                parameters(&VECTOR, sensor.unit(), typical),
+            )
+            .with(Traits {
+                scope: Scope::Log,
+                ..affine(Affine::Offset)
+            }),
         sensor: [sensor],
         needs: Needs::Sensor,
         fill,

@@ -1,7 +1,7 @@
 //! Any other column of the log acts on a sensor.
 
-use super::Words;
-use crate::card::{Card, Found, Parameter, Stage, VECTOR};
+use super::{Words, affine};
+use crate::card::{Affine, Card, Found, Parameter, Stage, VECTOR};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
@@ -39,7 +39,9 @@ pub fn column(sensor: Sensor, name: &str) -> Covariate {
         })
         .collect();
     Covariate {
-        card: words.card(format!("{}.column:{name}", sensor.prefix()), Stage::Offset, parameters),
+        card: words
+            .card(format!("{}.column:{name}", sensor.prefix()), Stage::Offset, parameters)
+            .with(affine(Affine::Offset)),
         sensor: [sensor],
         column: name.to_string(),
     }
@@ -65,6 +67,10 @@ impl Effect for Covariate {
     }
 
     fn column(&self) -> Option<&str> {
+        Some(&self.column)
+    }
+
+    fn centred_column(&self) -> Option<&str> {
         Some(&self.column)
     }
 

@@ -1,7 +1,7 @@
 //! A current beside the magnetometer makes a field of its own.
 
-use super::{Linear, Needs, Words};
-use crate::card::{Stage, VECTOR, parameters};
+use super::{Linear, Needs, Words, affine};
+use crate::card::{Affine, Stage, VECTOR, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
@@ -27,12 +27,14 @@ pub fn current() -> Linear {
         confirm: "let the sensor lie still and switch the motor on and off: the field must jump with the current",
     };
     Linear {
-        card: words.card(
-            "mag.current".to_string(),
-            Stage::Offset,
-            // Biot and Savart: mu_0 / (2 pi r) is 1 uT a metre per 5 A: 2 uT/A at 10 cm from a single wire.
-            parameters(&VECTOR, "uT/A", 2.0),
-        ),
+        card: words
+            .card(
+                "mag.current".to_string(),
+                Stage::Offset,
+                // Biot and Savart: mu_0 / (2 pi r) is 1 uT a metre per 5 A: 2 uT/A at 10 cm from a single wire.
+                parameters(&VECTOR, "uT/A", 2.0),
+            )
+            .with(affine(Affine::Offset)),
         sensor: [Sensor::Mag],
         needs: Needs::Column(MOTOR_CURRENT),
         fill,

@@ -1,7 +1,7 @@
 //! The zero of a sensor moves steadily with time.
 
 use super::{Linear, Needs, Words};
-use crate::card::{Card, Stage, VECTOR, parameters};
+use crate::card::{Card, Reach, Stage, Traits, VECTOR, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
@@ -49,7 +49,10 @@ pub fn bias_drift(sensor: Sensor) -> Linear {
         parameters(&VECTOR, &unit, typical),
     );
     Linear {
-        card: Card { shares: SHARES, ..card },
+        card: Card { shares: SHARES, ..card }.with(Traits {
+            reach: Reach::History,
+            ..Traits::default()
+        }),
         sensor: [sensor],
         needs: Needs::Sensor,
         fill,

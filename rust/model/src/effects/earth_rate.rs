@@ -1,7 +1,7 @@
 //! The reference frame turns with the Earth.
 
 use super::{Linear, Needs, Words};
-use crate::card::{Stage, parameters};
+use crate::card::{Reach, Stage, Traits, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
@@ -31,11 +31,16 @@ pub fn earth_rate() -> Linear {
         confirm: "let the sensor lie still, then turn it by 180 deg about the vertical: the north part changes its sign in the body; north over vertical must be 1 / tan(latitude)",
     };
     Linear {
-        card: words.card(
-            "gyr.earth_rate".to_string(),
-            Stage::Input,
-            parameters(&["north", "vertical"], "rad/s", 7.3e-5),
-        ),
+        card: words
+            .card(
+                "gyr.earth_rate".to_string(),
+                Stage::Input,
+                parameters(&["north", "vertical"], "rad/s", 7.3e-5),
+            )
+            .with(Traits {
+                reach: Reach::Reference,
+                ..Traits::default()
+            }),
         sensor: [Sensor::Gyr],
         needs: Needs::Sensor,
         fill,

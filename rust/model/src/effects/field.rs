@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Linear, Needs, Words};
-use crate::card::{Stage, VECTOR, parameters};
+use crate::card::{Reach, ReferencePart, Scope, Stage, Traits, VECTOR, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
@@ -23,9 +23,6 @@ fn fill(rows: &Rows, out: &mut Columns) {
     }
 }
 
-/// Id of [`field_reference`], which is fitted along wherever the field was estimated from the log itself.
-pub const FIELD_REFERENCE: &str = "mag.field_reference";
-
 /// `mag.field_reference`.
 pub fn field_reference() -> Linear {
     let words = Words {
@@ -37,11 +34,18 @@ pub fn field_reference() -> Linear {
         confirm: "measure the field with a second magnetometer at the same place",
     };
     Linear {
-        card: words.card(
-            FIELD_REFERENCE.to_string(),
-            Stage::Input,
-            parameters(&VECTOR, "uT", 5.0),
-        ),
+        card: words
+            .card(
+                "mag.field_reference".to_string(),
+                Stage::Input,
+                parameters(&VECTOR, "uT", 5.0),
+            )
+            .with(Traits {
+                scope: Scope::Log,
+                reach: Reach::Reference,
+                affine: None,
+                reference: Some(ReferencePart::Field),
+            }),
         sensor: [Sensor::Mag],
         needs: Needs::Sensor,
         fill,

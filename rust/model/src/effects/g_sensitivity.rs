@@ -1,6 +1,6 @@
 //! Acceleration acts on a gyroscope.
 
-use super::{Linear, Needs, Words, matrix};
+use super::{Linear, Needs, OF_THE_ROW, Words, matrix};
 use crate::card::{MATRIX, Stage, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
@@ -20,12 +20,14 @@ pub fn g_sensitivity() -> Linear {
         confirm: "let the sensor lie still on each of its six faces: the mean rate must not depend on the face",
     };
     Linear {
-        card: words.card(
-            "gyr.g_sensitivity".to_string(),
-            Stage::Offset,
-            // 0.1 deg/s per g is 1.8e-4 rad/s per m/s^2.
-            parameters(&MATRIX, "rad/s/(m/s^2)", 2e-4),
-        ),
+        card: words
+            .card(
+                "gyr.g_sensitivity".to_string(),
+                Stage::Offset,
+                // 0.1 deg/s per g is 1.8e-4 rad/s per m/s^2.
+                parameters(&MATRIX, "rad/s/(m/s^2)", 2e-4),
+            )
+            .with(OF_THE_ROW),
         sensor: [Sensor::Gyr],
         needs: Needs::Sensor,
         fill,

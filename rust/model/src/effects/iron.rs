@@ -1,7 +1,7 @@
 //! Iron that moves with the magnetometer.
 
-use super::{Linear, Needs, Words, matrix};
-use crate::card::{MATRIX, Stage, VECTOR, parameters};
+use super::{Linear, Needs, Words, affine, matrix};
+use crate::card::{Affine, MATRIX, Stage, VECTOR, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
@@ -26,11 +26,13 @@ pub fn hard_iron() -> Linear {
         confirm: "turn the sensor through all attitudes far from iron: the readings lie on a sphere whose centre is b",
     };
     Linear {
-        card: words.card(
-            "mag.hard_iron".to_string(),
-            Stage::Offset,
-            parameters(&VECTOR, "uT", 20.0),
-        ),
+        card: words
+            .card(
+                "mag.hard_iron".to_string(),
+                Stage::Offset,
+                parameters(&VECTOR, "uT", 20.0),
+            )
+            .with(affine(Affine::Offset)),
         sensor: [Sensor::Mag],
         needs: Needs::Sensor,
         fill: fill_hard,
@@ -48,7 +50,9 @@ pub fn soft_iron() -> Linear {
         confirm: "turn the sensor through all attitudes far from iron: the readings lie on an ellipsoid instead of a sphere",
     };
     Linear {
-        card: words.card("mag.soft_iron".to_string(), Stage::Gain, parameters(&MATRIX, "1", 0.05)),
+        card: words
+            .card("mag.soft_iron".to_string(), Stage::Gain, parameters(&MATRIX, "1", 0.05))
+            .with(affine(Affine::Matrix)),
         sensor: [Sensor::Mag],
         needs: Needs::Sensor,
         fill: fill_soft,

@@ -1,7 +1,7 @@
 //! Each axis picks up a little of the other two.
 
-use super::{Linear, Needs, Words};
-use crate::card::{OFF_DIAGONAL, Stage, parameters};
+use super::{Linear, Needs, Words, affine};
+use crate::card::{Affine, OFF_DIAGONAL, Stage, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
@@ -35,11 +35,13 @@ pub fn misalignment(sensor: Sensor) -> Linear {
         },
     };
     Linear {
-        card: words.card(
-            format!("{}.misalignment", sensor.prefix()),
-            Stage::Gain,
-            parameters(&OFF_DIAGONAL, "1", 0.02),
-        ),
+        card: words
+            .card(
+                format!("{}.misalignment", sensor.prefix()),
+                Stage::Gain,
+                parameters(&OFF_DIAGONAL, "1", 0.02),
+            )
+            .with(affine(Affine::Matrix)),
         sensor: [sensor],
         needs: Needs::Sensor,
         fill,

@@ -12,6 +12,7 @@ pub mod lever_arm;
 pub mod misalignment;
 pub mod nonlinearity;
 pub mod reference;
+pub mod reference_lowpass;
 pub mod rig;
 pub mod rounding;
 pub mod saturation;
@@ -21,7 +22,7 @@ pub mod timing;
 pub mod vibration;
 pub mod warmup;
 
-use crate::card::{Card, Parameter, Stage};
+use crate::card::{Affine, Card, Parameter, Reach, Scope, Stage, Traits};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
@@ -71,6 +72,9 @@ impl Effect for Linear {
         if !facts.sensors[self.sensor[0].index()] {
             return Some(format!("the log has no {}", self.sensor[0].name()));
         }
+        if self.needs == Needs::Shaking && !facts.sensors[Sensor::Acc.index()] {
+            return Some("the log has no accelerometer, which would show how the sensor is shaken".to_string());
+        }
         if self.needs == Needs::Shaking && !facts.shaking_varies {
             return Some("the sensor is shaken alike all the time, or not at all".to_string());
         }
@@ -88,6 +92,10 @@ impl Effect for Linear {
             Needs::Temperature => Some("temp"),
             Needs::Column(name) => Some(name),
         }
+    }
+
+    fn centred_column(&self) -> Option<&str> {
+        (self.needs == Needs::Temperature).then_some("temp")
     }
 
     fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {
@@ -118,6 +126,7 @@ impl Words<'_> {
         Card {
             id,
             stage,
+            traits: Traits::default(),
             parameters,
             name: self.name.to_string(),
             physics: self.physics.to_string(),
@@ -127,6 +136,22 @@ impl Words<'_> {
             confirm: self.confirm.to_string(),
             shares: 1.0,
         }
+    }
+}
+
+/// Traits of an effect that depends on nothing but the row.
+pub(crate) const OF_THE_ROW: Traits = Traits {
+    scope: Scope::Sensor,
+    reach: Reach::Row,
+    affine: None,
+    reference: None,
+};
+
+/// Traits of a part of a gain or an offset.
+pub(crate) const fn affine(part: Affine) -> Traits {
+    Traits {
+        affine: Some(part),
+        ..OF_THE_ROW
     }
 }
 

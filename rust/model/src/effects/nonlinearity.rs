@@ -1,6 +1,6 @@
 //! The reading of an axis is no straight line over the quantity on that axis.
 
-use super::{Linear, Needs, Words};
+use super::{Linear, Needs, OF_THE_ROW, Words};
 use crate::card::{Stage, VECTOR, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
@@ -42,11 +42,13 @@ fn rounded(value: f64) -> f64 {
 
 fn one(sensor: Sensor, name: &str, words: &Words, unit: &str, typical: f64, fill: crate::effects::Fill) -> Linear {
     Linear {
-        card: words.card(
-            format!("{}.{name}", sensor.prefix()),
-            Stage::Gain,
-            parameters(&VECTOR, unit, typical),
-        ),
+        card: words
+            .card(
+                format!("{}.{name}", sensor.prefix()),
+                Stage::Gain,
+                parameters(&VECTOR, unit, typical),
+            )
+            .with(OF_THE_ROW),
         sensor: [sensor],
         needs: Needs::Sensor,
         fill,

@@ -1,12 +1,13 @@
-//! The reference itself is off: turned against the sensor, not level, or late.
+//! The reference itself is off: turned against the sensor, not level, late, or ever later.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::Words;
-use crate::card::{Card, Stage, VECTOR, parameters};
+use crate::card::{Card, Reach, ReferencePart, Scope, Stage, Traits, VECTOR, parameters};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::ideal::ReferenceChange;
+use crate::rotation_rates::right_jacobian;
 use crate::sensor::Sensor;
 use crate::triple::Triple;
 
@@ -16,12 +17,23 @@ enum Kind {
     Alignment,
     Tilt,
     Delay,
+    Skew,
 }
 
 /// An effect of the reference on every sensor.
 pub struct Reference {
     card: Card,
     kind: Kind,
+}
+
+/// Traits of an effect that says what is wrong with the reference.
+pub(super) const fn wrong(part: ReferencePart, reach: Reach) -> Traits {
+    Traits {
+        scope: Scope::Sensor,
+        reach,
+        affine: None,
+        reference: Some(part),
+    }
 }
 
 /// `ref.alignment`: rotation vector phi with R_sensor = R_reference exp([phi]), hence x_sensor = exp(-[phi]) x.
@@ -35,11 +47,16 @@ pub fn alignment() -> Reference {
         confirm: "compare the rotation found from gravity with the one found from turning: a mount gives the same for both",
     };
     Reference {
-        card: words.card(
-            "ref.alignment".to_string(),
-            Stage::Reference,
-            parameters(&VECTOR, "rad", 0.02),
-        ),
+        card: words
+            .card(
+                "ref.alignment".to_string(),
+                Stage::Reference,
+                parameters(&VECTOR, "rad", 0.02),
+            )
+            .with(Traits {
+                scope: Scope::Log,
+                ..wrong(ReferencePart::Mount, Reach::Reference)
+            }),
         kind: Kind::Alignment,
     }
 }
@@ -55,11 +72,16 @@ pub fn tilt() -> Reference {
         confirm: "turn the sensor by 180 deg about the vertical on the same table: a leaning table changes the sign in the body, a bias does not",
     };
     Reference {
-        card: words.card(
-            "ref.tilt".to_string(),
-            Stage::Reference,
-            parameters(&["x", "y"], "rad", 0.02),
-        ),
+        card: words
+            .card(
+                "ref.tilt".to_string(),
+                Stage::Reference,
+                parameters(&["x", "y"], "rad", 0.02),
+            )
+            .with(Traits {
+                scope: Scope::Log,
+                ..wrong(ReferencePart::Level, Reach::Reference)
+            }),
         kind: Kind::Tilt,
     }
 }
@@ -75,28 +97,38 @@ pub fn delay() -> Reference {
         confirm: "knock the body: the step in the sensor and in the reference must come at the same time",
     };
     Reference {
-        card: words.card(
-            "ref.delay".to_string(),
-            Stage::Reference,
-            parameters(&["tau"], "s", 0.01),
-        ),
+        card: words
+            .card(
+                "ref.delay".to_string(),
+                Stage::Reference,
+                parameters(&["tau"], "s", 0.01),
+            )
+            .with(wrong(ReferencePart::Time, Reach::Neighbours)),
         kind: Kind::Delay,
     }
 }
 
-/// Right Jacobian of SO(3).
-fn right_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
-    let angle = phi.norm();
-    let cross = phi.cross_matrix();
-    let (a, b) = if angle < 1e-4 {
-        (0.5 - angle * angle / 24.0, 1.0 / 6.0 - angle * angle / 120.0)
-    } else {
-        (
-            (1.0 - angle.cos()) / angle.powi(2),
-            (angle - angle.sin()) / angle.powi(3),
-        )
+/// `ref.skew`: the truth of t is recorded in the reference at t + k (t - t0).
+pub fn skew() -> Reference {
+    let words = Words {
+        name: "reference on another clock",
+        physics: "reference and sensors are stamped by two clocks that run at different rates, so that the reference falls behind or gains",
+        formula: "x(t + k (t - t0)) - x(t) on every sensor, with x the ideal reading as recorded",
+        signature: "the residual of every sensor is proportional to the time derivative of its reading and to the time since the log began",
+        mistaken_for: "ref.delay in a short log or where only one part of it moves, drifting biases, a delay that warms up",
+        confirm: "knock the body at the beginning and at the end: the time from knock to knock must differ between sensors and reference",
     };
-    Matrix3::identity() - cross * a + cross * cross * b
+    Reference {
+        card: words
+            .card(
+                "ref.skew".to_string(),
+                Stage::Reference,
+                // Two quartz crystals, each within 20 to 100 ppm of its frequency.
+                parameters(&["k"], "1", 1e-4),
+            )
+            .with(wrong(ReferencePart::Time, Reach::Neighbours)),
+        kind: Kind::Skew,
+    }
 }
 
 impl Effect for Reference {
@@ -107,7 +139,7 @@ impl Effect for Reference {
     fn sensors(&self) -> &[Sensor] {
         match self.kind {
             Kind::Tilt => &[Sensor::Acc, Sensor::Mag],
-            Kind::Alignment | Kind::Delay => &Sensor::ALL,
+            Kind::Alignment | Kind::Delay | Kind::Skew => &Sensor::ALL,
         }
     }
 
@@ -126,6 +158,32 @@ impl Effect for Reference {
             Kind::Delay => {
                 for axis in 0..3 {
                     out.set(0, axis, rate.axis(axis).iter().copied());
+                }
+            }
+            Kind::Skew => {
+                // Rates are those of the sensors' clock, which the reference passes through 1 + k times as fast.
+                let pace = 1.0 / (1.0 + parameters[0]);
+                for axis in 0..3 {
+                    let late = rate.axis(axis).iter().zip(rows.t);
+                    out.set(0, axis, late.map(|(rate, t)| rate * (t - rows.facts.t_start) * pace));
+                }
+                match sensor {
+                    Sensor::Gyr => {
+                        for axis in 0..3 {
+                            for (column, rate) in out.column(0, axis).iter_mut().zip(x.axis(axis)) {
+                                *column += rate * pace;
+                            }
+                        }
+                    }
+                    Sensor::Acc => {
+                        for row in 0..rows.len() {
+                            let held = rows.attitude(row).inverse_transform_vector(&rows.facts.gravity);
+                            for axis in 0..3 {
+                                out.column(0, axis)[row] += 2.0 * pace * (x.axis(axis)[row] + held[axis]);
+                            }
+                        }
+                    }
+                    Sensor::Mag => {}
                 }
             }
             Kind::Tilt => {
@@ -176,13 +234,17 @@ impl Effect for Reference {
     }
 
     fn strongly_curved(&self) -> bool {
-        self.kind == Kind::Delay
+        matches!(self.kind, Kind::Delay | Kind::Skew)
     }
 
     fn reference_change(&self, parameters: &[f64]) -> ReferenceChange {
         match self.kind {
             Kind::Delay => ReferenceChange {
                 delay: parameters[0],
+                ..ReferenceChange::default()
+            },
+            Kind::Skew => ReferenceChange {
+                skew: parameters[0],
                 ..ReferenceChange::default()
             },
             Kind::Tilt => ReferenceChange {

@@ -4,7 +4,8 @@
 //! `R = R_reference exp(u delta)`, hence `f x u delta`, `m x u delta` and `omega x u delta + u d(delta)/dt`.
 
 use super::Words;
-use crate::card::{Card, Found, Parameter, Stage, parameters};
+use super::reference::wrong;
+use crate::card::{Card, Found, Parameter, Reach, ReferencePart, Stage, parameters};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::ideal::{Command, ReferenceChange};
@@ -36,11 +37,13 @@ pub fn backlash() -> RigEffect {
         confirm: "approach the same angle from below and from above and rest there: the readings differ by the width",
     };
     RigEffect {
-        card: words.card(
-            "rig.backlash".to_string(),
-            Stage::Reference,
-            parameters(&["width"], "rad", 5e-3),
-        ),
+        card: words
+            .card(
+                "rig.backlash".to_string(),
+                Stage::Reference,
+                parameters(&["width"], "rad", 5e-3),
+            )
+            .with(wrong(ReferencePart::Drive, Reach::History)),
         kind: Kind::Backlash,
     }
 }
@@ -56,11 +59,13 @@ pub fn flexure() -> RigEffect {
         confirm: "repeat with the table unloaded, or with a counterweight: flexure follows the load",
     };
     RigEffect {
-        card: words.card(
-            "rig.flexure".to_string(),
-            Stage::Reference,
-            parameters(&["k"], "rad", 5e-3),
-        ),
+        card: words
+            .card(
+                "rig.flexure".to_string(),
+                Stage::Reference,
+                parameters(&["k"], "rad", 5e-3),
+            )
+            .with(wrong(ReferencePart::Drive, Reach::Reference)),
         kind: Kind::Flexure,
     }
 }
@@ -83,7 +88,9 @@ pub fn periodic() -> RigEffect {
         found: Found::Search,
     });
     RigEffect {
-        card: words.card("rig.periodic".to_string(), Stage::Reference, list),
+        card: words
+            .card("rig.periodic".to_string(), Stage::Reference, list)
+            .with(wrong(ReferencePart::Drive, Reach::Reference)),
         kind: Kind::Periodic,
     }
 }

@@ -2,8 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::Words;
-use crate::card::{Card, Found, Parameter, Stage};
+use super::{OF_THE_ROW, Words};
+use crate::card::{Card, Found, Parameter, Scope, Stage, Traits};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
@@ -43,11 +43,16 @@ pub fn rounding(sensor: Sensor) -> Rounding {
             found: Found::Steps,
         });
     Rounding {
-        card: words.card(
-            format!("{}.rounding", sensor.prefix()),
-            Stage::Rounding,
-            parameters.collect(),
-        ),
+        card: words
+            .card(
+                format!("{}.rounding", sensor.prefix()),
+                Stage::Rounding,
+                parameters.collect(),
+            )
+            .with(Traits {
+                scope: Scope::Log,
+                ..OF_THE_ROW
+            }),
         sensor: [sensor],
     }
 }
@@ -75,6 +80,10 @@ impl Effect for Rounding {
         let coarse = steps(facts, sensor).iter().any(Option::is_some);
         (!facts.sensors[sensor.index()] || !coarse)
             .then(|| format!("the steps of the {} are fine against its noise", sensor.name()))
+    }
+
+    fn fitted_along(&self, _: &LogFacts) -> bool {
+        true
     }
 
     fn columns(&self, rows: &Rows, sensor: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {

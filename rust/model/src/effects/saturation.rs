@@ -1,6 +1,6 @@
 //! Readings cannot leave the range of the sensor.
 
-use super::Words;
+use super::{OF_THE_ROW, Words};
 use crate::card::{Card, Found, Parameter, Stage};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
@@ -46,7 +46,9 @@ pub fn saturation(sensor: Sensor) -> Saturation {
         found: Found::Search,
     };
     Saturation {
-        card: words.card(format!("{}.saturation", sensor.prefix()), Stage::Range, vec![range]),
+        card: words
+            .card(format!("{}.saturation", sensor.prefix()), Stage::Range, vec![range])
+            .with(OF_THE_ROW),
         sensor: [sensor],
     }
 }

@@ -1,7 +1,7 @@
 //! Each axis reads too much or too little by a constant factor.
 
-use super::{Linear, Needs, Words};
-use crate::card::{Stage, VECTOR, parameters};
+use super::{Linear, Needs, Words, affine};
+use crate::card::{Affine, Stage, VECTOR, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
@@ -32,11 +32,13 @@ pub fn scale(sensor: Sensor) -> Linear {
         },
     };
     Linear {
-        card: words.card(
-            format!("{}.scale", sensor.prefix()),
-            Stage::Gain,
-            parameters(&VECTOR, "1", 0.03),
-        ),
+        card: words
+            .card(
+                format!("{}.scale", sensor.prefix()),
+                Stage::Gain,
+                parameters(&VECTOR, "1", 0.03),
+            )
+            .with(affine(Affine::Scale)),
         sensor: [sensor],
         needs: Needs::Sensor,
         fill,

@@ -1,7 +1,7 @@
 //! The zero and the gain of a sensor move with its temperature.
 
-use super::{Linear, Needs, Words};
-use crate::card::{Stage, VECTOR, parameters};
+use super::{Linear, Needs, Words, affine};
+use crate::card::{Affine, Stage, VECTOR, parameters};
 use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
@@ -64,11 +64,13 @@ pub fn bias_temperature(sensor: Sensor) -> Linear {
     };
     let unit = format!("{}/K", sensor.unit());
     Linear {
-        card: words.card(
-            format!("{}.bias_temperature", sensor.prefix()),
-            Stage::Offset,
-            parameters(&VECTOR, &unit, typical),
-        ),
+        card: words
+            .card(
+                format!("{}.bias_temperature", sensor.prefix()),
+                Stage::Offset,
+                parameters(&VECTOR, &unit, typical),
+            )
+            .with(affine(Affine::Offset)),
         sensor: [sensor],
         needs: Needs::Temperature,
         fill: fill_bias,
@@ -116,11 +118,13 @@ pub fn scale_temperature(sensor: Sensor) -> Linear {
         ),
     };
     Linear {
-        card: words.card(
-            format!("{}.scale_temperature", sensor.prefix()),
-            Stage::Gain,
-            parameters(&VECTOR, "1/K", typical),
-        ),
+        card: words
+            .card(
+                format!("{}.scale_temperature", sensor.prefix()),
+                Stage::Gain,
+                parameters(&VECTOR, "1/K", typical),
+            )
+            .with(affine(Affine::Scale)),
         sensor: [sensor],
         needs: Needs::Temperature,
         fill: fill_scale,

@@ -1,7 +1,7 @@
 //! The zero of a gyroscope settles after switching on.
 
 use super::Words;
-use crate::card::{Card, Found, Parameter, Stage, VECTOR, parameters};
+use crate::card::{Card, Found, Parameter, Reach, Stage, Traits, VECTOR, parameters};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
@@ -37,7 +37,10 @@ pub fn warmup() -> WarmUp {
         found: Found::SearchThenSteps,
     });
     WarmUp {
-        card: words.card("gyr.warmup".to_string(), Stage::Offset, list),
+        card: words.card("gyr.warmup".to_string(), Stage::Offset, list).with(Traits {
+            reach: Reach::History,
+            ..Traits::default()
+        }),
     }
 }
 

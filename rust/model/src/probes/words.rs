@@ -1,7 +1,7 @@
 //! What a probe is called, its parameters, and how the residual follows it.
 
 use super::{AXES, Kind, OF, Quantity, SMALL, pairs};
-use crate::card::{Card, Found, Parameter, Stage};
+use crate::card::{Card, Found, Parameter, Stage, Traits};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
 use crate::temperature_course::PASTS;
@@ -111,6 +111,7 @@ pub(super) fn card(facts: &LogFacts, sensor: Sensor, kind: &Kind) -> Card {
         id: format!("{} {shape}: {on}", sensor.prefix()),
         name: on,
         stage,
+        traits: Traits::default(),
         parameters: names.into_iter().map(parameter).collect(),
         physics,
         formula,

@@ -1,0 +1,214 @@
+"""The loop as its users hold it: a sensor model that is fitted, compared and applied, its fit, and the ladder.
+
+The steps themselves are functions of the packages below, which know a model as a stack of effects and a fit as that
+stack fitted; both keep the class that they were given.
+"""
+
+from __future__ import annotations
+
+from imufit.diagnose.add import add
+from imufit.diagnose.compare import compare, compare_model
+from imufit.diagnose.diagnose import diagnose
+from imufit.diagnose.ladder import ladder as ladder_from
+from imufit.fit.apply import apply
+from imufit.fit.fitted_stack import FittedStack
+from imufit.log import Log, LogSource
+from imufit.log.several import Logs
+from imufit.model.effect_stack import EffectStack
+from imufit.progress import Progress, silent
+from imufit.results import Addition, Comparison, Diagnosis, Ladder
+
+
+class SensorModel(EffectStack):
+    """A stack of named effects on top of the ideal readings; no effect = the ideal sensor.
+
+    Parameters
+    ----------
+    effects : sequence of str
+        Ids such as ``gyr.bias``, each once. The order does not matter: effects act in the order of their physics.
+    parameters : mapping of str to mapping of str to float, optional
+        Values by effect and parameter, SI units; zero where not given.
+    constants : mapping, optional
+        ``temperature_mean`` (degC) and ``covariate_means`` (by name) of the log that the model was fitted on.
+    standard_errors : mapping, optional
+        Standard errors in the shape of `parameters`.
+
+    Raises
+    ------
+    InputError
+        An effect or a parameter is unknown, or an effect stands there twice.
+    """
+
+    def fit(self, log: Logs, progress: Progress | None = None) -> Fit:
+        """Fit the parameters to a log with reference, or to several of one sensor, starting from the present values.
+
+        Parameters
+        ----------
+        log : Log, LogStream or a sequence of them
+            With at least one sensor and a reference attitude. Several logs share all effects but biases and mounts.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+
+        Returns
+        -------
+        Fit
+            Parameters with standard errors, held-out error, and the evidence for further questions.
+
+        Raises
+        ------
+        InputError
+            The log has no usable reference, or an effect of the model cannot be tested on it.
+        """
+        return Fit.of(self, log, progress)
+
+    def compare(self, log: LogSource, progress: Progress | None = None) -> Comparison:
+        """Say where the model fails on a log, its parameters as they are; nothing is fitted.
+
+        Parameters
+        ----------
+        log : Log or LogStream
+            With reference attitude.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+
+        Returns
+        -------
+        Comparison
+            Residuals by channel, against every covariate, by segment and by frequency.
+
+        Raises
+        ------
+        InputError
+            The log has no usable reference, or an effect of the model cannot be tested on it.
+        """
+        return compare_model(self, log, progress or silent)
+
+    def apply(self, log: LogSource) -> Log:
+        """Correct a log's readings: take out what the model's effects added to them.
+
+        No reference is needed. What effects read of the motion is taken from the corrected readings themselves: an
+        effect of one sensor on another uses the other one corrected, held or interpolated where that one is slower, and
+        derivatives come from local polynomials. ``ref.alignment``, the mount of the sensor on the body that the
+        reference describes, turns the corrected readings into the axes of that body. The other effects of the
+        reference (``ref.delay``, ``ref.tilt``, ``mag.field_reference``) and of the rig change no reading; a note of the
+        result names them.
+
+        Parameters
+        ----------
+        log : Log or LogStream
+            Readings as they were recorded. A stream is read into memory.
+
+        Returns
+        -------
+        Log
+            The same rows with corrected ``acc``, ``gyr`` and ``mag``; everything else as it was. NaN stays NaN.
+
+        Raises
+        ------
+        InputError
+            An effect needs a column that the log does not have, or cannot be undone: different inputs give the same
+            reading, or none gives it. The effect and, where there is one, the row are named.
+        """
+        return apply(self, log)
+
+
+class Fit(FittedStack):
+    """A sensor model fitted to a log, or to several of one sensor, with the evidence that answers further questions.
+
+    Attributes
+    ----------
+    model : SensorModel
+        The model with its fitted parameters; what each log has for itself (its bias) stands with its mean.
+    own : tuple of dict
+        For each log the values of the effects that it has for itself, unnamed ones among them.
+    logs : tuple of LogSource
+        The logs it was fitted to.
+    ratio : float
+        Held-out residual RMS over the noise floor, all channels (1 = at the floor).
+    training_ratio : float
+        The same on the data of the fit.
+    analysis : Analysis
+        Evidence of the logs around the fitted parameters.
+    estimate : Estimate
+        Parameters, standard errors and held-out error that the evidence gives.
+    """
+
+    model: SensorModel
+
+    def compare(self, log: LogSource | None = None, progress: Progress | None = None) -> Comparison:
+        """Say where the model fails on a log (default: its own, of several the worst); parameters stay as they are.
+
+        Parameters
+        ----------
+        log : Log or LogStream, optional
+            With reference attitude.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+
+        Returns
+        -------
+        Comparison
+            Residuals by channel, against every covariate, by segment and by frequency.
+        """
+        return compare(self, log, progress or silent)
+
+    def diagnose(self, log: Logs | None = None, progress: Progress | None = None) -> Diagnosis:
+        """Say which effect is missing from the model, judged on a log (default: its own); fitted parameters move along.
+
+        Parameters
+        ----------
+        log : Log, LogStream or a sequence of them, optional
+            With reference attitude.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+        """
+        return diagnose(self.on(log, progress or silent))
+
+    def add(self, effect: str, log: Logs | None = None, progress: Progress | None = None) -> Addition:
+        """Add an effect to the model and refit.
+
+        Parameters
+        ----------
+        effect : str
+            Id such as ``gyr.g_sensitivity``.
+        log : Log, LogStream or a sequence of them, optional
+            Logs to fit to; default: its own.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+
+        Returns
+        -------
+        Addition
+            Held-out error before, expected and after; ``.fit`` is the better fit.
+
+        Raises
+        ------
+        InputError
+            The effect is unknown, in the model already, or cannot be tested on this log.
+        """
+        return add(self.on(log, progress or silent), effect)
+
+
+def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | None = None) -> Ladder:
+    """Repeat diagnose and add until nothing is missing, or until the log cannot tell what is.
+
+    Parameters
+    ----------
+    log : Log, LogStream or a sequence of them
+        With reference attitude, or with rests that stand in for one; several logs are of one sensor.
+    model : SensorModel, optional
+        Where to start from; default: the ideal sensor.
+    progress : callable, optional
+        Called with (rows done, rows in all, what is being done).
+
+    Returns
+    -------
+    Ladder
+        Every step with the held-out error before, expected and after, the final model and verdict.
+
+    Raises
+    ------
+    InputError
+        The log has no usable reference, or an effect of the model cannot be tested on it.
+    """
+    return ladder_from((model or SensorModel()).fit(log, progress), progress)

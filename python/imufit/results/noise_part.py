@@ -1,0 +1,57 @@
+"""One part of the noise floor of a channel, and which instrument it belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from imufit.figures import quantity
+from imufit.results.json_value import json_fields
+from imufit.results.table import Table
+
+
+@dataclass(frozen=True)
+class NoisePart:
+    """A component of the noise of one channel.
+
+    Attributes
+    ----------
+    channel : str
+        For instance ``gyr_x``.
+    component : str
+        ``white``, ``random_walk``, ``block_scatter``, ``quantisation``, ``reference`` or ``line``.
+    value : float
+        Its size in `unit`.
+    unit : str
+        Of a density, of a walk per root of time, or of the channel.
+    share : float
+        Its part of the floor's variance; that of a walk or a scatter of the zero stands over the same variance.
+    """
+
+    channel: str
+    component: str
+    value: float
+    unit: str
+    share: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of one component."""
+        return json_fields(self)
+
+
+def noise_table(parts: Sequence[NoisePart]) -> Table:
+    """List the components of the noise of every channel.
+
+    Parameters
+    ----------
+    parts : sequence of NoisePart
+        The components.
+    """
+
+    def row(part: NoisePart) -> tuple[str, ...]:
+        component = part.component.replace("_", " ")
+        return part.channel, component, quantity.quantity(part.value, part.unit), quantity.share(part.share)
+
+    rows = tuple(row(part) for part in parts)
+    return Table("Noise", ("channel", "component", ">size", ">share of the floor"), rows)

@@ -1,0 +1,482 @@
+//! Courses in time of a channel's zero that no walk makes: a level shift, a pulse, a transient, an oscillation, and what lags behind
+//! a covariate.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::asked::{Asked, Prior};
+use crate::bins::Covariate;
+use crate::dictionary;
+use crate::stack::{Beside, Criterion, Stack};
+
+/// Courses of each family that are integrated over the noise, of those that stand out at the likeliest noise and without any.
+const LOOKED_AT: usize = 3;
+/// Parts of a block that a level shift within it may fill.
+const FILLED: [f64; 3] = [0.25, 0.5, 0.75];
+/// Blocks before and after a pulse that show the level from which it rises and to which it comes back.
+const BACK: usize = 3;
+/// Widths of a transient, blocks; each is half as wide again as the one before.
+const WIDTHS: [f64; 7] = [0.75, 1.1, 1.7, 2.5, 3.8, 5.7, 8.5];
+/// Time constants of a lag, blocks.
+const FORGOTTEN: [f64; 4] = [0.7, 1.5, 3.0, 6.0];
+/// Oscillations in a log: fewer are a drift, more than one in three blocks are not resolved.
+const SLOWEST: f64 = 1.5;
+/// Step between the numbers of oscillations tried.
+const FINENESS: f64 = 0.25;
+/// Blocks that an oscillation needs.
+const RESOLVED: f64 = 3.0;
+
+/// What a zero does.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Course {
+    /// A level shift; blocks from the start.
+    Shift {
+        /// When it comes.
+        at: f64,
+    },
+    /// Another level for a while; blocks from the start.
+    Pulse {
+        /// When it begins.
+        begin: f64,
+        /// When it ends.
+        end: f64,
+    },
+    /// A rise and fall, as of the field of a magnet that passes by.
+    Transient {
+        /// Its middle, blocks from the start.
+        middle: f64,
+        /// Where it has fallen to a third, blocks from the middle.
+        width: f64,
+    },
+    /// An oscillation.
+    Oscillation {
+        /// Periods in the log.
+        periods: f64,
+    },
+    /// What lags behind a covariate.
+    Lag {
+        /// Its name.
+        covariate: String,
+        /// Its place among the bins.
+        index: usize,
+        /// Time constant, blocks.
+        blocks: f64,
+    },
+}
+
+impl Course {
+    /// Its values in each block (blocks x parameters).
+    fn columns(&self, criterion: &Criterion, channel: usize, blocks: usize) -> DMatrix<f64> {
+        let since = |at: f64, b: usize| (b as f64 + 1.0 - at).clamp(0.0, 1.0);
+        match *self {
+            Self::Shift { at } => DMatrix::from_fn(blocks, 1, |b, _| since(at, b)),
+            Self::Pulse { begin, end } => DMatrix::from_fn(blocks, 1, |b, _| since(begin, b) - since(end, b)),
+            Self::Transient { middle, width } => DMatrix::from_fn(blocks, 1, |b, _| {
+                let away = (b as f64 + 0.5 - middle) / width;
+                // The field of a dipole falls with the cube of the distance.
+                (1.0 + away * away).powf(-1.5)
+            }),
+            Self::Oscillation { periods } => DMatrix::from_fn(blocks, 2, |b, k| {
+                let phase = TAU * periods * (b as f64 + 0.5) / blocks as f64;
+                [phase.cos(), phase.sin()][k]
+            }),
+            Self::Lag {
+                index,
+                blocks: forgotten,
+                ..
+            } => block_means(criterion, channel, index).map_or_else(
+                || DMatrix::zeros(blocks, 1),
+                |means| {
+                    let past = past(&means, forgotten);
+                    // A constant is a bias, which has a name.
+                    let mean = past.mean();
+                    DMatrix::from_columns(&[past.add_scalar(-mean)])
+                },
+            ),
+        }
+    }
+
+    /// Number of its columns.
+    pub const fn parameters(&self) -> usize {
+        match self {
+            Self::Oscillation { .. } => 2,
+            _ => 1,
+        }
+    }
+
+    /// The covariate that the course is of.
+    pub fn covariate(&self) -> &str {
+        match self {
+            Self::Lag { covariate, .. } => covariate,
+            _ => "t",
+        }
+    }
+
+    /// A sentence part; `time` is the time at so many blocks from the start, s, `length` that of the log in blocks.
+    pub fn words(&self, time: impl Fn(f64) -> f64, blocks: f64) -> String {
+        match *self {
+            Self::Shift { at } => format!("a level shift at {:.1} s", time(at)),
+            Self::Pulse { begin, end } => format!("another level from {:.1} s to {:.1} s", time(begin), time(end)),
+            Self::Transient { middle, width } => {
+                let wide = 2.0 * (time(width) - time(0.0));
+                format!("a transient at {:.1} s, {wide:.1} s wide", time(middle))
+            }
+            Self::Oscillation { periods } => {
+                format!(
+                    "an oscillation with a period of {:.1} s",
+                    (time(blocks) - time(0.0)) / periods
+                )
+            }
+            Self::Lag { blocks, .. } => format!("it lags behind by {:.1} s", time(blocks) - time(0.0)),
+        }
+    }
+}
+
+/// Every course of each family.
+fn families(blocks: usize) -> [Vec<Course>; 4] {
+    let shifts = (1..blocks).flat_map(|b| {
+        std::iter::once(0.0)
+            .chain(FILLED)
+            .map(move |part| Course::Shift { at: b as f64 + part })
+    });
+    let ends = |first: usize| (first + 1)..(blocks + 1 - BACK).min(first + blocks / 2 + 1);
+    let pulses = (BACK..blocks.saturating_sub(BACK)).flat_map(|first| {
+        ends(first).flat_map(move |last| {
+            [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)].map(|(a, b)| Course::Pulse {
+                begin: first as f64 - a,
+                end: last as f64 + b,
+            })
+        })
+    });
+    let transients = (2..2 * blocks.saturating_sub(1)).flat_map(|k| {
+        WIDTHS.map(|width| Course::Transient {
+            middle: 0.5 * k as f64 + 0.25,
+            width,
+        })
+    });
+    let most = blocks as f64 / RESOLVED;
+    let steps = ((most - SLOWEST) / FINENESS).max(0.0) as u32;
+    let oscillations = (0..=steps).map(|k| Course::Oscillation {
+        periods: SLOWEST + FINENESS * f64::from(k),
+    });
+    [
+        shifts.collect(),
+        pulses.collect(),
+        transients.collect(),
+        oscillations.collect(),
+    ]
+}
+
+/// Columns that are constant within each block, the same course on each of some channels with a size of its own.
+fn asked(criterion: &Criterion, channels: &[usize], columns: &DMatrix<f64>) -> Asked {
+    let (p, m) = (criterion.problem.plausible.len(), columns.ncols());
+    let all = channels.len() * m;
+    let mut out = Asked {
+        cross: DMatrix::zeros(p, all),
+        information: DMatrix::zeros(all, all),
+        score: DVector::zeros(all),
+        sums: Vec::new(),
+        prior: Prior::Normal(Vec::new()),
+        trials: 0.0,
+    };
+    for (k, channel) in channels.iter().enumerate() {
+        let sums = &criterion.problem.sums[*channel];
+        let root = sums.weight.sqrt();
+        let weighted = DMatrix::from_diagonal(&sums.count) * columns;
+        out.cross.columns_mut(k * m, m).gemm_tr(root, &sums.sums, columns, 0.0);
+        out.information
+            .view_mut((k * m, k * m), (m, m))
+            .copy_from(&columns.tr_mul(&weighted));
+        out.score
+            .rows_mut(k * m, m)
+            .copy_from(&(columns.tr_mul(&sums.right) * root));
+        let modes = &criterion.modes[*channel].of_blocks;
+        let mut own = DMatrix::zeros(modes.nrows(), all);
+        own.columns_mut(k * m, m).copy_from(&(modes * columns));
+        out.sums.push((*channel, own));
+    }
+    let largest = out.information.diagonal().max();
+    let deviation = (0..all).map(|k| {
+        let own = out.information[(k, k)];
+        if own > 1e-9 * largest {
+            (criterion.samples / own).sqrt()
+        } else {
+            0.0
+        }
+    });
+    out.prior = Prior::Normal(deviation.collect());
+    out
+}
+
+/// A course that stands out, the channels (places among the sums) that show it, and its log Bayes factor.
+pub struct Found {
+    /// The course.
+    pub course: Course,
+    /// The channels.
+    pub channels: Vec<usize>,
+    /// Its columns.
+    pub asked: Asked,
+    /// Log Bayes factor, the number of courses tried taken off.
+    pub ln_bayes: f64,
+}
+
+/// The likeliest course of each family beside a stack in the channels of one sensor, in each alone and in all at once, where its log Bayes
+/// factor is at least `least`.
+pub fn likeliest(stack: &Stack, channels: &[usize], least: f64) -> Vec<Found> {
+    let criterion = stack.criterion;
+    let Some(first) = channels.first() else {
+        return Vec::new();
+    };
+    let blocks = criterion.problem.sums[*first].count.len();
+    let unit = DMatrix::identity(blocks, blocks);
+    let views: Vec<Vec<Beside>> = channels
+        .iter()
+        .map(|channel| {
+            let sensor = criterion.modes[*channel].sensor();
+            stack.views(&asked(criterion, &[*channel], &unit), sensor)
+        })
+        .collect();
+    let mut families = families(blocks).to_vec();
+    families.push(lags(criterion, *first));
+    let mut found = Vec::new();
+    for family in families.iter().filter(|f| !f.is_empty()) {
+        let tried = (family.len() as f64).ln();
+        let columns = |course: &Course| course.columns(criterion, *first, blocks);
+        // Half the square that each course explains, by channel and view.
+        let mut scores: Vec<Vec<Vec<f64>>> = Vec::new();
+        for own in &views {
+            let of = |view: &Beside| match family[0] {
+                Course::Pulse { .. } => of_pulses(view, family),
+                _ => family
+                    .iter()
+                    .map(|course| quick(&view.information, &view.score, &columns(course)))
+                    .collect(),
+            };
+            scores.push(own.iter().map(of).collect());
+        }
+        let mut groups: Vec<Vec<usize>> = (0..channels.len()).map(|k| vec![k]).collect();
+        if channels.len() > 1 {
+            groups.push((0..channels.len()).collect());
+        }
+        for group in groups {
+            let mut chosen: Vec<usize> = Vec::new();
+            let kinds = group.iter().map(|k| scores[*k].len()).min().unwrap_or(0);
+            for view in 0..kinds {
+                let mut order: Vec<usize> = (0..family.len()).collect();
+                let total = |i: &usize| group.iter().map(|k| scores[*k][view][*i]).sum::<f64>();
+                order.sort_by(|a, b| total(b).total_cmp(&total(a)));
+                // No evidence exceeds what the best parameters explain; beside bins a lag may explain more.
+                let may = |i: &usize| total(i) - tried >= least || matches!(family[*i], Course::Lag { .. });
+                chosen.extend(order.into_iter().take(LOOKED_AT).filter(may));
+            }
+            chosen.sort_unstable();
+            chosen.dedup();
+            let of_group: Vec<usize> = group.iter().map(|k| channels[*k]).collect();
+            let best = chosen
+                .into_iter()
+                .filter_map(|i| {
+                    let own = columns(&family[i]);
+                    let mut asked = asked(criterion, &of_group, &own);
+                    let bins = match &family[i] {
+                        Course::Lag { index, .. } => {
+                            let (joined, bins) = beside_bins(criterion, &of_group, *index, asked, &own);
+                            asked = joined;
+                            bins
+                        }
+                        _ => None,
+                    };
+                    asked.trials = tried;
+                    if stack.at_most(&asked) - tried < least {
+                        return None;
+                    }
+                    let ln_bayes = stack.ln_bayes(&asked) - tried;
+                    // What the covariate as it is explains needs no past of it.
+                    if bins.is_some_and(|bins| ln_bayes - stack.ln_bayes(&bins) < least) {
+                        return None;
+                    }
+                    (ln_bayes >= least).then(|| Found {
+                        course: family[i].clone(),
+                        channels: of_group.clone(),
+                        ln_bayes,
+                        asked,
+                    })
+                })
+                .max_by(|a, b| a.ln_bayes.total_cmp(&b.ln_bayes));
+            found.extend(best);
+        }
+    }
+    found
+}
+
+/// A lag beside what follows the covariate as it is, whatever the shape, and that alone: bins of each channel, then the columns that are
+/// constant within blocks.
+fn beside_bins(
+    criterion: &Criterion,
+    channels: &[usize],
+    index: usize,
+    course: Asked,
+    columns: &DMatrix<f64>,
+) -> (Asked, Option<Asked>) {
+    let problem = criterion.problem;
+    let mut out = course;
+    let mut alone: Option<Asked> = None;
+    for (k, place) in channels.iter().enumerate() {
+        let sums = &problem.sums[*place];
+        let part = &problem.parts[sums.log];
+        let covariate = Covariate {
+            name: part.white.layout.bins.names[index].clone(),
+            log: None,
+            index: (0..problem.parts.len())
+                .map(|log| (log == sums.log).then_some(index))
+                .collect(),
+        };
+        let Some(bins) = dictionary::bins(criterion, sums.channel, &Arc::new(covariate)) else {
+            continue;
+        };
+        let of_bins = sums.binned(part, index, &dictionary::contrasts_of(part, index));
+        // Products of contrasts with what is constant within a block: sums of the contrasts, block by block.
+        let more = columns.ncols();
+        let mut products = DMatrix::zeros(out.score.len(), bins.asked.score.len());
+        products
+            .rows_mut(k * more, more)
+            .copy_from(&(columns.tr_mul(&of_bins) * sums.weight.sqrt()));
+        out = out.beside(&bins.asked, &products);
+        let none = |known: &Asked| DMatrix::zeros(known.score.len(), bins.asked.score.len());
+        alone = Some(alone.map_or_else(|| bins.asked.clone(), |known| known.beside(&bins.asked, &none(&known))));
+    }
+    (out, alone)
+}
+
+/// Lags behind every covariate that has a past of its own.
+fn lags(criterion: &Criterion, channel: usize) -> Vec<Course> {
+    let sums = &criterion.problem.sums[channel];
+    let bins = &criterion.problem.parts[sums.log].white.layout.bins;
+    let mut found = Vec::new();
+    // The first covariate is time, which has none.
+    for (index, name) in bins.names.iter().enumerate().skip(1) {
+        if block_means(criterion, channel, index).is_some() {
+            found.extend(FORGOTTEN.map(|blocks| Course::Lag {
+                covariate: name.clone(),
+                index,
+                blocks,
+            }));
+        }
+    }
+    found
+}
+
+/// Block means of the rank of a covariate; `None` where they do not vary.
+fn block_means(criterion: &Criterion, channel: usize, covariate: usize) -> Option<DVector<f64>> {
+    let problem = criterion.problem;
+    let sums = &problem.sums[channel];
+    let part = &problem.parts[sums.log];
+    let bins = part.white.layout.bins.edges[covariate].len() + 1;
+    if bins < 2 {
+        return None;
+    }
+    let ranks = DMatrix::from_fn(bins, 2, |bin, k| {
+        if k == 0 {
+            1.0
+        } else {
+            2.0 * bin as f64 / (bins - 1) as f64 - 1.0
+        }
+    });
+    let binned = sums.binned(part, covariate, &ranks);
+    let mut last = 0.0;
+    let means = DVector::from_fn(binned.nrows(), |b, _| {
+        // A block without samples says nothing: what was before goes on.
+        if binned[(b, 0)] > 0.0 {
+            last = binned[(b, 1)] / binned[(b, 0)];
+        }
+        last
+    });
+    (means.max() > means.min()).then_some(means)
+}
+
+/// Means over blocks of the exponentially weighted past of a quantity with these means, of which nothing but the first was there before.
+fn past(means: &DVector<f64>, forgotten: f64) -> DVector<f64> {
+    let kept = (-1.0 / forgotten).exp();
+    let mut level = means[0];
+    DVector::from_fn(means.len(), |b, _| {
+        let mean = means[b] + (level - means[b]) * forgotten * (1.0 - kept);
+        level = level * kept + means[b] * (1.0 - kept);
+        mean
+    })
+}
+
+/// The same for pulses: each is the difference of two level shifts, whose products are worked out once.
+fn of_pulses(view: &Beside, family: &[Course]) -> Vec<f64> {
+    let blocks = view.score.len();
+    let halves = DMatrix::from_fn(blocks, 2 * blocks + 1, |b, k| {
+        (b as f64 + 1.0 - 0.5 * k as f64).clamp(0.0, 1.0)
+    });
+    let products = halves.tr_mul(&(&view.information * &halves));
+    let scores = halves.tr_mul(&view.score);
+    let place = |at: f64| (2.0 * at).round() as usize;
+    let of = |course: &Course| match course {
+        Course::Pulse { begin, end } => {
+            let (i, j) = (place(*begin), place(*end));
+            let right = scores[i] - scores[j];
+            let own = products[(i, i)] + products[(j, j)] - 2.0 * products[(i, j)];
+            0.5 * right * right / own.max(f64::MIN_POSITIVE)
+        }
+        _ => 0.0,
+    };
+    family.iter().map(of).collect()
+}
+
+/// Half of the square that columns explain.
+fn quick(information: &DMatrix<f64>, score: &DVector<f64>, columns: &DMatrix<f64>) -> f64 {
+    if columns.ncols() == 1 {
+        let v = columns.column(0);
+        let right = v.dot(score);
+        let own = (information * v).dot(&v);
+        return 0.5 * right * right / own.max(f64::MIN_POSITIVE);
+    }
+    let own = columns.tr_mul(&(information * columns));
+    let right = columns.tr_mul(score);
+    own.cholesky().map_or(0.0, |f| 0.5 * right.dot(&f.solve(&right)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pulses_are_differences_of_level_shifts() {
+        let blocks = 12;
+        let view = Beside {
+            information: DMatrix::from_fn(blocks, blocks, |i, j| {
+                if i == j {
+                    9.0
+                } else {
+                    1.0 / (1.0 + i.abs_diff(j) as f64)
+                }
+            }),
+            score: DVector::from_fn(blocks, |b, _| (1.7 * b as f64).sin()),
+        };
+        let [_, pulses, ..] = families(blocks);
+        for (course, quickly) in pulses.iter().zip(of_pulses(&view, &pulses)) {
+            let Course::Pulse { begin, end } = *course else {
+                continue;
+            };
+            let since = |at: f64, b: usize| (b as f64 + 1.0 - at).clamp(0.0, 1.0);
+            let column = DMatrix::from_fn(blocks, 1, |b, _| since(begin, b) - since(end, b));
+            let slowly = quick(&view.information, &view.score, &column);
+            assert!((slowly - quickly).abs() < 1e-9, "{course:?} {slowly} {quickly}");
+        }
+    }
+
+    #[test]
+    fn the_past_of_a_step_creeps_to_its_level() {
+        let step = DVector::from_fn(20, |b, _| if b < 5 { 0.0 } else { 1.0 });
+        let past = past(&step, 2.0);
+        assert!(past.rows(0, 5).norm() < 1e-12);
+        // Mean of 1 - exp(-t/2) over the first block after the step, and over the third.
+        let mean = |from: f64| 1.0 - 2.0 * ((-from / 2.0).exp() - (-(from + 1.0) / 2.0).exp());
+        assert!((past[5] - mean(0.0)).abs() < 1e-12);
+        assert!((past[7] - mean(2.0)).abs() < 1e-12);
+    }
+}

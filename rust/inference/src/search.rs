@@ -1,0 +1,344 @@
+//! Which effects of the catalogue stand beside one another: added, dropped and exchanged by their evidence alone.
+
+use std::collections::HashMap;
+
+use imufit_model::effect::Sign;
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::asked::{Asked, Prior};
+use crate::problem::Question;
+use crate::problem::indices;
+use crate::stack::{Criterion, Stack};
+use crate::varying;
+use crate::verdict::Plausible;
+
+/// Log odds that something is there before a name is given: one false name in a thousand logs, were all components of the noise right.
+const ODDS: f64 = 2.0;
+/// More effects at once are no explanation; whole sensors have seven.
+const MOST: usize = 12;
+/// Rounds of exchanges; each must raise the evidence.
+const ROUNDS: usize = 3;
+/// Log Bayes factors at the likeliest noise and integrated over it differ by less than this: the noise that a stack leaves out explains no more.
+const DOUBT: f64 = 50.0;
+/// Hardly any sensor has an effect this many times its prior deviation.
+const BEYOND: f64 = 20.0;
+/// No axis reads so much of itself, or of another, too much.
+const LARGEST_GAIN: f64 = 0.3;
+
+/// A problem with what may be named and what the model holds.
+pub struct Search<'a> {
+    /// The criterion.
+    pub criterion: &'a Criterion<'a>,
+    /// Slots of the model.
+    pub model: Vec<usize>,
+    /// Slots of the candidates.
+    pub candidates: Vec<usize>,
+    asked: HashMap<usize, Asked>,
+    /// Log Bayes factor from which on a candidate is there: the odds against one of so many.
+    pub threshold: f64,
+}
+
+/// One candidate beside a stack.
+#[derive(Clone, Debug)]
+pub struct Weighed {
+    /// Its slot.
+    pub slot: usize,
+    /// Its log Bayes factor, trials of a search taken off.
+    pub ln_bayes: f64,
+    /// Parameters and standard errors.
+    pub parameters: Vec<(f64, f64)>,
+    /// Whether sensors can have such parameters.
+    pub plausible: Plausible,
+    /// True if the log determines any of its parameters better than one knows beforehand.
+    pub testable: bool,
+}
+
+/// Log Bayes factor from which on one of so many questions is answered with yes.
+pub fn threshold(questions: usize) -> f64 {
+    ODDS + (questions.max(1) as f64).ln()
+}
+
+impl<'a> Search<'a> {
+    /// Over the candidates of a problem.
+    pub fn new(criterion: &'a Criterion<'a>, model: &[usize], candidates: &[usize]) -> Self {
+        let asked = candidates.iter().map(|s| (*s, Asked::slot(criterion, *s))).collect();
+        Self {
+            criterion,
+            model: model.to_vec(),
+            candidates: candidates.to_vec(),
+            asked,
+            threshold: threshold(candidates.len()),
+        }
+    }
+
+    /// Log of the number of candidates.
+    pub fn trials(&self) -> f64 {
+        self.threshold - ODDS
+    }
+
+    /// Prior deviations of the parameters of the model and of some members beside it.
+    fn parameters(&self, members: &[usize]) -> Vec<(usize, f64)> {
+        let problem = self.criterion.problem;
+        let of_model = indices(&problem.slots, &self.model)
+            .into_iter()
+            .map(|j| (j, 1.0 / problem.precision(j).sqrt()));
+        let of_members = indices(&problem.slots, members)
+            .into_iter()
+            .map(|j| (j, self.criterion.deviation(j)));
+        of_model.chain(of_members).collect()
+    }
+
+    /// The stack of the model and some members.
+    pub fn stack(&self, members: &[usize]) -> Option<Stack<'a>> {
+        Stack::new(self.criterion, &self.parameters(members))
+    }
+
+    /// The stack of the model and some members without one slot, be it in the model or a member.
+    pub fn stack_without(&self, members: &[usize], slot: usize) -> Option<Stack<'a>> {
+        let own = indices(&self.criterion.problem.slots, &[slot]);
+        let others: Vec<(usize, f64)> = self
+            .parameters(members)
+            .into_iter()
+            .filter(|(j, _)| !own.contains(j))
+            .collect();
+        Stack::new(self.criterion, &others)
+    }
+
+    /// One candidate beside a stack.
+    pub fn weigh(&self, stack: &Stack, slot: usize) -> Option<Weighed> {
+        let asked = self.asked.get(&slot)?;
+        let ln_bayes = stack.ln_bayes(asked) - asked.trials;
+        let equations = stack.equations(asked)?;
+        let (parameters, testable) = match &asked.prior {
+            Prior::Known(values) => {
+                let v = DVector::from_column_slice(values);
+                let seen = v.dot(&(&equations.information * &v)) > 1.0;
+                (values.iter().map(|v| (*v, 0.0)).collect(), seen)
+            }
+            Prior::Normal(deviation) => estimated(&equations.information, &equations.score, deviation)?,
+        };
+        let plausible = self.plausible(slot, &parameters);
+        Some(Weighed {
+            slot,
+            ln_bayes: if testable { ln_bayes } else { 0.0 },
+            parameters,
+            plausible,
+            testable,
+        })
+    }
+
+    /// How much likelier a candidate at its best makes the log, see [`Stack::fit`].
+    pub fn fit(&self, stack: &Stack, slot: usize) -> f64 {
+        self.asked
+            .get(&slot)
+            .map_or(0.0, |asked| stack.fit(asked) - asked.trials)
+    }
+
+    /// For each parameter of a candidate the size from which on the candidate would be there as often as not.
+    pub fn detectable(&self, stack: &Stack, slot: usize) -> Vec<f64> {
+        self.asked
+            .get(&slot)
+            .map_or_else(Vec::new, |asked| stack.detectable(asked, self.threshold + asked.trials))
+    }
+
+    /// All candidates beside a stack, likeliest first.
+    pub fn weigh_all(&self, stack: &Stack, without: &[usize]) -> Vec<Weighed> {
+        let mut found: Vec<Weighed> = self
+            .candidates
+            .par_iter()
+            .filter(|s| !without.contains(s))
+            .filter_map(|s| self.weigh(stack, *s))
+            .collect();
+        found.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
+        found
+    }
+
+    /// The candidate that is there with most evidence beside a stack. Those come first that may have most: what can have less than one that
+    /// has been worked out need not be.
+    pub fn likeliest(&self, stack: &Stack, without: &[usize]) -> Option<Weighed> {
+        let offered = self.candidates.par_iter().filter(|s| !without.contains(s));
+        let mut order: Vec<(usize, f64)> = offered
+            .filter_map(|s| {
+                let asked = self.asked.get(s)?;
+                Some((*s, stack.at_most(asked) - asked.trials))
+            })
+            .filter(|(_, most)| *most >= self.threshold)
+            .collect();
+        order.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut best: Option<Weighed> = None;
+        for (slot, most) in order {
+            if best.as_ref().is_some_and(|b| b.ln_bayes >= most) {
+                break;
+            }
+            let weighed = self.weigh(stack, slot).filter(|w| self.there(w));
+            if let Some(weighed) = weighed
+                && best.as_ref().is_none_or(|b| weighed.ln_bayes > b.ln_bayes)
+            {
+                best = Some(weighed);
+            }
+        }
+        best
+    }
+
+    /// Whether sensors can have such parameters: signs and ranges that the effect declares.
+    fn plausible(&self, slot: usize, parameters: &[(f64, f64)]) -> Plausible {
+        let problem = self.criterion.problem;
+        let of = &problem.slots[slot];
+        let cards = &of.effect.card().parameters;
+        let within = parameters.iter().enumerate().all(|(k, (value, error))| {
+            let gain = cards[k % cards.len()].unit == "1";
+            let most = BEYOND * problem.plausible[of.first + k];
+            let limit = if gain { most.min(LARGEST_GAIN) } else { most };
+            !problem.typical[of.first + k] || value.abs() - 3.0 * error <= limit
+        });
+        let negative = parameters.iter().any(|(value, error)| *value < -3.0 * error);
+        match of.effect.sign() {
+            Sign::Positive if negative => Plausible::No,
+            _ if !within => Plausible::TooLarge,
+            Sign::RatherPositive if negative => Plausible::OtherSign,
+            _ => Plausible::Yes,
+        }
+    }
+
+    /// True if a candidate is there.
+    pub fn there(&self, weighed: &Weighed) -> bool {
+        weighed.testable && weighed.plausible == Plausible::Yes && weighed.ln_bayes >= self.threshold
+    }
+
+    /// Log Bayes factor of a member beside the others where it may vary from block to block as well; `stack` is that of all members.
+    pub fn varying(&self, stack: &Stack, members: &[usize], slot: usize) -> f64 {
+        let others: Vec<usize> = members.iter().copied().filter(|m| *m != slot).collect();
+        self.asked
+            .get(&slot)
+            .map_or(f64::INFINITY, |asked| self.varying_beside(stack, &others, slot, asked))
+    }
+
+    /// The same of any slot beside some members; `stack` has the noise.
+    pub fn varying_beside(&self, stack: &Stack, members: &[usize], slot: usize, asked: &Asked) -> f64 {
+        let Prior::Normal(deviation) = &asked.prior else {
+            return f64::INFINITY;
+        };
+        let problem = self.criterion.problem;
+        let own = indices(&problem.slots, &[slot]);
+        let columns = self.columns(members);
+        let question = problem.question(&columns, &own, &DMatrix::identity(own.len(), own.len()));
+        self.varying_of(stack, members, question, deviation, asked.trials)
+    }
+
+    /// Parameters of the model and of some members.
+    pub fn columns(&self, members: &[usize]) -> Vec<usize> {
+        self.parameters(members).iter().map(|(j, _)| *j).collect()
+    }
+
+    /// The same of any question beside some members.
+    pub fn varying_of(
+        &self,
+        stack: &Stack,
+        members: &[usize],
+        mut question: Question,
+        deviation: &[f64],
+        trials: f64,
+    ) -> f64 {
+        for (k, (_, deviation)) in self.parameters(members).iter().enumerate() {
+            question.precision[k] = deviation.powi(-2);
+        }
+        let strength = |sensor| stack.strength(sensor);
+        varying::ln_bayes(&question, deviation, &self.criterion.modes, strength).map_or(f64::INFINITY, |ln| ln - trials)
+    }
+
+    /// The effects that are there beside one another, in the order in which they were found.
+    pub fn find(&self) -> Option<Vec<usize>> {
+        let mut members: Vec<usize> = Vec::new();
+        let mut dropped: Vec<usize> = Vec::new();
+        while members.len() < MOST {
+            let stack = self.stack(&members)?;
+            let without: Vec<usize> = members.iter().chain(&dropped).copied().collect();
+            let weighed = self.weigh_all(&stack, &without);
+            let Some(next) = weighed.iter().find(|w| self.there(w)) else {
+                break;
+            };
+            members.push(next.slot);
+            let needless = self.needless(&members)?;
+            members.retain(|m| !needless.contains(m));
+            dropped.extend(needless);
+        }
+        for _ in 0..ROUNDS {
+            if !self.exchange(&mut members)? {
+                break;
+            }
+        }
+        Some(members)
+    }
+
+    /// Log evidence of some members over the model alone: each beside those before it.
+    pub fn evidence(&self, members: &[usize]) -> f64 {
+        let beside = |k: usize| {
+            let stack = self.stack(&members[..k])?;
+            self.weigh(&stack, members[k])
+        };
+        (0..members.len()).filter_map(beside).map(|w| w.ln_bayes).sum()
+    }
+
+    /// Members that the others make needless, but not the last one.
+    fn needless(&self, members: &[usize]) -> Option<Vec<usize>> {
+        let mut found = Vec::new();
+        let stack = self.stack(members)?;
+        for member in &members[..members.len().saturating_sub(1)] {
+            let parameters = indices(&self.criterion.problem.slots, &[*member]);
+            let known = self.criterion.problem.known_values(&parameters).is_some();
+            // What is far beyond doubt at the likeliest noise is so at any.
+            if !known
+                && stack
+                    .ratio_of(&parameters)
+                    .is_some_and(|ln| ln > self.threshold + DOUBT)
+            {
+                continue;
+            }
+            let others: Vec<usize> = members
+                .iter()
+                .copied()
+                .filter(|m| m != member && !found.contains(m))
+                .collect();
+            let weighed = self.weigh(&self.stack(&others)?, *member)?;
+            if !self.there(&weighed) {
+                found.push(*member);
+            }
+        }
+        Some(found)
+    }
+
+    /// Puts a candidate in the place of a member where that raises the evidence; whether any was.
+    fn exchange(&self, members: &mut [usize]) -> Option<bool> {
+        let mut any = false;
+        for place in 0..members.len() {
+            let others: Vec<usize> = members.iter().copied().filter(|m| *m != members[place]).collect();
+            let best = self.likeliest(&self.stack(&others)?, &others);
+            if let Some(best) = best.filter(|w| w.slot != members[place]) {
+                members[place] = best.slot;
+                any = true;
+            }
+        }
+        Some(any)
+    }
+}
+
+/// Estimates and standard errors from equations, and whether any direction of them is determined by the log.
+fn estimated(information: &DMatrix<f64>, score: &DVector<f64>, deviation: &[f64]) -> Option<(Vec<(f64, f64)>, bool)> {
+    let m = score.len();
+    // A hundredth of the prior's information decides only where the log does not.
+    let scaled = DMatrix::from_fn(m, m, |i, j| information[(i, j)] * deviation[i] * deviation[j]);
+    let eigen = scaled.clone().symmetric_eigen();
+    let testable = eigen.eigenvalues.iter().any(|l| *l > 1.0);
+    let factor = Cholesky::new(scaled + DMatrix::identity(m, m) * 0.01)?;
+    let right = DVector::from_fn(m, |j, _| score[j] * deviation[j]);
+    let solved = factor.solve(&right);
+    let covariance = factor.inverse();
+    let parameters = (0..m).map(|j| {
+        (
+            solved[j] * deviation[j],
+            covariance[(j, j)].max(0.0).sqrt() * deviation[j],
+        )
+    });
+    Some((parameters.collect(), testable))
+}
