@@ -125,4 +125,4 @@ def within(case: Case, said: Answer) -> list[bool]:
     """Return for each true parameter that the final model holds whether its estimate is within two standard errors."""
     truth = {f"{effect}.{name}": value for effect, each in case.effects.items() for name, value in each.items()}
     estimates = [(*said.parameters[name], value) for name, value in truth.items() if name in said.parameters]
-    return [abs(estimate - value) <= 2.0 * error for estimate, error, value in estimates if error > 0.0]
+    return [bool(abs(estimate - value) <= 2.0 * error) for estimate, error, value in estimates if error > 0.0]

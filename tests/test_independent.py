@@ -14,19 +14,14 @@ from independent_answer import REFUSED, SEED, Answer, answer, false_names, fault
 
 OPEN = frozenset(
     {
-        "mocap_lowpassed",
-        "robot_poses_interpolated",
-        "hard_iron_reference_in_own_rows",
         "reference_stamps_bunched",
         "shaken_without_position_turned_mount",
         "sensor_1khz_reference_in_own_rows",
         "sensor_4khz_reference_interpolated",
         "sensor_8khz_reference_interpolated",
-        "stated_noise_too_small",
         "gyro_soft_clip",
         "gyro_wrapped_int16",
         "dead_bus_zeros",
-        "mains_line",
         "swept_tone",
         "irrelevant_columns_drifting_heading",
         "magnetic_hysteresis",

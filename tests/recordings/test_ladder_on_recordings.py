@@ -48,7 +48,8 @@ def lag(result: Ladder, sensor: str) -> float:
 @pytest.mark.parametrize("name", BROAD)
 def test_delays_and_lever_arm_of_broad_are_confirmed_by_the_other_half(name: str) -> None:
     log = imufit.read(recording(name))
-    for result in (imufit.ladder(log.rows(0, log.n // 2)), imufit.ladder(log.rows(log.n // 2, log.n))):
+    for first in (0, log.n // 2):
+        result = imufit.ladder(log.rows(first, first + log.n // 4))
         assert result.ratio_end < 0.9 * result.ratio_start
         assert {"acc.lever_arm", "mag.delay"} <= set(result.model[:3])
         # The same sensor in every trial: its rates come four milliseconds after the cameras, its field fifteen.
@@ -58,11 +59,12 @@ def test_delays_and_lever_arm_of_broad_are_confirmed_by_the_other_half(name: str
 
 
 def test_iron_of_the_aircraft_is_the_same_in_both_parts_of_the_flight() -> None:
-    log, whole = climbed("uav_motor_current/thor75_part1.parquet")
-    assert whole.ratio_end < 0.5 * whole.ratio_start
+    log = imufit.read(recording("uav_motor_current/thor75_part1.parquet"))
     # On the ground the reference's heading drifts; the second half is flight.
     cuts = [log.n // 2, 3 * log.n // 4, log.n]
     first, second = (imufit.ladder(log.rows(a, b)) for a, b in itertools.pairwise(cuts))
+    for part in (first, second):
+        assert part.ratio_end < 0.5 * part.ratio_start
     np.testing.assert_allclose(values(first, "mag.hard_iron"), values(second, "mag.hard_iron"), rtol=0.2)
 
 
@@ -82,7 +84,7 @@ def test_error_falls_on_the_robot_arm(name: str) -> None:
 
 def test_bias_and_mount_of_the_encoder_rig_are_confirmed_by_the_other_half() -> None:
     log = without_other_columns("encoder_rig/roll_slow.parquet")
-    halves = [imufit.ladder(log.rows(first, first + 20000)) for first in (0, log.n // 2)]
+    halves = [imufit.ladder(log.rows(first, first + 10000)) for first in (0, log.n // 2)]
     for result in halves:
         assert result.ratio_end < 0.5 * result.ratio_start
         assert result.model[0] == "acc.bias"
