@@ -148,8 +148,12 @@ def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] 
         return None if effect in futile else effect
     passed = [c for c in diagnosis.candidates if c.status == PASSED and c.effect not in futile]
     if diagnosis.verdict == "unknown":
-        # Beside what nothing explains, only effects that matter are taken up.
-        passed = [c for c in passed if matters(c.held_out_before, c.held_out_after)]
+        # Beside what nothing explains, only effects that matter are taken up, and no straight line in a column of the
+        # log that acts in another way.
+        bent = {item.covariate for item in diagnosis.unexplained}
+        passed = [
+            c for c in passed if matters(c.held_out_before, c.held_out_after) and c.effect.partition(":")[2] not in bent
+        ]
     return passed[0].effect if passed else None
 
 
