@@ -319,13 +319,6 @@ impl Evidence {
         self.blocks.get(&(block, channel))
     }
 
-    /// Mean square of the residual of a block in a channel; `None` without samples.
-    pub fn mean_square(&self, block: usize, channel: usize) -> Option<f64> {
-        let b = self.get(block, channel).filter(|b| b.n > 0)?;
-        let last = self.layout.model.active()[channel].len();
-        Some(b.gram[(last, last)] / b.n as f64)
-    }
-
     /// Number of samples of a channel.
     pub fn count(&self, channel: usize) -> usize {
         (0..self.layout.blocks)

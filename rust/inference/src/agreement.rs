@@ -50,7 +50,7 @@ pub fn disagreements(
     if equations.len() < 2 || problem.own[slot] {
         return Vec::new();
     }
-    let others: Vec<usize> = members.iter().copied().filter(|m| *m != slot).collect();
+    let others = search::without(members, slot);
     let in_model = search.model.contains(&slot);
     let with: Vec<usize> = others.iter().copied().chain((!in_model).then_some(slot)).collect();
     let Some(stack) = search.stack(&with) else {

@@ -68,6 +68,12 @@ impl Asked {
         }
     }
 
+    /// These columns, then others of other channels: rows of different channels have no products.
+    #[must_use]
+    pub fn apart(&self, other: &Self) -> Self {
+        self.beside(other, &DMatrix::zeros(self.score.len(), other.score.len()))
+    }
+
     /// These columns, then others whose products with these are `products` (these x others).
     #[must_use]
     pub fn beside(&self, other: &Self, products: &DMatrix<f64>) -> Self {

@@ -2,6 +2,7 @@
 
 use imufit_fit::normal_equations::NormalEquations;
 use imufit_model::probes::OF;
+use imufit_model::sensor::AXES;
 use imufit_model::sensor_model::Slot;
 use nalgebra::{DMatrix, DVector};
 
@@ -10,8 +11,6 @@ use crate::problem::{Problem, Question};
 
 /// Contrasts over the bins: polynomials of the bin's rank up to this degree.
 pub const CONTRASTS: usize = 5;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The covariate that every log has for itself.
 const TIME: &str = "t";

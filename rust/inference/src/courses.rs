@@ -1,6 +1,7 @@
 //! Courses in time of a channel's zero that no walk makes: a level shift, a pulse, a transient, an oscillation, and what lags behind
 //! a covariate.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -69,7 +70,6 @@ pub enum Course {
 impl Course {
     /// Its values in each block (blocks x parameters).
     fn columns(&self, criterion: &Criterion, channel: usize, blocks: usize) -> DMatrix<f64> {
-        let since = |at: f64, b: usize| (b as f64 + 1.0 - at).clamp(0.0, 1.0);
         match *self {
             Self::Shift { at } => DMatrix::from_fn(blocks, 1, |b, _| since(at, b)),
             Self::Pulse { begin, end } => DMatrix::from_fn(blocks, 1, |b, _| since(begin, b) - since(end, b)),
@@ -132,6 +132,11 @@ impl Course {
             Self::Lag { blocks, .. } => format!("it lags behind by {:.1} s", time(blocks) - time(0.0)),
         }
     }
+}
+
+/// Part of a block that lies behind a time, blocks from the start.
+fn since(at: f64, block: usize) -> f64 {
+    (block as f64 + 1.0 - at).clamp(0.0, 1.0)
 }
 
 /// Every course of each family.
@@ -241,6 +246,7 @@ pub fn likeliest(stack: &Stack, channels: &[usize], least: f64) -> Vec<Found> {
     let mut families = families(blocks).to_vec();
     families.push(lags(criterion, *first));
     let mut found = Vec::new();
+    let mut known = KnownBins::new();
     for family in families.iter().filter(|f| !f.is_empty()) {
         let tried = (family.len() as f64).ln();
         let columns = |course: &Course| course.columns(criterion, *first, blocks);
@@ -281,7 +287,7 @@ pub fn likeliest(stack: &Stack, channels: &[usize], least: f64) -> Vec<Found> {
                     let mut asked = asked(criterion, &of_group, &own);
                     let bins = match &family[i] {
                         Course::Lag { index, .. } => {
-                            let (joined, bins) = beside_bins(criterion, &of_group, *index, asked, &own);
+                            let (joined, bins) = beside_bins(criterion, &of_group, *index, asked, &own, &mut known);
                             asked = joined;
                             bins
                         }
@@ -310,6 +316,9 @@ pub fn likeliest(stack: &Stack, channels: &[usize], least: f64) -> Vec<Found> {
     found
 }
 
+/// Bins of a covariate in one channel (place among the sums, index of the covariate): their columns, and their sums over blocks.
+type KnownBins = BTreeMap<(usize, usize), Option<(Asked, DMatrix<f64>)>>;
+
 /// A lag beside what follows the covariate as it is, whatever the shape, and that alone: bins of each channel, then the columns that are
 /// constant within blocks.
 fn beside_bins(
@@ -318,6 +327,7 @@ fn beside_bins(
     index: usize,
     course: Asked,
     columns: &DMatrix<f64>,
+    known: &mut KnownBins,
 ) -> (Asked, Option<Asked>) {
     let problem = criterion.problem;
     let mut out = course;
@@ -325,26 +335,31 @@ fn beside_bins(
     for (k, place) in channels.iter().enumerate() {
         let sums = &problem.sums[*place];
         let part = &problem.parts[sums.log];
-        let covariate = Covariate {
-            name: part.white.layout.bins.names[index].clone(),
-            log: None,
-            index: (0..problem.parts.len())
-                .map(|log| (log == sums.log).then_some(index))
-                .collect(),
-        };
-        let Some(bins) = dictionary::bins(criterion, sums.channel, &Arc::new(covariate)) else {
+        let found = known.entry((*place, index)).or_insert_with(|| {
+            let covariate = Covariate {
+                name: part.white.layout.bins.names[index].clone(),
+                log: None,
+                index: (0..problem.parts.len())
+                    .map(|log| (log == sums.log).then_some(index))
+                    .collect(),
+            };
+            let bins = dictionary::bins(criterion, sums.channel, &Arc::new(covariate))?;
+            Some((
+                bins.asked,
+                sums.binned(part, index, &dictionary::contrasts_of(part, index)),
+            ))
+        });
+        let Some((bins, of_bins)) = found else {
             continue;
         };
-        let of_bins = sums.binned(part, index, &dictionary::contrasts_of(part, index));
         // Products of contrasts with what is constant within a block: sums of the contrasts, block by block.
         let more = columns.ncols();
-        let mut products = DMatrix::zeros(out.score.len(), bins.asked.score.len());
+        let mut products = DMatrix::zeros(out.score.len(), bins.score.len());
         products
             .rows_mut(k * more, more)
-            .copy_from(&(columns.tr_mul(&of_bins) * sums.weight.sqrt()));
-        out = out.beside(&bins.asked, &products);
-        let none = |known: &Asked| DMatrix::zeros(known.score.len(), bins.asked.score.len());
-        alone = Some(alone.map_or_else(|| bins.asked.clone(), |known| known.beside(&bins.asked, &none(&known))));
+            .copy_from(&(columns.tr_mul(of_bins) * sums.weight.sqrt()));
+        out = out.beside(bins, &products);
+        alone = Some(alone.map_or_else(|| bins.clone(), |others| others.apart(bins)));
     }
     (out, alone)
 }
@@ -409,9 +424,7 @@ fn past(means: &DVector<f64>, forgotten: f64) -> DVector<f64> {
 /// The same for pulses: each is the difference of two level shifts, whose products are worked out once.
 fn of_pulses(view: &Beside, family: &[Course]) -> Vec<f64> {
     let blocks = view.score.len();
-    let halves = DMatrix::from_fn(blocks, 2 * blocks + 1, |b, k| {
-        (b as f64 + 1.0 - 0.5 * k as f64).clamp(0.0, 1.0)
-    });
+    let halves = DMatrix::from_fn(blocks, 2 * blocks + 1, |b, k| since(0.5 * k as f64, b));
     let products = halves.tr_mul(&(&view.information * &halves));
     let scores = halves.tr_mul(&view.score);
     let place = |at: f64| (2.0 * at).round() as usize;
@@ -462,7 +475,6 @@ mod tests {
             let Course::Pulse { begin, end } = *course else {
                 continue;
             };
-            let since = |at: f64, b: usize| (b as f64 + 1.0 - at).clamp(0.0, 1.0);
             let column = DMatrix::from_fn(blocks, 1, |b, _| since(begin, b) - since(end, b));
             let slowly = quick(&view.information, &view.score, &column);
             assert!((slowly - quickly).abs() < 1e-9, "{course:?} {slowly} {quickly}");

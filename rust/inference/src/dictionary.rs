@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use imufit_model::sensor::CHANNELS;
+use imufit_model::sensor::{AXES, CHANNELS};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -14,11 +14,10 @@ use crate::asked::{Asked, Prior};
 use crate::bins::{self, Covariate};
 use crate::courses;
 use crate::part::Part;
+use crate::problem::Problem;
 use crate::search::Search;
 use crate::stack::{Criterion, Stack};
 
-/// Axes of a sensor.
-const AXES: [&str; 3] = ["x", "y", "z"];
 /// What the covariates are called that hold the quantities that sensors measure, up to the axis.
 const OWN: [&str; 3] = ["f_", "omega_", "m_"];
 
@@ -82,9 +81,7 @@ fn of_sensors(of_bins: &[Unnamed]) -> Vec<Unnamed> {
             asked: first.asked.clone(),
         };
         for other in others {
-            // Rows of different channels have no products.
-            let products = DMatrix::zeros(out.asked.score.len(), other.asked.score.len());
-            out.asked = out.asked.beside(&other.asked, &products);
+            out.asked = out.asked.apart(&other.asked);
             if let (Origin::Bins(parts), Origin::Bins(more)) = (&mut out.origin, &other.origin) {
                 parts.extend(more.iter().cloned());
             }
@@ -100,6 +97,11 @@ fn without_constant(bins: usize) -> DMatrix<f64> {
     contrasts.columns(1, contrasts.ncols() - 1).into_owned()
 }
 
+/// Contrasts over the bins of a covariate, which are the same in every log that has it.
+pub fn contrasts(problem: &Problem, covariate: &Covariate) -> Option<DMatrix<f64>> {
+    (0..problem.parts.len()).find_map(|log| covariate.index[log].map(|k| contrasts_of(&problem.parts[log], k)))
+}
+
 /// Contrasts over the bins of one covariate of a log.
 pub fn contrasts_of(part: &Part, covariate: usize) -> DMatrix<f64> {
     without_constant(part.white.layout.bins.edges[covariate].len() + 1)
@@ -108,10 +110,8 @@ pub fn contrasts_of(part: &Part, covariate: usize) -> DMatrix<f64> {
 /// Contrasts over the bins of a covariate on one channel.
 pub fn bins(criterion: &Criterion, channel: usize, covariate: &Arc<Covariate>) -> Option<Unnamed> {
     let problem = criterion.problem;
-    let edges = |log: usize| covariate.index[log].map(|k| problem.parts[log].white.layout.bins.edges[k].len());
-    let bins = (0..problem.parts.len()).find_map(edges)? + 1;
-    let q = without_constant(bins);
-    let m = q.ncols();
+    let q = contrasts(problem, covariate)?;
+    let (bins, m) = q.shape();
     let parameters = problem.plausible.len();
     let mut asked = Asked {
         cross: DMatrix::zeros(parameters, m),

@@ -69,15 +69,6 @@ pub fn contrast(layout: &Layout, channel: usize, step: &DVector<f64>) -> DVector
     DVector::from_vec(v)
 }
 
-/// Mean square of the residual of a block in the channel where it is largest.
-pub fn largest_square(evidence: &Evidence, block: usize, weights: &[f64; CHANNELS]) -> f64 {
-    let of_channel = |channel: usize| {
-        let square = evidence.mean_square(block, channel)?;
-        (weights[channel] > 0.0).then(|| weights[channel] * square)
-    };
-    (0..CHANNELS).filter_map(of_channel).fold(0.0, f64::max)
-}
-
 /// Number of parameters that a channel can tell apart. The rests of a log are too few for most of what they are asked; rows that
 /// are many count every parameter.
 fn freedom(evidence: &Evidence, channel: usize) -> usize {

@@ -54,6 +54,11 @@ pub struct Weighed {
     pub testable: bool,
 }
 
+/// Members but one.
+pub fn without(members: &[usize], slot: usize) -> Vec<usize> {
+    members.iter().copied().filter(|m| *m != slot).collect()
+}
+
 /// Log Bayes factor from which on one of so many questions is answered with yes.
 pub fn threshold(questions: usize) -> f64 {
     ODDS + (questions.max(1) as f64).ln()
@@ -208,7 +213,7 @@ impl<'a> Search<'a> {
 
     /// Log Bayes factor of a member beside the others where it may vary from block to block as well; `stack` is that of all members.
     pub fn varying(&self, stack: &Stack, members: &[usize], slot: usize) -> f64 {
-        let others: Vec<usize> = members.iter().copied().filter(|m| *m != slot).collect();
+        let others = without(members, slot);
         self.asked
             .get(&slot)
             .map_or(f64::INFINITY, |asked| self.varying_beside(stack, &others, slot, asked))
@@ -312,7 +317,7 @@ impl<'a> Search<'a> {
     fn exchange(&self, members: &mut [usize]) -> Option<bool> {
         let mut any = false;
         for place in 0..members.len() {
-            let others: Vec<usize> = members.iter().copied().filter(|m| *m != members[place]).collect();
+            let others = without(members, members[place]);
             let best = self.likeliest(&self.stack(&others)?, &others);
             if let Some(best) = best.filter(|w| w.slot != members[place]) {
                 members[place] = best.slot;

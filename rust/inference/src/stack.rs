@@ -112,6 +112,20 @@ struct Point {
     right: DVector<f64>,
 }
 
+impl Point {
+    /// Takes out of equations what the stack explains; `cross` are their products with its columns, in units of prior deviations.
+    fn project(&self, cross: &mut DMatrix<f64>, equations: Beside) -> Beside {
+        let Beside {
+            mut information,
+            mut score,
+        } = equations;
+        self.factor.l_dirty().solve_lower_triangular_mut(cross);
+        information -= cross.tr_mul(cross);
+        score -= cross.tr_mul(&self.right);
+        Beside { information, score }
+    }
+}
+
 /// A stack of effects.
 pub struct Stack<'a> {
     /// What it belongs to.
@@ -312,13 +326,22 @@ impl<'a> Stack<'a> {
         {
             self.take(*c, own, strength, &mut cross, &mut information, &mut score);
         }
+        self.scaled(&mut cross);
+        point.project(&mut cross, Beside { information, score })
+    }
+
+    /// Puts products with the stack's columns in units of their prior deviations.
+    fn scaled(&self, cross: &mut DMatrix<f64>) {
         for mut column in cross.column_iter_mut() {
             column.component_mul_assign(&self.deviation);
         }
-        point.factor.l_dirty().solve_lower_triangular_mut(&mut cross);
-        information -= cross.tr_mul(&cross);
-        score -= cross.tr_mul(&point.right);
-        Beside { information, score }
+    }
+
+    /// The point of the likeliest noise, with its sensor; of sensors with points the first.
+    fn likeliest(&self) -> Option<(usize, &Point)> {
+        let sensor = self.points.iter().position(|p| !p.is_empty())?;
+        let point = self.points[sensor].iter().find(|p| p.strength == self.best[sensor])?;
+        Some((sensor, point))
     }
 
     /// Takes the noise of one channel out of the equations of columns with these sums along its modes.
@@ -446,8 +469,7 @@ impl<'a> Stack<'a> {
 
     /// Equations of columns beside the stack at the likeliest noise.
     pub fn equations(&self, asked: &Asked) -> Option<Beside> {
-        let sensor = self.points.iter().position(|p| !p.is_empty())?;
-        let point = self.points[sensor].iter().find(|p| p.strength == self.best[sensor])?;
+        let (sensor, point) = self.likeliest()?;
         let (others, cross) = self.others(asked, Some(sensor));
         Some(self.beside(asked, sensor, point, &others, &cross))
     }
@@ -458,12 +480,12 @@ impl<'a> Stack<'a> {
             return 0.0;
         };
         let mut cross = asked.cross.select_rows(&self.columns);
-        for mut column in cross.column_iter_mut() {
-            column.component_mul_assign(&self.deviation);
-        }
-        point.factor.l_dirty().solve_lower_triangular_mut(&mut cross);
-        let score = &asked.score - cross.tr_mul(&point.right);
-        let mut information = &asked.information - cross.tr_mul(&cross);
+        self.scaled(&mut cross);
+        let equations = Beside {
+            information: asked.information.clone(),
+            score: asked.score.clone(),
+        };
+        let Beside { mut information, score } = point.project(&mut cross, equations);
         for k in 0..score.len() {
             information[(k, k)] += RIDGE * asked.information[(k, k)].max(f64::MIN_POSITIVE);
         }
@@ -486,8 +508,7 @@ impl<'a> Stack<'a> {
     /// Log Bayes factor of some of the stack's own columns beside the others, at the likeliest noise (Savage-Dickey density ratio,
     /// Dickey 1971): without the rounds that an evidence of its own takes.
     pub fn ratio_of(&self, parameters: &[usize]) -> Option<f64> {
-        let sensor = self.points.iter().position(|p| !p.is_empty())?;
-        let point = self.points[sensor].iter().find(|p| p.strength == self.best[sensor])?;
+        let (_, point) = self.likeliest()?;
         let places: Vec<usize> = parameters
             .iter()
             .filter_map(|j| self.columns.iter().position(|c| c == j))
@@ -527,21 +548,16 @@ impl<'a> Stack<'a> {
     /// What the stack's own parameters are at the likeliest noise, and what they do to other columns: the coefficients by which
     /// each column asked about is projected on the stack (columns x asked).
     pub fn projection(&self, asked: &Asked) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let sensor = self.points.iter().position(|p| !p.is_empty())?;
-        let point = self.points[sensor].iter().find(|p| p.strength == self.best[sensor])?;
+        let (_, point) = self.likeliest()?;
         let (_, mut cross) = self.others(asked, None);
-        for mut column in cross.column_iter_mut() {
-            column.component_mul_assign(&self.deviation);
-        }
+        self.scaled(&mut cross);
         let l = point.factor.l();
         point.factor.l_dirty().solve_lower_triangular_mut(&mut cross);
         let (mut own, mut projected) = (point.right.clone(), cross);
         l.tr_solve_lower_triangular_mut(&mut own);
         l.tr_solve_lower_triangular_mut(&mut projected);
         own.component_mul_assign(&self.deviation);
-        for mut column in projected.column_iter_mut() {
-            column.component_mul_assign(&self.deviation);
-        }
+        self.scaled(&mut projected);
         Some((own, projected))
     }
 

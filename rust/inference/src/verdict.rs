@@ -356,7 +356,7 @@ fn disagreements(search: &Search, members: &[usize], weighed: &[Weighed]) -> Vec
 fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) -> Option<usize> {
     let search = &inquiry.search;
     members.iter().copied().find(|member| {
-        let others: Vec<usize> = members.iter().copied().filter(|m| m != member).collect();
+        let others = search::without(members, *member);
         let Some(without) = search.stack(&others) else {
             return false;
         };
@@ -383,7 +383,7 @@ fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) 
 
 /// Candidates in whose presence the best one is no longer there, or whose columns differ from its by no more than their own noise.
 fn rivals_of(search: &Search, members: &[usize], best: usize, known: &Known) -> Option<Vec<usize>> {
-    let others: Vec<usize> = members.iter().copied().filter(|m| *m != best).collect();
+    let others = search::without(members, best);
     let rest = search.stack(&others)?;
     let weighed = search.weigh_all(&rest, members);
     let own = search.weigh(&rest, best)?;
@@ -473,7 +473,7 @@ fn shown(
                     Plausible::Yes | Plausible::No => Status::NotSignificant,
                 }
             };
-            let others: Vec<usize> = members.iter().copied().filter(|m| *m != w.slot).collect();
+            let others = search::without(members, w.slot);
             let of_others = if there { search.stack(&others) } else { None };
             let beside = of_others.as_ref().or(stack.as_ref());
             // Odds against one of so many that nobody has heard of yet.
@@ -627,18 +627,24 @@ fn by_shape(
     let Some(shape) = ridge.cholesky().map(|factor| factor.solve(&equations.score)) else {
         return Vec::new();
     };
-    let width = m / parts.len();
-    let told = |(k, (channel, covariate)): (usize, &(usize, Arc<Covariate>))| {
-        let own = k * width..(k + 1) * width;
+    let mut first = 0;
+    let told = |(channel, covariate): &(usize, Arc<Covariate>)| {
+        // Axes may differ in their bins.
+        let own = first..first + dictionary::contrasts(stack.criterion.problem, covariate).map_or(0, |q| q.ncols());
+        first = own.end;
         let square: f64 = own.clone().map(|j| shape[j] * equations.score[j]).sum();
         let word = bins::shape_name(&shape.as_slice()[own]).to_string();
         (square, common(*channel, covariate.name.clone(), covariate.log, word))
     };
-    let mut all: Vec<(f64, Finding)> = parts.iter().enumerate().map(told).collect();
+    shown_most(parts.iter().map(told).collect())
+}
+
+/// What shows a cause, by the square that each explains, without what shows hardly any of it; the one that shows most comes first.
+fn shown_most<T>(mut all: Vec<(f64, T)>) -> Vec<T> {
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let most = all[0].0;
+    let most = all.first().map_or(0.0, |(square, _)| *square);
     let shown = all.into_iter().filter(|(square, _)| *square >= SHOWN * most);
-    shown.map(|(_, finding)| finding).collect()
+    shown.map(|(_, what)| what).collect()
 }
 
 /// The channels (by their places among the sums) that show a course, the one that shows it most first.
@@ -655,9 +661,5 @@ fn showing(stack: &Stack, unnamed: &Unnamed, places: &[usize]) -> Vec<usize> {
             .map(|j| equations.score[j].powi(2) / equations.information[(j, j)].max(f64::MIN_POSITIVE))
             .sum()
     };
-    let mut squares: Vec<(usize, f64)> = (0..places.len()).map(|k| (places[k], square(k))).collect();
-    squares.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let most = squares[0].1;
-    let shown = squares.iter().filter(|(_, square)| *square >= SHOWN * most);
-    shown.map(|(place, _)| *place).collect()
+    shown_most((0..places.len()).map(|k| (square(k), places[k])).collect())
 }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use crate::card::Card;
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
-use crate::sensor::Sensor;
+use crate::sensor::{AXES, Sensor};
 use crate::triple::Triple;
 
 /// Columns of a log's own that are asked about; a log with more is asked about the first ones.
@@ -67,8 +67,6 @@ const SMALL: [f64; 5] = [0.005, 0.01, 0.02, 0.04, 0.08];
 const CLEAR: f64 = 5.0;
 /// What is left of products of the motion counts if it is this many times what noise leaves of them.
 const CANCELLED: f64 = 3.0;
-/// Names of the body axes.
-const AXES: [&str; 3] = ["x", "y", "z"];
 /// Stands between a product of two quantities and the axis that it acts on, in the name of a parameter.
 pub const OF: char = ':';
 
