@@ -34,7 +34,7 @@ from typing import Any
 import imufit
 import numpy as np
 from imufit import InputError, Log, SensorModel, _imufit
-from imufit.diagnose.attitude import corrected
+from imufit.compare.attitude import corrected
 from imufit.replay import SETTINGS, convert_frame
 from imufit.replay import replay as run_filters
 from numpy.typing import NDArray

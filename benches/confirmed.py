@@ -1,7 +1,8 @@
 """What the ladder finds on parts of recordings of one sensor, and whether each effect has its size on the other parts.
 
 Imported by `benches/recordings.py`. An effect that was found on one part is fitted to every other part within the whole
-model of the part that shows it best. How much of it the other part has is the ratio r of the two sizes,
+model of the part that shows it best, on another recording with zeros of its own. How much of the effect the other part
+has is the ratio r of the two sizes,
 
     r = sum(w a b) / sum(w a^2),    w = 1 / (s_a^2 + s_b^2),
 
@@ -21,15 +22,16 @@ from imufit.loop import Fit
 from imufit.model.catalogue import each_log_has_its_own
 from imufit.results import Parameter
 
-NOT_CAUSES = ("movement", "ref_exact", "encoder_deg", "still_", "dmp_")
-"""Columns that mark rows, hold the reference again or come from another sensor: none can be the cause of an error."""
+NOT_CAUSES = ("encoder_deg", "still_", "dmp_")
+"""Columns that hold the reference again or come from another sensor: they can't be the cause of an error."""
 SAME = 1.0 / 3.0
 """Sizes may differ by this much ..."""
 CHANCE = 2.0
 """... or by as many standard errors."""
 SEEN = 0.5
 """A part whose ratio has a standard error above this does not see the effect."""
-OF_A_RECORDING = ("bias_drift", "warmup")
+OF_A_RECORDING = ("bias_drift", "warmup", "rig.")
+"""Besides what each log has for itself: a drive is loaded otherwise in each set-up."""
 
 
 @dataclass(frozen=True)
@@ -151,10 +153,20 @@ def fitted(model: SensorModel, there: Fit) -> tuple[Parameter, ...]:
     return Fit(*there.analysis.solved_for(model, there.own, only=())).parameters
 
 
+def of_a_recording(effect: str) -> bool:
+    """Zeros, mounts, tables and drives are one recording's; all else is the sensor's."""
+    return each_log_has_its_own(effect) or any(name in effect for name in OF_A_RECORDING)
+
+
 def comparable(effect: str, here: Part, there: Part) -> bool:
-    """Zeros, mounts and tables are one recording's; all else is the sensor's."""
-    own = each_log_has_its_own(effect) or any(name in effect for name in OF_A_RECORDING)
-    return not own or here.files == there.files
+    return not of_a_recording(effect) or here.files == there.files
+
+
+def with_zeros(model: SensorModel, logs: Sequence[Log]) -> SensorModel:
+    """Return a model with the zeros of its sensors: switching on makes others, whether a ladder saw them or not."""
+    zeros = [f"{sensor}.bias" for sensor in ("acc", "gyr") if all(getattr(log, sensor) is not None for log in logs)]
+    values = {**model.parameters, **{zero: {} for zero in zeros if zero not in model.effects}}
+    return SensorModel(list(values), values, constants=model.constants)
 
 
 class Climber:
@@ -184,7 +196,9 @@ class Climber:
 
         def there(best: str, other: str) -> tuple[Parameter, ...]:
             if (best, other) not in fits:
-                fits[best, other] = fitted(ladders[best].fit.model, ladders[other].fit)
+                model, fit = ladders[best].fit.model, ladders[other].fit
+                same = parts[best].files == parts[other].files
+                fits[best, other] = fitted(model if same else with_zeros(model, fit.logs), fit)
             return fits[best, other]
 
         found = []

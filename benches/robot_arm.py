@@ -16,7 +16,7 @@ from typing import Any
 import imufit
 import numpy as np
 from imufit import Log
-from imufit.diagnose.attitude import corrected
+from imufit.compare.attitude import corrected
 from imufit.replay import estimate_mag_reference
 from imufit.replay import replay as run_filters
 from imufit.tune import tune

@@ -141,18 +141,16 @@ def diagnosis(verdict="missing"):
     candidates = tuple(
         Candidate(
             effect,
-            p,
-            1.0 - p,
-            -math.log(p),
-            after,
+            status,
             1.52,
             after,
+            "Acceleration bends the sensing structure." if status == "passed" else "",
+            1.0 - p,
+            -math.log(p),
             gain,
             0.02,
             parameters,
             rivals,
-            "Acceleration bends the sensing structure." if status == "passed" else "",
-            status,
             {item.name: (5e-6, item.unit) for item in parameters} or {"x": (1e-4, "rad/s")},
         )
         for effect, p, after, gain, parameters, rivals, status in rows

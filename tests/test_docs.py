@@ -64,14 +64,14 @@ def test_index_links_every_page():
         ("rust/inference/src/verdict.rs", "NAMED_SHARE", "named effects have at least {:.0%} of the evidence"),
         ("rust/inference/src/verdict.rs", "NOISE", "no more than {} that is the same"),
         ("rust/inference/src/stack.rs", "ATTENUATION", "too small by {} times the noise's part"),
-        ("rust/inference/src/saturated.rs", "COMMON", "as much as {} samples of the whole"),
+        ("rust/fit/src/saturated.rs", "COMMON", "as much as {} samples of the whole"),
         ("rust/inference/src/held_out.rs", "FOLDS", "over {} folds"),
         ("rust/inference/src/bins.rs", "CONTRASTS", "up to degree {},"),
         ("rust/fit/src/bins.rs", "BINS", "up to {} bins"),
         ("rust/fit/src/whitening.rs", "MAX_ORDER", "filter of at most {} taps"),
         ("rust/model/src/bandwidth.rs", "TOLERANCE", "{}\\,\\sigma_{{\\text{{ref}}}}"),
         ("python/imufit/fit/passes.py", "BLOCKS", "B = {} blocks"),
-        ("python/imufit/diagnose/revise.py", "MATTERS", "at least {:.1%} off the held-out error"),
+        ("python/imufit/diagnose/curved.py", "MATTERS", "at least {:.1%} off the held-out error"),
     ],
 )
 def test_method_states_the_constants_of_the_code(file, constant, words):

@@ -16,6 +16,7 @@ PARTS = (
     "replay",
     "model",
     "fit",
+    "compare",
     "diagnose",
     "results",
     "report",

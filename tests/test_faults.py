@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import imufit
 import numpy as np
+import pandas as pd
 import pytest
 from imufit import Diagnosis, Log, SensorModel
 from imufit.cli.app import main
-from imufit.faults import axes, row_faults
+from imufit.faults import row_faults
+from imufit.faults.frames import PERMUTATIONS
+from imufit.results import fault_words
 from imufit.simulate import FAULTS, simulate, with_fault
 from scipy.spatial.transform import Rotation
 
@@ -78,15 +81,15 @@ def test_an_angle_in_degrees_is_told_from_a_gyroscope_in_another_unit() -> None:
 
 def test_signed_permutations_are_undone_by_their_mapping() -> None:
     y = np.array([1.0, 2.0, 3.0])
-    for matrix in axes.PERMUTATIONS[1:]:
+    for matrix in PERMUTATIONS[1:]:
         shown = dict(zip(("gyr_x", "gyr_y", "gyr_z"), matrix @ y, strict=True))
         undone = dict(shown)
-        for part in axes.mapping("gyr", matrix).split(","):
+        for part in fault_words.mapping("gyr", matrix).split(","):
             target, source = part.split("=")
             undone[target] = shown[source.lstrip("-")] * (-1.0 if source.startswith("-") else 1.0)
         np.testing.assert_allclose(list(undone.values()), y)
-    assert np.array_equal(axes.PERMUTATIONS[0], np.eye(3))
-    assert len(axes.PERMUTATIONS) == 48
+    assert np.array_equal(PERMUTATIONS[0], np.eye(3))
+    assert len(PERMUTATIONS) == 48
 
 
 def test_the_command_line_names_the_fault(tmp_path, capsys) -> None:
@@ -287,3 +290,20 @@ def test_a_knock_in_one_of_several_logs_is_named_with_its_log() -> None:
     assert [(each.fault, each.file, each.spoils) for each in found.data_faults] == [("knock", "log 2", True)]
     assert found.verdict == "unknown"
     assert [each.verdict for each in found.without] == ["adequate"]
+
+
+def test_a_reference_in_packets_is_spread_and_named() -> None:
+    log = simulate("handheld", {}, seed=3, duration=40.0).to_log()
+    table = log.to_dataframe()
+    reference = [name for name in table.columns if name.startswith("ref_")]
+    poses = table[["t", *reference]].copy()
+    packet = np.arange(len(poses)) // 6
+    arrival = poses.groupby(packet)["t"].transform("mean")
+    # The middle of six lies between two readings.
+    poses["t"] = arrival + 1.5e-5 * (np.arange(len(poses)) % 6 - 2.5)
+    both = pd.concat([table.drop(columns=reference), poses]).sort_values("t", ignore_index=True)
+    found = diagnosed(Log.from_dataframe(both, log.metadata))
+    (fault,) = found.data_faults
+    assert (fault.fault, fault.sensor, fault.spoils) == ("packets", "ref", False)
+    assert "packets of 6" in fault.evidence
+    assert found.verdict == "adequate"

@@ -64,11 +64,13 @@ def test_bias_and_gyro_bias_are_named(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_scale_is_named_with_what_six_poses_cannot_tell_from_it(seed):
+def test_scale_is_named_and_no_cubic_which_goes_through_any_three_readings(seed):
     # On its side an axis reads +-g or nothing: the cube of that is a scale, too.
     diagnosis = SensorModel().fit(six_poses(seed, scale=SCALE)).diagnose()
-    assert diagnosis.verdict == "ambiguous"
-    assert named(diagnosis) == {"acc.scale", "acc.cubic"}
+    assert diagnosis.verdict == "missing"
+    assert named(diagnosis) == {"acc.scale"}
+    with pytest.raises(InputError, match="4 are needed"):
+        SensorModel(["acc.cubic"]).fit(six_poses(seed, scale=SCALE))
 
 
 @pytest.mark.parametrize("seed", range(4))

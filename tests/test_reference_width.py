@@ -1,5 +1,7 @@
 """How far a reference is smoothed: by its own noise and motion, whatever the noise of the sensor."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from imufit import Log, SensorModel
@@ -34,3 +36,23 @@ def test_a_noisy_accelerometer_does_not_smooth_the_motion_away(noise):
     assert all(channel.rms == pytest.approx(noise, rel=0.05) for channel in residual)
     answer = fit.diagnose()
     assert (answer.verdict, answer.best) == ("adequate", None)
+
+
+def test_a_reference_in_rows_of_its_own_is_smoothed_as_one_beside_the_readings():
+    rng = np.random.default_rng(3)
+    log = bouncing(0.05, 2)
+    # Noise that goes on over three samples is not white: no two widths agree, and the sensor is asked.
+    jitter = np.apply_along_axis(np.convolve, 0, rng.normal(size=(log.n, 3)), np.ones(3) / 3.0, mode="same")
+    shaken = replace(log, ref_p=log.ref_p + 5e-4 * jitter)
+    reading = (np.arange(log.n) % 2 == 0)[:, None]
+    apart = replace(
+        shaken,
+        acc=np.where(reading, shaken.acc, np.nan),
+        ref_q=np.where(reading, np.nan, shaken.ref_q),
+        ref_p=np.where(reading, np.nan, shaken.ref_p),
+    )
+    together, own_rows = (
+        np.array([channel.rms for channel in SensorModel().fit(each).compare().channels]) for each in (shaken, apart)
+    )
+    # Half as many samples of the reference; where the sensor was not asked it was seven times as much.
+    assert np.all(own_rows < 2.0 * together)

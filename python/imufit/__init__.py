@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from imufit import allan as allan
     from imufit import calibrate as calibrate
+    from imufit import compare as compare
     from imufit import device as device
     from imufit import diagnose as diagnose
     from imufit import emulate as emulate
@@ -40,6 +41,7 @@ else:
     _MODULES = (
         "allan",
         "calibrate",
+        "compare",
         "device",
         "diagnose",
         "emulate",

@@ -6,8 +6,8 @@ stack fitted; both keep the class that they were given.
 
 from __future__ import annotations
 
+from imufit.compare import compare, compare_model
 from imufit.diagnose.add import add
-from imufit.diagnose.compare import compare, compare_model
 from imufit.diagnose.diagnose import diagnose
 from imufit.diagnose.ladder import ladder as ladder_from
 from imufit.fit.apply import apply

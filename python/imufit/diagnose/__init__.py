@@ -1,8 +1,7 @@
-"""The loop: where the model fails, which effect is missing, what adding it brings."""
+"""The loop: which effect is missing, and what adding it brings."""
 
 from imufit.diagnose.add import add
-from imufit.diagnose.compare import compare
 from imufit.diagnose.diagnose import diagnose
 from imufit.diagnose.ladder import ladder
 
-__all__ = ["add", "compare", "diagnose", "ladder"]
+__all__ = ["add", "diagnose", "ladder"]

@@ -55,43 +55,19 @@ def _named(analysis: Analysis, key: str, steps: Sequence[tuple[float, float]]) -
 
 
 def answers_without(
-    fit: FittedStack, found: Sequence[_imufit.Disagreement], diagnose: Callable[[FittedStack], Diagnosis]
-) -> tuple[Without, ...]:
-    """Ask again without the logs that disagree wildly; of logs that all do, ask each alone.
-
-    Parameters
-    ----------
-    fit : FittedStack
-        To all logs.
-    found : sequence of mapping
-        As for :func:`disagreements`.
-    diagnose : callable
-        Asks the question of a fit.
-    """
-    return _without(fit, {item.log for item in found if item.wild}, diagnose)
-
-
-def answers_without_faulty(
-    fit: FittedStack, files: Collection[str], diagnose: Callable[[FittedStack], Diagnosis]
-) -> tuple[Without, ...]:
-    """Ask again without the logs whose data are at fault; nothing where all are, or where there is only one.
-
-    Parameters
-    ----------
-    fit : FittedStack
-        To all logs.
-    files : collection of str
-        What the logs at fault are called.
-    diagnose : callable
-        Asks the question of a fit.
-    """
-    faulty = {k for k, log in enumerate(fit.logs) if name_of(log, k) in files}
-    return _without(fit, faulty, diagnose) if 0 < len(faulty) < len(fit.logs) else ()
-
-
-def _without(
     fit: FittedStack, spoiling: Collection[int], diagnose: Callable[[FittedStack], Diagnosis]
 ) -> tuple[Without, ...]:
+    """Ask again without the logs that spoil the answer; of logs that all do, ask each alone.
+
+    Parameters
+    ----------
+    fit : FittedStack
+        To all logs.
+    spoiling : collection of int
+        Numbers of the logs.
+    diagnose : callable
+        Asks the question of a fit.
+    """
     everything = range(len(fit.logs))
     rest = [log for log in everything if log not in spoiling]
     names = [name_of(log, k) for k, log in enumerate(fit.logs)]

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit._imufit import Kind, Status, Verdict
-from imufit.diagnose import sentences, without_reference
-from imufit.diagnose.agreement import answers_without, answers_without_faulty, disagreements
+from imufit.compare import judged, noise_budget, notes, unexplained
+from imufit.diagnose.agreement import answers_without, disagreements
 from imufit.diagnose.column_noise import column_noise
-from imufit.diagnose.compare import notes
-from imufit.diagnose.fast_changes import Seen, fast_changes
-from imufit.diagnose.judged import above_stated_noise, judged
-from imufit.diagnose.noise_budget import noise_budget
+from imufit.diagnose.curved import fitted
+from imufit.diagnose.fast_changes import fast_changes
+from imufit.diagnose.seen_in_rows import seen_in_rows
 from imufit.fit.analysis import Analysis, pooled
-from imufit.fit.log_evidence import LogEvidence
-from imufit.fit.passes import CHANNELS
-from imufit.fit.rest_passes import RestPasses
+from imufit.fit.rest_passes import NEEDS_REFERENCE
 from imufit.log.several import name_of
-from imufit.model.catalogue import card_of, each_log_has_its_own
-from imufit.results import Candidate, DataFault, Diagnosis, LogParameters, Parameter, Rival, Unexplained
-from imufit.results.diagnosis import PASSED
+from imufit.model.catalogue import card_of, each_log_has_its_own, effects
+from imufit.results import Candidate, DataFault, Diagnosis, LogParameters, Parameter, Rival, sentences
+from imufit.results.diagnosis import NOT_TESTABLE, PASSED
 
 if TYPE_CHECKING:
     from imufit.fit import FittedStack
@@ -34,8 +31,6 @@ Array = NDArray[np.float64]
 
 MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
-NEAR = 0.8
-"""Share of the best one's log Bayes factor from which on a fit may show that another candidate explains more."""
 BESIDE = 10.0
 """An effect is named beside a fault of the data only if it explains this many times more."""
 POWER = 0.84
@@ -73,47 +68,32 @@ def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
     faults = tuple(replace(fault, spoils=fault.gain * BESIDE > largest) for fault in analysis.faults)
     if any(fault.spoils for fault in faults):
         return _spoilt(fit, faults)
-    by_id = {candidate.effect: candidate for candidate in candidates}
-    cards = {key: card_of(analysis.candidates[key]) for key in by_id}
-    best = None if result.best is None else ids[result.best]
-    rivals = tuple(ids[slot] for slot in result.rivals)
-    word = result.kind.word
-    unexplained = _unexplained(analysis, fit.estimate.step, result.findings)
-    disagrees = disagreements(analysis, result.disagreements)
-    without = answers_without(fit, result.disagreements, diagnose) if result.spoilt else ()
-    doubtful = next((candidate for candidate in candidates if candidate.status in sentences.DOUBTS), None)
-    sentence = sentences.verdict(
-        word, by_id[best] if best else None, cards[best] if best else None, rivals, unexplained, doubtful
-    )
-    unshown = without_reference.untold(fit)
-    if result.kind == Kind.ADEQUATE and "rests" in without_reference.evidence_of(analysis):
-        sentence = without_reference.adequate(fit.ratio, [candidate.effect for candidate in unshown])
-    elif result.kind == Kind.ADEQUATE and fit.ratio > sentences.OFF_FLOOR:
-        sentence = sentences.above_floor(fit.ratio)
-    sentence = sentences.with_disagreements(sentence, disagrees, spoilt=result.spoilt)
-    sensors = judged(analysis)
-    sentence = sentences.with_judged(sentence, sensors, adequate=result.kind == Kind.ADEQUATE)
-    experiment = None
-    if result.kind == Kind.AMBIGUOUS and best is not None:
-        experiment = sentences.experiment(cards[best], [cards[rival] for rival in rivals])
-    return Diagnosis(
-        verdict=word,
-        best=best if result.kind in (Kind.MISSING, Kind.AMBIGUOUS) else None,
-        ambiguous_with=rivals if result.kind == Kind.AMBIGUOUS else (),
+    best = next((c for c in candidates if result.best is not None and c.effect == ids[result.best]), None)
+    named = best.effect if best is not None and result.kind in (Kind.MISSING, Kind.AMBIGUOUS) else None
+    rivals = tuple(ids[slot] for slot in result.rivals) if result.kind == Kind.AMBIGUOUS else ()
+    cards = [card_of(analysis.candidates[key]) for key in (named, *rivals) if key is not None]
+    unshown = _needing_reference(fit)
+    wild = {item.log for item in result.disagreements if item.wild}
+    found = Diagnosis(
+        verdict=result.kind.word,
+        best=named,
+        ambiguous_with=rivals,
         candidates=(*candidates, *unshown),
-        unexplained=unexplained,
+        unexplained=unexplained(analysis, fit.estimate.step, result.findings),
         model=analysis.model.effects,
-        experiment=experiment,
-        sentence=sentence,
+        experiment=sentences.experiment(cards) if result.kind == Kind.AMBIGUOUS else None,
+        sentence="",
         notes=_notes(analysis),
         logs=fit.by_log,
-        disagrees=disagrees,
-        without=without,
+        disagrees=disagreements(analysis, result.disagreements),
+        without=answers_without(fit, wild, diagnose) if result.spoilt else (),
         data_faults=faults,
-        evidence=without_reference.evidence_of(analysis),
-        judged=sensors,
+        evidence=analysis.judged_by,
+        judged=judged(analysis),
         noise=noise_budget(analysis),
     )
+    words = sentences.answer(found, best, ratio=fit.ratio, untold=len(unshown), spoilt=result.spoilt)
+    return replace(found, sentence=words)
 
 
 def _decided(fit: FittedStack, excluded: Sequence[str]) -> Verdict:
@@ -123,61 +103,20 @@ def _decided(fit: FittedStack, excluded: Sequence[str]) -> Verdict:
     asked = analysis.fitted_slots, slots, analysis.probe_slots
     noise = column_noise(analysis)
     result = analysis.problem.diagnose(*asked, column_noise=noise)
-    fitted = _fitted_alone(fit, result)
-    seen = _above_stated(analysis)
+    fits = fitted(fit, result)
+    seen = seen_in_rows(analysis)
     if result.best is None:
         seen += fast_changes(analysis, fit.estimate.step)
-    if fitted or seen:
-        result = analysis.problem.diagnose(*asked, fitted=fitted, column_noise=noise, seen=seen)
+    if fits or seen:
+        result = analysis.problem.diagnose(*asked, fitted=fits, column_noise=noise, seen=seen)
     return result
-
-
-def _above_stated(analysis: Analysis) -> list[Seen]:
-    """Name the channels that stand far above their stated noise, whatever that goes with."""
-    several = len(analysis.logs) > 1
-    return [
-        (log if several else None, index, 0.5 * ratio**2, f"it stands at {ratio:.1f} times its stated noise")
-        for log, evidence in enumerate(analysis.logs)
-        if not isinstance(evidence.passes, RestPasses)
-        for index, ratio in above_stated_noise(evidence).items()
-    ]
-
-
-def _fitted_alone(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
-    """Log evidences of the best candidate and others like it, each from a fit of its own, by slot.
-
-    Columns taken at one point say little of a delay as long as a turn takes, or of play in a drive; a late sensor and
-    a sluggish one have the same column. What the columns set apart by far needs no fit, unless they depend on a search.
-    """
-    analysis = fit.analysis
-    ids = analysis.slots
-    best = result.best
-    if best is None or not analysis.candidates[ids[best]].strongly_curved:
-        return []
-    items = {item.slot: item for item in result.candidates}
-    alike = {second for _, second, correlation in result.correlations if correlation >= MIN_CORRELATION}
-    near = {slot for slot in alike if items[slot].ln_bayes >= NEAR * items[best].ln_bayes}
-    close = [
-        slot
-        for slot, item in items.items()
-        if item.status != Status.NOT_TESTABLE
-        and analysis.candidates[ids[slot]].strongly_curved
-        and (slot == best or slot in result.rivals or slot in near or ids[slot] in analysis.found)
-    ]
-    if len(close) < 2:
-        return []
-    return [(slot, _evidence_of(fit, ids[slot])) for slot in close]
-
-
-def _evidence_of(fit: FittedStack, effect: str) -> float:
-    """Return the log evidence of the model with one more effect, around its best parameters."""
-    analysis, _ = fit.analysis.solved_for(fit.model.with_effect(effect), fit.own, only=())
-    return analysis.problem.ln_evidence(analysis.fitted_slots)
 
 
 def _spoilt(fit: FittedStack, faults: tuple[DataFault, ...]) -> Diagnosis:
     """Name the faults of the data that explain what is missing, and no effect."""
     spoiling = [fault for fault in faults if fault.spoils]
+    files = {fault.file for fault in spoiling}
+    faulty = {k for k, log in enumerate(fit.logs) if name_of(log, k) in files}
     return Diagnosis(
         verdict="unknown",
         best=None,
@@ -189,9 +128,9 @@ def _spoilt(fit: FittedStack, faults: tuple[DataFault, ...]) -> Diagnosis:
         sentence=sentences.spoilt(spoiling),
         notes=_notes(fit.analysis),
         logs=fit.by_log,
-        without=answers_without_faulty(fit, {fault.file for fault in spoiling if fault.file is not None}, diagnose),
+        without=answers_without(fit, faulty, diagnose) if 0 < len(faulty) < len(fit.logs) else (),
         data_faults=faults,
-        evidence=without_reference.evidence_of(fit.analysis),
+        evidence=fit.analysis.judged_by,
     )
 
 
@@ -218,18 +157,15 @@ def _candidate(item: _imufit.Candidate, effect: _imufit.Effect, rivals: list[Riv
     }
     candidate = Candidate(
         effect=effect.id,
-        p_value=float(np.exp(-max(item.ln_bayes, 0.0))),
+        status=item.status.words,
         probability=item.probability,
         ln_bayes=item.ln_bayes,
-        expected_ratio=item.held_out_after,
         held_out_before=item.held_out_before,
         held_out_after=item.held_out_after,
         gain=item.gain,
         gain_error=item.gain_error,
         parameters=parameters,
         confounded_with=tuple(sorted(rivals, key=lambda rival: -rival.correlation)),
-        explanation="",
-        status=item.status.words,
         minimal_detectable=detectable,
         logs=_own_parameters(analysis, effect.id, [named(at[:, 0], at[:, 1]) for at in by_log]),
     )
@@ -248,54 +184,22 @@ def _own_parameters(
     )
 
 
-def _unexplained(analysis: Analysis, step: Any, found: Sequence[_imufit.Finding]) -> tuple[Unexplained, ...]:
-    """Dependences that nothing in the catalogue explains, with their share of the excess and where in time it lies."""
-    if not found:
-        return ()
-    residuals = [analysis.problem.residual(step, log) for log in range(len(analysis.logs))]
-    return tuple(_dependence(analysis, residuals, item) for item in found)
-
-
-def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item: _imufit.Finding) -> Unexplained:
-    """Say what one dependence is worth in the log where it is worth most."""
-
-    def share(log: int) -> float:
-        panels = residuals[log]["panels"]
-        same = (p["share"] for p in panels if (p["channel"], p["covariate"]) == (item.channel, item.covariate))
-        return max(float(next(same, 0.0)), _share(analysis.logs[log], residuals[log], item))
-
-    concerned = range(len(residuals)) if item.log is None else [item.log]
-    having = [log for log in concerned if any(c["channel"] == item.channel for c in residuals[log]["channels"])]
-    log = max(having, key=share)
-    facts = analysis.logs[log].facts
-    first, last = next(c["stretch"] for c in residuals[log]["channels"] if c["channel"] == item.channel)
-    spans = analysis.logs[log].passes.spans(facts)[first:last]
-    begin, end = float(spans[:, 0].min()), float(spans[:, 1].max())
-    return Unexplained(item.channel, item.covariate, share(log), item.shape, begin, end)
-
-
-def _share(evidence: LogEvidence, residual: Mapping[str, Any], item: _imufit.Finding) -> float:
-    """Return what a dependence explains of the excess of its channels in a log."""
-    excess = {
-        each["index"]: each["n"] * (each["rms"] ** 2 - evidence.floors[each["index"]] ** 2)
-        for each in residual["channels"]
-        if each["index"] in item.channels and evidence.floors[each["index"]] > 0.0
-    }
-    if item.channel not in CHANNELS or not excess:
-        return 0.0
-    # The drop is one of the whitened residual; what changes slowly passes whitening with its gain at zero frequency.
-    k = CHANNELS.index(item.channel)
-    drop = item.drop * evidence.variance[k] / max(evidence.slow_gain(k), 1e-9)
-    total = sum(excess.values())
-    return float(np.clip(drop / total, 0.0, 1.0)) if total > 0.0 else 0.0
+def _needing_reference(fit: FittedStack) -> tuple[Candidate, ...]:
+    """Return the effects that only a reference would show, as candidates that cannot be tested."""
+    analysis = fit.analysis
+    refused = [each.surveyed.refused for each in analysis.logs]
+    lacking = [
+        key
+        for key in effects()
+        if key not in analysis.slots and any(reasons.get(key) == NEEDS_REFERENCE for reasons in refused)
+    ]
+    ratio, explained = fit.ratio, sentences.unshown
+    return tuple(Candidate(key, NOT_TESTABLE, ratio, ratio, explained(key, NEEDS_REFERENCE)) for key in lacking)
 
 
 def _notes(analysis: Analysis) -> tuple[str, ...]:
     """Return what the reader should know of the logs; of several each note tells which of them it is about."""
-    found = [
-        (each.surveyed.log, without_reference.notes(each) if isinstance(each.passes, RestPasses) else notes(each))
-        for each in analysis.logs
-    ]
-    if len(found) == 1:
-        return found[0][1]
-    return tuple(f"{name_of(log, k)}: {note}" for k, (log, own) in enumerate(found) for note in own)
+    if len(analysis.logs) == 1:
+        return notes(analysis.logs[0])
+    named = ((name_of(each.surveyed.log, k), each) for k, each in enumerate(analysis.logs))
+    return tuple(f"{name}: {note}" for name, each in named for note in notes(each))

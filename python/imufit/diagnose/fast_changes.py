@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.diagnose.hops import hops
-from imufit.diagnose.tones import strongest
+from imufit.diagnose.tones import moving, strongest
 from imufit.fit.analysis import Analysis
 from imufit.fit.log_evidence import LogEvidence
 from imufit.fit.rest_passes import RestPasses
@@ -56,11 +56,17 @@ def _changes(evidence: LogEvidence, step: Array) -> list[tuple[int, float, str]]
     channels = {index: residual for index, residual in enumerate(residuals) if residual is not None}
     for index, residual in channels.items():
         square, p_value, shape, least = 0.0, 1.0, "", LEAST
-        tone, hopping = strongest(t, residual), hops(t, residual)
+        step_of_sensor = evidence.facts.sensor_dt[index // 3]
+        tone, sweep, hopping = strongest(t, residual), moving(t, residual), hops(t, residual)
         if tone is not None:
             frequency, square, p_value = tone
             shape = f"a line at {frequency:.3g} Hz"
-            least = LEAST if frequency * evidence.facts.sensor_dt[index // 3] < FASTEST else MOST_OF_IT
+            least = LEAST if frequency * step_of_sensor < FASTEST else MOST_OF_IT
+        # A steady line is one in each stretch, too.
+        if sweep is not None and sweep[1] > 2.0 * square:
+            (first, last), square, p_value = sweep
+            shape = f"a line that moves from {first:.3g} to {last:.3g} Hz"
+            least = LEAST if max(first, last) * step_of_sensor < FASTEST else MOST_OF_IT
         if hopping is not None:
             square, p_value, least = hopping.size**2 * hopping.upper * (1.0 - hopping.upper), 2.0**-hopping.count, LEAST
             shape = (

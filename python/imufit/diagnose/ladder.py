@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from imufit.compare import attitude_comparison, comparison
 from imufit.diagnose.add import add
-from imufit.diagnose.attitude import attitude_comparison
-from imufit.diagnose.compare import comparison
+from imufit.diagnose.curved import matters
 from imufit.diagnose.diagnose import diagnose
-from imufit.diagnose.revise import Swap, matters, revise
-from imufit.diagnose.without_reference import evidence_of
+from imufit.diagnose.revise import Swap, revise
 from imufit.fit import FittedStack
 from imufit.progress import Progress, silent
 from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
@@ -49,7 +48,7 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
         climb = climb.again(revision)
         climb.up()
     fit, diagnosis, worst = climb.fit, climb.diagnosis, start.worst
-    whole = evidence_of(start.analysis) == "reference"
+    whole = start.analysis.judged_by == "reference"
     return Ladder(
         steps=tuple(climb.steps),
         model=fit.model.effects,
@@ -141,19 +140,12 @@ def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] 
     futile : collection of str
         Effects that were tried and did not lower the held-out error.
     """
-    if diagnosis.verdict == "adequate" or diagnosis.without:
+    if diagnosis.verdict in ("adequate", "unknown") or diagnosis.without:
         return None
     if diagnosis.verdict == "ambiguous":
         effect = _beside_the_unsure(fit)
         return None if effect in futile else effect
     passed = [c for c in diagnosis.candidates if c.status == PASSED and c.effect not in futile]
-    if diagnosis.verdict == "unknown":
-        # Beside what nothing explains, only effects that matter are taken up, and no straight line in a column of the
-        # log that acts in another way.
-        bent = {item.covariate for item in diagnosis.unexplained}
-        passed = [
-            c for c in passed if matters(c.held_out_before, c.held_out_after) and c.effect.partition(":")[2] not in bent
-        ]
     return passed[0].effect if passed else None
 
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from imufit.diagnose.curved import likelier, matters
 from imufit.results import Revision
 
 if TYPE_CHECKING:
     from imufit.fit import FittedStack
 
-MATTERS = 0.002
-"""Share of the held-out error that counts: less is no reason to add beside something unknown, to swap, or to keep."""
 Swap = tuple[str | None, str | None]
 """An effect and what takes its place, if anything."""
 
@@ -20,7 +19,8 @@ def revise(fit: FittedStack, added: Sequence[str], tried: set[Swap]) -> Revision
     """Return the first swap or drop that a fit confirms.
 
     The evidence proposes, to first order; the fit of the other stack decides: a swap must lower the held-out error, a
-    drop must not raise it.
+    drop must not raise it. Where columns say little of an effect's full size, the marginal likelihood of the fits
+    proposes and decides.
 
     Parameters
     ----------
@@ -45,15 +45,14 @@ def revise(fit: FittedStack, added: Sequence[str], tried: set[Swap]) -> Revision
         other = fit.moved(model if by is None else model.with_effect(by))
         if matters(fit.ratio, other.ratio) if by else not matters(other.ratio, fit.ratio):
             return Revision(removed, by, fit.ratio, other.ratio)
+    for slot in members:
+        removed = ids[slot]
+        if (removed, removed) in tried:
+            continue
+        tried.add((removed, removed))
+        by = likelier(fit, slot)
+        if by is not None:
+            tried.add((by, by))
+            other = fit.moved(fit.model.without_effect(removed).with_effect(by))
+            return Revision(removed, by, fit.ratio, other.ratio)
     return None
-
-
-def matters(before: float, after: float) -> bool:
-    """Return whether a held-out error falls by enough to count.
-
-    Parameters
-    ----------
-    before, after : float
-        Held-out errors.
-    """
-    return before - after >= MATTERS * before

@@ -1,4 +1,4 @@
-"""A tone in a residual: an oscillation of one frequency, too fast for the means of blocks."""
+"""A tone in a residual, steady or moving: an oscillation too fast for the means of blocks."""
 
 from __future__ import annotations
 
@@ -13,6 +13,56 @@ SLOWEST = 24
 """Periods in the log; the means of blocks show slower swings."""
 AROUND = ((64, 10), (256, 40), (1024, 160))
 """To which line of the spectrum on each side how many lines tell the noise around: few where it still rises steeply."""
+
+STRETCH = 256
+"""Samples of a stretch within which a moving tone counts as steady: at 200 Hz one that crosses the spectrum in a minute
+moves by a line."""
+LOWEST = 6
+"""Lines of a stretch below which its slow course is seen, not a tone."""
+BESIDE = 10
+"""Lines on each side that show the noise around a line of a stretch."""
+RARE = 1e-3
+"""Probability below which noise seldom makes a line as high as the highest of a stretch."""
+
+
+def moving(t: Array, residual: Array) -> tuple[tuple[float, float], float, float] | None:
+    """Find a tone whose frequency changes: a line in most stretches of the residual, each where it pleases.
+
+    Parameters
+    ----------
+    t, residual : ndarray
+        (n,) time stamps, s, and residual; NaN where there is none.
+
+    Returns
+    -------
+    tuple of tuple of float, float and float or None
+        Frequencies of the first and of the last stretch, Hz, mean square, and the p-value of so many lines; None if
+        there are too few samples, or a line stands in less than half of the stretches.
+    """
+    from scipy.ndimage import median_filter  # noqa: PLC0415  only needed here
+    from scipy.stats import binom  # noqa: PLC0415  only needed here
+
+    known = np.isfinite(residual)
+    t, residual = t[known], residual[known]
+    stretches = len(t) // STRETCH
+    if len(t) < FEWEST_ROWS:
+        return None
+    taper = np.hanning(STRETCH)
+    parts = residual[: stretches * STRETCH].reshape(stretches, STRETCH)
+    power = np.abs(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * taper)) ** 2
+    floor = median_filter(power, (1, 2 * BESIDE + 1)) / np.log(2.0)
+    ratio = (power / np.maximum(floor, np.finfo(float).tiny))[:, LOWEST:-2]
+    # A crest of the spectrum that stands in all stretches alike is the colour of the noise.
+    ratio /= np.maximum(np.median(ratio, axis=0) / np.log(2.0), 1.0)
+    line = LOWEST + ratio.argmax(axis=1)
+    seen = ratio.shape[1] * np.exp(-ratio.max(axis=1)) < RARE
+    if 2 * np.count_nonzero(seen) < stretches:
+        return None
+    lobe = line[:, None] + np.arange(-2, 3)
+    above = np.take_along_axis(power - floor, lobe, axis=1).sum(axis=1)
+    square = 2.0 * float(np.mean(above * seen)) / (STRETCH * float(np.sum(taper**2)))
+    frequency = line[seen] / (STRETCH * float(np.median(np.diff(t))))
+    return (frequency[0], frequency[-1]), square, float(binom.sf(np.count_nonzero(seen) - 1, stretches, RARE))
 
 
 def strongest(t: Array, residual: Array) -> tuple[float, float, float] | None:

@@ -7,7 +7,7 @@ right.
 
 from imufit.faults.clipped import ClippedRows
 from imufit.faults.frames import frame_faults
-from imufit.faults.in_time import time_faults
+from imufit.faults.knock import knock_faults
 from imufit.faults.rows import LeftOut, row_faults
 
-__all__ = ["ClippedRows", "LeftOut", "frame_faults", "row_faults", "time_faults"]
+__all__ = ["ClippedRows", "LeftOut", "frame_faults", "knock_faults", "row_faults"]

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from imufit.faults.row_fault import SENSORS, RowFault
+from imufit.faults.row_fault import SENSORS, RowFault, runs
 from imufit.log import Chunk, Log
 
 FASTER: Final = 0.67
@@ -59,14 +59,13 @@ def backlogs(chunk: Chunk) -> list[RowFault]:
         return []
     row = chunk.start - chunk.begin
     # Rows within a fast window, short interruptions included.
-    edges = np.flatnonzero(np.diff(fast.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
     spans: list[list[int]] = []
-    for first, stop in edges:
+    for first, stop in runs(fast)[0 if fast[0] else 1 :: 2].tolist():
         if spans and first - spans[-1][1] < 2 * ROWS:
-            spans[-1][1] = int(stop) + ROWS
+            spans[-1][1] = stop + ROWS
         else:
             # What leads up to the first fast rows of a log is part of the burst.
-            spans.append([0 if row + first < 2 * ROWS else int(first), int(stop) + ROWS])
+            spans.append([0 if row + first < 2 * ROWS else first, stop + ROWS])
     sensors = tuple(name for name in SENSORS if getattr(chunk.log, name) is not None)
     found = []
     for first, stop in spans:
@@ -75,12 +74,10 @@ def backlogs(chunk: Chunk) -> list[RowFault]:
         surplus = (last - first) - span / usual
         gap = float(np.max(np.diff(t[max(0, first - ROWS) : first + ROWS])))
         held_back = row + first < 2 * ROWS or (gap > GAP * usual and gap / usual > 0.5 * surplus)
-        if surplus < SURPLUS or not held_back or first >= chunk.end or last < chunk.begin:
-            continue
-        low, high = max(first, chunk.begin), min(last, chunk.end - 1)
-        moved = float(_moved(chunk.log, low, high))
-        figures = {"rate": (last - first) / span, "usual": 1.0 / usual, "surplus": surplus, "moved": moved}
-        found.append(
-            RowFault("backlog", sensors, "xyz", row + low, row + high + 1, float(t[low]), float(t[high]), figures)
-        )
+        if surplus >= SURPLUS and held_back:
+            moved = float(_moved(chunk.log, max(first, chunk.begin), min(last, chunk.end - 1)))
+            rate = (last - first) / span
+            found += RowFault.within(
+                chunk, (first, last), "backlog", sensors, rate=rate, usual=1.0 / usual, surplus=surplus, moved=moved
+            )
     return found

@@ -6,11 +6,13 @@ from collections.abc import Collection, Mapping
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from imufit.faults.row_fault import UNITS
-from imufit.figures import quantity
 from imufit.replay.clipped import end_of_range
+from imufit.results import fault_words
 from imufit.results.data_fault import DataFault
+
+Array = NDArray[np.float64]
 
 LEAST: Final = 3
 """Rows at the end of a range below which it may be chance."""
@@ -30,9 +32,7 @@ class ClippedRows:
     def __init__(self, ends: Mapping[str, float], certain: Collection[str] = ()) -> None:
         self._ends = dict(ends)
         self._certain = set(certain)
-        self._rows: dict[str, int] = {}
-        self._first: dict[str, float] = {}
-        self._last: dict[str, float] = {}
+        self._times: dict[str, list[Array]] = {}
 
     def add(self, chunk: Mapping[str, Any]) -> None:
         """Take the core rows of a chunk, as the compiled core takes it."""
@@ -47,25 +47,15 @@ class ClippedRows:
                 if found is not None and found >= end * (1.0 - 1e-9):
                     self._certain.add(sensor)
             for axis, name in enumerate("xyz"):
-                rows = np.flatnonzero(at_end[:, axis])
-                if rows.size:
-                    channel = f"{sensor}_{name}"
-                    self._rows[channel] = self._rows.get(channel, 0) + int(rows.size)
-                    self._first.setdefault(channel, float(chunk["t"][core][rows[0]]))
-                    self._last[channel] = float(chunk["t"][core][rows[-1]])
+                self._times.setdefault(f"{sensor}_{name}", []).append(chunk["t"][core][at_end[:, axis]])
 
     def faults(self) -> list[DataFault]:
         """Name the channels that are clipped."""
         found = []
-        for channel, rows in self._rows.items():
-            sensor = channel[:3]
-            if rows < LEAST or sensor not in self._certain:
-                continue
-            end = quantity.quantity(self._ends[sensor], UNITS[sensor])
-            first, last = self._first[channel], self._last[channel]
-            evidence = (
-                f"{channel} stands at the end of its range, {end}, in {rows} rows at {quantity.span(first, last)}."
-            )
-            remedy = f"Set a larger range, or move less; {sensor}.saturation models the loss."
-            found.append(DataFault("clipped", sensor, channel, first, last, rows, evidence, remedy))
+        for channel, parts in self._times.items():
+            sensor, times = channel[:3], np.concatenate(parts)
+            if times.size >= LEAST and sensor in self._certain:
+                span = float(times[0]), float(times[-1])
+                words = fault_words.clipped(channel, self._ends[sensor], times.size, span)
+                found.append(DataFault("clipped", sensor, channel, *span, times.size, *words))
         return found

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.faults.row_fault import SENSORS, RowFault
+from imufit.faults.row_fault import SENSORS, RowFault, runs
 from imufit.log import Chunk
 
 Array = NDArray[np.float64]
@@ -35,7 +35,6 @@ def duplicates(chunk: Chunk) -> list[RowFault]:
         Rows with margins: copies are looked for as far back as the margin.
     """
     log = chunk.log
-    row = chunk.start - chunk.begin
     found = []
     for sensor in SENSORS:
         column = getattr(log, sensor)
@@ -44,15 +43,10 @@ def duplicates(chunk: Chunk) -> list[RowFault]:
         rows = np.flatnonzero(np.isfinite(column).all(axis=1))
         for first, stop, lag in _copies(_codes(column[rows])):
             copy, original = rows[first:stop], rows[first - lag : stop - lag]
-            core = copy[(copy >= chunk.begin) & (copy < chunk.end)]
-            if not core.size:
-                continue
             names = tuple(n for n in (*SENSORS, "ref_q") if n == sensor or _same(getattr(log, n), copy, original))
             sensors = tuple(name.removesuffix("_q") for name in names)
-            low, high = int(core[0]), int(core[-1])
-            figures = {"lag": float(log.t[copy[0]] - log.t[original[0]])}
-            times = float(log.t[low]), float(log.t[high])
-            found.append(RowFault("duplicate", sensors, "xyz", row + low, row + high + 1, *times, figures))
+            before = float(log.t[copy[0]] - log.t[original[0]])
+            found += RowFault.within(chunk, (int(copy[0]), int(copy[-1])), "duplicate", sensors, lag=before)
     return found
 
 
@@ -78,29 +72,23 @@ def _codes(values: Array) -> NDArray[np.uint64]:
 def _copies(codes: NDArray[np.uint64]) -> list[tuple[int, int, int]]:
     """First sample of each copy, the sample after its last, and how many samples before the original is."""
     n = codes.size
-    if n < 4 * SAMPLES:
-        return []
-    # Most logs have no two samples alike, and a sort tells that quicker than the order of the samples is found.
-    ordered = np.sort(codes)
-    if np.count_nonzero(ordered[1:] == ordered[:-1]) < SAMPLES:
-        return []
     order = np.argsort(codes, kind="stable")
-    same = ordered[1:] == ordered[:-1]
-    later, earlier = order[1:][same], order[:-1][same]
+    same = np.flatnonzero(codes[order[1:]] == codes[order[:-1]])
+    if same.size < SAMPLES:
+        return []
     lag = np.zeros(n, np.intp)
-    lag[later] = later - earlier
-    edges = np.flatnonzero(np.concatenate(([True], lag[1:] != lag[:-1], [True])))
-    spans = np.column_stack([edges[:-1], edges[1:]])[lag[edges[:-1]] > 0]
+    lag[order[same + 1]] = order[same + 1] - order[same]
+    _, kind, count = np.unique(codes, return_inverse=True, return_counts=True)
+    spans = runs(lag)
+    spans = spans[lag[spans[:, 0]] > 0]
     lengths = spans[:, 1] - spans[:, 0]
     by_chance = int(np.sort(lengths)[-1 - _TRUE]) if lengths.size > _TRUE else 1
     found = []
     for first, stop in spans[lengths >= max(SAMPLES, LONGER * by_chance)]:
-        kinds, inverse = np.unique(codes[first:stop], return_inverse=True)
-        if kinds.size < SAMPLES:
-            continue
-        counts = np.searchsorted(ordered, kinds, "right") - np.searchsorted(ordered, kinds, "left")
+        kinds = kind[first:stop]
         # Without the pair itself.
-        share = (counts[inverse] - 1.5) / n
-        if np.sum(np.log10(share)) + 2.0 * np.log10(n) < np.log10(CHANCE):
+        share = (count[kinds] - 1.5) / n
+        chance = np.sum(np.log10(share)) + 2.0 * np.log10(n)
+        if np.unique(kinds).size >= SAMPLES and chance < np.log10(CHANCE):
             found.append((int(first), int(stop), int(lag[first])))
     return found

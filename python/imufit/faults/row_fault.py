@@ -4,10 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.log import Chunk
 
 SENSORS: Final = ("acc", "gyr", "mag")
-UNITS: Final = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
+
+
+def runs(values: NDArray[Any]) -> NDArray[np.intp]:
+    """Return the stretches of equal values, (k, 2): the first of each, and the one after its last.
+
+    Parameters
+    ----------
+    values : ndarray
+        (n,) of any type.
+    """
+    edges = np.flatnonzero(np.concatenate(([True], values[1:] != values[:-1], [True])))
+    return np.column_stack([edges[:-1], edges[1:]])
 
 
 @dataclass(frozen=True)
@@ -39,14 +55,46 @@ class RowFault:
     t_end: float
     figures: dict[str, float]
 
+    @classmethod
+    def within(
+        cls,
+        chunk: Chunk,
+        span: tuple[int, int],
+        fault: str,
+        sensors: tuple[str, ...],
+        axes: str = "xyz",
+        **figures: float,
+    ) -> list[RowFault]:
+        """Return the part of a fault that lies in the core rows of a chunk, if any does.
+
+        Parameters
+        ----------
+        chunk : Chunk
+            Rows with margins.
+        span : tuple of int
+            First and last row in the chunk.
+        fault, sensors, axes, figures
+            As the attributes.
+        """
+        low, high = max(span[0], chunk.begin), min(span[1], chunk.end - 1)
+        offset, t = chunk.start - chunk.begin, chunk.log.t
+        if low > high:
+            return []
+        return [cls(fault, sensors, axes, offset + low, offset + high + 1, float(t[low]), float(t[high]), figures)]
+
     @property
     def rows(self) -> int:
         """Number of rows."""
         return self.stop - self.first
 
+    @property
+    def kind(self) -> tuple[str, ...]:
+        """What stretches that belong together have in common: a block that comes twice does so in several sensors."""
+        return (self.fault,) if self.fault == "duplicate" else (self.fault, *self.sensors, self.axes)
+
 
 def joined(faults: Iterable[RowFault]) -> list[RowFault]:
-    """Join stretches of one kind that meet at the border of two chunks.
+    """Join stretches of one kind that meet, at the border of two chunks or in several sensors.
 
     Parameters
     ----------
@@ -54,16 +102,13 @@ def joined(faults: Iterable[RowFault]) -> list[RowFault]:
         In any order.
     """
     out: list[RowFault] = []
-    for item in sorted(faults, key=lambda f: (f.fault, f.sensors, f.axes, f.first)):
+    for item in sorted(faults, key=lambda f: (f.kind, f.first)):
         last = out[-1] if out else None
-        if (
-            last is not None
-            and (last.fault, last.sensors, last.axes) == (item.fault, item.sensors, item.axes)
-            and item.first <= last.stop
-        ):
-            figures = {key: max(value, last.figures.get(key, value)) for key, value in item.figures.items()}
-            stop, end = (item.stop, item.t_end) if item.stop > last.stop else (last.stop, last.t_end)
-            out[-1] = replace(last, stop=stop, t_end=end, figures=figures)
-        else:
+        if last is None or last.kind != item.kind or item.first > last.stop:
             out.append(item)
+            continue
+        sensors = tuple(name for name in (*SENSORS, "ref") if name in last.sensors + item.sensors)
+        figures = {key: max(value, last.figures[key]) for key, value in item.figures.items()}
+        stop, end = max((item.stop, item.t_end), (last.stop, last.t_end))
+        out[-1] = replace(last, sensors=sensors, stop=stop, t_end=end, figures=figures)
     return sorted(out, key=lambda f: f.first)

@@ -73,6 +73,29 @@ class Samples:
     ideal: dict[str, Array]
     attitude: Array
 
+    def with_force(self, more: Array) -> Samples:
+        """Return the samples with a specific force (3,), reference frame, added to the ideal one.
+
+        Parameters
+        ----------
+        more : ndarray
+            (3,) specific force, m/s^2, reference frame.
+        """
+        force = {name: x + more @ self.attitude for name, x in self.ideal.items() if name == "acc"}
+        return Samples(self.readings, {**self.ideal, **force}, self.attitude)
+
+    def with_own_field(self, matrix: Array) -> Samples:
+        """Return the samples of the magnetometer, its axes put right, with the field that its readings then give.
+
+        Parameters
+        ----------
+        matrix : ndarray
+            (3, 3) signed permutation P: the reading is P times the true vector.
+        """
+        readings = self.readings["mag"] @ matrix
+        field = np.nanmean(np.einsum("nij,nj->ni", self.attitude, readings), axis=0)
+        return Samples({"mag": readings}, {"mag": field @ self.attitude}, self.attitude)
+
 
 def samples(parts: Iterable[Mapping[str, Any]], facts: _imufit.Facts) -> Samples:
     """Return the readings of some windows of a log beside those of an ideal sensor.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
-from imufit.faults.row_fault import SENSORS, RowFault
+from imufit.faults.row_fault import SENSORS, RowFault, runs
 from imufit.log import Chunk, Log
 
 Array = NDArray[np.float64]
@@ -44,53 +44,41 @@ def stuck(chunk: Chunk) -> list[RowFault]:
     found: dict[tuple[str, int, int], dict[int, float]] = {}
     for sensor in SENSORS:
         column = getattr(log, sensor)
-        if column is None:
-            continue
-        rows = np.flatnonzero(np.isfinite(column).all(axis=1))
-        if rows.size < 4 * SAMPLES:
-            continue
-        for axis in range(3):
-            for first, last in _suspicious(column[rows, axis]):
+        rows = np.empty(0, np.intp) if column is None else np.flatnonzero(np.isfinite(column).all(axis=1))
+        for axis in range(3) if rows.size >= 4 * SAMPLES else ():
+            values = column[rows, axis]
+            for first, last in _suspicious(values):
                 low, high = int(rows[first]), int(rows[last])
                 moved = _expected_change(log, sensor, axis, low, high)
-                steps = np.abs(np.diff(column[rows, axis]))
-                steps = steps[steps > 0.0]
-                smallest = float(steps.min() + np.median(steps)) if steps.size else 0.0
-                if moved > max(MOVED[sensor], STEPS * smallest):
+                if moved > MOVED[sensor] and moved > STEPS * _noise_and_step(values):
                     found.setdefault((sensor, low, high), {})[axis] = moved
-    return [_fault(chunk, *key, axes) for key, axes in found.items() if key[1] < chunk.end and key[2] >= chunk.begin]
+    return [
+        part
+        for (sensor, low, high), axes in found.items()
+        for part in RowFault.within(
+            chunk, (low, high), "stuck", (sensor,), "".join("xyz"[axis] for axis in axes), moved=max(axes.values())
+        )
+    ]
 
 
-def _fault(chunk: Chunk, sensor: str, low: int, high: int, axes: dict[int, float]) -> RowFault:
-    low, high = max(low, chunk.begin), min(high, chunk.end - 1)
-    t = chunk.log.t
-    row = chunk.start - chunk.begin
-    named = "".join("xyz"[axis] for axis in sorted(axes))
-    span = row + low, row + high + 1
-    value = getattr(chunk.log, sensor)[low, min(axes)]
-    figures = {"moved": max(axes.values()), "value": float(value)}
-    return RowFault("stuck", (sensor,), named, *span, float(t[low]), float(t[high]), figures)
+def _noise_and_step(values: Array) -> float:
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 0.0]
+    return float(steps.min() + np.median(steps)) if steps.size else 0.0
 
 
 def _suspicious(values: Array) -> list[tuple[int, int]]:
     """First and last sample of repetitions that are much longer than is usual, the longest first."""
-    edges = np.flatnonzero(np.concatenate(([True], values[1:] != values[:-1], [True])))
-    lengths = np.diff(edges)
+    spans = runs(values)
+    lengths = spans[:, 1] - spans[:, 0]
     longest = np.argsort(lengths)[::-1][:_MOST]
     longest = longest[lengths[longest] >= SAMPLES]
-    if not longest.size:
-        return []
     others = np.delete(lengths, longest)
     usual = float(np.quantile(others, 0.99)) if others.size else 1.0
     top, bottom = values.max(), values.min()
-    found = []
-    for k in longest:
-        value = values[edges[k]]
-        # At the end of its range a reading stands still for another reason; a dead channel has no other value.
-        at_end = (value == top) != (value == bottom)
-        if lengths[k] > USUAL * usual and not at_end:
-            found.append((int(edges[k]), int(edges[k + 1]) - 1))
-    return found
+    # At the end of its range a reading stands still for another reason; a dead channel has no other value.
+    at_end = (values[spans[:, 0]] == top) != (values[spans[:, 0]] == bottom)
+    return [(int(spans[k, 0]), int(spans[k, 1]) - 1) for k in longest if lengths[k] > USUAL * usual and not at_end[k]]
 
 
 def _expected_change(log: Log, sensor: str, axis: int, low: int, high: int) -> float:
@@ -99,7 +87,7 @@ def _expected_change(log: Log, sensor: str, axis: int, low: int, high: int) -> f
     rows = low + np.flatnonzero(np.isfinite(log.ref_q[low : high + 1]).all(axis=1))
     if rows.size < SAMPLES or log.t[rows[-1]] - log.t[rows[0]] < 0.5 * (log.t[high] - log.t[low]):
         return 0.0
-    turned = Rotation.from_quat(log.ref_q[rows][:, [1, 2, 3, 0]])
+    turned = Rotation.from_quat(log.ref_q[rows], scalar_first=True)
     if sensor == "gyr":
         width = max(5, rows.size // 6)
         if rows.size < 2 * width:
@@ -122,5 +110,5 @@ def _direction(log: Log, sensor: str) -> Array:
     known = np.isfinite(log.mag).all(axis=1) & np.isfinite(log.ref_q).all(axis=1)
     if not known.any():
         return np.zeros(3)
-    mean: Array = Rotation.from_quat(log.ref_q[known][:, [1, 2, 3, 0]]).apply(log.mag[known]).mean(axis=0)
+    mean: Array = Rotation.from_quat(log.ref_q[known], scalar_first=True).apply(log.mag[known]).mean(axis=0)
     return mean

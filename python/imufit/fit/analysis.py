@@ -156,7 +156,7 @@ class Analysis:
         fitted = [_fitted(each, model, self.unnamed, at) for each, at in zip(surveyed, values, strict=True)]
         kept = {key: self.found[key] for key in model.effects if key in self.found}
         found = kept | search(surveyed, fitted, asked)
-        probes = _probes(surveyed) if with_candidates and not lean and only is None else ()
+        probes = () if lean else _probes(surveyed, noise_only=not with_candidates or only is not None)
         columns = [*asked, *probes]
         evidence = [each.around(at, columns, found, lean=lean) for each, at in zip(self.logs, fitted, strict=True)]
         return replace(
@@ -169,6 +169,23 @@ class Analysis:
             found=found,
             problem=_problem(evidence, model, self.unnamed, columns),
         )
+
+    def ln_likelihood(self, of: Analysis) -> float:
+        """Log of the marginal likelihood of the logs under another stack, with the noise that its own residual has.
+
+        A stack changes the noise, too: what smooths the ideal reading smooths the noise of the reference. Each of the
+        other's candidates may be there or not.
+
+        Parameters
+        ----------
+        of : Analysis
+            The other stack; its rows are counted as those of this one, since a stack may lack some at the ends.
+        """
+        logs = [each.with_own_noise() for each in of.logs]
+        problem = _problem(logs, of.model, of.unnamed, [*of.candidates, *of.probes])
+        size = sum(own.ln_noise(each.counts) for own, each in zip(logs, self.logs, strict=True))
+        square = 0.5 * sum(sum(each.counts) for each in logs)
+        return size + square + problem.ln_evidence(of.fitted_slots, of.candidate_slots)
 
     def of_logs(self, chosen: Sequence[int]) -> Analysis:
         """Return the same evidence of some of the logs alone; effects that none of them can tell of are left out."""
@@ -204,6 +221,12 @@ class Analysis:
     def probe_slots(self) -> list[int]:
         """Slots of the probes."""
         return list(range(len(self.slots) - len(self.probes), len(self.slots)))
+
+    @property
+    def judged_by(self) -> str:
+        """What the logs are judged by: ``reference``, ``rests``, or ``reference and rests``."""
+        kinds = {"rests" if isinstance(each.passes, RestPasses) else "reference" for each in self.logs}
+        return " and ".join(sorted(kinds))
 
     @property
     def faults(self) -> tuple[DataFault, ...]:
@@ -427,8 +450,9 @@ def _fitted(each: SurveyedLog, model: EffectStack, unnamed: Sequence[str], own: 
     return named | {key: own[key] for key in unnamed if key in own}
 
 
-def _probes(logs: Sequence[SurveyedLog]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(key for each in logs for key in each.probes))
+def _probes(logs: Sequence[SurveyedLog], *, noise_only: bool = False) -> tuple[str, ...]:
+    known = {key: effect for each in logs for key, effect in each.probes.items()}
+    return tuple(key for key, effect in known.items() if effect.reference_part or not noise_only)
 
 
 def _problem(

@@ -8,8 +8,10 @@ from typing import Any
 from imufit import _imufit
 from imufit.faults import ClippedRows, frame_faults
 from imufit.faults.samples import windows
+from imufit.faults.wrapped import wrapped_faults
 from imufit.fit.passes import Passes
 from imufit.fit.rest_passes import RestPasses
+from imufit.log import LogSource
 from imufit.results import DataFault
 
 
@@ -36,4 +38,19 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
             yield chunk
 
     parts = windows(counted(), facts)
-    return (*frame_faults(parts, facts, passes.log.metadata), *passes.row_faults, *clipped.faults())
+    faults = frame_faults(parts, facts, passes.log.metadata)
+    faults += wrapped_faults(parts, facts, ends)
+    return (*faults, *passes.row_faults, *clipped.faults(), *_packets(passes.log, facts))
+
+
+def _packets(log: LogSource, facts: _imufit.Facts) -> tuple[DataFault, ...]:
+    """Name stamps of the reference that come in packets; the compiled module has spread them."""
+    size = facts.reference_packet
+    if size == 1:
+        return ()
+    evidence = (
+        f"The samples of the reference come in packets of {size} with nearly the same time: their times are those of "
+        "arrival, not of sampling. They are spread evenly here."
+    )
+    remedy = "Let the reference stamp its samples."
+    return (DataFault("packets", "ref", None, facts.t_start, facts.t_end, log.n, evidence, remedy),)

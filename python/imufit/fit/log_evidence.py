@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.errors import InputError
-from imufit.faults import time_faults
+from imufit.faults import knock_faults
 from imufit.fit.passes import CHANNELS, Passes
 from imufit.fit.profile import Found
 from imufit.fit.rest_passes import RestPasses
@@ -19,6 +20,7 @@ from imufit.model.catalogue import find_effect
 from imufit.results import DataFault
 
 Values = Mapping[str, list[float]]
+Array = NDArray[np.float64]
 
 LEFT_OF_STEP = 0.05
 """Part of a coarse step that no effect explains, at least: readings that stand on one value are not free of noise."""
@@ -104,15 +106,47 @@ class LogEvidence:
         _check_samples(surveyed.log, fitted, raw_variance)
         if not any(fault.spoils for fault in faults):
             effects = [slot for slot in slots if slot not in surveyed.probes]
-            faults = (*faults, *time_faults(raw, raw_variance, _places(surveyed, effects), facts))
-        filters = passes.autocovariance(raw, facts, step).filters()
+            faults = (*faults, *knock_faults(raw, raw_variance, _places(surveyed, effects), facts))
         floors = _floors(surveyed.log, facts, raw_variance)
-        white, variance = raw, raw_variance
-        if any(filters):
-            white = passes.evidence(raw.with_filters(filters), facts, "whitening the evidence")
-            _, variance, loudness = _imufit.saturate(white)
-            variance = _not_below_steps(facts, variance)
-        return cls(surveyed, slots, raw, white, raw_variance, variance, loudness, floors, filters, faults)
+        filters: list[list[float]] = [[] for _ in CHANNELS]
+        plain = cls(surveyed, slots, raw, raw, raw_variance, raw_variance, loudness, floors, filters, faults)
+        return plain._whitened(step)
+
+    def with_own_noise(self) -> LogEvidence:
+        """Return the evidence with the noise of its own residual; that of rests is their scatter."""
+        if isinstance(self.passes, RestPasses):
+            return self
+        step, variance, loudness = _imufit.saturate(self.raw)
+        variance = _not_below_steps(self.facts, variance)
+        return replace(self, raw_variance=variance, variance=variance, loudness=loudness)._whitened(step)
+
+    def _whitened(self, step: Array) -> LogEvidence:
+        """Return evidence that stands in for its whitened form, whitened; `step` leaves only its noise."""
+        passes, facts = self.passes, self.facts
+        filters = passes.autocovariance(self.raw, facts, step).filters()
+        if not any(filters):
+            return replace(self, white=self.raw, filters=filters)
+        white = passes.evidence(self.raw.with_filters(filters), facts, "whitening the evidence")
+        _, variance, loudness = _imufit.saturate(white)
+        variance = _not_below_steps(facts, variance)
+        return replace(self, white=white, variance=variance, loudness=loudness, filters=filters)
+
+    def ln_noise(self, counts: Sequence[int]) -> float:
+        """Log of what the size of the noise makes of the density of so many samples of each channel.
+
+        Parameters
+        ----------
+        counts : sequence of int
+            Samples of each channel.
+        """
+        known = (k for k in range(len(CHANNELS)) if counts[k] and self.variance[k] > 0.0)
+        of = (counts[k] * (np.log(self.variance[k]) + np.mean(np.log(self.loudness[k]))) for k in known)
+        return -0.5 * float(sum(of))
+
+    @property
+    def counts(self) -> list[int]:
+        """Samples of each channel."""
+        return [self.white.count(k) for k in range(len(CHANNELS))]
 
     def around(
         self, fitted: Values, candidates: Sequence[str], found: Mapping[str, Found], *, lean: bool = False

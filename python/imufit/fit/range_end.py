@@ -24,6 +24,11 @@ CHANCE = 1e-6
 """Probability of so many equal readings in a row in a sensor that reads the same twice as often as this one."""
 TALLER = 2.0
 """Readings at the largest value are this many times those at a step below: the tail of a distribution gets thinner."""
+ALIKE = 1e-3
+"""Part of the largest reading within which the ends of several axes, or of both signs, are one: motion does not end
+alike."""
+ENDS = 3
+"""Of the six ends of the axes those that must be one."""
 
 
 @dataclass
@@ -41,6 +46,7 @@ class RangeEnd:
     _same: int = 0
     _pairs: int = 0
     _near: Array = field(default_factory=lambda: np.empty((0, 2)))
+    _ends: Array = field(default_factory=lambda: np.zeros(6))
 
     def add(self, column: Array) -> None:
         """Take the readings of a chunk.
@@ -61,6 +67,8 @@ class RangeEnd:
         # A reading at the end has no digits of its own: steps to and from there tell nothing of the resolution.
         self._step = min(self._step, float(np.quantile(steps, 0.01)) if steps.size else np.inf)
         self.largest = max(self.largest, float(values.max()))
+        ends = np.concatenate([np.fmax.reduce(column, axis=0), np.fmax.reduce(-column, axis=0)])
+        self._ends = np.fmax(self._ends, ends)
         change = np.abs(np.diff(column, axis=0, prepend=column[:1], append=column[-1:]))
         jump = np.fmax(change[:-1], change[1:])
         known = np.isfinite(column)
@@ -71,7 +79,9 @@ class RangeEnd:
         return max(self.largest - BELOW * self._step, 0.98 * self.largest)
 
     def end(self) -> float | None:
-        """Return the value at which readings pile up; None where they do not."""
+        """Return the value at which readings pile up, or at which several axes end; None where they do not."""
+        if np.count_nonzero(self._ends >= (1.0 - ALIKE) * self.largest) >= ENDS:
+            return self.largest
         value, jump = self._near[self._near[:, 0] >= self._reach()].T
         at_end = value >= self.largest * (1.0 - 1e-12)
         count = int(np.count_nonzero(at_end))

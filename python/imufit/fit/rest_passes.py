@@ -109,6 +109,11 @@ class RestPasses(Passes):
         """Return why rests cannot tell of an effect; None if they can."""
         if effect.stage in IN_REFERENCE or not _imufit.rests_tell(effect, facts, self.rests.arrays):
             return NEEDS_REFERENCE
+        if effect.least_levels > self.rests.levels:
+            return (
+                f"the rests hold each axis at {self.rests.levels} different parts of gravity at most, and "
+                f"{effect.least_levels} are needed"
+            )
         return None
 
     def evidence(self, evidence: _imufit.Evidence, facts: _imufit.Facts, label: str) -> _imufit.Evidence:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,8 @@ FIELD_BLOCKS = 20
 CLEAR = 8.0
 """Specific forces of different poses are told apart from this many times their noise on."""
 EDGES = 60
+APART: Final = 0.1
+"""Part of gravity by which two levels of an axis differ; a sensor that is laid up by hand lies within five degrees."""
 _POSE = _imufit.rest_channels().index("acc_pose")
 
 
@@ -57,6 +59,8 @@ class RestReadings:
         Times at which each block begins and ends, s.
     rests, attitudes, turns, labels : int
         How many were found; attitudes differ by more than 8 degrees, labels are those that stand in for a reference.
+    levels : int
+        Different parts of gravity at which one axis was held, at most.
     placement : float
         How far a labelled side is off the vertical, rad; NaN without labels.
     sensors : tuple of str
@@ -78,6 +82,7 @@ class RestReadings:
     spans: Array
     rests: int
     attitudes: int
+    levels: int
     turns: int
     labels: int
     placement: float
@@ -145,6 +150,7 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
         blocks=blocks,
         spans=spans,
         rests=len(poses),
+        levels=_levels(poses),
         attitudes=distinct(np.array([pose.direction for pose in poses])) if poses else 0,
         turns=len(turns),
         labels=len(upright),
@@ -156,6 +162,12 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
         means=_means(stills, arrays["field"]),
         notes=tuple(notes),
     )
+
+
+def _levels(poses: Sequence[Pose]) -> int:
+    """Count the parts of gravity at which one axis was held; the axis that was held at most."""
+    directions = np.sort(np.array([pose.direction for pose in poses]).reshape(-1, 3), axis=0)
+    return int(np.max(1 + np.count_nonzero(np.diff(directions, axis=0) > APART, axis=0))) if len(poses) else 0
 
 
 def _means(stills: dict[str, Any], field: dict[str, Any]) -> list[float]:

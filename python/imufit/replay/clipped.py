@@ -16,7 +16,7 @@ An axis counts as clipped at the largest value of the log, of one sign, where
   after tell that the value went on: one differs by more than `WINDOW` of it, or by `STEPS` steps while the parabola
   through two rows on either side passes `BEYOND` of the value above it; or
 - readings pile up there: at least `PILE` of them, more than within the next `WINDOW` of the value below, most of them
-  peaks of one or two rows that stand out by more than a thousandth. So short blows show.
+  peaks of one or two rows that stand out by more than a thousandth and a step. So short blows show.
 
 Below 1.5 times gravity and 1 rad/s, less than any common range, nothing counts.
 
@@ -99,9 +99,13 @@ def end_of_range(column: Array, least: float) -> float | None:
         values = sign * column[:, axis]
         runs = _runs(values == end)
         long = runs[runs[:, 1] - runs[:, 0] >= ROWS]
-        if len(long) and step is None:
+        piled = _is_many(values, runs, end)
+        if (len(long) or piled) and step is None:
             step = _resolution(column)
-        if _is_pile(values, runs, end) or any(_is_cut(column, axis, span, end, step or 0.0) for span in long):
+        step_here = step or 0.0
+        if (piled and _are_peaks(values, runs, end, step_here)) or any(
+            _is_cut(column, axis, span, end, step_here) for span in long
+        ):
             ends.append(end)
     return min(ends, default=None)
 
@@ -147,12 +151,16 @@ def _goes_beyond(values: Array, start: int, stop: int, step: float) -> bool:
     return bool(jump > max(smallest, WINDOW * end) or (jump > smallest and top - end > max(smallest, BEYOND * end)))
 
 
-def _is_pile(values: Array, runs: NDArray[np.intp], end: float) -> bool:
-    lengths = runs[:, 1] - runs[:, 0]
-    if lengths.sum() < PILE or np.count_nonzero(values > (1.0 - WINDOW) * end) >= 2 * lengths.sum():
-        return False
+def _is_many(values: Array, runs: NDArray[np.intp], end: float) -> bool:
+    count = (runs[:, 1] - runs[:, 0]).sum()
+    return bool(count >= PILE and np.count_nonzero(values > (1.0 - WINDOW) * end) < 2 * count)
+
+
+def _are_peaks(values: Array, runs: NDArray[np.intp], end: float, step: float) -> bool:
     before, after = values[np.maximum(runs[:, 0] - 1, 0)], values[np.minimum(runs[:, 1], len(values) - 1)]
-    peaks = (lengths < ROWS) & (np.maximum(before, after) < (1.0 - 1e-3) * end)
+    # Noise makes a reading flicker between two steps of the resolution.
+    below = min((1.0 - 1e-3) * end, end - 1.5 * step)
+    peaks = (runs[:, 1] - runs[:, 0] < ROWS) & (np.maximum(before, after) < below)
     return bool(2 * np.count_nonzero(peaks) > len(runs))
 
 

@@ -34,6 +34,8 @@ class DataFault:
         What to do about it, in a sentence.
     left_out : bool
         True if the samples concerned were left out of the evidence; what is said of the log rests on the others.
+    false_readings : bool
+        True if the sensor read falsely in these rows, and what is said of the others is not the whole truth about it.
     spoils : bool
         True if nothing can be said of effects before it is put right.
     gain : float
@@ -51,6 +53,7 @@ class DataFault:
     evidence: str
     remedy: str
     left_out: bool = False
+    false_readings: bool = False
     spoils: bool = False
     gain: float = math.nan
     file: str | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
@@ -65,26 +65,22 @@ class Candidate:
     ----------
     effect : str
         Its id.
-    p_value : float
-        Bound on the chance of such evidence without the effect: one over its Bayes factor, at most 1.
+    status : str
+        ``passed``, ``not significant``, ``not testable here``, ``implausible size`` or ``negative delay``.
+    held_out_before, held_out_after : float
+        Held-out residual over noise floor without and with it.
+    explanation : str
+        The physics and the figures in a sentence.
     probability : float
         Probability that the effect is there beside the others that are; rivals share it.
     ln_bayes : float
         Log Bayes factor on top of the model.
-    expected_ratio : float
-        Expected residual over noise floor with the effect.
-    held_out_before, held_out_after : float
-        Held-out residual over noise floor without and with it.
     gain, gain_error : float
         Held-out gain and its standard error, in any common unit.
     parameters : tuple of Parameter
         Predicted parameters.
     confounded_with : tuple of Rival
         Effects that this log hardly tells apart from it.
-    explanation : str
-        The physics and the figures in a sentence.
-    status : str
-        ``passed``, ``not significant``, ``not testable here``, ``implausible size`` or ``negative delay``.
     minimal_detectable : dict
         Smallest detectable (value, unit) by parameter.
     logs : tuple of LogParameters
@@ -92,20 +88,28 @@ class Candidate:
     """
 
     effect: str
-    p_value: float
-    probability: float
-    ln_bayes: float
-    expected_ratio: float
+    status: str
     held_out_before: float
     held_out_after: float
-    gain: float
-    gain_error: float
-    parameters: tuple[Parameter, ...]
-    confounded_with: tuple[Rival, ...]
-    explanation: str
-    status: str
-    minimal_detectable: dict[str, tuple[float, str]]
+    explanation: str = ""
+    probability: float = 0.0
+    ln_bayes: float = 0.0
+    gain: float = 0.0
+    gain_error: float = 0.0
+    parameters: tuple[Parameter, ...] = ()
+    confounded_with: tuple[Rival, ...] = ()
+    minimal_detectable: dict[str, tuple[float, str]] = field(default_factory=dict)
     logs: tuple[LogParameters, ...] = ()
+
+    @property
+    def p_value(self) -> float:
+        """Bound on the chance of such evidence without the effect: one over its Bayes factor, at most 1."""
+        return math.exp(-max(self.ln_bayes, 0.0))
+
+    @property
+    def expected_ratio(self) -> float:
+        """Expected residual over noise floor with the effect."""
+        return self.held_out_after
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one candidate; gain, status and smallest detectable sizes besides."""

@@ -5,10 +5,11 @@ use imufit_model::sensor_model::Evaluation;
 /// Bins per covariate, at most.
 pub const BINS: usize = 12;
 
-/// Rows within this many noise deviations of an edge may fall on either side of it.
+/// Noise deviations around an edge within which rows that may fall on either side of it are counted.
 const NEAR: f64 = 4.0;
-/// Share of the rows that may do so.
-const CROWDED: f64 = 0.04;
+/// Standard errors by which sorting rows into bins by noise, which is in their residuals too, may shift the mean of a bin at most. Of
+/// twelve bins three such edges are as much as one standard error.
+const SHIFT: f64 = 0.3;
 
 /// Covariates that every log has, before the log's own columns.
 const FIXED: [&str; 9] = [
@@ -32,13 +33,15 @@ pub struct Bins {
     pub edges: Vec<Vec<f64>>,
 }
 
-/// Samples of every covariate of a log.
+/// Samples of every covariate of a log; of forces and rates those that the reference gives, as far as it does.
 #[derive(Clone, Debug)]
 pub struct CovariateSamples {
     /// Names of the covariates.
     pub names: Vec<String>,
     /// Samples of each.
     pub values: Vec<Vec<f64>>,
+    /// Rows of the log.
+    pub rows: usize,
     /// Noise of the reference's rates, rad/s.
     pub rate_noise: f64,
     /// Noise of the reference's specific forces, m/s^2.
@@ -67,8 +70,11 @@ impl Bins {
     }
 
     /// Bins of equal count from samples of one log, or of several together: for the covariates of the first of them. Rows sorted
-    /// into bins by their reference's noise would show a dependence that is none: no edge is put where many rows lie within
-    /// that noise.
+    /// into bins by their reference's noise would show a dependence that is none: no edge is put where so many lie within that noise that
+    /// it shows, and counts are equal without those.
+    ///
+    /// With k rows within NEAR deviations s to either side, noise moves k / (2 NEAR) times s from one side of the edge to the other, in all; the
+    /// sum of a bin of m rows scatters by s times the root of m.
     pub fn new(logs: &[&CovariateSamples]) -> Self {
         let Some(first) = logs.first() else {
             return Self {
@@ -78,6 +84,7 @@ impl Bins {
         };
         let most = |noise: fn(&CovariateSamples) -> f64| logs.iter().map(|l| noise(l)).fold(0.0, f64::max);
         let (rate_noise, force_noise) = (most(|l| l.rate_noise), most(|l| l.force_noise));
+        let rows = logs.iter().map(|l| l.rows as f64).sum::<f64>();
         let edges = first
             .names
             .iter()
@@ -96,18 +103,21 @@ impl Bins {
                     _ => 0.0,
                 };
                 sample.sort_unstable_by(f64::total_cmp);
+                let near = |v: f64| {
+                    let reach = NEAR * noise;
+                    sample.partition_point(|o| *o <= v + reach) - sample.partition_point(|o| *o < v - reach)
+                };
+                let most = SHIFT * (rows / BINS as f64).sqrt() * 2.0 * NEAR * sample.len() as f64 / rows;
+                let possible: Vec<f64> = (sample.iter().copied())
+                    .filter(|v| noise == 0.0 || near(*v) as f64 <= most)
+                    .collect();
                 let mut edges: Vec<f64> = Vec::new();
                 for k in 1..BINS {
-                    if sample.len() < 4 * BINS {
+                    if possible.len() < 4 * BINS {
                         break;
                     }
-                    let edge = sample[k * sample.len() / BINS];
+                    let edge = possible[k * possible.len() / BINS];
                     // A covariate that rests on one value gets no bin of width zero.
-                    let near = sample.partition_point(|v| *v <= edge + NEAR * noise)
-                        - sample.partition_point(|v| *v < edge - NEAR * noise);
-                    if noise > 0.0 && near as f64 > CROWDED * sample.len() as f64 {
-                        continue;
-                    }
                     if edge > sample[0] && edges.last().is_none_or(|e| edge > *e) {
                         edges.push(edge);
                     }

@@ -319,12 +319,46 @@ impl Evidence {
         self.blocks.get(&(block, channel))
     }
 
+    /// Evidence of a channel in every block in which it has samples, with the block's number.
+    pub fn of_channel(&self, channel: usize) -> impl Iterator<Item = (usize, &ChannelBlock)> {
+        (0..self.layout.blocks).filter_map(move |b| Some((b, self.get(b, channel)?)))
+    }
+
     /// Number of samples of a channel.
     pub fn count(&self, channel: usize) -> usize {
-        (0..self.layout.blocks)
-            .filter_map(|b| self.get(b, channel))
-            .map(|b| b.n)
-            .sum()
+        self.of_channel(channel).map(|(_, block)| block.n).sum()
+    }
+
+    /// Gram matrix of a channel over all blocks with the number of samples, each block weighted by `weight`; `None` without any.
+    pub fn total(&self, channel: usize, weight: impl Fn(usize) -> f64) -> Option<(DMatrix<f64>, usize)> {
+        self.of_channel(channel).fold(None, |total, (b, block)| {
+            let (mut gram, n) = total.unwrap_or_else(|| (block.gram.map(|_| 0.0), 0));
+            gram.zip_apply(&block.gram, |sum, own| *sum += weight(b) * own);
+            Some((gram, n + block.n))
+        })
+    }
+
+    /// The vector that turns `[columns | residual]` of a channel into the residual after a step of all parameters.
+    pub fn contrast(&self, channel: usize, step: &DVector<f64>) -> DVector<f64> {
+        let active = &self.layout.model.active()[channel];
+        let values = active.iter().map(|p| -step[*p]).chain([1.0]);
+        DVector::from_iterator(active.len() + 1, values)
+    }
+
+    /// Sum of squared residuals and number of samples of a channel after a step, block by block.
+    pub fn squares(&self, channel: usize, step: &DVector<f64>) -> Vec<(f64, usize)> {
+        let v = self.contrast(channel, step);
+        let of = |b: usize| {
+            self.get(b, channel)
+                .map_or((0.0, 0), |block| ((&block.gram * &v).dot(&v).max(0.0), block.n))
+        };
+        (0..self.layout.blocks).map(of).collect()
+    }
+
+    /// The same of all blocks.
+    pub fn square(&self, channel: usize, step: &DVector<f64>) -> (f64, usize) {
+        let add = |(sum, count): (f64, usize), (square, n): (f64, usize)| (sum + square, count + n);
+        self.squares(channel, step).into_iter().fold((0.0, 0), add)
     }
 }
 

@@ -4,13 +4,18 @@
 //! sensor, can be added up.
 
 pub mod bins;
+pub mod block_equations;
+pub mod block_sums;
 pub mod evidence;
 pub mod noise;
 pub mod normal_equations;
+pub mod part;
 pub mod profile;
 pub mod reference_width;
+pub mod residual;
 pub mod rests;
 pub mod rounding;
+pub mod saturated;
 pub mod survey;
 pub mod travel;
 pub mod whitening;

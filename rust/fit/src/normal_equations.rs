@@ -55,6 +55,22 @@ impl NormalEquations {
         self.n += factor * other.n;
     }
 
+    /// Adds one channel's Gram matrix of `[columns | residual]` over `n` samples; `chosen` are pairs of a place here and one there.
+    pub fn add_channel(&mut self, gram: &DMatrix<f64>, n: usize, chosen: &[(usize, usize)], weight: f64) {
+        if !(weight > 0.0 && weight.is_finite()) {
+            return;
+        }
+        let last = gram.ncols() - 1;
+        for (q, j) in chosen {
+            for (p, i) in chosen {
+                self.gram[(*p, *q)] += weight * gram[(*i, *j)];
+            }
+            self.right[*q] += weight * gram[(*j, last)];
+        }
+        self.square += weight * gram[(last, last)];
+        self.n += n as f64;
+    }
+
     /// Equations of the parameters `kept`, then of directions in the parameters `others`: `beta = directions * gamma`.
     #[must_use]
     pub fn reduced(&self, kept: &[usize], others: &[usize], directions: &DMatrix<f64>) -> Self {

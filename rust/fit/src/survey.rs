@@ -1,10 +1,12 @@
 //! First pass over a log: what has to be known of the whole before evidence is taken.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use imufit_model::bandwidth::Bandwidth;
 use imufit_model::facts::{Frame, LogFacts};
 use imufit_model::kinematics_memory::KinematicsMemory;
+use imufit_model::knots::usual_step;
 use imufit_model::rig::Rig;
 use imufit_model::sensor::Sensor;
 use imufit_model::smoothing::Smoothing;
@@ -18,6 +20,8 @@ use crate::reference_width::{self, SampledRow, SampledRows};
 use crate::rounding::SensorSteps;
 use crate::travel::Travel;
 
+/// Fraction of the golden ratio, in units of 2^-64.
+const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 /// Rows looked at more closely, at most.
 const SAMPLES: usize = 8192;
 /// Rows on which the width of the reference polynomial is judged, at most.
@@ -66,22 +70,39 @@ pub struct Survey {
     rounding: [SensorSteps; 3],
 }
 
-/// A sensor's reading at a row and its change from two rows before to two rows after; NaN where not known.
-fn around(window: &Window, sensor: Sensor, row: usize) -> (Vector3<f64>, Vector3<f64>) {
-    let at = |i: usize| match window.reading(sensor) {
-        Some(y) if i < window.len() => Vector3::new(y[3 * i], y[3 * i + 1], y[3 * i + 2]),
-        _ => Vector3::repeat(f64::NAN),
+/// Rows to either side in which two readings of a sensor are looked for where the reference has rows of its own: enough for a reference
+/// that is thirty times as fast.
+const BETWEEN: usize = 64;
+/// Attitudes further apart than so many usual steps have nothing known between them: one that was not seen.
+const GAP: f64 = 2.5;
+
+/// A sensor's reading at a row and its change from two rows before to two rows after, or, where the reference has rows of its own
+/// (`apart`), from two of its readings before to two after; NaN where not known.
+fn around(window: &Window, sensor: Sensor, row: usize, apart: bool) -> (Vector3<f64>, Vector3<f64>) {
+    let unknown = Vector3::repeat(f64::NAN);
+    let Some(y) = window.reading(sensor) else {
+        return (unknown, unknown);
     };
-    if row < 2 {
-        return (at(row), Vector3::repeat(f64::NAN));
-    }
-    (at(row), at(row + 2) - at(row - 2))
+    let at = |i: usize| Vector3::new(y[3 * i], y[3 * i + 1], y[3 * i + 2]);
+    let known = |i: &usize| !apart || at(*i).iter().all(|x| x.is_finite());
+    let before = (row.saturating_sub(BETWEEN)..row).rev().filter(known).nth(1);
+    let after = (row + 1..window.len().min(row + 1 + BETWEEN)).filter(known).nth(1);
+    let change = before
+        .zip(after)
+        .map_or(unknown, |(before, after)| at(after) - at(before));
+    (at(row), change)
+}
+
+/// The attitude that stands in a row.
+fn attitude_at(window: &Window, row: usize) -> Option<UnitQuaternion<f64>> {
+    let q = window.attitude.map(|q| &q[4 * row..4 * row + 4])?;
+    Some(UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3])))
 }
 
 /// Rows of a window in which the attitude is known: sensors and reference may stand in rows of their own.
 struct Attitudes {
     rows: Vec<usize>,
-    /// Median time between them, s.
+    /// Usual time between them, s.
     spacing: f64,
 }
 
@@ -92,14 +113,27 @@ impl Attitudes {
             window.attitude.is_some_and(of_row)
         };
         let rows: Vec<usize> = (0..window.len()).filter(known).collect();
-        let mut steps: Vec<f64> = rows
-            .windows(2)
-            .map(|pair| window.t[pair[1]] - window.t[pair[0]])
-            .collect();
+        let times: Vec<f64> = rows.iter().map(|k| window.t[*k]).collect();
         Self {
-            spacing: median(&mut steps),
+            spacing: usual_step(&times),
             rows,
         }
+    }
+
+    /// The attitude at a row, on the shortest way between those before and after where the row has none itself.
+    fn between(&self, window: &Window, row: usize) -> Option<UnitQuaternion<f64>> {
+        let after = self.rows.partition_point(|k| *k < row);
+        let next = *self.rows.get(after)?;
+        if next == row {
+            return attitude_at(window, row);
+        }
+        let last = *self.rows.get(after.checked_sub(1)?)?;
+        let step = window.t[next] - window.t[last];
+        if step > GAP * self.spacing {
+            return None;
+        }
+        let part = (window.t[row] - window.t[last]) / step;
+        attitude_at(window, last)?.try_slerp(&attitude_at(window, next)?, part, f64::EPSILON)
     }
 
     /// The attitude nearest in time to a row, no further away than the attitudes lie apart.
@@ -109,9 +143,8 @@ impl Attitudes {
         let away = |k: &usize| (window.t[*k] - window.t[row]).abs();
         let near = around.filter_map(|k| self.rows.get(k).copied());
         let nearest = near.min_by(|a, b| away(a).total_cmp(&away(b)))?;
-        let q = window.attitude.map(|q| &q[4 * nearest..4 * nearest + 4])?;
         let close = nearest == row || away(&nearest) <= self.spacing;
-        close.then(|| UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3])))
+        attitude_at(window, nearest).filter(|_| close)
     }
 }
 
@@ -122,6 +155,22 @@ fn median(values: &mut [f64]) -> f64 {
     }
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Places of the components of the specific force among the covariates, ...
+const FORCES: Range<usize> = 2..5;
+/// ... and of those of the angular rate with its size.
+const RATES: Range<usize> = 5..9;
+
+/// Puts the components of vectors, and their size where there is a place for it, in the place of other samples, if there are any.
+fn put(samples: &mut [Vec<f64>], vectors: &[Vector3<f64>]) {
+    if vectors.is_empty() {
+        return;
+    }
+    for (k, sample) in samples.iter_mut().enumerate() {
+        let of = |v: &Vector3<f64>| v.as_slice().get(k).copied().unwrap_or_else(|| v.norm());
+        *sample = vectors.iter().map(of).filter(|v| v.is_finite()).collect();
+    }
 }
 
 impl Survey {
@@ -151,8 +200,10 @@ impl Survey {
         }
     }
 
+    /// True of about `most` rows, spread evenly: multiples of the golden ratio (Weyl 1916), whose steps no pattern of rows has.
     fn sampled(&self, row: usize, most: usize) -> bool {
-        row.is_multiple_of(self.given.n.div_ceil(most).max(1))
+        let every = self.given.n.div_ceil(most).max(1) as u64;
+        (row as u64).wrapping_mul(GOLDEN) <= u64::MAX / every
     }
 
     /// Adds the core rows of a window.
@@ -246,13 +297,9 @@ impl Survey {
             .filter(|i| self.sampled(window.offset + i, BANDWIDTH_SAMPLES))
             .collect();
         for &i in &rows {
-            if let Some(q) = window
-                .attitude
-                .map(|q| &q[4 * i..4 * i + 4])
-                .filter(|q| q.iter().all(|v| v.is_finite()))
-            {
-                let attitude = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
-                let (rate, force) = (around(window, Sensor::Gyr, i), around(window, Sensor::Acc, i));
+            if let Some(attitude) = attitudes.between(window, i) {
+                let apart = attitudes.rows.binary_search(&i).is_err();
+                let [rate, force] = [Sensor::Gyr, Sensor::Acc].map(|sensor| around(window, sensor, i, apart));
                 self.width_rows
                     .insert(window.offset + i, SampledRow { rate, force, attitude });
             }
@@ -267,7 +314,8 @@ impl Survey {
                     .map(|i| Vector3::new(p[3 * i], p[3 * i + 1], p[3 * i + 2]))
             };
             self.origin = self.origin.or_else(first);
-            self.has_position |= rows.iter().any(|i| p[3 * i].is_finite());
+            // The rows looked at may all lie between those of a reference that has rows of its own.
+            self.has_position |= p.iter().step_by(3).any(|v| v.is_finite());
             self.position_width.add(window, rows.into_iter());
         }
     }
@@ -297,6 +345,7 @@ impl Survey {
         // What columns are made of is smoother than what readings are compared with.
         let attitude_columns = self.attitude_width.for_columns(attitude_smoothing);
         let position_columns = position_smoothing.map(|s| self.position_width.for_columns(s));
+        let forces = self.forces(position_columns);
         let attitude_noise = self.attitude_width.noise();
         let rate_noise = self.attitude_width.derivative_noise(attitude_columns);
         let force_noise = attitude_noise * self.given.gravity.norm()
@@ -342,7 +391,10 @@ impl Survey {
             position_origin: self.origin.unwrap_or_default(),
             attitude_columns,
             position_columns,
+            attitude_bends: self.attitude_width.for_bends(attitude_columns),
+            position_bends: position_columns.map(|s| self.position_width.for_bends(s)),
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),
+            reference_packet: self.attitude_width.packet(),
             ranges: [None; 3],
             steps,
             steps_crossed,
@@ -351,9 +403,14 @@ impl Survey {
             rests: false,
             kinematics: KinematicsMemory::default(),
         };
+        let mut values = self.samples;
+        let rates = (self.attitude_width.derivatives(attitude_columns)).map(|(_, rate)| Vector3::from(rate));
+        put(&mut values[RATES], &rates.collect::<Vec<_>>());
+        put(&mut values[FORCES], &forces);
         let samples = CovariateSamples {
             names: Bins::covariate_names(&self.given.covariates),
-            values: self.samples,
+            values,
+            rows: self.given.n,
             rate_noise,
             force_noise,
         };
@@ -381,6 +438,19 @@ impl Survey {
                 0.0
             }
         })
+    }
+
+    /// Specific forces in the sampled rows by the reference, its accelerations by this width.
+    fn forces(&self, width: Option<Smoothing>) -> Vec<Vector3<f64>> {
+        let of = |row: &SampledRow, acceleration: Vector3<f64>| {
+            (row.attitude).inverse_transform_vector(&(acceleration - self.given.gravity))
+        };
+        match width {
+            None => self.width_rows.values().map(|row| of(row, Vector3::zeros())).collect(),
+            Some(width) => (self.position_width.derivatives(width))
+                .filter_map(|(at, a)| Some(of(self.width_rows.get(&at)?, Vector3::from(a))))
+                .collect(),
+        }
     }
 
     /// For each sensor the axes along which its ideal reading is nothing but the noise of the reference.

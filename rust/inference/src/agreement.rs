@@ -1,7 +1,7 @@
 //! Do the logs agree about an effect? A log that disagrees is better predicted with a value of its own.
 
 use imufit_fit::normal_equations::NormalEquations;
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::asked::{Asked, Prior};
 use crate::problem::indices;
@@ -64,8 +64,9 @@ pub fn disagreements(
     }
     let least = search::threshold(having.len() * search.candidates.len().max(1));
     let found = having.iter().filter_map(|log| {
-        let asked = own_columns(search, equations, slot, *log)?;
-        let ln = stack.ln_bayes(&asked);
+        let asked = Asked::of_logs(criterion, slot, &equations[*log], |other| other == *log);
+        // What readings themselves tell beforehand no log has for itself.
+        let ln = matches!(asked.prior, Prior::Normal(_)).then(|| stack.ln_bayes(&asked))?;
         (ln >= least).then_some((*log, ln, asked))
     });
     let Some((log, ln_bayes, asked)) = found.max_by(|a, b| a.1.total_cmp(&b.1)) else {
@@ -95,38 +96,18 @@ pub fn disagreements(
     out
 }
 
-/// Columns of an effect in one log alone.
-fn own_columns(search: &Search, equations: &[NormalEquations], slot: usize, log: usize) -> Option<Asked> {
-    let criterion = search.criterion;
-    let parameters = indices(&criterion.problem.slots, &[slot]);
-    if criterion.problem.known_values(&parameters).is_some() {
-        return None;
-    }
-    let of_log = &equations[log];
-    let cross = of_log.gram.select_columns(&parameters);
-    let sums = (criterion.modes.iter().enumerate())
-        .filter(|(_, modes)| modes.log == log)
-        .map(|(c, modes)| (c, modes.sums.select_columns(&parameters)))
-        .collect();
-    Some(Asked {
-        information: cross.select_rows(&parameters),
-        score: of_log.right.select_rows(&parameters),
-        cross,
-        sums,
-        prior: Prior::Normal(parameters.iter().map(|j| criterion.deviation(*j)).collect()),
-        trials: 0.0,
-    })
-}
-
 /// Values of an effect with their standard errors: by the log itself, and by the others.
 type Values = (Vec<(f64, f64)>, Vec<(f64, f64)>, bool);
 
 /// Values of an effect by one log and by the others, and whether they differ wildly.
 fn values(search: &Search, stack: &Stack, slot: usize, own: &Asked) -> Option<Values> {
+    let problem = search.criterion.problem;
     let shared = Asked::slot(search.criterion, slot);
-    let m = shared.score.len();
-    let parameters = indices(&search.criterion.problem.slots, &[slot]);
-    let deviation: Vec<f64> = parameters.iter().map(|j| search.criterion.deviation(*j)).collect();
+    let Prior::Normal(deviation) = &shared.prior else {
+        return None;
+    };
+    let m = deviation.len();
+    let parameters = indices(&problem.slots, &[slot]);
     let both = shared.beside(own, &own.cross.select_rows(&parameters));
     let equations = stack.equations(&both)?;
     let scale = |k: usize| deviation[k % m];
@@ -134,18 +115,17 @@ fn values(search: &Search, stack: &Stack, slot: usize, own: &Asked) -> Option<Va
         equations.information[(i, j)] * scale(i) * scale(j) + if i == j { 0.01 } else { 0.0 }
     });
     let factor = Cholesky::new(scaled)?;
-    let right = nalgebra::DVector::from_fn(2 * m, |k, _| equations.score[k] * scale(k));
-    let solved = factor.solve(&right);
+    let solved = factor.solve(&DVector::from_fn(2 * m, |k, _| equations.score[k] * scale(k)));
     let covariance = factor.inverse();
-    let present = &search.criterion.problem.slots[slot].parameters;
-    let error = |v: f64, k: usize| v.max(0.0).sqrt() * scale(k);
-    let of_others = (0..m).map(|k| (solved[k] * scale(k), error(covariance[(k, k)], k)));
+    // What the equations were taken at counts as well: only the rest is in the residual.
+    let present = &problem.slots[slot].parameters;
+    let held = |k: usize| if search.model.contains(&slot) { present[k] } else { 0.0 };
+    let told = |k: usize, step: f64, variance: f64| (held(k) + step * scale(k), variance.max(0.0).sqrt() * scale(k));
+    let of_others = (0..m).map(|k| told(k, solved[k], covariance[(k, k)]));
     let of_log = (0..m).map(|k| {
         let variance = covariance[(k, k)] + covariance[(m + k, m + k)] + 2.0 * covariance[(k, m + k)];
-        ((solved[k] + solved[m + k]) * scale(k), error(variance, k))
+        told(k, solved[k] + solved[m + k], variance)
     });
-    // What the equations were taken at counts as well: only the rest is in the residual.
-    let held = |k: usize| if search.model.contains(&slot) { present[k] } else { 0.0 };
     let size = |value: &dyn Fn(usize) -> f64| -> f64 {
         (0..m)
             .map(|k| value(k).powi(2) / covariance[(m + k, m + k)].max(f64::MIN_POSITIVE))
@@ -153,16 +133,5 @@ fn values(search: &Search, stack: &Stack, slot: usize, own: &Asked) -> Option<Va
     };
     let difference = size(&|k| solved[m + k]);
     let common = size(&|k| solved[k] + held(k) / scale(k));
-    let whole = |values: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
-        values
-            .into_iter()
-            .enumerate()
-            .map(|(k, (v, e))| (v + held(k), e))
-            .collect()
-    };
-    Some((
-        whole(of_log.collect()),
-        whole(of_others.collect()),
-        difference > WILD * common,
-    ))
+    Some((of_log.collect(), of_others.collect(), difference > WILD * common))
 }

@@ -1,5 +1,6 @@
 //! Columns asked about beside a stack: those of an effect, of bins of a covariate, or of a course in time.
 
+use imufit_fit::normal_equations::NormalEquations;
 use nalgebra::{DMatrix, DVector};
 
 use crate::problem::indices;
@@ -32,39 +33,69 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// Of an effect that has its columns in the evidence.
-    pub fn slot(criterion: &Criterion, slot: usize) -> Self {
-        let parameters = indices(&criterion.problem.slots, &[slot]);
-        let prior = criterion.problem.known_values(&parameters).map_or_else(
-            || Prior::Normal(parameters.iter().map(|j| criterion.deviation(*j)).collect()),
-            Prior::Known,
-        );
-        let of = &criterion.problem.slots[slot];
+    /// Nothing yet of so many columns.
+    pub fn zeros(criterion: &Criterion, columns: usize) -> Self {
         Self {
-            prior,
-            trials: f64::from(u32::try_from(of.tried).unwrap_or(u32::MAX)).max(1.0).ln(),
-            ..Self::parameters(criterion, &parameters)
+            cross: DMatrix::zeros(criterion.problem.plausible.len(), columns),
+            information: DMatrix::zeros(columns, columns),
+            score: DVector::zeros(columns),
+            sums: Vec::new(),
+            prior: Prior::Normal(vec![0.0; columns]),
+            trials: 0.0,
         }
     }
 
-    /// Of some parameters of the problem, with no prior yet.
-    fn parameters(criterion: &Criterion, parameters: &[usize]) -> Self {
-        let cross = criterion.total.gram.select_columns(parameters);
-        let sums = (criterion.modes.iter().enumerate())
-            .filter(|(_, modes)| {
-                parameters
-                    .iter()
-                    .any(|j| modes.sums.column(*j).iter().any(|v| *v != 0.0))
-            })
-            .map(|(c, modes)| (c, modes.sums.select_columns(parameters)))
+    /// The same columns where nobody can tell their size: as much as makes a signal as large as the noise of a sample (unit information).
+    #[must_use]
+    pub fn of_any_size(mut self, criterion: &Criterion) -> Self {
+        let own = self.information.diagonal();
+        // A column that hardly any row shows is not asked about.
+        let seen = 1e-9 * own.max();
+        let deviation = |own: &f64| {
+            if *own > seen {
+                (criterion.samples / own).sqrt()
+            } else {
+                0.0
+            }
+        };
+        self.prior = Prior::Normal(own.iter().map(deviation).collect());
+        self
+    }
+
+    /// Of an effect that has its columns in the evidence.
+    pub fn slot(criterion: &Criterion, slot: usize) -> Self {
+        Self::of_logs(criterion, slot, &criterion.total, |_| true)
+    }
+
+    /// The same in some of the logs alone, whose equations over all parameters are given.
+    pub fn of_logs(
+        criterion: &Criterion,
+        slot: usize,
+        equations: &NormalEquations,
+        concerned: impl Fn(usize) -> bool,
+    ) -> Self {
+        let problem = criterion.problem;
+        let parameters = indices(&problem.slots, &[slot]);
+        let prior = problem.known_values(&parameters).map_or_else(
+            || Prior::Normal(parameters.iter().map(|j| criterion.deviation(*j)).collect()),
+            Prior::Known,
+        );
+        let cross = equations.gram.select_columns(&parameters);
+        let modes = criterion.modes.iter().enumerate();
+        let sums = modes
+            .filter(|(_, modes)| concerned(modes.log))
+            .map(|(c, modes)| (c, modes.sums.select_columns(&parameters)))
+            .filter(|(_, sums)| sums.iter().any(|v| *v != 0.0))
             .collect();
         Self {
-            information: cross.select_rows(parameters),
-            score: criterion.total.right.select_rows(parameters),
+            information: cross.select_rows(&parameters),
+            score: equations.right.select_rows(&parameters),
             cross,
             sums,
-            prior: Prior::Normal(vec![0.0; parameters.len()]),
-            trials: 0.0,
+            prior,
+            trials: f64::from(u32::try_from(problem.slots[slot].tried).unwrap_or(u32::MAX))
+                .max(1.0)
+                .ln(),
         }
     }
 

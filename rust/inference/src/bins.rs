@@ -1,13 +1,15 @@
 //! What a residual depends on, whatever the shape: a few orthogonal contrasts over the bins of each covariate.
 
-use imufit_fit::normal_equations::NormalEquations;
+use imufit_fit::block_equations::Form;
+use imufit_fit::evidence::ChannelBlock;
 use imufit_model::probes::OF;
 use imufit_model::sensor::AXES;
 use imufit_model::sensor_model::Slot;
 use nalgebra::{DMatrix, DVector};
 
-use crate::block_equations::Form;
+use crate::asked::Asked;
 use crate::problem::{Problem, Question};
+use crate::stack::Criterion;
 
 /// Contrasts over the bins: polynomials of the bin's rank up to this degree.
 pub const CONTRASTS: usize = 5;
@@ -15,29 +17,13 @@ pub const CONTRASTS: usize = 5;
 /// The covariate that every log has for itself.
 const TIME: &str = "t";
 
-/// Orthonormal polynomials over bin ranks, constant included; at most as many as bins.
-pub(crate) fn contrasts(bins: usize) -> DMatrix<f64> {
+/// Orthonormal polynomials over bin ranks, at most as many as bins; without the constant, which is a bias and has a name.
+fn contrasts(bins: usize) -> DMatrix<f64> {
     let m = (CONTRASTS + 1).min(bins);
-    let mut q = DMatrix::zeros(bins, m);
-    for k in 0..m {
-        let mut v = DVector::from_fn(bins, |i, _| {
-            (2.0 * i as f64 / (bins.max(2) - 1) as f64 - 1.0).powf(k as f64)
-        });
-        for j in 0..k {
-            let c = q.column(j).dot(&v);
-            v -= q.column(j) * c;
-        }
-        let norm = v.norm();
-        q.set_column(k, &(v / norm));
-    }
-    q
-}
-
-/// A covariate that a channel is tested against.
-struct Asked {
-    channel: usize,
-    /// Its index among the bins of each log; `None` where the log has it not or is not concerned.
-    index: Vec<Option<usize>>,
+    let powers = DMatrix::from_fn(bins, m, |i, k| {
+        (2.0 * i as f64 / (bins.max(2) - 1) as f64 - 1.0).powf(k as f64)
+    });
+    powers.qr().q().columns(1, m - 1).into_owned()
 }
 
 /// A covariate of any log.
@@ -51,6 +37,32 @@ pub struct Covariate {
     pub index: Vec<Option<usize>>,
 }
 
+impl Covariate {
+    /// The covariate with this index in a log, that log alone concerned.
+    pub fn of_log(problem: &Problem, log: usize, index: usize) -> Self {
+        Self {
+            name: problem.parts[log].white.layout.bins.names[index].clone(),
+            log: None,
+            index: (0..problem.parts.len())
+                .map(|other| (other == log).then_some(index))
+                .collect(),
+        }
+    }
+
+    /// Its index among the bins of a log that has readings of a channel.
+    fn in_log(&self, problem: &Problem, log: usize, channel: usize) -> Option<usize> {
+        self.index[log].filter(|_| problem.parts[log].weights()[channel] > 0.0)
+    }
+
+    /// Contrasts over its bins, which are the same in every log that has it.
+    pub fn contrasts(&self, problem: &Problem) -> Option<DMatrix<f64>> {
+        let edges = |log: usize| Some(problem.parts[log].white.layout.bins.edges[self.index[log]?].len());
+        (0..problem.parts.len())
+            .find_map(edges)
+            .map(|edges| contrasts(edges + 1))
+    }
+}
+
 /// Every covariate of any log. What a residual depends on is the same in all logs, and so are the edges of their bins; time is
 /// another one in each log.
 pub(crate) fn covariates(problem: &Problem) -> Vec<Covariate> {
@@ -61,128 +73,111 @@ pub(crate) fn covariates(problem: &Problem) -> Vec<Covariate> {
             names.push(name);
         }
     }
-    let of_log = |name: &str, log: usize| {
-        let index = bins(log).names.iter().position(|n| n == name)?;
-        (!bins(log).edges[index].is_empty()).then_some(index)
-    };
     let logs = 0..problem.parts.len();
-    let mut out = Vec::new();
-    for name in names {
-        if name == TIME && logs.len() > 1 {
-            out.extend(logs.clone().map(|log| {
-                let index = logs.clone().map(|other| of_log(name, log).filter(|_| other == log));
-                Covariate {
-                    name: name.clone(),
-                    log: Some(log),
-                    index: index.collect(),
-                }
-            }));
-        } else {
-            out.push(Covariate {
-                name: name.clone(),
-                log: None,
-                index: logs.clone().map(|log| of_log(name, log)).collect(),
-            });
+    let of = |name: &String, only: Option<usize>| {
+        let of_log = |log: usize| {
+            let index = bins(log).names.iter().position(|n| n == name)?;
+            (!bins(log).edges[index].is_empty() && only.is_none_or(|only| only == log)).then_some(index)
+        };
+        Covariate {
+            name: name.clone(),
+            log: only,
+            index: logs.clone().map(of_log).collect(),
         }
-    }
-    out
+    };
+    let of_name = |name: &String| -> Vec<Covariate> {
+        if name == TIME && logs.len() > 1 {
+            logs.clone().map(|log| of(name, Some(log))).collect()
+        } else {
+            vec![of(name, None)]
+        }
+    };
+    names.into_iter().flat_map(of_name).collect()
 }
 
-/// Equations of the model's parameters (`fitted`, block by block) and the contrasts of one covariate in one channel.
-fn question(problem: &Problem, model: &[usize], fitted: &[NormalEquations], asked: &Asked) -> Option<Question> {
-    let channel = asked.channel;
-    let edges = |log: usize| asked.index[log].map(|k| problem.parts[log].white.layout.bins.edges[k].len());
-    let bins = (0..problem.parts.len()).find_map(edges)? + 1;
-    let q = contrasts(bins);
-    let (p, m) = (model.len(), q.ncols());
-    let mut white = Vec::with_capacity(problem.blocks());
+/// Products of contrasts over the bins of a covariate in one block: with `[columns | residual]` (width x m), and with one another (m x m).
+fn products(block: &ChannelBlock, covariate: usize, contrasts: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    let counts = DVector::from_column_slice(&block.bin_count[covariate]);
+    let sums = DMatrix::from_column_slice(block.sum.len(), counts.len(), &block.bin_sum[covariate]);
+    (
+        sums * contrasts,
+        contrasts.tr_mul(&(DMatrix::from_diagonal(&counts) * contrasts)),
+    )
+}
+
+/// Contrasts over the bins of a covariate on one channel, over all blocks; `None` where no row shows any.
+pub(crate) fn asked(criterion: &Criterion, channel: usize, covariate: &Covariate) -> Option<Asked> {
+    let problem = criterion.problem;
+    let q = covariate.contrasts(problem)?;
+    let mut asked = Asked::zeros(criterion, q.ncols());
     for (log, part) in problem.parts.iter().enumerate() {
-        let evidence = &part.white;
-        let active = &evidence.layout.model.active()[channel];
-        let width = active.len() + 1;
-        let columns: Vec<(usize, usize)> = active
-            .iter()
-            .enumerate()
-            .filter_map(|(a, own)| {
-                let parameter = problem.places[log][*own];
-                model.iter().position(|j| *j == parameter).map(|k| (k, a))
-            })
-            .collect();
-        for (b, inner) in fitted[problem.logs[log].clone()].iter().enumerate() {
+        let Some(index) = covariate.in_log(problem, log, channel) else {
+            continue;
+        };
+        let active = &part.white.layout.model.active()[channel];
+        for (b, block) in part.white.of_channel(channel) {
             let weight = part.block_weights(b)[channel];
-            let mut out = NormalEquations::zeros(p + m);
-            out.gram.view_mut((0, 0), (p, p)).copy_from(&inner.gram);
-            out.right.rows_mut(0, p).copy_from(&inner.right);
-            (out.square, out.n) = (inner.square, inner.n);
-            if let (Some(covariate), Some(block)) = (asked.index[log], evidence.get(b, channel)) {
-                let (counts, sums) = (&block.bin_count[covariate], &block.bin_sum[covariate]);
-                for bin in 0..bins {
-                    for i in 0..m {
-                        let qi = weight * q[(bin, i)];
-                        for j in 0..m {
-                            out.gram[(p + i, p + j)] += qi * counts[bin] * q[(bin, j)];
-                        }
-                        for (k, a) in &columns {
-                            let v = qi * sums[bin * width + a];
-                            out.gram[(p + i, *k)] += v;
-                            out.gram[(*k, p + i)] += v;
-                        }
-                        out.right[p + i] += qi * sums[bin * width + width - 1];
-                    }
+            let (cross, own) = products(block, index, &q);
+            for (a, parameter) in active.iter().enumerate() {
+                let mut row = asked.cross.row_mut(problem.places[log][*parameter]);
+                row += weight * cross.row(a);
+            }
+            asked.score += weight * cross.row(active.len()).transpose();
+            asked.information += weight * own;
+        }
+        let place = (problem.sums.iter()).position(|s| s.log == log && s.channel == channel);
+        asked.sums.extend(place.map(|place| {
+            let sums = problem.sums[place].binned(part, index, &q);
+            (place, criterion.modes[place].along(&sums))
+        }));
+    }
+    (asked.information.diagonal().max() > 0.0).then(|| asked.of_any_size(criterion))
+}
+
+/// The question whether a channel depends on a covariate beside the parameters of a model, block by block.
+pub(crate) fn question(problem: &Problem, model: &[usize], channel: usize, covariate: &Covariate) -> Option<Question> {
+    let q = covariate.contrasts(problem)?;
+    let (p, m) = (model.len(), q.ncols());
+    let index = |log: usize| covariate.in_log(problem, log, channel);
+    let mut white = Vec::with_capacity(problem.blocks());
+    let fitted = problem.equations.blocks(Form::White, model);
+    for (log, part) in problem.parts.iter().enumerate() {
+        let active = &part.white.layout.model.active()[channel];
+        let place = |own: &usize| model.iter().position(|j| *j == problem.places[log][*own]);
+        let places: Vec<Option<usize>> = active.iter().map(place).collect();
+        for (b, inner) in fitted[problem.logs[log].clone()].iter().enumerate() {
+            let mut out = inner.placed(&(0..p).collect::<Vec<usize>>(), p + m);
+            if let (Some(index), Some(block)) = (index(log), part.white.get(b, channel)) {
+                let weight = part.block_weights(b)[channel];
+                let (cross, own) = products(block, index, &q);
+                out.gram.view_mut((p, p), (m, m)).copy_from(&(weight * own));
+                for (a, k) in places.iter().enumerate().filter_map(|(a, k)| Some((a, (*k)?))) {
+                    let row = weight * cross.row(a);
+                    out.gram.view_mut((k, p), (1, m)).copy_from(&row);
+                    out.gram.view_mut((p, k), (m, 1)).copy_from(&row.transpose());
                 }
+                let right = weight * cross.row(active.len()).transpose();
+                out.right.rows_mut(p, m).copy_from(&right);
             }
             white.push(out);
         }
     }
-    let mut total = NormalEquations::zeros(p + m);
-    for b in &white {
-        total.add(b, 1.0);
-    }
-    let mut precision = DVector::zeros(p + m);
-    for (k, j) in model.iter().enumerate() {
-        precision[k] = problem.precision(*j);
-    }
-    for i in 0..m {
-        // Weak: a contrast that stands out a hundredfold is as good as free.
-        precision[p + i] = 1e-4 * total.gram[(p + i, p + i)].max(1e-300);
-    }
-    let sums = problem
-        .sums
-        .iter()
-        .map(|s| {
-            let mut own = DMatrix::zeros(s.sums.nrows(), p + m);
-            own.columns_mut(0, p).copy_from(&s.columns(model));
-            if let (true, Some(covariate)) = (s.channel == channel, asked.index[s.log]) {
-                let sums = s.binned(&problem.parts[s.log], covariate, &q);
-                own.columns_mut(p, m).copy_from(&sums);
-            }
-            s.with_sums(own)
-        })
-        .collect();
+    let sums = problem.sums.iter().map(|s| {
+        let mut own = s.columns(model).resize_horizontally(p + m, 0.0);
+        if let Some(index) = index(s.log).filter(|_| s.channel == channel) {
+            let binned = s.binned(&problem.parts[s.log], index, &q);
+            own.columns_mut(p, m).copy_from(&binned);
+        }
+        s.with_sums(own)
+    });
     Some(Question {
-        raw: white.clone(),
+        raw: Vec::new(),
         white,
-        precision,
+        precision: DVector::from_fn(p + m, |k, _| model.get(k).map_or(0.0, |j| problem.precision(*j))),
         model: p,
-        sums,
+        sums: sums.collect(),
         logs: problem.logs.clone(),
     })
-}
-
-/// The question whether a channel depends on a covariate beside the parameters of a model, the constant among its contrasts.
-pub(crate) fn of_bins(problem: &Problem, model: &[usize], channel: usize, covariate: &Covariate) -> Option<Question> {
-    let fitted: Vec<NormalEquations> = problem.equations.blocks(Form::White, model);
-    let seen = |log: usize| problem.parts[log].weights()[channel] > 0.0;
-    let index = covariate
-        .index
-        .iter()
-        .enumerate()
-        .map(|(log, k)| k.filter(|_| seen(log)));
-    let asked = Asked {
-        channel,
-        index: index.collect(),
-    };
-    question(problem, model, &fitted, &asked)
 }
 
 /// The channel that shows a probe most, with the words for it.
@@ -209,7 +204,7 @@ pub(crate) fn of_probe(slot: &Slot, certainties: &[f64]) -> OfProbe {
     };
     let card = slot.effect.card();
     // What the axis itself causes is called as its own bins are.
-    let own = matches!(card.name.as_str(), "f" | "omega");
+    let own = matches!(card.name.as_str(), "f" | "omega" | "m");
     let covariate = match card.parameters.get(largest).and_then(|p| p.name.split_once(OF)) {
         Some((product, _)) => product.to_string(),
         None if own => format!("{}_{}", card.name, AXES[axis]),
@@ -244,10 +239,11 @@ mod tests {
     #[test]
     fn contrasts_are_orthonormal_and_name_their_shape() {
         let q = contrasts(12);
-        assert!((q.transpose() * &q - DMatrix::identity(6, 6)).norm() < 1e-10);
+        assert!((q.transpose() * &q - DMatrix::identity(5, 5)).norm() < 1e-10);
+        assert!(q.row_sum().norm() < 1e-10);
         let project = |f: fn(f64) -> f64| -> Vec<f64> {
             let v = DVector::from_fn(12, |i, _| f(2.0 * i as f64 / 11.0 - 1.0));
-            q.tr_mul(&v).iter().skip(1).copied().collect()
+            q.tr_mul(&v).iter().copied().collect()
         };
         assert_eq!(shape_name(&project(|x| 3.0 * x)), "rising or falling steadily");
         assert_eq!(shape_name(&project(f64::abs)), "V-shaped");

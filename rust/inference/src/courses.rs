@@ -1,21 +1,18 @@
 //! Courses in time of a channel's zero that no walk makes: a level shift, a pulse, a transient, an oscillation, and what lags behind
 //! a covariate.
 
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::asked::{Asked, Prior};
-use crate::bins::Covariate;
-use crate::dictionary;
+use crate::asked::Asked;
+use crate::bins::{self, Covariate};
 use crate::stack::{Beside, Criterion, Stack};
 
 /// Courses of each family that are integrated over the noise, of those that stand out at the likeliest noise and without any.
 const LOOKED_AT: usize = 3;
-/// Parts of a block that a level shift within it may fill.
-const FILLED: [f64; 3] = [0.25, 0.5, 0.75];
+/// Parts of a block after which a level shift may come.
+const FILLED: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 /// Blocks before and after a pulse that show the level from which it rises and to which it comes back.
 const BACK: usize = 3;
 /// Widths of a transient, blocks; each is half as wide again as the one before.
@@ -32,16 +29,11 @@ const RESOLVED: f64 = 3.0;
 /// What a zero does.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Course {
-    /// A level shift; blocks from the start.
-    Shift {
-        /// When it comes.
-        at: f64,
-    },
-    /// Another level for a while; blocks from the start.
-    Pulse {
+    /// Another level for a while, or from a time on; blocks from the start.
+    Level {
         /// When it begins.
         begin: f64,
-        /// When it ends.
+        /// When it ends; infinite for a level shift.
         end: f64,
     },
     /// A rise and fall, as of the field of a magnet that passes by.
@@ -68,12 +60,12 @@ pub enum Course {
 }
 
 impl Course {
-    /// Its values in each block (blocks x parameters).
-    fn columns(&self, criterion: &Criterion, channel: usize, blocks: usize) -> DMatrix<f64> {
+    /// Its values in each block (blocks x parameters); those of a lag follow its covariate.
+    fn columns(&self, blocks: usize, means: impl Fn(usize) -> Option<DVector<f64>>) -> DMatrix<f64> {
+        let of_time = |value: &dyn Fn(usize) -> f64| DMatrix::from_fn(blocks, 1, |b, _| value(b));
         match *self {
-            Self::Shift { at } => DMatrix::from_fn(blocks, 1, |b, _| since(at, b)),
-            Self::Pulse { begin, end } => DMatrix::from_fn(blocks, 1, |b, _| since(begin, b) - since(end, b)),
-            Self::Transient { middle, width } => DMatrix::from_fn(blocks, 1, |b, _| {
+            Self::Level { begin, end } => of_time(&|b| since(begin, b) - since(end, b)),
+            Self::Transient { middle, width } => of_time(&|b| {
                 let away = (b as f64 + 0.5 - middle) / width;
                 // The field of a dipole falls with the cube of the distance.
                 (1.0 + away * away).powf(-1.5)
@@ -86,13 +78,12 @@ impl Course {
                 index,
                 blocks: forgotten,
                 ..
-            } => block_means(criterion, channel, index).map_or_else(
+            } => means(index).map_or_else(
                 || DMatrix::zeros(blocks, 1),
                 |means| {
                     let past = past(&means, forgotten);
                     // A constant is a bias, which has a name.
-                    let mean = past.mean();
-                    DMatrix::from_columns(&[past.add_scalar(-mean)])
+                    of_time(&|b| past[b] - past.mean())
                 },
             ),
         }
@@ -117,8 +108,8 @@ impl Course {
     /// A sentence part; `time` is the time at so many blocks from the start, s, `length` that of the log in blocks.
     pub fn words(&self, time: impl Fn(f64) -> f64, blocks: f64) -> String {
         match *self {
-            Self::Shift { at } => format!("a level shift at {:.1} s", time(at)),
-            Self::Pulse { begin, end } => format!("another level from {:.1} s to {:.1} s", time(begin), time(end)),
+            Self::Level { begin, end } if end.is_infinite() => format!("a level shift at {:.1} s", time(begin)),
+            Self::Level { begin, end } => format!("another level from {:.1} s to {:.1} s", time(begin), time(end)),
             Self::Transient { middle, width } => {
                 let wide = 2.0 * (time(width) - time(0.0));
                 format!("a transient at {:.1} s, {wide:.1} s wide", time(middle))
@@ -142,14 +133,15 @@ fn since(at: f64, block: usize) -> f64 {
 /// Every course of each family.
 fn families(blocks: usize) -> [Vec<Course>; 4] {
     let shifts = (1..blocks).flat_map(|b| {
-        std::iter::once(0.0)
-            .chain(FILLED)
-            .map(move |part| Course::Shift { at: b as f64 + part })
+        FILLED.map(|part| Course::Level {
+            begin: b as f64 + part,
+            end: f64::INFINITY,
+        })
     });
     let ends = |first: usize| (first + 1)..(blocks + 1 - BACK).min(first + blocks / 2 + 1);
     let pulses = (BACK..blocks.saturating_sub(BACK)).flat_map(|first| {
         ends(first).flat_map(move |last| {
-            [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)].map(|(a, b)| Course::Pulse {
+            [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)].map(|(a, b)| Course::Level {
                 begin: first as f64 - a,
                 end: last as f64 + b,
             })
@@ -176,16 +168,8 @@ fn families(blocks: usize) -> [Vec<Course>; 4] {
 
 /// Columns that are constant within each block, the same course on each of some channels with a size of its own.
 fn asked(criterion: &Criterion, channels: &[usize], columns: &DMatrix<f64>) -> Asked {
-    let (p, m) = (criterion.problem.plausible.len(), columns.ncols());
-    let all = channels.len() * m;
-    let mut out = Asked {
-        cross: DMatrix::zeros(p, all),
-        information: DMatrix::zeros(all, all),
-        score: DVector::zeros(all),
-        sums: Vec::new(),
-        prior: Prior::Normal(Vec::new()),
-        trials: 0.0,
-    };
+    let m = columns.ncols();
+    let mut out = Asked::zeros(criterion, channels.len() * m);
     for (k, channel) in channels.iter().enumerate() {
         let sums = &criterion.problem.sums[*channel];
         let root = sums.weight.sqrt();
@@ -198,21 +182,11 @@ fn asked(criterion: &Criterion, channels: &[usize], columns: &DMatrix<f64>) -> A
             .rows_mut(k * m, m)
             .copy_from(&(columns.tr_mul(&sums.right) * root));
         let modes = &criterion.modes[*channel].of_blocks;
-        let mut own = DMatrix::zeros(modes.nrows(), all);
+        let mut own = DMatrix::zeros(modes.nrows(), channels.len() * m);
         own.columns_mut(k * m, m).copy_from(&(modes * columns));
         out.sums.push((*channel, own));
     }
-    let largest = out.information.diagonal().max();
-    let deviation = (0..all).map(|k| {
-        let own = out.information[(k, k)];
-        if own > 1e-9 * largest {
-            (criterion.samples / own).sqrt()
-        } else {
-            0.0
-        }
-    });
-    out.prior = Prior::Normal(deviation.collect());
-    out
+    out.of_any_size(criterion)
 }
 
 /// A course that stands out, the channels (places among the sums) that show it, and its log Bayes factor.
@@ -231,93 +205,84 @@ pub struct Found {
 /// factor is at least `least`.
 pub fn likeliest(stack: &Stack, channels: &[usize], least: f64) -> Vec<Found> {
     let criterion = stack.criterion;
-    let Some(first) = channels.first() else {
+    let Some(first) = channels.first().copied() else {
         return Vec::new();
     };
-    let blocks = criterion.problem.sums[*first].count.len();
+    let blocks = criterion.problem.sums[first].count.len();
     let unit = DMatrix::identity(blocks, blocks);
-    let views: Vec<Vec<Beside>> = channels
-        .iter()
-        .map(|channel| {
-            let sensor = criterion.modes[*channel].sensor();
-            stack.views(&asked(criterion, &[*channel], &unit), sensor)
-        })
-        .collect();
-    let mut families = families(blocks).to_vec();
-    families.push(lags(criterion, *first));
+    let sensor = criterion.modes[first].sensor();
+    let views = |channel: &usize| stack.views(&asked(criterion, &[*channel], &unit), sensor);
+    let views: Vec<Vec<Beside>> = channels.iter().map(views).collect();
+    let mut groups: Vec<Vec<usize>> = (0..channels.len()).map(|k| vec![k]).collect();
+    if channels.len() > 1 {
+        groups.push((0..channels.len()).collect());
+    }
+    let families = families(blocks).into_iter().chain([lags(criterion, first)]);
     let mut found = Vec::new();
-    let mut known = KnownBins::new();
-    for family in families.iter().filter(|f| !f.is_empty()) {
+    for family in families.filter(|f| !f.is_empty()) {
         let tried = (family.len() as f64).ln();
-        let columns = |course: &Course| course.columns(criterion, *first, blocks);
+        let of = |course: &Course| course.columns(blocks, |index| block_means(criterion, first, index));
+        let columns: Vec<DMatrix<f64>> = family.iter().map(of).collect();
         // Half the square that each course explains, by channel and view.
-        let mut scores: Vec<Vec<Vec<f64>>> = Vec::new();
-        for own in &views {
-            let of = |view: &Beside| match family[0] {
-                Course::Pulse { .. } => of_pulses(view, family),
-                _ => family
-                    .iter()
-                    .map(|course| quick(&view.information, &view.score, &columns(course)))
-                    .collect(),
-            };
-            scores.push(own.iter().map(of).collect());
-        }
-        let mut groups: Vec<Vec<usize>> = (0..channels.len()).map(|k| vec![k]).collect();
-        if channels.len() > 1 {
-            groups.push((0..channels.len()).collect());
-        }
-        for group in groups {
+        let scores: Vec<Vec<Vec<f64>>> = views
+            .iter()
+            .map(|own| own.iter().map(|view| explained(view, &columns)).collect())
+            .collect();
+        for group in &groups {
+            let of_group: Vec<usize> = group.iter().map(|k| channels[*k]).collect();
             let mut chosen: Vec<usize> = Vec::new();
-            let kinds = group.iter().map(|k| scores[*k].len()).min().unwrap_or(0);
-            for view in 0..kinds {
+            for view in 0..group.iter().map(|k| scores[*k].len()).min().unwrap_or(0) {
+                let total: Vec<f64> = (0..family.len())
+                    .map(|i| group.iter().map(|k| scores[*k][view][i]).sum())
+                    .collect();
                 let mut order: Vec<usize> = (0..family.len()).collect();
-                let total = |i: &usize| group.iter().map(|k| scores[*k][view][*i]).sum::<f64>();
-                order.sort_by(|a, b| total(b).total_cmp(&total(a)));
+                order.sort_by(|a, b| total[*b].total_cmp(&total[*a]));
                 // No evidence exceeds what the best parameters explain; beside bins a lag may explain more.
-                let may = |i: &usize| total(i) - tried >= least || matches!(family[*i], Course::Lag { .. });
+                let may = |i: &usize| total[*i] - tried >= least || matches!(family[*i], Course::Lag { .. });
                 chosen.extend(order.into_iter().take(LOOKED_AT).filter(may));
             }
             chosen.sort_unstable();
             chosen.dedup();
-            let of_group: Vec<usize> = group.iter().map(|k| channels[*k]).collect();
-            let best = chosen
-                .into_iter()
-                .filter_map(|i| {
-                    let own = columns(&family[i]);
-                    let mut asked = asked(criterion, &of_group, &own);
-                    let bins = match &family[i] {
-                        Course::Lag { index, .. } => {
-                            let (joined, bins) = beside_bins(criterion, &of_group, *index, asked, &own, &mut known);
-                            asked = joined;
-                            bins
-                        }
-                        _ => None,
-                    };
-                    asked.trials = tried;
-                    if stack.at_most(&asked) - tried < least {
-                        return None;
-                    }
-                    let ln_bayes = stack.ln_bayes(&asked) - tried;
-                    // What the covariate as it is explains needs no past of it.
-                    if bins.is_some_and(|bins| ln_bayes - stack.ln_bayes(&bins) < least) {
-                        return None;
-                    }
-                    (ln_bayes >= least).then(|| Found {
-                        course: family[i].clone(),
-                        channels: of_group.clone(),
-                        ln_bayes,
-                        asked,
-                    })
+            let weighed = chosen.into_iter().filter_map(|i| {
+                let mut asked = asked(criterion, &of_group, &columns[i]);
+                let mut bins = None;
+                if let Course::Lag { index, .. } = family[i] {
+                    (asked, bins) = beside_bins(criterion, &of_group, index, asked, &columns[i]);
+                }
+                asked.trials = tried;
+                if stack.at_most(&asked) - tried < least {
+                    return None;
+                }
+                let ln_bayes = stack.ln_bayes(&asked) - tried;
+                // What the covariate as it is explains needs no past of it.
+                let more = bins.is_none_or(|bins| ln_bayes - stack.ln_bayes(&bins) >= least);
+                (ln_bayes >= least && more).then(|| Found {
+                    course: family[i].clone(),
+                    channels: of_group.clone(),
+                    ln_bayes,
+                    asked,
                 })
-                .max_by(|a, b| a.ln_bayes.total_cmp(&b.ln_bayes));
-            found.extend(best);
+            });
+            found.extend(weighed.max_by(|a, b| a.ln_bayes.total_cmp(&b.ln_bayes)));
         }
     }
     found
 }
 
-/// Bins of a covariate in one channel (place among the sums, index of the covariate): their columns, and their sums over blocks.
-type KnownBins = BTreeMap<(usize, usize), Option<(Asked, DMatrix<f64>)>>;
+/// Half of the square that the columns of each course explain, all courses of a family having as many.
+fn explained(view: &Beside, courses: &[DMatrix<f64>]) -> Vec<f64> {
+    let columns: Vec<_> = courses.iter().flat_map(|course| course.column_iter()).collect();
+    let all = DMatrix::from_columns(&columns);
+    let products = &view.information * &all;
+    let right = all.tr_mul(&view.score);
+    let of = |(k, course): (usize, &DMatrix<f64>)| {
+        let m = course.ncols();
+        let own = course.tr_mul(&products.columns(k * m, m));
+        let right = right.rows(k * m, m);
+        own.cholesky().map_or(0.0, |f| 0.5 * right.dot(&f.solve(&right)))
+    };
+    courses.iter().enumerate().map(of).collect()
+}
 
 /// A lag beside what follows the covariate as it is, whatever the shape, and that alone: bins of each channel, then the columns that are
 /// constant within blocks.
@@ -327,39 +292,25 @@ fn beside_bins(
     index: usize,
     course: Asked,
     columns: &DMatrix<f64>,
-    known: &mut KnownBins,
 ) -> (Asked, Option<Asked>) {
     let problem = criterion.problem;
-    let mut out = course;
-    let mut alone: Option<Asked> = None;
+    let m = columns.ncols();
+    let (mut out, mut alone) = (course, None);
     for (k, place) in channels.iter().enumerate() {
         let sums = &problem.sums[*place];
-        let part = &problem.parts[sums.log];
-        let found = known.entry((*place, index)).or_insert_with(|| {
-            let covariate = Covariate {
-                name: part.white.layout.bins.names[index].clone(),
-                log: None,
-                index: (0..problem.parts.len())
-                    .map(|log| (log == sums.log).then_some(index))
-                    .collect(),
-            };
-            let bins = dictionary::bins(criterion, sums.channel, &Arc::new(covariate))?;
-            Some((
-                bins.asked,
-                sums.binned(part, index, &dictionary::contrasts_of(part, index)),
-            ))
-        });
-        let Some((bins, of_bins)) = found else {
+        let covariate = Covariate::of_log(problem, sums.log, index);
+        let contrasts = covariate.contrasts(problem);
+        let Some((q, bins)) = contrasts.zip(bins::asked(criterion, sums.channel, &covariate)) else {
             continue;
         };
         // Products of contrasts with what is constant within a block: sums of the contrasts, block by block.
-        let more = columns.ncols();
+        let of_bins = sums.binned(&problem.parts[sums.log], index, &q);
         let mut products = DMatrix::zeros(out.score.len(), bins.score.len());
         products
-            .rows_mut(k * more, more)
-            .copy_from(&(columns.tr_mul(of_bins) * sums.weight.sqrt()));
-        out = out.beside(bins, &products);
-        alone = Some(alone.map_or_else(|| bins.clone(), |others| others.apart(bins)));
+            .rows_mut(k * m, m)
+            .copy_from(&(columns.tr_mul(&of_bins) * sums.weight.sqrt()));
+        out = out.beside(&bins, &products);
+        alone = Some(alone.map_or_else(|| bins.clone(), |others: Asked| others.apart(&bins)));
     }
     (out, alone)
 }
@@ -368,18 +319,17 @@ fn beside_bins(
 fn lags(criterion: &Criterion, channel: usize) -> Vec<Course> {
     let sums = &criterion.problem.sums[channel];
     let bins = &criterion.problem.parts[sums.log].white.layout.bins;
-    let mut found = Vec::new();
     // The first covariate is time, which has none.
-    for (index, name) in bins.names.iter().enumerate().skip(1) {
-        if block_means(criterion, channel, index).is_some() {
-            found.extend(FORGOTTEN.map(|blocks| Course::Lag {
-                covariate: name.clone(),
-                index,
-                blocks,
-            }));
-        }
-    }
-    found
+    let names = bins.names.iter().enumerate().skip(1);
+    let varying = names.filter(|(index, _)| block_means(criterion, channel, *index).is_some());
+    let of = |(index, name): (usize, &String)| {
+        FORGOTTEN.map(|blocks| Course::Lag {
+            covariate: name.clone(),
+            index,
+            blocks,
+        })
+    };
+    varying.flat_map(of).collect()
 }
 
 /// Block means of the rank of a covariate; `None` where they do not vary.
@@ -421,65 +371,9 @@ fn past(means: &DVector<f64>, forgotten: f64) -> DVector<f64> {
     })
 }
 
-/// The same for pulses: each is the difference of two level shifts, whose products are worked out once.
-fn of_pulses(view: &Beside, family: &[Course]) -> Vec<f64> {
-    let blocks = view.score.len();
-    let halves = DMatrix::from_fn(blocks, 2 * blocks + 1, |b, k| since(0.5 * k as f64, b));
-    let products = halves.tr_mul(&(&view.information * &halves));
-    let scores = halves.tr_mul(&view.score);
-    let place = |at: f64| (2.0 * at).round() as usize;
-    let of = |course: &Course| match course {
-        Course::Pulse { begin, end } => {
-            let (i, j) = (place(*begin), place(*end));
-            let right = scores[i] - scores[j];
-            let own = products[(i, i)] + products[(j, j)] - 2.0 * products[(i, j)];
-            0.5 * right * right / own.max(f64::MIN_POSITIVE)
-        }
-        _ => 0.0,
-    };
-    family.iter().map(of).collect()
-}
-
-/// Half of the square that columns explain.
-fn quick(information: &DMatrix<f64>, score: &DVector<f64>, columns: &DMatrix<f64>) -> f64 {
-    if columns.ncols() == 1 {
-        let v = columns.column(0);
-        let right = v.dot(score);
-        let own = (information * v).dot(&v);
-        return 0.5 * right * right / own.max(f64::MIN_POSITIVE);
-    }
-    let own = columns.tr_mul(&(information * columns));
-    let right = columns.tr_mul(score);
-    own.cholesky().map_or(0.0, |f| 0.5 * right.dot(&f.solve(&right)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn pulses_are_differences_of_level_shifts() {
-        let blocks = 12;
-        let view = Beside {
-            information: DMatrix::from_fn(blocks, blocks, |i, j| {
-                if i == j {
-                    9.0
-                } else {
-                    1.0 / (1.0 + i.abs_diff(j) as f64)
-                }
-            }),
-            score: DVector::from_fn(blocks, |b, _| (1.7 * b as f64).sin()),
-        };
-        let [_, pulses, ..] = families(blocks);
-        for (course, quickly) in pulses.iter().zip(of_pulses(&view, &pulses)) {
-            let Course::Pulse { begin, end } = *course else {
-                continue;
-            };
-            let column = DMatrix::from_fn(blocks, 1, |b, _| since(begin, b) - since(end, b));
-            let slowly = quick(&view.information, &view.score, &column);
-            assert!((slowly - quickly).abs() < 1e-9, "{course:?} {slowly} {quickly}");
-        }
-    }
 
     #[test]
     fn the_past_of_a_step_creeps_to_its_level() {

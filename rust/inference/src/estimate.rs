@@ -45,7 +45,7 @@ pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
     })
 }
 
-/// What the noise of the zeros adds to the covariance of the right-hand side, at its likeliest strength.
+/// What the noise of the zeros and of the reference's heading adds to the covariance of the right-hand side, at its likeliest strength.
 fn spread(problem: &Problem, model: &[usize]) -> DMatrix<f64> {
     let criterion = Criterion::new(problem);
     let parameters: Vec<(usize, f64)> = model.iter().map(|j| (*j, 1.0 / problem.precision(*j).sqrt())).collect();
@@ -56,6 +56,12 @@ fn spread(problem: &Problem, model: &[usize]) -> DMatrix<f64> {
             let variance = modes.variance(stack.strength(modes.sensor()));
             sum += own.tr_mul(&(DMatrix::from_diagonal(&variance) * &own));
         }
+        let heading = criterion
+            .total
+            .gram
+            .select_rows(&criterion.heading)
+            .select_columns(model);
+        sum.gemm_tr(stack.wanders().powi(2), &heading, &heading, 1.0);
     }
     sum
 }

@@ -7,17 +7,12 @@
 pub mod agreement;
 pub mod asked;
 pub mod bins;
-pub mod block_equations;
-pub mod block_sums;
 pub mod courses;
 pub mod dictionary;
 pub mod estimate;
 pub mod held_out;
-pub mod part;
 pub mod problem;
-pub mod residual;
 pub mod revision;
-pub mod saturated;
 pub mod scatter;
 pub mod search;
 pub mod similarity;

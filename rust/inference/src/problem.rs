@@ -3,17 +3,16 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use imufit_fit::block_equations::{BlockEquations, Form};
+use imufit_fit::block_sums::{self, ChannelSums};
 use imufit_fit::evidence::Layout;
 use imufit_fit::normal_equations::NormalEquations;
+use imufit_fit::part::{self, Part};
 use imufit_fit::whitening;
 use imufit_model::card::{Affine, Found};
 use imufit_model::sensor::Sensor;
 use imufit_model::sensor_model::Slot;
 use nalgebra::{DMatrix, DVector};
-
-use crate::block_equations::{BlockEquations, Form};
-use crate::block_sums::{self, ChannelSums};
-use crate::part::{self, Part};
 
 /// Evidence in the form that every question is asked of: the blocks of all logs, one log after the other.
 pub struct Problem {
@@ -91,7 +90,7 @@ impl Problem {
         let mut plausible = DVector::zeros(p);
         let mut typical = vec![false; p];
         let mut known = vec![None; p];
-        let information = equations.information();
+        let information = equations.total(&(0..p).collect::<Vec<usize>>()).gram.diagonal();
         for slot in &slots {
             let parameters = &slot.effect.card().parameters;
             let searched = !slot.in_model && parameters.iter().all(|p| p.found == Found::Search);

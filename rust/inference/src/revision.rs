@@ -6,7 +6,7 @@
 use imufit_model::card::Found;
 
 use crate::problem::Problem;
-use crate::search::Search;
+use crate::search::{self, Search, Weighed};
 use crate::stack::Criterion;
 
 /// An effect of the model that need not be there.
@@ -24,29 +24,45 @@ pub fn revisions(problem: &Problem, model: &[usize], members: &[usize], candidat
         let parameters = &problem.slots[*slot].effect.card().parameters;
         parameters.iter().all(|p| p.found != Found::Search)
     };
-    members
-        .iter()
-        .copied()
-        .filter(linear)
-        .filter_map(|slot| revision(problem, model, slot, candidates))
-        .collect()
+    let of = |slot| {
+        competition(problem, model, slot, candidates, |search, weighed, own| {
+            let best = weighed.iter().find(|w| search.there(w));
+            match best {
+                Some(best) if best.slot != slot && best.ln_bayes > own + search.threshold => Some(Revision {
+                    slot,
+                    by: Some(best.slot),
+                }),
+                _ if own < search.threshold => Some(Revision { slot, by: None }),
+                _ => None,
+            }
+        })
+    };
+    members.iter().copied().filter(linear).filter_map(of).collect()
 }
 
-fn revision(problem: &Problem, model: &[usize], slot: usize, candidates: &[usize]) -> Option<Revision> {
+/// Candidates that explain at least a share of what an effect of the model explains in its place: where columns say little of their full
+/// size, a fit may show that one of them explains more.
+pub fn alike(problem: &Problem, model: &[usize], slot: usize, candidates: &[usize], share: f64) -> Vec<usize> {
+    let near = competition(problem, model, slot, candidates, |_, weighed, own| {
+        let near = |w: &&Weighed| w.slot != slot && w.testable && w.ln_bayes >= share * own;
+        Some(weighed.iter().filter(near).map(|w| w.slot).collect())
+    });
+    near.unwrap_or_default()
+}
+
+/// Takes an effect out of the model and weighs it with all candidates beside the others; `decide` gets its own log Bayes factor last.
+fn competition<T>(
+    problem: &Problem,
+    model: &[usize],
+    slot: usize,
+    candidates: &[usize],
+    decide: impl FnOnce(&Search, &[Weighed], f64) -> Option<T>,
+) -> Option<T> {
     let without = problem.taken_out(slot);
     let criterion = Criterion::new(&without);
-    let others: Vec<usize> = model.iter().copied().filter(|s| *s != slot).collect();
     let offered: Vec<usize> = candidates.iter().copied().chain([slot]).collect();
-    let search = Search::new(&criterion, &others, &offered);
+    let search = Search::new(&criterion, &search::without(model, slot), &offered);
     let weighed = search.weigh_all(&search.stack(&[])?, &[]);
-    let own = weighed.iter().find(|w| w.slot == slot)?;
-    let best = weighed.iter().find(|w| search.there(w));
-    match best {
-        Some(best) if best.slot != slot && best.ln_bayes > own.ln_bayes + search.threshold => Some(Revision {
-            slot,
-            by: Some(best.slot),
-        }),
-        _ if own.ln_bayes < search.threshold => Some(Revision { slot, by: None }),
-        _ => None,
-    }
+    let own = weighed.iter().find(|w| w.slot == slot)?.ln_bayes;
+    decide(&search, &weighed, own)
 }

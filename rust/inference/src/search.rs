@@ -1,15 +1,20 @@
 //! Which effects of the catalogue stand beside one another: added, dropped and exchanged by their evidence alone.
 
 use std::collections::HashMap;
+use std::f64::consts::LN_2;
 
+use imufit_fit::part::Part;
+use imufit_model::card::Stage;
 use imufit_model::effect::Sign;
+use imufit_model::sensor::Sensor;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::asked::{Asked, Prior};
+
 use crate::problem::Question;
 use crate::problem::indices;
-use crate::stack::{Criterion, Stack};
+use crate::stack::{Criterion, Stack, log_sum_exp};
 use crate::varying;
 use crate::verdict::Plausible;
 
@@ -206,6 +211,19 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// True if a candidate says how the motion of the body acts on the accelerometer where this motion is not known: without a reference
+    /// position a body that is on no rig may translate, which makes block means of the force scatter beside the candidate. `stack` holds it.
+    pub fn of_unseen_motion(&self, stack: &Stack, slot: usize) -> bool {
+        let problem = self.criterion.problem;
+        let effect = &problem.slots[slot].effect;
+        let by_motion = matches!(effect.card().stage, Stage::Time | Stage::Input) && effect.sensors() == [Sensor::Acc];
+        let unknown = |part: &Part| {
+            let facts = &part.white.layout.facts;
+            facts.position_smoothing.is_none() && !facts.rests && facts.rig.is_none()
+        };
+        by_motion && problem.parts.iter().any(unknown) && stack.strength(Sensor::Acc.index()).scatter > 0.0
+    }
+
     /// True if a candidate is there.
     pub fn there(&self, weighed: &Weighed) -> bool {
         weighed.testable && weighed.plausible == Plausible::Yes && weighed.ln_bayes >= self.threshold
@@ -226,7 +244,7 @@ impl<'a> Search<'a> {
         };
         let problem = self.criterion.problem;
         let own = indices(&problem.slots, &[slot]);
-        let columns = self.columns(members);
+        let columns: Vec<usize> = self.beside(stack, members).iter().map(|(j, _)| *j).collect();
         let question = problem.question(&columns, &own, &DMatrix::identity(own.len(), own.len()));
         self.varying_of(stack, members, question, deviation, asked.trials)
     }
@@ -234,6 +252,13 @@ impl<'a> Search<'a> {
     /// Parameters of the model and of some members.
     pub fn columns(&self, members: &[usize]) -> Vec<usize> {
         self.parameters(members).iter().map(|(j, _)| *j).collect()
+    }
+
+    /// Parameters of the model, of some members and of a heading that wanders as beside a stack, each with its prior deviation.
+    pub fn beside(&self, stack: &Stack, members: &[usize]) -> Vec<(usize, f64)> {
+        let heading = self.criterion.heading.iter().map(|j| (*j, stack.wanders()));
+        let wandering = heading.filter(|(_, deviation)| *deviation > 0.0);
+        self.parameters(members).into_iter().chain(wandering).collect()
     }
 
     /// The same of any question beside some members.
@@ -245,7 +270,7 @@ impl<'a> Search<'a> {
         deviation: &[f64],
         trials: f64,
     ) -> f64 {
-        for (k, (_, deviation)) in self.parameters(members).iter().enumerate() {
+        for (k, (_, deviation)) in self.beside(stack, members).iter().enumerate() {
             question.precision[k] = deviation.powi(-2);
         }
         let strength = |sensor| stack.strength(sensor);
@@ -274,6 +299,15 @@ impl<'a> Search<'a> {
             }
         }
         Some(members)
+    }
+
+    /// Log of the marginal likelihood of the model, where each of the candidates may be there or not, one as likely as the other.
+    pub fn ln_evidence(&self) -> Option<f64> {
+        let stack = self.stack(&[])?;
+        let weighed = self.weigh_all(&stack, &[]);
+        let possible = weighed.iter().filter(|w| w.plausible == Plausible::Yes);
+        let of = |w: &Weighed| log_sum_exp(&[0.0, w.ln_bayes]) - LN_2;
+        Some(stack.ln_z + possible.map(of).sum::<f64>())
     }
 
     /// Log evidence of some members over the model alone: each beside those before it.

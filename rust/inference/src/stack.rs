@@ -1,5 +1,6 @@
 //! A stack of effects with the likelihood of the log under it, and the Bayes factor of columns beside it.
 
+use imufit_fit::block_sums::ChannelSums;
 use imufit_fit::normal_equations::NormalEquations;
 use imufit_fit::whitening;
 use imufit_model::card::ReferencePart;
@@ -8,8 +9,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 use crate::asked::{Asked, Prior};
-use crate::block_sums::ChannelSums;
-use crate::problem::Problem;
+use crate::problem::{Problem, parameters_of};
 use crate::zeros::{self, Modes, Strength};
 
 /// Strengths of the noise whose log likelihood lies so far below the best one do not count, unless they are weaker than that:
@@ -25,6 +25,11 @@ const SIZES: [f64; 4] = [1.0, 0.2, 0.04, 0.008];
 const RIDGE: f64 = 1e-6;
 /// Sensors of a log.
 const SENSORS: usize = 3;
+/// What the noise of the reference's heading is called among those of the sensors.
+const HEADING: usize = SENSORS;
+/// Deviations by which the heading of a reference may wander over a log, rad: from none, by that of a good gyroscope, to that of a filter
+/// that has not settled.
+const WANDERS: [f64; 7] = [0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3];
 
 /// What all questions of a problem share.
 pub struct Criterion<'a> {
@@ -38,6 +43,8 @@ pub struct Criterion<'a> {
     pub strengths: Vec<Strength>,
     /// Gains that the noise of the reference makes uncertain: parameter and deviation.
     attenuated: Vec<(usize, f64)>,
+    /// Parameters of a heading of the reference that wanders by one radian.
+    pub heading: Vec<usize>,
     /// Number of samples of a channel, on average.
     pub samples: f64,
 }
@@ -73,6 +80,8 @@ impl<'a> Criterion<'a> {
             .map(deviation)
             .filter(|(_, deviation)| *deviation > ATTENUATION_SEEN)
             .collect();
+        let wanders = |s: &&Slot| s.effect.card().traits.reference == Some(ReferencePart::Heading);
+        let heading = parameters_of(problem.slots.iter().filter(wanders));
         let channels: usize = problem
             .parts
             .iter()
@@ -85,6 +94,7 @@ impl<'a> Criterion<'a> {
             modes: zeros::modes(problem),
             strengths: zeros::strengths(),
             attenuated,
+            heading,
         }
     }
 
@@ -104,21 +114,30 @@ impl<'a> Criterion<'a> {
     }
 }
 
-/// The likelihood of a stack for one strength of the noise of one sensor, that of the others at their best.
+/// The likelihood of a stack for one strength of the noise of one sensor, or of the heading, that of the others at their best.
 struct Point {
     strength: usize,
     ln_z: f64,
+    deviation: DVector<f64>,
     factor: Cholesky<f64, Dyn>,
     right: DVector<f64>,
 }
 
 impl Point {
-    /// Takes out of equations what the stack explains; `cross` are their products with its columns, in units of prior deviations.
+    /// Puts products with the stack's columns in units of their prior deviations.
+    fn scaled(&self, cross: &mut DMatrix<f64>) {
+        for mut column in cross.column_iter_mut() {
+            column.component_mul_assign(&self.deviation);
+        }
+    }
+
+    /// Takes out of equations what the stack explains; `cross` are their products with its columns.
     fn project(&self, cross: &mut DMatrix<f64>, equations: Beside) -> Beside {
         let Beside {
             mut information,
             mut score,
         } = equations;
+        self.scaled(cross);
         self.factor.l_dirty().solve_lower_triangular_mut(cross);
         information -= cross.tr_mul(cross);
         score -= cross.tr_mul(&self.right);
@@ -131,12 +150,13 @@ pub struct Stack<'a> {
     /// What it belongs to.
     pub criterion: &'a Criterion<'a>,
     columns: Vec<usize>,
+    /// Prior deviations, those of the heading for a unit one.
     deviation: DVector<f64>,
     /// For every channel the columns that act on it, and their sums along its modes.
     sums: Vec<(Vec<usize>, DMatrix<f64>)>,
-    /// The likeliest strength for each sensor.
-    best: [usize; SENSORS],
-    points: [Vec<Point>; SENSORS],
+    /// The likeliest strength for each sensor, and for the heading of the reference.
+    best: [usize; SENSORS + 1],
+    points: [Vec<Point>; SENSORS + 1],
     /// Log of the marginal likelihood.
     pub ln_z: f64,
 }
@@ -192,6 +212,7 @@ impl<'a> Stack<'a> {
             .iter()
             .copied()
             .chain(criterion.attenuated.iter().copied().filter(|(j, _)| !known.contains(j)))
+            .chain(criterion.heading.iter().map(|j| (*j, 1.0)))
             .collect();
         let columns: Vec<usize> = all.iter().map(|(j, _)| *j).collect();
         let of_channel = |modes: &Modes| {
@@ -206,7 +227,7 @@ impl<'a> Stack<'a> {
             deviation: DVector::from_iterator(all.len(), all.iter().map(|(_, d)| *d)),
             columns,
             sums,
-            best: [0; SENSORS],
+            best: [0; SENSORS + 1],
             points: Default::default(),
             ln_z: f64::NEG_INFINITY,
         };
@@ -230,63 +251,95 @@ impl<'a> Stack<'a> {
         (gram, right, square, determinant)
     }
 
-    fn point(&self, strength: usize, equations: (DMatrix<f64>, DVector<f64>, f64, f64)) -> Option<Point> {
+    fn point(
+        &self,
+        strength: usize,
+        ln_prior: f64,
+        wanders: usize,
+        equations: (DMatrix<f64>, DVector<f64>, f64, f64),
+    ) -> Option<Point> {
         let (mut gram, mut right, square, determinant) = equations;
         let p = self.columns.len();
+        let mut deviation = self.deviation.clone();
+        let heading = p - self.criterion.heading.len();
+        deviation.rows_mut(heading, p - heading).scale_mut(WANDERS[wanders]);
         for j in 0..p {
             for i in 0..p {
-                gram[(i, j)] *= self.deviation[i] * self.deviation[j];
+                gram[(i, j)] *= deviation[i] * deviation[j];
             }
             gram[(j, j)] += 1.0;
         }
-        right.component_mul_assign(&self.deviation);
+        right.component_mul_assign(&deviation);
         let factor = Cholesky::new(gram)?;
         factor.l_dirty().solve_lower_triangular_mut(&mut right);
         let half: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
         Some(Point {
             strength,
-            ln_z: self.criterion.strengths[strength].ln_prior
-                - determinant
-                - 0.5 * (square - right.norm_squared())
-                - half,
+            ln_z: ln_prior - determinant - 0.5 * (square - right.norm_squared()) - half,
+            deviation,
             factor,
             right,
         })
     }
 
+    /// Strengths of the noise of a sensor, or of the heading, that can be.
+    fn possible(&self, sensor: usize) -> Vec<usize> {
+        let criterion = self.criterion;
+        if sensor == HEADING {
+            return (0..if criterion.heading.is_empty() { 0 } else { WANDERS.len() }).collect();
+        }
+        let own: Vec<&Modes> = criterion
+            .modes
+            .iter()
+            .filter(|modes| modes.sensor() == sensor)
+            .collect();
+        let known = if own.is_empty() { 0 } else { criterion.strengths.len() };
+        let possible = |k: &usize| own.iter().all(|modes| modes.possible(criterion.strengths[*k]));
+        (0..known).filter(possible).collect()
+    }
+
+    /// Points of some strengths of a sensor, or of the heading, the others at their best.
+    fn points_of(&self, sensor: usize, strengths: &[usize]) -> Vec<Point> {
+        let criterion = self.criterion;
+        let others = self.without_noise(|s| (s != sensor).then_some(self.best[s]));
+        let of = |k: &usize| {
+            if sensor == HEADING {
+                return self.point(*k, zeros::ln_prior(WANDERS.len(), *k), *k, others.clone());
+            }
+            let strength = criterion.strengths[*k];
+            let (mut gram, mut right, mut square, mut determinant) = others.clone();
+            for (modes, sums) in criterion.modes.iter().zip(&self.sums) {
+                if modes.sensor() == sensor {
+                    take(modes, sums, strength, &mut gram, &mut right, &mut square);
+                    determinant += modes.log_determinant(strength);
+                }
+            }
+            let equations = (gram, right, square, determinant);
+            self.point(*k, strength.ln_prior, self.best[HEADING], equations)
+        };
+        strengths.par_iter().filter_map(of).collect()
+    }
+
     fn fill(&mut self) -> Option<()> {
-        let strengths = self.criterion.strengths.clone();
         for round in 0..2 {
             // The noise of one sensor hardly depends on that of the others: a second look only where there was some.
             if round > 0 && self.best.iter().filter(|k| **k > 0).count() < 2 {
                 break;
             }
-            for sensor in 0..SENSORS {
-                let own: Vec<usize> = (0..self.criterion.modes.len())
-                    .filter(|c| self.criterion.modes[*c].sensor() == sensor)
-                    .collect();
-                if own.is_empty() || (round > 0 && self.points[sensor].is_empty()) {
+            for sensor in [HEADING, 0, 1, 2] {
+                let possible = self.possible(sensor);
+                if possible.is_empty() {
                     continue;
                 }
-                let others = self.without_noise(|s| (s != sensor).then_some(self.best[s]));
-                let possible = |k: &usize| own.iter().all(|c| self.criterion.modes[*c].possible(strengths[*k]));
-                let points: Vec<Point> = (0..strengths.len())
-                    .into_par_iter()
-                    .filter(possible)
-                    .filter_map(|k| {
-                        let (mut gram, mut right, mut square, mut determinant) = others.clone();
-                        for c in &own {
-                            let modes = &self.criterion.modes[*c];
-                            take(modes, &self.sums[*c], strengths[k], &mut gram, &mut right, &mut square);
-                            determinant += modes.log_determinant(strengths[k]);
-                        }
-                        self.point(k, (gram, right, square, determinant))
-                    })
-                    .collect();
-                let best = points.iter().max_by(|a, b| a.ln_z.total_cmp(&b.ln_z))?;
-                self.best[sensor] = best.strength;
+                let points = self.points_of(sensor, &possible);
+                self.best[sensor] = points.iter().max_by(|a, b| a.ln_z.total_cmp(&b.ln_z))?.strength;
                 self.points[sensor] = points;
             }
+        }
+        for sensor in 0..self.points.len() {
+            let kept = self.counting(sensor);
+            // The others have moved since.
+            self.points[sensor] = self.points_of(sensor, &kept);
         }
         let mut total = None;
         for points in self.points.iter().filter(|p| !p.is_empty()) {
@@ -297,22 +350,33 @@ impl<'a> Stack<'a> {
         }
         self.ln_z = total.unwrap_or_else(|| {
             let equations = self.without_noise(|_| None);
-            self.point(0, equations).map_or(f64::NEG_INFINITY, |p| p.ln_z)
+            let point = self.point(0, self.criterion.strengths[0].ln_prior, 0, equations);
+            point.map_or(f64::NEG_INFINITY, |p| p.ln_z)
         });
-        for (sensor, points) in self.points.iter_mut().enumerate() {
-            let top = strengths[self.best[sensor]];
-            let most = points.iter().map(|p| p.ln_z).fold(f64::NEG_INFINITY, f64::max);
-            points.retain(|p| {
-                let s = strengths[p.strength];
-                p.ln_z > most - NEGLIGIBLE || (s.walk <= top.walk && s.scatter <= top.scatter)
-            });
-        }
         Some(())
+    }
+
+    /// Strengths of a sensor, or of the heading, that count.
+    fn counting(&self, sensor: usize) -> Vec<usize> {
+        let strengths = &self.criterion.strengths;
+        let (points, best) = (&self.points[sensor], self.best[sensor]);
+        let most = points.iter().map(|p| p.ln_z).fold(f64::NEG_INFINITY, f64::max);
+        let weaker = |k: usize| {
+            let (s, top) = (strengths[k], strengths[best]);
+            k <= best && (sensor == HEADING || (s.walk <= top.walk && s.scatter <= top.scatter))
+        };
+        let counts = |p: &&Point| p.ln_z > most - NEGLIGIBLE || weaker(p.strength);
+        points.iter().filter(counts).map(|p| p.strength).collect()
     }
 
     /// The likeliest strength of the noise of a sensor's zeros, and whether it is the strongest that is known.
     pub fn strength(&self, sensor: usize) -> Strength {
         self.criterion.strengths[self.best[sensor]]
+    }
+
+    /// By how much the heading of the reference wanders, likeliest, rad.
+    pub fn wanders(&self) -> f64 {
+        WANDERS[self.best[HEADING]]
     }
 
     /// Equations of what is asked beside the stack, for one point.
@@ -326,15 +390,7 @@ impl<'a> Stack<'a> {
         {
             self.take(*c, own, strength, &mut cross, &mut information, &mut score);
         }
-        self.scaled(&mut cross);
         point.project(&mut cross, Beside { information, score })
-    }
-
-    /// Puts products with the stack's columns in units of their prior deviations.
-    fn scaled(&self, cross: &mut DMatrix<f64>) {
-        for mut column in cross.column_iter_mut() {
-            column.component_mul_assign(&self.deviation);
-        }
     }
 
     /// The point of the likeliest noise, with its sensor; of sensors with points the first.
@@ -388,7 +444,7 @@ impl<'a> Stack<'a> {
     /// Sensors whose noise matters to what is asked.
     fn sensors(&self, asked: &Asked) -> Vec<usize> {
         let of = |(c, _): &(usize, DMatrix<f64>)| self.criterion.modes[*c].sensor();
-        let mut sensors: Vec<usize> = asked.sums.iter().map(of).collect();
+        let mut sensors: Vec<usize> = asked.sums.iter().map(of).chain([HEADING]).collect();
         sensors.sort_unstable();
         sensors.dedup();
         sensors.retain(|s| !self.points[*s].is_empty());
@@ -476,11 +532,10 @@ impl<'a> Stack<'a> {
 
     /// Whitened square that columns explain beside the stack where zeros make no noise.
     pub fn explained(&self, asked: &Asked) -> f64 {
-        let Some(point) = self.point(0, self.without_noise(|_| None)) else {
+        let Some(point) = self.point(0, 0.0, self.best[HEADING], self.without_noise(|_| None)) else {
             return 0.0;
         };
         let mut cross = asked.cross.select_rows(&self.columns);
-        self.scaled(&mut cross);
         let equations = Beside {
             information: asked.information.clone(),
             score: asked.score.clone(),
@@ -550,14 +605,14 @@ impl<'a> Stack<'a> {
     pub fn projection(&self, asked: &Asked) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let (_, point) = self.likeliest()?;
         let (_, mut cross) = self.others(asked, None);
-        self.scaled(&mut cross);
+        point.scaled(&mut cross);
         let l = point.factor.l();
         point.factor.l_dirty().solve_lower_triangular_mut(&mut cross);
         let (mut own, mut projected) = (point.right.clone(), cross);
         l.tr_solve_lower_triangular_mut(&mut own);
         l.tr_solve_lower_triangular_mut(&mut projected);
-        own.component_mul_assign(&self.deviation);
-        self.scaled(&mut projected);
+        own.component_mul_assign(&point.deviation);
+        point.scaled(&mut projected);
         Some((own, projected))
     }
 

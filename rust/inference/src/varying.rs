@@ -4,11 +4,11 @@
 //! part, normal with the deviation tau times what is typical, is integrated out with and without the common one (a random-effects
 //! meta-analysis, DerSimonian and Laird 1986). A few informative blocks then count as few.
 
+use imufit_fit::block_sums::ChannelSums;
 use imufit_fit::normal_equations::NormalEquations;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::asked::Prior;
-use crate::block_sums::ChannelSums;
 use crate::problem::Question;
 use crate::stack::{Beside, log_sum_exp};
 use crate::zeros::{Modes, Strength};

@@ -102,7 +102,8 @@ pub struct Finding {
 /// What Gram matrices do not hold, and passes over the rows have found.
 #[derive(Clone, Debug, Default)]
 pub struct Known {
-    /// Log evidences of candidates whose columns say little of their full size, each from a fit of its own: these decide among them.
+    /// Log Bayes factors of candidates whose columns say little of their full size, from a fit with each of them and one without: these
+    /// decide among them.
     pub fitted: Vec<(usize, f64)>,
     /// Share of noise in the column of the log that a candidate reads.
     pub column_noise: Vec<(usize, f64)>,
@@ -233,10 +234,20 @@ pub fn decide(
     }
     unexplained.sort_by(|a, b| b.1.total_cmp(&a.1));
     let search = &inquiry.search;
-    // What people see is the error: the effect that lowers it most comes first.
-    let error = |slot: &usize| (*slot, held_out_of(search, Some(*slot)).ratio);
-    let least = members.iter().map(error).min_by(|a, b| a.1.total_cmp(&b.1));
-    let mut best = least.map(|(member, _)| member);
+    // Where more is left than effects explain, their names are those of the nearest shapes.
+    let acts = |slot: usize, sensor: &Sensor| problem.slots[slot].effect.sensors().contains(sensor);
+    let mut unclear = unclear(&inquiry, &members, &before, &unexplained, None);
+    // What people see is the error: the effect that lowers it most comes first. None does that foretells worse than nothing: then the noise
+    // is not what the evidence takes it for.
+    let base = held_out_of(search, None);
+    let error = |slot: &usize| {
+        let in_doubt = unclear.iter().any(|s| acts(*slot, s));
+        let with = held_out_of(search, Some(*slot));
+        (held_out::gain(&base, &with).0 > 0.0).then_some((*slot, in_doubt, with.ratio))
+    };
+    let first = |a: &(usize, bool, f64), b: &(usize, bool, f64)| a.1.cmp(&b.1).then(a.2.total_cmp(&b.2));
+    let least = members.iter().filter_map(error).min_by(first);
+    let mut best = least.map(|(member, ..)| member);
     let mut rivals = best.map_or_else(|| Some(Vec::new()), |best| rivals_of(search, &members, best, known))?;
     if let Some(first) = best.filter(|best| fitted.iter().any(|(slot, _)| slot == best)) {
         let can = |slot: usize| weighed.iter().any(|w| w.slot == slot && w.plausible == Plausible::Yes);
@@ -250,6 +261,7 @@ pub fn decide(
         );
         members.iter_mut().filter(|m| **m == first).for_each(|m| *m = most.0);
         best = Some(most.0);
+        unclear = self::unclear(&inquiry, &members, &before, &unexplained, Some(*most));
     }
     let impossible = too_large
         || (search.weigh_all(&stack, &members).iter())
@@ -260,25 +272,11 @@ pub fn decide(
         .is_some_and(|d| d.wild && (problem.parts.len() == 2 || best.is_none_or(|b| b == d.slot)));
     let kind = match best {
         _ if spoilt => Kind::Unknown,
-        None if unexplained.is_empty() && known.seen.is_empty() && !impossible => Kind::Adequate,
+        None if members.is_empty() && unexplained.is_empty() && known.seen.is_empty() && !impossible => Kind::Adequate,
         None => Kind::Unknown,
-        Some(first) => {
-            let sensors = problem.slots[first].effect.sensors();
-            let concerned = unexplained.iter().filter(|(k, _)| {
-                let of = sensors_of(problem, &inquiry.unnamed[*k].origin);
-                of.iter().any(|s| sensors.contains(s))
-            });
-            let most = concerned.map(|(_, ln)| *ln).fold(0.0, f64::max);
-            let named = search.evidence(&members);
-            let better = before.iter().copied().fold(0.0, f64::max);
-            if named < NAMED_SHARE * (named + most) || better - threshold > named {
-                Kind::Unknown
-            } else if rivals.is_empty() {
-                Kind::Missing
-            } else {
-                Kind::Ambiguous
-            }
-        }
+        Some(first) if unclear.iter().any(|s| acts(first, s)) => Kind::Unknown,
+        Some(_) if rivals.is_empty() => Kind::Missing,
+        Some(_) => Kind::Ambiguous,
     };
     let candidates = shown(search, &weighed, &members, best, &rivals);
     let correlations = correlations(problem, model, best, &candidates);
@@ -300,6 +298,36 @@ pub fn decide(
     })
 }
 
+/// Sensors in which named effects explain less than [`NAMED_SHARE`] of all that is explained, or less than one unnamed cause alone would.
+/// `fitted`: a member whose columns say little, and what it explains by a fit.
+fn unclear(
+    inquiry: &Inquiry,
+    members: &[usize],
+    before: &[f64],
+    unexplained: &[(usize, f64)],
+    fitted: Option<(usize, f64)>,
+) -> Vec<Sensor> {
+    let search = &inquiry.search;
+    let problem = search.criterion.problem;
+    let shows = |k: usize, sensor: &Sensor| sensors_of(problem, &inquiry.unnamed[k].origin).contains(sensor);
+    let of = |sensor: &&Sensor| {
+        let acts = |slot: &usize| problem.slots[*slot].effect.sensors().contains(sensor);
+        let own: Vec<usize> = members.iter().copied().filter(acts).collect();
+        let columns = search.evidence(&own);
+        let named = match fitted.filter(|(slot, _)| own.contains(slot)) {
+            // A fit may show that columns promise too little; what it explains is less where others have explained a part of it.
+            Some((slot, ln)) => columns.max(search.evidence(&search::without(&own, slot)) + ln),
+            None => columns,
+        };
+        let left = unexplained.iter().filter(|(k, _)| shows(*k, sensor)).map(|(_, ln)| *ln);
+        let left = left.fold(0.0, f64::max);
+        let alone = (0..before.len()).filter(|k| shows(*k, sensor)).map(|k| before[k]);
+        let alone = alone.fold(0.0, f64::max);
+        named < NAMED_SHARE * (named + left) || alone - inquiry.threshold > named
+    };
+    Sensor::ALL.iter().filter(of).copied().collect()
+}
+
 /// True if the candidate with most evidence would have to be larger than sensors have it.
 fn outdone(weighed: &[Weighed]) -> bool {
     let can = |w: &&Weighed| w.testable && matches!(w.plausible, Plausible::Yes | Plausible::TooLarge);
@@ -314,6 +342,8 @@ fn outdone(weighed: &[Weighed]) -> bool {
 fn named(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>)> {
     let search = &inquiry.search;
     let mut members = search.find()?;
+    let stack = search.stack(&members)?;
+    members.retain(|m| !search.of_unseen_motion(&stack, *m));
     // What varies from block to block is no property of the sensor.
     loop {
         let stack = search.stack(&members)?;

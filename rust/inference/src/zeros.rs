@@ -5,10 +5,10 @@
 //! of any question are worked out for every strength (w, s) without a further factorisation:
 //! T(w, s) = G - sum over modes k of m_k u_k u_k^T with m_k = (w l_k + s) / (1 + w l_k + s), l_k the eigenvalue.
 
+use imufit_fit::block_sums::ChannelSums;
 use imufit_model::sensor::Sensor;
 use nalgebra::{DMatrix, DVector};
 
-use crate::block_sums::ChannelSums;
 use crate::problem::Problem;
 
 /// Variances of a walk's step over a block, in units of the variance that white noise gives to a block mean.
@@ -30,19 +30,21 @@ pub struct Strength {
 /// Chance that a component is there at all, before the log is seen; every strength of it is then as likely as any.
 const THERE: f64 = 0.5;
 
+/// Log of the prior probability of one of so many strengths of a component; the first is none.
+pub fn ln_prior(strengths: usize, k: usize) -> f64 {
+    if k == 0 {
+        (1.0 - THERE).ln()
+    } else {
+        (THERE / (strengths - 1) as f64).ln()
+    }
+}
+
 /// Every strength that is integrated over; the first is none.
 pub fn strengths() -> Vec<Strength> {
-    let prior = |grid: &[f64], k: usize| {
-        if k == 0 {
-            (1.0 - THERE).ln()
-        } else {
-            (THERE / (grid.len() - 1) as f64).ln()
-        }
-    };
     let of = |i: usize, j: usize| Strength {
         walk: WALK[i],
         scatter: SCATTER[j],
-        ln_prior: prior(&WALK, i) + prior(&SCATTER, j),
+        ln_prior: ln_prior(WALK.len(), i) + ln_prior(SCATTER.len(), j),
     };
     (0..WALK.len())
         .flat_map(|i| (0..SCATTER.len()).map(move |j| of(i, j)))
@@ -138,10 +140,10 @@ pub fn modes(problem: &Problem) -> Vec<Modes> {
 
 #[cfg(test)]
 mod tests {
+    use imufit_fit::block_sums::Walk;
     use nalgebra::{Cholesky, DMatrix, DVector};
 
     use super::*;
-    use crate::block_sums::Walk;
 
     #[test]
     fn modes_take_out_what_the_dense_covariance_of_walk_and_scatter_does() {

@@ -5,78 +5,33 @@
 //! itself comes from residuals of the narrowest fits, which any motion below a few hertz leaves untouched.
 
 use crate::reference::LocalReference;
-use crate::smoothing::{NARROWEST, Smoothing};
+use crate::smoothing::{Kernel, LocalFit, NARROWEST, Smoothing};
 use crate::window::Window;
 
 /// The widths tried, narrowest first. The last ones follow no motion that a sensor could: they are for references that shake near
 /// half their own sampling rate, and only the sensor can ask for them.
 pub const WIDTHS: [Smoothing; 15] = [
     NARROWEST,
-    Smoothing {
-        degree: 8,
-        half_width: 6,
-    },
-    Smoothing {
-        degree: 6,
-        half_width: 6,
-    },
-    Smoothing {
-        degree: 6,
-        half_width: 8,
-    },
-    Smoothing {
-        degree: 6,
-        half_width: 11,
-    },
-    Smoothing {
-        degree: 6,
-        half_width: 15,
-    },
-    Smoothing {
-        degree: 6,
-        half_width: 20,
-    },
-    Smoothing {
-        degree: 6,
-        half_width: 27,
-    },
-    Smoothing {
-        degree: 6,
-        half_width: 36,
-    },
-    Smoothing {
-        degree: 6,
-        half_width: 48,
-    },
-    Smoothing {
-        degree: 6,
-        half_width: 64,
-    },
-    Smoothing {
-        degree: 6,
-        half_width: 86,
-    },
-    Smoothing {
-        degree: 2,
-        half_width: 1,
-    },
-    Smoothing {
-        degree: 2,
-        half_width: 2,
-    },
-    Smoothing {
-        degree: 2,
-        half_width: 4,
-    },
+    Smoothing::uniform(8, 6),
+    Smoothing::uniform(6, 6),
+    Smoothing::uniform(6, 8),
+    Smoothing::uniform(6, 11),
+    Smoothing::uniform(6, 15),
+    Smoothing::uniform(6, 20),
+    Smoothing::uniform(6, 27),
+    Smoothing::uniform(6, 36),
+    Smoothing::uniform(6, 48),
+    Smoothing::uniform(6, 64),
+    Smoothing::uniform(6, 86),
+    Smoothing::uniform(2, 1),
+    Smoothing::uniform(2, 2),
+    Smoothing::uniform(2, 4),
 ];
 
 /// Number of widths that the reference alone may choose from.
 const ORDERED: usize = 12;
 
-const NOISE_FIT: Smoothing = Smoothing {
-    degree: 8,
-    half_width: 5,
-};
+const NOISE_FIT: Smoothing = Smoothing::uniform(8, 5);
 
 /// Rows are judged in groups of like motion, so that short turns are not outvoted by long rests: upper ends of the groups, as shares of
 /// the rows ordered by how fast the first derivative changes.
@@ -97,10 +52,59 @@ const REACH: f64 = 0.9;
 const BURIED: f64 = 2.0;
 /// Part of the mean square of a derivative from which on it shrinks what is fitted to it.
 const NOISY: f64 = 1e-3;
-/// ... and of that along one axis for the axis to be silent.
+/// Part of the mean square of a second derivative that noise may make: so much of the difference between a lag and a delay, which is that
+/// derivative, would lower the residual by smoothing noise.
+const NOISY_BEND: f64 = 0.05;
+/// Part of the mean square of a derivative that noise makes along one axis, from which on the axis is silent.
 const NOISY_AXIS: f64 = 0.1;
 /// The width whose second derivative tells how lively a row is.
 const LIVELY: usize = 4;
+
+/// What one polynomial says in a row.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    /// The derivative, the one above it and the one above that.
+    value: [f64; 3],
+    above: [f64; 3],
+    bend: [f64; 3],
+    /// Variance that white noise of unit variance gives to each.
+    gain: f64,
+    gain_above: f64,
+    gain_bend: f64,
+}
+
+impl Found {
+    const NOTHING: Self = Self {
+        value: [f64::NAN; 3],
+        above: [f64::NAN; 3],
+        bend: [f64::NAN; 3],
+        gain: 0.0,
+        gain_above: 0.0,
+        gain_bend: 0.0,
+    };
+
+    /// Of the weights of each.
+    fn of([weights, above, bend]: &[Vec<f64>; 3], values: &[[f64; 3]]) -> Self {
+        let combine = |weights: &[f64]| {
+            let mut value = [0.0; 3];
+            for (w, v) in weights.iter().zip(values) {
+                for axis in 0..3 {
+                    value[axis] += w * v[axis];
+                }
+            }
+            value
+        };
+        let gain = |weights: &[f64]| weights.iter().map(|w| w * w).sum();
+        Self {
+            value: combine(weights),
+            above: combine(above),
+            bend: combine(bend),
+            gain: gain(weights),
+            gain_above: gain(above),
+            gain_bend: gain(bend),
+        }
+    }
+}
 
 /// Differences of neighbouring widths at one sampled row.
 #[derive(Clone, Debug)]
@@ -108,11 +112,8 @@ struct Sample {
     lively: f64,
     difference: [f64; WIDTHS.len()],
     gain: [f64; WIDTHS.len()],
-    own_gain: [f64; WIDTHS.len()],
-    gain_above: [f64; WIDTHS.len()],
-    /// The derivative and the one above it, per width.
-    values: [[f64; 3]; WIDTHS.len()],
-    above: [[f64; 3]; WIDTHS.len()],
+    /// By each width with knots that all count alike, and with tapered ones.
+    found: [[Found; WIDTHS.len()]; 2],
     row: usize,
     reached: [bool; WIDTHS.len()],
 }
@@ -126,6 +127,7 @@ pub struct Bandwidth {
     noise_freedom: usize,
     samples: Vec<Sample>,
     spacing: Option<f64>,
+    packet: usize,
 }
 
 impl Bandwidth {
@@ -152,6 +154,7 @@ impl Bandwidth {
             noise_freedom: 0,
             samples: Vec::new(),
             spacing: None,
+            packet: 1,
         }
     }
 
@@ -166,6 +169,7 @@ impl Bandwidth {
         let lowest = reference.lowest();
         if self.spacing.is_none() {
             self.spacing = Some(reference.spacing()).filter(|s| *s > 0.0);
+            self.packet = reference.packet();
         }
         for row in rows {
             let at = window.t[row];
@@ -175,42 +179,36 @@ impl Bandwidth {
                 self.noise_freedom += freedom;
             }
             let zero = [0.0; WIDTHS.len()];
-            let none = [[f64::NAN; 3]; WIDTHS.len()];
             let mut sample = Sample {
                 lively: 0.0,
                 difference: zero,
                 gain: zero,
-                own_gain: zero,
-                gain_above: zero,
-                values: none,
-                above: none,
+                found: [[Found::NOTHING; WIDTHS.len()]; 2],
                 row: window.offset + row,
                 reached: [false; WIDTHS.len()],
             };
             let mut last: Option<(usize, Vec<f64>, [f64; 3])> = None;
+            let weights_of = |fit: &LocalFit| {
+                let all = fit.weights();
+                [0, 1, 2]
+                    .map(|k| self.order + k)
+                    .map(|order| all.iter().map(|w| w[order - lowest]).collect::<Vec<f64>>())
+            };
             for (k, width) in WIDTHS.iter().enumerate() {
                 let Some((fit, values)) = reference.local_fit(at, *width, self.of_attitude) else {
                     continue;
                 };
-                let all = fit.weights();
-                let combine = |weights: &[f64]| {
-                    let mut value = [0.0; 3];
-                    for (w, v) in weights.iter().zip(&values) {
-                        for axis in 0..3 {
-                            value[axis] += w * v[axis];
-                        }
-                    }
-                    value
-                };
-                let [weights, above] = [self.order, self.order + 1]
-                    .map(|order| all.iter().map(|w| w[order - lowest]).collect::<Vec<f64>>());
-                let value = combine(&weights);
-                sample.own_gain[k] = weights.iter().map(|w| w * w).sum();
-                sample.values[k] = value;
-                sample.above[k] = combine(&above);
-                sample.gain_above[k] = above.iter().map(|w| w * w).sum();
+                let both = weights_of(&fit);
+                sample.found[0][k] = Found::of(&both, &values);
+                if k < ORDERED
+                    && let Some((fit, values)) = reference.local_fit(at, width.tapered(), self.of_attitude)
+                {
+                    sample.found[1][k] = Found::of(&weights_of(&fit), &values);
+                }
+                let [weights, ..] = both;
+                let value = sample.found[0][k].value;
                 if k <= LIVELY {
-                    sample.lively = sample.above[k].iter().map(|v| v * v).sum();
+                    sample.lively = sample.found[0][k].above.iter().map(|v| v * v).sum();
                 }
                 if let Some((half, narrow, before)) = last.as_ref().filter(|_| k < ORDERED) {
                     let margin = width.half_width - half;
@@ -232,7 +230,12 @@ impl Bandwidth {
         }
     }
 
-    /// Median time between reference samples, s, where the log begins.
+    /// Samples of the reference that come in one packet, where the log begins; 1 where every sample has a stamp of its own.
+    pub fn packet(&self) -> usize {
+        self.packet
+    }
+
+    /// Usual time between reference samples, s, where the log begins.
     pub fn spacing(&self) -> Option<f64> {
         self.spacing
     }
@@ -242,22 +245,31 @@ impl Bandwidth {
         (self.noise_sum / self.noise_freedom.max(1) as f64).sqrt()
     }
 
+    /// What a polynomial says in each row that it reaches, with the row.
+    fn rows(&self, width: Smoothing) -> impl Iterator<Item = (usize, &Found)> {
+        let alike = |w: &Smoothing| (w.degree, w.half_width) == (width.degree, width.half_width);
+        let place = WIDTHS.iter().position(alike);
+        let kernel = usize::from(width.kernel == Kernel::Tapered);
+        let reached = move |s: &&Sample| place.is_some_and(|k| s.reached[k] && s.found[kernel][k].gain > 0.0);
+        (self.samples.iter().filter(reached)).map(move |s| (s.row, &s.found[kernel][place.unwrap_or_default()]))
+    }
+
+    /// The same without the row.
+    fn found(&self, width: Smoothing) -> impl Iterator<Item = &Found> {
+        self.rows(width).map(|(_, found)| found)
+    }
+
+    /// The derivative by one width in each row sampled, with the row.
+    pub fn derivatives(&self, width: Smoothing) -> impl Iterator<Item = (usize, [f64; 3])> {
+        self.rows(width).map(|(row, found)| (row, found.value))
+    }
+
     /// Noise of the derivative at a width, per component: rad/s of the angular rate or m/s^2 of the acceleration.
     pub fn derivative_noise(&self, width: Smoothing) -> f64 {
-        let Some(k) = WIDTHS.iter().position(|w| *w == width) else {
-            return 0.0;
-        };
-        let gains: Vec<f64> = self
-            .samples
-            .iter()
-            .filter(|s| s.reached[k])
-            .map(|s| s.own_gain[k])
-            .collect();
-        if gains.is_empty() {
-            0.0
-        } else {
-            self.noise() * (gains.iter().sum::<f64>() / gains.len() as f64).sqrt()
-        }
+        let (sum, n) = self
+            .found(width)
+            .fold((0.0, 0.0), |(sum, n), f| (sum + f.gain, n + 1.0));
+        if n > 0.0 { self.noise() * (sum / n).sqrt() } else { 0.0 }
     }
 
     /// Mean square difference of each width to the next narrower one, over what noise explains: the worst group of rows,
@@ -341,43 +353,49 @@ impl Bandwidth {
             return width;
         }
         let last = (k + 2).min(ORDERED - 1);
-        (k..=last).rev().find(|j| self.reaches(*j)).map_or(width, |j| WIDTHS[j])
+        (k + 1..=last)
+            .rev()
+            .find(|j| self.reaches(*j))
+            .map_or(width, |j| WIDTHS[j].tapered())
+    }
+
+    /// Width for second derivatives of what a sensor reads: the narrowest, from that of columns on, of whose noise they hold little.
+    pub fn for_bends(&self, columns: Smoothing) -> Smoothing {
+        let known = |w: &&Smoothing| (w.degree, w.half_width) == (columns.degree, columns.half_width);
+        let Some(first) = WIDTHS[..ORDERED].iter().position(|w| known(&w)) else {
+            return columns;
+        };
+        let quiet = |width: &Smoothing| {
+            let noise: f64 = self.found(*width).map(|f| 3.0 * f.gain_bend).sum::<f64>() * self.noise().powi(2);
+            let all: f64 = self.found(*width).flat_map(|f| f.bend).map(|v| v * v).sum();
+            noise <= NOISY_BEND * all
+        };
+        let reached = (first + 1..ORDERED)
+            .filter(|k| self.reaches(*k))
+            .map(|k| WIDTHS[k].tapered());
+        let all: Vec<Smoothing> = std::iter::once(columns).chain(reached).collect();
+        all.iter().find(|w| quiet(w)).or(all.last()).copied().unwrap_or(columns)
     }
 
     /// True if noise of the reference makes more than [`NOISY`] of the highest derivative that enters columns.
     fn noisy(&self, k: usize) -> bool {
-        let rows = || self.samples.iter().filter(|s| s.reached[k]);
-        let noise: f64 = rows().map(|s| 3.0 * s.gain_above[k]).sum::<f64>() * self.noise().powi(2);
-        let all: f64 = rows().flat_map(|s| s.above[k]).map(|v| v * v).sum();
+        let noise: f64 = self.found(WIDTHS[k]).map(|f| 3.0 * f.gain_above).sum::<f64>() * self.noise().powi(2);
+        let all: f64 = self.found(WIDTHS[k]).flat_map(|f| f.above).map(|v| v * v).sum();
         noise > NOISY * all
     }
 
     /// Axes along which noise of the reference makes more than [`NOISY_AXIS`] of the highest derivative that enters columns.
     pub fn noisy_axes(&self, width: Smoothing) -> [bool; 3] {
-        let Some(k) = WIDTHS.iter().position(|w| *w == width) else {
-            return [false; 3];
-        };
-        let rows = || self.samples.iter().filter(|s| s.reached[k]);
-        let noise: f64 = rows().map(|s| s.gain_above[k]).sum::<f64>() * self.noise().powi(2);
-        std::array::from_fn(|axis| noise > NOISY_AXIS * rows().map(|s| s.above[k][axis].powi(2)).sum::<f64>())
+        let noise: f64 = self.found(width).map(|f| f.gain_above).sum::<f64>() * self.noise().powi(2);
+        std::array::from_fn(|axis| noise > NOISY_AXIS * self.found(width).map(|f| f.above[axis].powi(2)).sum::<f64>())
     }
 
     /// Part that noise of the reference makes of the mean square of the derivative, axis by axis.
     pub fn noise_shares(&self, width: Smoothing) -> [f64; 3] {
-        let noise = self.derivative_noise(width).powi(2);
-        let Some(k) = WIDTHS.iter().position(|w| *w == width) else {
-            return [0.0; 3];
-        };
-        let rows = self.samples.iter().filter(|s| s.reached[k]);
-        let (square, n): ([f64; 3], f64) = rows.fold(([0.0; 3], 0.0), |(square, n), s| {
-            (std::array::from_fn(|a| square[a] + s.values[k][a].powi(2)), n + 1.0)
-        });
-        square.map(|square| {
-            if noise > 0.0 {
-                (n * noise / square).min(1.0)
-            } else {
-                0.0
-            }
+        let noise: f64 = self.found(width).map(|f| f.gain).sum::<f64>() * self.noise().powi(2);
+        std::array::from_fn(|axis| {
+            let square: f64 = self.found(width).map(|f| f.value[axis].powi(2)).sum();
+            if noise > 0.0 { (noise / square).min(1.0) } else { 0.0 }
         })
     }
 
@@ -392,6 +410,6 @@ impl Bandwidth {
         self.samples
             .iter()
             .filter(move |s| s.reached[width])
-            .map(move |s| (s.row, s.values[width], s.above[width]))
+            .map(move |s| (s.row, s.found[0][width].value, s.found[0][width].above))
     }
 }

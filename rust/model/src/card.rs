@@ -93,6 +93,8 @@ pub enum ReferencePart {
     Field,
     /// The angle that the drive of a rig is at.
     Drive,
+    /// Its heading, which wanders.
+    Heading,
 }
 
 /// Properties of an effect that others ask about instead of its name.

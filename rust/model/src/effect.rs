@@ -197,6 +197,12 @@ pub trait Effect: Send + Sync {
         None
     }
 
+    /// Different readings of one ideal axis that determine its parameters beside all effects of lower order (a cubic goes through any
+    /// three); zero where that is no question.
+    fn least_levels(&self) -> usize {
+        0
+    }
+
     /// True if its columns around one value say little of larger ones, so that only a fit tells how much it explains.
     fn strongly_curved(&self) -> bool {
         false

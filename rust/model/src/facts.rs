@@ -66,6 +66,10 @@ pub struct LogFacts {
     pub attitude_columns: Smoothing,
     /// The same for the position, accelerations included.
     pub position_columns: Option<Smoothing>,
+    /// How the attitude is differentiated where a second derivative of what a sensor reads counts: that of a lag against a delay.
+    pub attitude_bends: Smoothing,
+    /// The same for the position.
+    pub position_bends: Option<Smoothing>,
     /// For each sensor the body axes along which its ideal reading never exceeds the noise of the reference (a rig that never turns
     /// about an axis, an axis that stays level): those readings are noise, and a column made of noise would give a scale of -1.
     pub silent_axes: [[bool; 3]; 3],
@@ -76,8 +80,10 @@ pub struct LogFacts {
     pub noise_shares: [[f64; 3]; 2],
     /// True if the sensor is shaken more at some times than at others.
     pub shaking_varies: bool,
-    /// Median time between reference samples, s.
+    /// Usual time between reference samples, s.
     pub reference_dt: f64,
+    /// Samples of the reference that come in one packet; 1 where every sample has a stamp of its own.
+    pub reference_packet: usize,
     /// Where the range of each sensor ends, if readings are cut off there; m/s^2, rad/s, uT.
     pub ranges: [Option<f64>; 3],
     /// Step between readings of each sensor along each axis where it is coarse against the noise, 0 elsewhere; m/s^2, rad/s, uT.
@@ -144,11 +150,14 @@ impl LogFacts {
             position_origin: Vector3::zeros(),
             attitude_columns: NARROWEST,
             position_columns: None,
+            attitude_bends: NARROWEST,
+            position_bends: None,
             silent_axes: [[false; 3]; 3],
             silent_accelerations: [false; 3],
             noise_shares: [[0.0; 3]; 2],
             shaking_varies: true,
             reference_dt: dt,
+            reference_packet: 1,
             ranges: [None; 3],
             steps: [[0.0; 3]; 3],
             steps_crossed: [[false; 3]; 3],
@@ -195,11 +204,14 @@ impl LogFacts {
             position_origin: Vector3::zeros(),
             attitude_columns: NARROWEST,
             position_columns: None,
+            attitude_bends: NARROWEST,
+            position_bends: None,
             silent_axes: [[false; 3]; 3],
             silent_accelerations: [false; 3],
             noise_shares: [[0.0; 3]; 2],
             shaking_varies: true,
             reference_dt: dt,
+            reference_packet: 1,
             ranges: [None; 3],
             steps: [[0.0; 3]; 3],
             steps_crossed: [[false; 3]; 3],
@@ -216,6 +228,8 @@ impl LogFacts {
             Some(self.attitude_columns),
             self.position_smoothing,
             self.position_columns,
+            Some(self.attitude_bends),
+            self.position_bends,
         ];
         let widest = widths.iter().flatten().map(|s| s.half_width).max().unwrap_or(0);
         let reach = 2.0 * (widest as f64 + 4.0) * (self.reference_dt / self.dt).max(1.0);

@@ -10,6 +10,7 @@ use crate::reference::{self, Kinematics, Widths};
 use crate::reference_clock::ReferenceClock;
 use crate::rig::{Play, RigError, Slack};
 use crate::sensor::Sensor;
+use crate::smoothing::Smoothing;
 use crate::triple::Triple;
 use crate::window::Window;
 
@@ -135,17 +136,28 @@ pub struct Command {
     pub rate: f64,
 }
 
+/// What motion is asked about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Motion {
+    /// All that readings are compared with.
+    Whole,
+    /// As much of it as has second derivatives with little noise.
+    Smooth,
+}
+
 /// Kinematics of the core rows of a window, worked out once for all passes over a log.
-fn kinematics(window: &Window, facts: &LogFacts, clock: ReferenceClock) -> KinematicsRows {
+fn kinematics(window: &Window, facts: &LogFacts, clock: ReferenceClock, motion: Motion) -> KinematicsRows {
+    let widths = |value: Smoothing, columns: Smoothing, bends: Smoothing| match motion {
+        Motion::Whole => Widths { value, columns, bends },
+        Motion::Smooth => Widths::alike(bends),
+    };
+    let of_position = |value: Smoothing| {
+        let columns = facts.position_columns.unwrap_or(value);
+        widths(value, columns, facts.position_bends.unwrap_or(columns))
+    };
     let how = Differentiation {
-        attitude: Widths {
-            value: facts.attitude_smoothing,
-            columns: facts.attitude_columns,
-        },
-        position: facts.position_smoothing.map(|value| Widths {
-            value,
-            columns: facts.position_columns.unwrap_or(value),
-        }),
+        attitude: widths(facts.attitude_smoothing, facts.attitude_columns, facts.attitude_bends),
+        position: facts.position_smoothing.map(of_position),
         clock,
     };
     facts.kinematics.of(window, facts.n, how, || {
@@ -156,12 +168,18 @@ fn kinematics(window: &Window, facts: &LogFacts, clock: ReferenceClock) -> Kinem
 impl Ideal {
     /// Ideal readings of the window's core rows.
     pub fn new(window: &Window, facts: &LogFacts, change: &ReferenceChange) -> Self {
-        Self::by_clock(window, facts, change, change.clock(facts))
+        Self::by_clock(window, facts, change, change.clock(facts), Motion::Whole)
     }
 
     /// The same with the reference read by another clock.
-    fn by_clock(window: &Window, facts: &LogFacts, change: &ReferenceChange, clock: ReferenceClock) -> Self {
-        let rows = kinematics(window, facts, clock);
+    fn by_clock(
+        window: &Window,
+        facts: &LogFacts,
+        change: &ReferenceChange,
+        clock: ReferenceClock,
+        motion: Motion,
+    ) -> Self {
+        let rows = kinematics(window, facts, clock, motion);
         let mut ideal = Self::default();
         let mut rig = facts.rig.as_ref().map(|rig| {
             ideal.rig_axis = change.alignment.inverse_transform_vector(&rig.axis);
@@ -226,24 +244,27 @@ impl Ideal {
             return None;
         }
         let clock = change.clock(facts);
-        let before = |past: f64| Self::by_clock(window, facts, change, clock.before(past));
-        let mut now = before(time.delay + time.lag);
+        let before = |past: f64, motion| Self::by_clock(window, facts, change, clock.before(past), motion);
+        let mut now = before(time.delay + time.lag, Motion::Whole);
         if time.lag == 0.0 {
             return Some(now);
         }
-        // The detail, mostly the reference's noise, is only late: a mean of it would lower the residual of any sensor that is called
-        // sluggish.
-        let n = now.len();
-        now.settling = Triple::zeros(n);
-        for triple in now.smooth() {
-            *triple = Triple::zeros(n);
-        }
+        // A lag is a delay and a mean besides. That of noise of the reference would lower the residual of any sensor that is called
+        // sluggish, so only what is smooth is averaged; the remainder is only late, as is all where that does not reach.
+        let mut late = before(time.delay + time.lag, Motion::Smooth);
+        let mut settling = late.rate(sensor).negative();
+        let mut means = late.smooth().map(|triple| triple.negative());
         for (node, weight) in PAST {
-            let mut then = before(time.delay + time.lag * node);
-            now.settling.add(then.rate(sensor), weight * node);
-            for (sum, triple) in now.smooth().into_iter().zip(then.smooth()) {
-                sum.add(triple, weight);
+            let mut then = before(time.delay + time.lag * node, Motion::Smooth);
+            settling.add(then.rate(sensor), weight * node);
+            for (mean, triple) in means.iter_mut().zip(then.smooth()) {
+                mean.add(triple, weight);
             }
+        }
+        now.settling = now.rate(sensor).clone();
+        now.settling.add_known(&settling);
+        for (triple, mean) in now.smooth().into_iter().zip(&means) {
+            triple.add_known(mean);
         }
         Some(now)
     }

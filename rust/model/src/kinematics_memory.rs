@@ -131,10 +131,7 @@ mod tests {
     }
 
     const HOW: Differentiation = Differentiation {
-        attitude: Widths {
-            value: NARROWEST,
-            columns: NARROWEST,
-        },
+        attitude: Widths::alike(NARROWEST),
         position: None,
         clock: later(0.0),
     };

@@ -5,7 +5,8 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::knots::{Knots, median_step};
+use crate::interpolated::Course;
+use crate::knots::{Knots, usual_step};
 use crate::reference_clock::ReferenceClock;
 use crate::rotation_rates::{RotationRates, rates};
 use crate::smoothing::{self, Derivatives, LocalFit, Smoothing, Weights};
@@ -53,7 +54,7 @@ impl WeightCache {
         &mut self,
         t: &[f64],
         at: f64,
-        degree: usize,
+        smoothing: Smoothing,
         values: &[[f64; 3]],
         lowest: usize,
     ) -> Option<Derivatives> {
@@ -69,9 +70,9 @@ impl WeightCache {
         self.offsets.extend(t.iter().map(|v| v - at));
         self.weights.clear();
         if self.uneven > UNEVEN {
-            return smoothing::derivatives(t, at, degree, values, lowest);
+            return smoothing::derivatives(t, at, smoothing, values, lowest);
         }
-        if !self.fit.prepare(t, at, degree, lowest) {
+        if !self.fit.prepare(t, at, smoothing, lowest) {
             return None;
         }
         self.fit.weights_into(&mut self.weights);
@@ -134,7 +135,19 @@ impl<'a> LocalReference<'a> {
     pub fn attitude(window: &'a Window<'a>, spacing: Option<f64>) -> Option<Self> {
         let q = window.attitude?;
         let known = |i: usize| q[4 * i..4 * i + 4].iter().all(|v| v.is_finite());
-        let knots = Knots::new(window, known, spacing);
+        let change = |i: usize, j: usize| {
+            let cosine = quaternion_at(q, i).coords.dot(&quaternion_at(q, j).coords);
+            1.0 - cosine.powi(2)
+        };
+        let course = |[i, j, k]: [usize; 3], part: f64| {
+            let back = quaternion_at(q, i).inverse();
+            let way = rotation_vector(&(back * quaternion_at(q, k)));
+            Course {
+                bend: rotation_vector(&(back * quaternion_at(q, j))) - way * part,
+                way,
+            }
+        };
+        let knots = Knots::new(window, known, change, course, spacing);
         let attitudes = knots.row.iter().map(|row| quaternion_at(q, *row)).collect();
         Some(Self::new(window, knots, attitudes))
     }
@@ -143,12 +156,31 @@ impl<'a> LocalReference<'a> {
     pub fn position(window: &'a Window<'a>, spacing: Option<f64>) -> Option<Self> {
         let p = window.position?;
         let known = |i: usize| p[3 * i..3 * i + 3].iter().all(|v| v.is_finite());
-        Some(Self::new(window, Knots::new(window, known, spacing), Vec::new()))
+        let change = |i: usize, j: usize| {
+            (0..3)
+                .map(|axis| (p[3 * i + axis] - p[3 * j + axis]).powi(2))
+                .sum::<f64>()
+        };
+        let course = |[i, j, k]: [usize; 3], part: f64| {
+            let from_first = |row: usize| Vector3::from_fn(|axis, _| p[3 * row + axis] - p[3 * i + axis]);
+            let way = from_first(k);
+            Course {
+                bend: from_first(j) - way * part,
+                way,
+            }
+        };
+        let knots = Knots::new(window, known, change, course, spacing);
+        Some(Self::new(window, knots, Vec::new()))
     }
 
-    /// Median time between the knots.
+    /// Usual time between the knots.
     pub fn spacing(&self) -> f64 {
-        median_step(&self.knots.t)
+        usual_step(&self.knots.t)
+    }
+
+    /// Samples of a packet; 1 where every sample has a stamp of its own.
+    pub fn packet(&self) -> usize {
+        self.knots.packet
     }
 
     fn new(window: &'a Window<'a>, knots: Knots, attitudes: Vec<UnitQuaternion<f64>>) -> Self {
@@ -206,7 +238,7 @@ impl<'a> LocalReference<'a> {
         let (centre, first, last) = self.rotations(at, s.half_width)?;
         let d = self
             .cache
-            .derivatives(&self.knots.t[first..last], at, s.degree, &self.values, 0)?;
+            .derivatives(&self.knots.t[first..last], at, s, &self.values, 0)?;
         Some((centre, d))
     }
 
@@ -214,7 +246,7 @@ impl<'a> LocalReference<'a> {
     pub fn position_derivatives(&mut self, at: f64, s: Smoothing) -> Option<Derivatives> {
         let (first, last) = self.positions(at, s.half_width)?;
         self.cache
-            .derivatives(&self.knots.t[first..last], at, s.degree, &self.values, 1)
+            .derivatives(&self.knots.t[first..last], at, s, &self.values, 1)
     }
 
     /// A fit around `at` with its values, for judging how wide the polynomial may be.
@@ -226,7 +258,7 @@ impl<'a> LocalReference<'a> {
             self.positions(at, s.half_width)?
         };
         Some((
-            LocalFit::new(&self.knots.t[first..last], at, s.degree, usize::from(!of_attitude))?,
+            LocalFit::new(&self.knots.t[first..last], at, s, usize::from(!of_attitude))?,
             self.values.clone(),
         ))
     }
@@ -239,6 +271,19 @@ pub struct Widths {
     pub value: Smoothing,
     /// For what enters columns, where noise would shrink every parameter (errors in variables).
     pub columns: Smoothing,
+    /// For second derivatives of what a sensor reads: what a smoothed reference has lost.
+    pub bends: Smoothing,
+}
+
+impl Widths {
+    /// One polynomial for all.
+    pub const fn alike(smoothing: Smoothing) -> Self {
+        Self {
+            value: smoothing,
+            columns: smoothing,
+            bends: smoothing,
+        }
+    }
 }
 
 /// Rates from a rotation vector and its first three derivatives.
@@ -268,6 +313,12 @@ pub fn kinematics(
     let mut smooth_translation = position
         .and_then(wider)
         .and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w)));
+    let still_wider = |w: Widths| Some(w.bends).filter(|b| *b != w.columns);
+    let mut bent_rotation =
+        still_wider(attitude).and_then(|w| LocalReference::attitude(window, spacing).map(|r| (r, w)));
+    let mut bent_translation = position
+        .and_then(still_wider)
+        .and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w)));
     (window.begin..window.end)
         .map(|i| {
             let at = clock.at(window.t[i]);
@@ -280,8 +331,14 @@ pub fn kinematics(
                 omega_detail = turning.omega - smooth.omega;
                 turning = smooth;
             }
+            // Where the widest polynomial does not reach, the one of the columns has to do.
+            let bent =
+                |(reference, width): &mut (LocalReference, Smoothing)| reference.rotation_derivatives(at, *width);
+            if let Some((_, d)) = bent_rotation.as_mut().and_then(bent) {
+                turning.alpha_rate = rates_of(&d).alpha_rate;
+            }
             let mut acceleration_detail = Vector3::zeros();
-            let [acceleration, jerk, snap] = match translation.as_mut() {
+            let [acceleration, jerk, mut snap] = match translation.as_mut() {
                 None => [Vector3::zeros(); 3],
                 Some((reference, s)) => {
                     let all = above_velocity(&reference.position_derivatives(at, *s)?);
@@ -295,6 +352,11 @@ pub fn kinematics(
                     }
                 }
             };
+            let bent =
+                |(reference, width): &mut (LocalReference, Smoothing)| reference.position_derivatives(at, *width);
+            if let Some(d) = bent_translation.as_mut().and_then(bent) {
+                [_, _, snap] = above_velocity(&d);
+            }
             // On the clock of the sensors.
             let rate = clock.rate();
             Some(Kinematics {
@@ -357,10 +419,7 @@ mod tests {
             let mut worst = (0.0_f64, 0.0_f64);
             let k = kinematics(
                 &window,
-                Widths {
-                    value: NARROWEST,
-                    columns: NARROWEST,
-                },
+                Widths::alike(NARROWEST),
                 None,
                 None,
                 ReferenceClock {
@@ -376,19 +435,7 @@ mod tests {
             }
             assert!(worst.0 < 1e-6 * 5.0 && worst.1 < 1e-5 * 60.0, "{worst:?}");
         }
-        assert!(
-            kinematics(
-                &window,
-                Widths {
-                    value: NARROWEST,
-                    columns: NARROWEST
-                },
-                None,
-                None,
-                ReferenceClock::default()
-            )[3]
-            .is_none()
-        );
+        assert!(kinematics(&window, Widths::alike(NARROWEST), None, None, ReferenceClock::default())[3].is_none());
     }
 
     #[test]
@@ -419,16 +466,7 @@ mod tests {
             attitude: Some(&q),
             ..Window::over(&t)
         };
-        let k = kinematics(
-            &window,
-            Widths {
-                value: NARROWEST,
-                columns: NARROWEST,
-            },
-            None,
-            None,
-            ReferenceClock::default(),
-        );
+        let k = kinematics(&window, Widths::alike(NARROWEST), None, None, ReferenceClock::default());
         assert!((97..123).all(|i| k[i].is_none()));
         assert!(k[90].is_some() && k[130].is_some());
     }

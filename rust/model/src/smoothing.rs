@@ -7,13 +7,60 @@
 
 use std::array::from_fn;
 
-/// Degree and half width of the local polynomial.
+/// How knots are weighted within the reach of a polynomial.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kernel {
+    /// All alike: least noise within the band that the polynomial follows.
+    #[default]
+    Uniform,
+    /// Less towards both ends, as (1 - u^2)^2: the side lobes pass 4 % of the amplitude beyond that band, those of equal weights 18 %, and a
+    /// column has this noise in common with the residual.
+    Tapered,
+}
+
+impl Kernel {
+    /// Weight at a distance from the middle, in units of the reach.
+    fn weight(self, u: f64) -> f64 {
+        match self {
+            Self::Uniform => 1.0,
+            // The last knot counts a little, too.
+            Self::Tapered => (1.0 - (EDGE * u).powi(2)).powi(2),
+        }
+    }
+}
+
+/// Part of the reach of the taper at which the last knot lies: with 16 knots to a side, half way to the next one.
+const EDGE: f64 = 0.97;
+
+/// Degree, half width and kernel of the local polynomial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Smoothing {
     /// Degree of the polynomial, at most [`MAX_DEGREE`].
     pub degree: usize,
     /// Knots taken on each side of the time asked for.
     pub half_width: usize,
+    /// How these are weighted.
+    pub kernel: Kernel,
+}
+
+impl Smoothing {
+    /// A polynomial for which all knots count alike.
+    pub const fn uniform(degree: usize, half_width: usize) -> Self {
+        Self {
+            degree,
+            half_width,
+            kernel: Kernel::Uniform,
+        }
+    }
+
+    /// The same with knots that count less towards both ends.
+    #[must_use]
+    pub const fn tapered(self) -> Self {
+        Self {
+            kernel: Kernel::Tapered,
+            ..self
+        }
+    }
 }
 
 /// Highest degree that [`LocalFit`] supports.
@@ -21,10 +68,7 @@ pub const MAX_DEGREE: usize = 8;
 const TERMS: usize = MAX_DEGREE + 1;
 
 /// The narrowest choice: nine knots, degree eight, exact to 1e-8 for motions up to 4 Hz at 100 Hz.
-pub const NARROWEST: Smoothing = Smoothing {
-    degree: 8,
-    half_width: 4,
-};
+pub const NARROWEST: Smoothing = Smoothing::uniform(8, 4);
 
 /// Normal equations of one local polynomial in Legendre polynomials of u = (t - t_at) / scale, which keeps them well conditioned.
 #[derive(Default)]
@@ -138,13 +182,15 @@ fn add(sum: &mut Lanes, a: &Lanes, b: &Lanes) {
 
 /// Times of some knots on the scale of the polynomials, and what each counts: a lane without a knot nothing.
 #[inline]
-fn scaled(knots: &[f64], at: f64, per_scale: f64) -> (Lanes, Lanes) {
+fn scaled(knots: &[f64], at: f64, per_scale: f64, kernel: Kernel) -> (Lanes, Lanes) {
     if let Ok(knots) = <&Lanes>::try_from(knots) {
-        return (knots.map(|t| (t - at) * per_scale), [1.0; LANES]);
+        let u = knots.map(|t| (t - at) * per_scale);
+        return (u, u.map(|u| kernel.weight(u)));
     }
     let known = |lane: usize| knots.get(lane);
-    let u = from_fn(|lane| known(lane).map_or(0.0, |t| (t - at) * per_scale));
-    (u, from_fn(|lane| f64::from(u8::from(known(lane).is_some()))))
+    let u: Lanes = from_fn(|lane| known(lane).map_or(0.0, |t| (t - at) * per_scale));
+    let count = |lane: usize| known(lane).map_or(0.0, |_| kernel.weight(u[lane]));
+    (u, from_fn(count))
 }
 
 /// Adds the Legendre polynomials at some knots to their sums, up to a product's degree, and hands out those of the fit.
@@ -153,10 +199,11 @@ fn along<const T: usize>(
     knots: &[f64],
     at: f64,
     per_scale: f64,
+    kernel: Kernel,
     sums: &mut [Lanes; PRODUCTS],
     mut each: impl FnMut(usize, &Lanes),
 ) {
-    let (u, one) = scaled(knots, at, per_scale);
+    let (u, one) = scaled(knots, at, per_scale, kernel);
     let mut before = [[0.0; LANES]; 2];
     for (k, sum) in sums.iter_mut().enumerate().take(2 * T - 1) {
         let p = next(k, &u, &one, &before);
@@ -168,14 +215,20 @@ fn along<const T: usize>(
     }
 }
 
-/// Legendre polynomials at each knot, and the sums of their products (lower triangle): since a product is a sum of such polynomials
+/// Legendre polynomials at each knot, times what the knot counts, and the sums of their products (lower triangle): since a product is a sum of such polynomials
 /// again, the sums of each of them over the knots are enough.
-fn gram<const T: usize>(t: &[f64], at: f64, scale: f64, basis: &mut Vec<[f64; TERMS]>) -> [[f64; TERMS]; TERMS] {
+fn gram<const T: usize>(
+    t: &[f64],
+    at: f64,
+    scale: f64,
+    kernel: Kernel,
+    basis: &mut Vec<[f64; TERMS]>,
+) -> [[f64; TERMS]; TERMS] {
     let mut sums = [[0.0; LANES]; PRODUCTS];
     basis.clear();
     for knots in t.chunks(LANES) {
         let mut terms = [[0.0; TERMS]; LANES];
-        along::<T>(knots, at, scale.recip(), &mut sums, |k, p| {
+        along::<T>(knots, at, scale.recip(), kernel, &mut sums, |k, p| {
             for lane in 0..LANES {
                 terms[lane][k] = p[lane];
             }
@@ -198,14 +251,21 @@ fn products<const T: usize>(sums: &[[f64; LANES]; PRODUCTS]) -> [[f64; TERMS]; T
 }
 
 /// Four derivatives of the polynomial through values at knots, in one go: nothing is kept for other values.
-fn fitted<const T: usize>(t: &[f64], at: f64, scale: f64, values: &[[f64; 3]], lowest: usize) -> Option<Derivatives> {
+fn fitted<const T: usize>(
+    t: &[f64],
+    at: f64,
+    scale: f64,
+    kernel: Kernel,
+    values: &[[f64; 3]],
+    lowest: usize,
+) -> Option<Derivatives> {
     let mut sums = [[0.0; LANES]; PRODUCTS];
     let mut right = [[[0.0; LANES]; 3]; T];
     let per_scale = scale.recip();
     for (knots, values) in t.chunks(LANES).zip(values.chunks(LANES)) {
         let value = |axis: usize| from_fn(|lane| values.get(lane).map_or(0.0, |v| v[axis]));
         let values: [Lanes; 3] = from_fn(value);
-        along::<T>(knots, at, per_scale, &mut sums, |k, p| {
+        along::<T>(knots, at, per_scale, kernel, &mut sums, |k, p| {
             for (sum, value) in right[k].iter_mut().zip(&values) {
                 add(sum, p, value);
             }
@@ -234,10 +294,16 @@ fn fitted<const T: usize>(t: &[f64], at: f64, scale: f64, values: &[[f64; 3]], l
 
 /// Derivatives of order `lowest` (0 or 1) and the three next ones around `at` of the polynomial through values at times `t`; `None` if these
 /// do not determine it.
-pub fn derivatives(t: &[f64], at: f64, degree: usize, values: &[[f64; 3]], lowest: usize) -> Option<Derivatives> {
-    let (terms, scale) = terms_and_scale(t, at, degree)?;
-    let lowest = lowest.min(HIGHEST_LOWEST);
-    with_terms!(terms, fitted(t, at, scale, values, lowest))
+pub fn derivatives(
+    t: &[f64],
+    at: f64,
+    smoothing: Smoothing,
+    values: &[[f64; 3]],
+    lowest: usize,
+) -> Option<Derivatives> {
+    let (terms, scale) = terms_and_scale(t, at, smoothing.degree)?;
+    let (lowest, kernel) = (lowest.min(HIGHEST_LOWEST), smoothing.kernel);
+    with_terms!(terms, fitted(t, at, scale, kernel, values, lowest))
 }
 
 /// Number of terms, and the scale of time; `None` where there are too few knots.
@@ -304,18 +370,19 @@ fn combined<const T: usize>(basis: &[[f64; TERMS]], coefficients: &[[f64; 4]; TE
 impl LocalFit {
     /// Prepares the fit around `at` through knots at times `t`, for derivatives of order `lowest` (0 or 1) and the three next ones; `None`
     /// if the knots do not determine the polynomial.
-    pub fn new(t: &[f64], at: f64, degree: usize, lowest: usize) -> Option<Self> {
+    pub fn new(t: &[f64], at: f64, smoothing: Smoothing, lowest: usize) -> Option<Self> {
         let mut fit = Self::default();
-        fit.prepare(t, at, degree, lowest).then_some(fit)
+        fit.prepare(t, at, smoothing, lowest).then_some(fit)
     }
 
     /// The same in place; false if the knots do not determine the polynomial.
-    pub fn prepare(&mut self, t: &[f64], at: f64, degree: usize, lowest: usize) -> bool {
-        let Some((terms, scale)) = terms_and_scale(t, at, degree) else {
+    pub fn prepare(&mut self, t: &[f64], at: f64, smoothing: Smoothing, lowest: usize) -> bool {
+        let kernel = smoothing.kernel;
+        let Some((terms, scale)) = terms_and_scale(t, at, smoothing.degree) else {
             return false;
         };
         (self.terms, self.scale, self.lowest) = (terms, scale, lowest.min(HIGHEST_LOWEST));
-        self.factor = with_terms!(terms, gram(t, at, scale, &mut self.basis));
+        self.factor = with_terms!(terms, gram(t, at, scale, kernel, &mut self.basis));
         let least = DETERMINED * t.len() as f64;
         with_terms!(terms, factorise(&mut self.factor, least))
     }
@@ -346,7 +413,7 @@ impl LocalFit {
         with_terms!(self.terms, combined(&self.basis, &coefficients, weights));
     }
 
-    /// Sum of squared residuals of the fit to `values`, and its degrees of freedom.
+    /// Sum of squared residuals of the fit to `values`, and its degrees of freedom, where all knots count alike.
     pub fn residual(&self, values: &[[f64; 3]]) -> (f64, usize) {
         let mut sum = 0.0;
         for axis in 0..3 {
@@ -396,7 +463,7 @@ mod tests {
                 [1.0 + 2.0 * u + 3.0 * u * u, u * u * u, 4.0 * u]
             })
             .collect();
-        let fit = LocalFit::new(&t, at, 6, 0).expect("determined");
+        let fit = LocalFit::new(&t, at, Smoothing::uniform(6, 7), 0).expect("determined");
         let d = apply(&fit.weights(), &values);
         for (got, want) in [
             (d[0][0], 1.0),
@@ -408,7 +475,7 @@ mod tests {
             assert!((got - want).abs() < 1e-7, "{got} {want}");
         }
         assert!(fit.residual(&values).0 < 1e-24);
-        let at_once = derivatives(&t, at, 6, &values, 0).expect("determined");
+        let at_once = derivatives(&t, at, Smoothing::uniform(6, 7), &values, 0).expect("determined");
         for (a, b) in d.as_flattened().iter().zip(at_once.as_flattened()) {
             assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} {b}");
         }
@@ -418,8 +485,13 @@ mod tests {
     fn the_fourth_derivative_comes_with_the_first_three() {
         let t: Vec<f64> = (0..15).map(|i| f64::from(i) + 0.2 * f64::from(i * 7 % 5)).collect();
         let values: Vec<[f64; 3]> = t.iter().map(|v| [(v - 7.0).powi(4), (v - 7.0).powi(6), 1.0]).collect();
-        let d = derivatives(&t, 7.5, 8, &values, 1).expect("determined");
-        let weighted = apply(&LocalFit::new(&t, 7.5, 8, 1).expect("determined").weights(), &values);
+        let d = derivatives(&t, 7.5, Smoothing::uniform(8, 7), &values, 1).expect("determined");
+        let weighted = apply(
+            &LocalFit::new(&t, 7.5, Smoothing::uniform(8, 7), 1)
+                .expect("determined")
+                .weights(),
+            &values,
+        );
         let wanted = [
             [0.5, 3.0, 12.0, 24.0],
             [6.0 / 32.0, 30.0 / 16.0, 120.0 / 8.0, 360.0 / 4.0],
@@ -438,7 +510,7 @@ mod tests {
     fn sums_of_products_come_from_sums_of_polynomials() {
         let t: Vec<f64> = (0..22).map(|i| f64::from(i) + 0.3 * f64::from(i * 5 % 7)).collect();
         let mut basis = Vec::new();
-        let sums = gram::<TERMS>(&t, 11.0, 13.0, &mut basis);
+        let sums = gram::<TERMS>(&t, 11.0, 13.0, Kernel::Uniform, &mut basis);
         for i in 0..TERMS {
             for j in 0..=i {
                 let direct: f64 = basis.iter().map(|b| b[i] * b[j]).sum();
@@ -448,7 +520,29 @@ mod tests {
     }
 
     #[test]
+    fn a_taper_keeps_polynomials_and_hardly_passes_what_is_fast() {
+        let t: Vec<f64> = (0..41).map(f64::from).collect();
+        let passed = |smoothing: Smoothing, frequency: f64| {
+            let weights = LocalFit::new(&t, 20.0, smoothing, 0).expect("determined").weights();
+            assert!((weights.iter().map(|w| w[0]).sum::<f64>() - 1.0).abs() < 1e-9);
+            let wave = weights
+                .iter()
+                .zip(&t)
+                .map(|(w, t)| w[0] * (frequency * (t - 20.0)).cos());
+            wave.sum::<f64>().abs()
+        };
+        let most = |smoothing: Smoothing| {
+            (0..60)
+                .map(|k| passed(smoothing, 1.2 + 0.03 * f64::from(k)))
+                .fold(0.0, f64::max)
+        };
+        let alike = Smoothing::uniform(6, 20);
+        let (alike, tapered) = (most(alike), most(alike.tapered()));
+        assert!(tapered < 0.3 * alike, "{tapered} {alike}");
+    }
+
+    #[test]
     fn too_few_knots_are_refused() {
-        assert!(LocalFit::new(&[0.0, 0.1, 0.2], 0.1, 6, 0).is_none());
+        assert!(LocalFit::new(&[0.0, 0.1, 0.2], 0.1, Smoothing::uniform(6, 1), 0).is_none());
     }
 }

@@ -21,6 +21,21 @@ impl Triple {
         }
     }
 
+    /// Adds another quantity of as many rows where it is known.
+    pub fn add_known(&mut self, other: &Self) {
+        for (own, other) in self.0.iter_mut().zip(&other.0) {
+            for (a, b) in own.iter_mut().zip(other).filter(|(_, b)| b.is_finite()) {
+                *a += b;
+            }
+        }
+    }
+
+    /// The opposite.
+    #[must_use]
+    pub fn negative(&self) -> Self {
+        Self(std::array::from_fn(|axis| self.0[axis].iter().map(|v| -v).collect()))
+    }
+
     /// Appends a row.
     pub fn push(&mut self, v: &Vector3<f64>) {
         for axis in 0..3 {

@@ -13,10 +13,7 @@ use imufit_model::window::Window;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// A width that averages, and loses nothing of a motion this slow.
-const WIDER: Smoothing = Smoothing {
-    degree: 8,
-    half_width: 11,
-};
+const WIDER: Smoothing = Smoothing::uniform(8, 11);
 
 /// A rig about an axis of its own, with the reversals that the motion makes about it.
 fn rig(t: &[f64], attitude: &[f64]) -> Rig {
@@ -100,11 +97,14 @@ fn every_built_in_effect_keeps_the_contract() {
         attitude_columns: NARROWEST,
         // A fourth derivative by the narrowest polynomial has the rounding of the times in it.
         position_columns: Some(WIDER),
+        attitude_bends: NARROWEST,
+        position_bends: Some(WIDER),
         silent_axes: [[false; 3]; 3],
         silent_accelerations: [false; 3],
         noise_shares: [[0.0; 3]; 2],
         shaking_varies: true,
         reference_dt: 0.01,
+        reference_packet: 1,
         ranges: [None; 3],
         steps: [[0.0; 3]; 3],
         steps_crossed: [[false; 3]; 3],

@@ -1,10 +1,11 @@
 //! Questions asked of the evidence.
 
-use imufit_inference::part::Part;
+use imufit_fit::part::Part;
+use imufit_fit::{residual, saturated};
 use imufit_inference::problem::{Problem, parameters_of};
-use imufit_inference::search::Search;
+use imufit_inference::search::{self, Search};
 use imufit_inference::stack::{self, Criterion};
-use imufit_inference::{estimate, held_out, residual, revision, saturated, verdict};
+use imufit_inference::{estimate, held_out, revision, verdict};
 use imufit_model::rest_channels;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::{DMatrix, DVector};
@@ -151,7 +152,7 @@ impl PyProblem {
     }
 
     /// Which effect is missing from the model of slots `model`, among the slots `candidates`; what none of them explains is
-    /// asked of the slots `probes`. `fitted` holds log evidences of candidates from fits of their own, by slot; `column_noise` the share of
+    /// asked of the slots `probes`. `fitted` holds log Bayes factors of candidates from fits of their own, by slot; `column_noise` the share of
     /// noise in the column that a candidate reads; `seen` what rows show besides: (log or None, channel index, log Bayes factor, shape).
     #[pyo3(signature = (model, candidates, probes=Vec::new(), fitted=Vec::new(), column_noise=Vec::new(), seen=Vec::new()))]
     #[allow(clippy::too_many_arguments)] // one name for each thing that is known
@@ -201,14 +202,15 @@ impl PyProblem {
         Ok(PyVerdict::new(&self.0, found))
     }
 
-    /// Log of the marginal likelihood of all logs under the slots given, their parameters near their present values.
-    fn ln_evidence(&self, py: Python<'_>, slots: Vec<usize>) -> PyResult<f64> {
-        if slots.iter().any(|s| *s >= self.0.slots.len()) {
+    /// Log of the marginal likelihood of all logs under the slots given, their parameters near their present values; each of the
+    /// `possible` slots may be there or not.
+    fn ln_evidence(&self, py: Python<'_>, slots: Vec<usize>, possible: Vec<usize>) -> PyResult<f64> {
+        if slots.iter().chain(&possible).any(|s| *s >= self.0.slots.len()) {
             return Err(value_error("there is no such slot"));
         }
         let found = py.detach(|| {
             let criterion = Criterion::new(&self.0);
-            Search::new(&criterion, &slots, &[]).stack(&[]).map(|stack| stack.ln_z)
+            Search::new(&criterion, &slots, &possible).ln_evidence()
         });
         found.ok_or_else(|| value_error("the normal equations cannot be solved"))
     }
@@ -244,6 +246,31 @@ impl PyProblem {
         }
         let found = py.detach(|| revision::revisions(&self.0, &model, &members, &candidates));
         Ok(found.iter().map(|r| (r.slot, r.by)).collect())
+    }
+
+    /// Log Bayes factor from which on one of so many candidates is there.
+    #[staticmethod]
+    fn threshold(candidates: usize) -> f64 {
+        search::threshold(candidates)
+    }
+
+    /// Candidates that explain at least a share of what an effect of the model explains, each in its place.
+    fn alike(
+        &self,
+        py: Python<'_>,
+        model: Vec<usize>,
+        slot: usize,
+        candidates: Vec<usize>,
+        share: f64,
+    ) -> PyResult<Vec<usize>> {
+        if [model.as_slice(), &[slot], &candidates]
+            .concat()
+            .iter()
+            .any(|s| *s >= self.0.slots.len())
+        {
+            return Err(value_error("there is no such slot"));
+        }
+        Ok(py.detach(|| revision::alike(&self.0, &model, slot, &candidates, share)))
     }
 
     /// Residual of one log at a step (p,) of all parameters: RMS and mean by channel and block, and binned panels, in the
@@ -312,7 +339,7 @@ fn training(problem: &Problem, step: &DVector<f64>) -> (f64, f64) {
     for (log, part) in problem.parts.iter().enumerate() {
         let step = problem.of_log(log, step);
         for (channel, floor) in part.floors.iter().enumerate() {
-            let (s, n) = saturated::channel_square(&part.raw, channel, &step);
+            let (s, n) = part.raw.square(channel, &step);
             if n > 0 && *floor > 0.0 {
                 square += s / (floor * floor);
                 count += n as f64;

@@ -88,6 +88,7 @@ impl PyEffect {
             ReferencePart::Bandwidth => "bandwidth",
             ReferencePart::Field => "field",
             ReferencePart::Drive => "drive",
+            ReferencePart::Heading => "heading",
         })
     }
 
@@ -124,6 +125,12 @@ impl PyEffect {
     #[pyo3(signature = (facts, found=None, round=0))]
     fn search(&self, facts: &PyFacts, found: Option<Vec<f64>>, round: usize) -> Vec<Vec<f64>> {
         self.0.search(&facts.facts, found.as_deref().map(|f| (f, round)))
+    }
+
+    /// Different readings of one ideal axis that determine its parameters beside all effects of lower order.
+    #[getter]
+    fn least_levels(&self) -> usize {
+        self.0.least_levels()
     }
 
     /// True if its columns around one value say little of larger ones: only a fit tells how much it explains.
@@ -298,6 +305,12 @@ impl PyFacts {
             .cloned()
             .zip(self.facts.covariate_means.iter().copied())
             .collect()
+    }
+
+    /// Samples of the reference that come in one packet; 1 where every sample has a stamp of its own.
+    #[getter]
+    fn reference_packet(&self) -> usize {
+        self.facts.reference_packet
     }
 
     /// Degree and half width of the polynomial through the reference attitude.

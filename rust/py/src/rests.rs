@@ -151,6 +151,7 @@ fn facts_at_rest(
     let samples = CovariateSamples {
         names,
         values: samples,
+        rows: facts.n,
         rate_noise: 0.0,
         force_noise: 0.0,
     };

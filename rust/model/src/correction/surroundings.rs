@@ -12,10 +12,7 @@ use crate::window::{HOLD_ROWS, Window};
 const SAMPLES: usize = 400;
 
 /// Samples and degree of the one-sided polynomial at the ends of a recording.
-const END: Smoothing = Smoothing {
-    degree: 4,
-    half_width: 4,
-};
+const END: Smoothing = Smoothing::uniform(4, 4);
 
 /// Rows in which all three axes have a sample.
 fn sampled(x: &Triple) -> Vec<usize> {
@@ -118,7 +115,14 @@ fn at_the_end(x: &Triple, t: &[f64], rows: &[usize], i: usize, next: usize, gap:
     }
     let times: Vec<f64> = near.iter().map(|k| t[*k]).collect();
     let values: Vec<[f64; 3]> = near.iter().map(|k| x.row(*k).into()).collect();
-    derivatives(&times, t[i], END.degree.min(near.len() - 1), &values, 1).map(|d| d[0])
+    derivatives(
+        &times,
+        t[i],
+        Smoothing::uniform(END.degree.min(near.len() - 1), END.half_width),
+        &values,
+        1,
+    )
+    .map(|d| d[0])
 }
 
 /// The attitude of every row, the last known one held; NaN where none is near.

@@ -35,6 +35,8 @@ pub type Fill = fn(&Rows, &mut Columns);
 pub enum Needs {
     /// Nothing but the sensor.
     Sensor,
+    /// So many different readings of an ideal axis.
+    Levels(usize),
     /// A thermometer.
     Temperature,
     /// A covariate of this name.
@@ -68,6 +70,13 @@ impl Effect for Linear {
         self.needs == Needs::Shaking
     }
 
+    fn least_levels(&self) -> usize {
+        match self.needs {
+            Needs::Levels(least) => least,
+            _ => 0,
+        }
+    }
+
     fn not_testable(&self, facts: &LogFacts) -> Option<String> {
         if !facts.sensors[self.sensor[0].index()] {
             return Some(format!("the log has no {}", self.sensor[0].name()));
@@ -79,7 +88,7 @@ impl Effect for Linear {
             return Some("the sensor is shaken alike all the time, or not at all".to_string());
         }
         let lacking = match self.needs {
-            Needs::Sensor | Needs::Shaking => None,
+            Needs::Sensor | Needs::Levels(_) | Needs::Shaking => None,
             Needs::Temperature => (!facts.has_temperature).then_some("temp"),
             Needs::Column(name) => facts.covariate(name).is_none().then_some(name),
         };
@@ -88,7 +97,7 @@ impl Effect for Linear {
 
     fn column(&self) -> Option<&str> {
         match self.needs {
-            Needs::Sensor | Needs::Shaking => None,
+            Needs::Sensor | Needs::Levels(_) | Needs::Shaking => None,
             Needs::Temperature => Some("temp"),
             Needs::Column(name) => Some(name),
         }

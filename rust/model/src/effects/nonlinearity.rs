@@ -40,7 +40,14 @@ fn rounded(value: f64) -> f64 {
     (value / unit).round() * unit
 }
 
-fn one(sensor: Sensor, name: &str, words: &Words, unit: &str, typical: f64, fill: crate::effects::Fill) -> Linear {
+fn one(
+    sensor: Sensor,
+    (name, levels): (&str, usize),
+    words: &Words,
+    unit: &str,
+    typical: f64,
+    fill: crate::effects::Fill,
+) -> Linear {
     Linear {
         card: words
             .card(
@@ -50,7 +57,7 @@ fn one(sensor: Sensor, name: &str, words: &Words, unit: &str, typical: f64, fill
             )
             .with(OF_THE_ROW),
         sensor: [sensor],
-        needs: Needs::Sensor,
+        needs: Needs::Levels(levels),
         fill,
     }
 }
@@ -82,7 +89,7 @@ pub fn quadratic(sensor: Sensor) -> Linear {
             "s/rad",
         ),
     };
-    one(sensor, "quadratic", &words, unit, rounded(share / at), fill_square)
+    one(sensor, ("quadratic", 3), &words, unit, rounded(share / at), fill_square)
 }
 
 /// `acc.cubic`, `gyr.cubic`.
@@ -112,7 +119,14 @@ pub fn cubic(sensor: Sensor) -> Linear {
             "(s/rad)^2",
         ),
     };
-    one(sensor, "cubic", &words, unit, rounded(share / (at * at)), fill_cube)
+    one(
+        sensor,
+        ("cubic", 4),
+        &words,
+        unit,
+        rounded(share / (at * at)),
+        fill_cube,
+    )
 }
 
 /// `gyr.scale_asymmetry`.
@@ -126,5 +140,5 @@ pub fn scale_asymmetry() -> Linear {
         confirm: "turn by exactly 360 degrees one way and back: the two angles differ by 2 k of the turn, at any speed",
     };
     // Half of the IDG-300 data sheet's nonlinearity of 1 %, on either side of a straight line.
-    one(Sensor::Gyr, "scale_asymmetry", &words, "1", 0.005, fill_magnitude)
+    one(Sensor::Gyr, ("scale_asymmetry", 3), &words, "1", 0.005, fill_magnitude)
 }

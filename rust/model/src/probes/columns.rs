@@ -1,6 +1,6 @@
 //! Columns of the probes.
 
-use super::{CLEAR, Kind, Quantity, SMALL, pairs};
+use super::{CLEAR, Kind, Quantity, SMALL, WIDTHS, pairs};
 use crate::effect::{Columns, Rows};
 use crate::effects::lever_arm::accelerations_of_levers;
 use crate::facts::LogFacts;
@@ -184,6 +184,25 @@ pub(super) fn fill(kind: &Kind, sensor: Sensor, rows: &Rows, out: &mut Columns) 
             for other in 0..3 {
                 for axis in 0..3 {
                     out.set(3 * other + axis, axis, rows.x.axis(other).iter().map(|m| m * m));
+                }
+            }
+        }
+        Kind::Plays => {
+            for (k, part) in WIDTHS.iter().enumerate() {
+                let width = part * rows.facts.field.norm();
+                for axis in 0..3 {
+                    let x = rows.x.axis(axis);
+                    // What was before these rows is not known: it starts where they do.
+                    let mut held = x.iter().copied().find(|x| x.is_finite()).unwrap_or(0.0);
+                    let follow = |x: &f64| {
+                        held = if x.is_finite() {
+                            held.clamp(x - width, x + width)
+                        } else {
+                            held
+                        };
+                        held + x * 0.0
+                    };
+                    out.set(3 * k + axis, axis, x.iter().map(follow));
                 }
             }
         }

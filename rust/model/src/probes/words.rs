@@ -1,6 +1,6 @@
 //! What a probe is called, its parameters, and how the residual follows it.
 
-use super::{AXES, Kind, OF, Quantity, SMALL, pairs};
+use super::{AXES, Kind, OF, Quantity, SMALL, WIDTHS, pairs};
 use crate::card::{Card, Found, Parameter, Stage, Traits};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
@@ -65,6 +65,12 @@ pub(super) fn card(facts: &LogFacts, sensor: Sensor, kind: &Kind) -> Card {
                 .collect(),
             "m".to_string(),
             "parabolic",
+        ),
+        Kind::Plays => (
+            Stage::Offset,
+            on_axes(WIDTHS.len()),
+            "m".to_string(),
+            "its past counts as well: hysteresis",
         ),
         Kind::Heading => (Stage::Offset, on_axes(4), "heading".to_string(), "once or twice a turn"),
         Kind::Speed => (Stage::Offset, on_axes(2), "speed".to_string(), "growing with it"),

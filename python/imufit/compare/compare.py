@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.diagnose.attitude import attitude_comparison
-from imufit.diagnose.without_reference import refuse_rests
+from imufit.compare.attitude import attitude_comparison
+from imufit.compare.notes import notes
+from imufit.errors import InputError
 from imufit.fit.analysis import Analysis
 from imufit.fit.log_evidence import LogEvidence
 from imufit.fit.passes import CHANNELS, UNITS
-from imufit.log.contents import SENSOR_NAMES
+from imufit.fit.rest_passes import RestPasses
 from imufit.progress import Progress
 from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
 
@@ -31,8 +32,6 @@ SCATTER = 4.0
 WORST_SEGMENTS = 8
 SPECTRUM_ROWS = 512
 SPECTRUM_CHUNKS = 8
-OFF_FLOOR = 1.2
-"""Stated noise is doubted where what nothing explains differs from it by this factor."""
 
 
 def compare(fit: FittedStack, log: LogSource | None, progress: Progress) -> Comparison:
@@ -49,7 +48,7 @@ def compare(fit: FittedStack, log: LogSource | None, progress: Progress) -> Comp
     """
     if log is not None and not any(log is known for known in fit.logs):
         return compare_model(fit.model, log, progress)
-    refuse_rests(fit.analysis, "a comparison")
+    _refuse_rests(fit.analysis)
     own = fit.worst if log is None else next(k for k, known in enumerate(fit.logs) if known is log)
     found = comparison(fit.analysis, fit.estimate.step, own)
     return _with_attitude(found, fit.model_of(own), fit.logs[own], progress)
@@ -68,9 +67,20 @@ def compare_model(model: EffectStack, log: LogSource, progress: Progress) -> Com
         Called with (rows done, rows in all, what is being done).
     """
     analysis = Analysis.of(model, (log,), progress, keep_constants=True)
-    refuse_rests(analysis, "a comparison")
+    _refuse_rests(analysis)
     found = comparison(analysis, analysis.estimate_unnamed().step)
     return _with_attitude(found, model, log, progress)
+
+
+def _refuse_rests(analysis: Analysis) -> None:
+    """Refuse logs without a reference: every sample is needed."""
+    for each in analysis.logs:
+        if isinstance(each.passes, RestPasses):
+            raise InputError(
+                "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz), which a comparison needs",
+                file=each.surveyed.log.path,
+                remedy="Ask `imufit diagnose`, which judges the rests of such a log, or `imufit calibrate`.",
+            )
 
 
 def _with_attitude(found: Comparison, model: EffectStack, log: LogSource, progress: Progress) -> Comparison:
@@ -78,7 +88,17 @@ def _with_attitude(found: Comparison, model: EffectStack, log: LogSource, progre
 
 
 def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
-    """Comparison of one log with the model after a step of all parameters from where the evidence was taken."""
+    """Comparison of one log with the model after a step of all parameters from where the evidence was taken.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        The evidence.
+    step : ndarray
+        (p,) step of every parameter, SI units.
+    log : int
+        Number of the log.
+    """
     evidence = analysis.logs[log]
     facts = evidence.facts
     result = analysis.problem.residual(step, log)
@@ -197,33 +217,3 @@ def _spectra(evidence: LogEvidence, step: Array) -> tuple[Spectrum, ...]:
         )
         for index, densities in sorted(sums.items())
     )
-
-
-def notes(evidence: LogEvidence) -> tuple[str, ...]:
-    """Return what the reader should know about the figures of this log."""
-    log, facts = evidence.surveyed.log, evidence.facts
-    out = [*log.notes, *evidence.passes.empty]
-    stated = log.metadata.noise
-    for index, (floor, variance) in enumerate(zip(evidence.floors, evidence.raw_variance, strict=True)):
-        if index % 3 == 0 and CHANNELS[index][:3] in stated and np.isfinite(variance):
-            group = np.sqrt(np.mean(evidence.raw_variance[index : index + 3]))
-            if not 1 / OFF_FLOOR < group / floor < OFF_FLOOR:
-                sensor = CHANNELS[index][:3]
-                out.append(
-                    f"The stated noise of {sensor} is {stated[sensor]:.3g} {UNITS[sensor]}; what no effect explains "
-                    f"here is {group:.3g} {UNITS[sensor]}."
-                )
-    for sensor, steps in zip(SENSOR_NAMES, facts.steps, strict=True):
-        if any(steps):
-            out.append(
-                f"Readings of {sensor} come in steps of {max(steps):.3g} {UNITS[sensor]}, coarse against the noise; "
-                "where they move, what rounding does to them is fitted along."
-            )
-    if facts.field_estimated and "mag" in facts.sensors:
-        out.append("The reference field was estimated from this log and is fitted along.")
-    if evidence.passes.commanded is not None:
-        out.append("The reference is the attitude at ref_angle: ref_q is the same but for its noise.")
-    coloured = sorted({CHANNELS[k][:3] for k, taps in enumerate(evidence.filters) if taps})
-    if coloured:
-        out.append(f"The residual noise of {', '.join(coloured)} is coloured; the fit whitens it.")
-    return tuple(out)

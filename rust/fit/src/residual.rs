@@ -1,10 +1,9 @@
 //! Where a model fails: residual by channel, by block of time, and against every covariate.
 
-use imufit_fit::evidence::Evidence;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::DVector;
 
-use crate::saturated::{block_square, channel_square, contrast};
+use crate::evidence::{ChannelBlock, Evidence};
 
 /// Residual of one channel.
 #[derive(Clone, Debug)]
@@ -38,46 +37,26 @@ pub struct Panel {
 
 /// Residual of every channel that has samples, at a step of the parameters.
 pub fn channels(raw: &Evidence, step: &DVector<f64>) -> Vec<ChannelResidual> {
-    let blocks = raw.layout.blocks;
-    let covariate = (0..raw.layout.bins.edges.len()).find(|c| !raw.layout.bins.edges[*c].is_empty());
-    (0..CHANNELS)
-        .filter_map(|channel| {
-            let (square, n) = channel_square(raw, channel, step);
-            if n == 0 {
-                return None;
-            }
-            let v = contrast(&raw.layout, channel, step);
-            let sum: f64 = covariate.map_or(0.0, |c| {
-                (0..blocks)
-                    .filter_map(|b| raw.get(b, channel))
-                    .map(|b| b.bin_sum[c].chunks_exact(v.len()).map(|s| dot(s, &v)).sum::<f64>())
-                    .sum()
-            });
-            let block_rms = (0..blocks)
-                .map(|b| {
-                    let (s, n) = block_square(raw, b, channel, step);
-                    if n == 0 { f64::NAN } else { (s / n as f64).sqrt() }
-                })
-                .collect();
-            Some(ChannelResidual {
-                channel,
-                n,
-                rms: (square / n as f64).sqrt(),
-                mean: sum / n as f64,
-                block_rms,
-            })
+    let of = |channel: usize| {
+        let (square, n) = raw.square(channel, step);
+        let v = raw.contrast(channel, step);
+        let sum: f64 = raw.of_channel(channel).map(|(_, block)| block.sum.dot(&v)).sum();
+        let rms = |(square, n): (f64, usize)| (square / n as f64).sqrt();
+        (n > 0).then(|| ChannelResidual {
+            channel,
+            n,
+            rms: rms((square, n)),
+            mean: sum / n as f64,
+            block_rms: raw.squares(channel, step).into_iter().map(rms).collect(),
         })
-        .collect()
-}
-
-fn dot(sums: &[f64], v: &DVector<f64>) -> f64 {
-    sums.iter().zip(v.iter()).map(|(a, b)| a * b).sum()
+    };
+    (0..CHANNELS).filter_map(of).collect()
 }
 
 /// Binned residuals of one channel against every covariate that varies; the largest share first.
 pub fn panels(raw: &Evidence, step: &DVector<f64>, channel: usize, floor: f64) -> Vec<Panel> {
-    let v = contrast(&raw.layout, channel, step);
-    let (square, n) = channel_square(raw, channel, step);
+    let v = raw.contrast(channel, step);
+    let (square, n) = raw.square(channel, step);
     let excess = (square - n as f64 * floor * floor).max(0.05 * square);
     let mut out = Vec::new();
     for covariate in 0..raw.layout.bins.edges.len() {
@@ -89,16 +68,13 @@ pub fn panels(raw: &Evidence, step: &DVector<f64>, channel: usize, floor: f64) -
         // Around the mean: a constant residual depends on nothing.
         let (mut between, mut expected, mut sum, mut all) = (0.0, -floor * floor, 0.0, 0.0);
         for bin in 0..bins {
-            let parts: Vec<(f64, f64)> = (0..raw.layout.blocks)
-                .filter_map(|b| raw.get(b, channel))
-                .map(|b| {
-                    (
-                        dot(&b.bin_sum[covariate][bin * v.len()..(bin + 1) * v.len()], &v),
-                        b.bin_count[covariate][bin],
-                    )
-                })
-                .filter(|(_, count)| *count > 0.0)
-                .collect();
+            let of_block = |(_, block): (usize, &ChannelBlock)| {
+                let sums = &block.bin_sum[covariate][bin * v.len()..(bin + 1) * v.len()];
+                let sum: f64 = sums.iter().zip(v.iter()).map(|(a, b)| a * b).sum();
+                (sum, block.bin_count[covariate][bin])
+            };
+            let parts = raw.of_channel(channel).map(of_block).filter(|(_, count)| *count > 0.0);
+            let parts: Vec<(f64, f64)> = parts.collect();
             let count: f64 = parts.iter().map(|p| p.1).sum();
             if count == 0.0 {
                 continue;

@@ -6,11 +6,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use imufit_fit::evidence::Evidence;
-use imufit_fit::normal_equations::NormalEquations;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::DMatrix;
 
+use crate::normal_equations::NormalEquations;
 use crate::part::Part;
 
 /// In which form the evidence is asked.
@@ -22,15 +21,23 @@ pub enum Form {
     Raw,
 }
 
-/// Where the columns of some parameters stand: for each channel pairs of a place among these parameters and one in the evidence.
-type Chosen = Vec<Vec<(usize, usize)>>;
-
 /// Where the columns of parameters stand in the evidence of one log.
 struct Columns {
-    /// For each channel the parameters, by their place among those of all logs, in the order of the evidence's columns.
-    parameters: Vec<Vec<usize>>,
+    /// For each channel the place among the evidence's columns of every parameter of all logs that acts on it.
+    places: Vec<Vec<Option<usize>>>,
     /// For each channel the whitened Gram matrix of all blocks together.
     total: Vec<Option<(DMatrix<f64>, usize)>>,
+}
+
+impl Columns {
+    /// For each channel pairs of a place among the parameters asked about and one in the evidence.
+    fn chosen<'a>(&'a self, asked: &'a [usize]) -> impl Iterator<Item = Vec<(usize, usize)>> + 'a {
+        let of_channel = |places: &'a Vec<Option<usize>>| {
+            let known = |(place, parameter): (usize, &usize)| Some((place, places[*parameter]?));
+            asked.iter().enumerate().filter_map(known).collect()
+        };
+        self.places.iter().map(of_channel)
+    }
 }
 
 /// Equations of every block of one log or of several.
@@ -38,8 +45,6 @@ struct Columns {
 pub struct BlockEquations {
     parts: Arc<[Part]>,
     columns: Arc<[Columns]>,
-    /// Number of all parameters.
-    known: usize,
     /// Parameters that have been given values, what these explain being taken off the observations.
     given: Vec<usize>,
     values: Vec<f64>,
@@ -48,13 +53,18 @@ pub struct BlockEquations {
 impl BlockEquations {
     /// `places` has for each log the place of each of its parameters among all `known` ones.
     pub fn new(parts: Arc<[Part]>, places: &[Vec<usize>], known: usize) -> Self {
-        let of = |(part, places): (&Part, &Vec<usize>)| {
-            let active = part.white.layout.model.active();
-            let of_channel = |channel: usize| active[channel].iter().map(|own| places[*own]).collect();
+        let of = |(part, own): (&Part, &Vec<usize>)| {
+            let of_channel = |active: &Vec<usize>| {
+                let mut places = vec![None; known];
+                for (k, parameter) in active.iter().enumerate() {
+                    places[own[*parameter]] = Some(k);
+                }
+                places
+            };
             Columns {
-                parameters: (0..CHANNELS).map(of_channel).collect(),
+                places: part.white.layout.model.active().iter().map(of_channel).collect(),
                 total: (0..CHANNELS)
-                    .map(|channel| sum(&part.white, channel, |block| 1.0 / part.loudness[channel][block]))
+                    .map(|channel| part.white.total(channel, |block| 1.0 / part.loudness[channel][block]))
                     .collect(),
             }
         };
@@ -62,7 +72,6 @@ impl BlockEquations {
         Self {
             parts,
             columns: columns.into(),
-            known,
             given: Vec::new(),
             values: Vec::new(),
         }
@@ -82,7 +91,7 @@ impl BlockEquations {
         let asked: Vec<usize> = parameters.iter().chain(&self.given).copied().collect();
         let mut out = Vec::new();
         for (part, columns) in self.parts.iter().zip(self.columns.iter()) {
-            let chosen = self.chosen(columns, &asked);
+            let chosen: Vec<_> = columns.chosen(&asked).collect();
             let evidence = match form {
                 Form::White => &part.white,
                 Form::Raw => &part.raw,
@@ -95,7 +104,7 @@ impl BlockEquations {
                 let mut equations = NormalEquations::zeros(asked.len());
                 for (channel, chosen) in chosen.iter().enumerate() {
                     if let Some(b) = evidence.get(block, channel) {
-                        add_channel(&mut equations, &b.gram, b.n, chosen, weights[channel]);
+                        equations.add_channel(&b.gram, b.n, chosen, weights[channel]);
                     }
                 }
                 out.push(self.without_given(equations, parameters.len()));
@@ -119,28 +128,13 @@ impl BlockEquations {
         let mut equations = NormalEquations::zeros(asked.len());
         if let (Some(part), Some(columns)) = (self.parts.get(log), self.columns.get(log)) {
             let weights = part.weights();
-            for (channel, chosen) in self.chosen(columns, &asked).iter().enumerate() {
+            for (channel, chosen) in columns.chosen(&asked).enumerate() {
                 if let Some((gram, n)) = &columns.total[channel] {
-                    add_channel(&mut equations, gram, *n, chosen, weights[channel]);
+                    equations.add_channel(gram, *n, &chosen, weights[channel]);
                 }
             }
         }
         self.without_given(equations, parameters.len())
-    }
-
-    /// Information of all blocks about each parameter: the diagonal of the whitened Gram matrix.
-    pub fn information(&self) -> Vec<f64> {
-        let mut out = vec![0.0; self.known];
-        for (part, columns) in self.parts.iter().zip(self.columns.iter()) {
-            for (channel, weight) in part.weights().iter().enumerate() {
-                if let Some((gram, _)) = &columns.total[channel] {
-                    for (k, parameter) in columns.parameters[channel].iter().enumerate() {
-                        out[*parameter] += weight * gram[(k, k)];
-                    }
-                }
-            }
-        }
-        out
     }
 
     /// Blocks of each log.
@@ -153,22 +147,6 @@ impl BlockEquations {
         ends.collect()
     }
 
-    fn chosen(&self, columns: &Columns, asked: &[usize]) -> Chosen {
-        let mut places = vec![None; self.known];
-        let of_channel = |parameters: &Vec<usize>| {
-            for (k, parameter) in parameters.iter().enumerate() {
-                places[*parameter] = Some(k);
-            }
-            let known = |(place, parameter): (usize, &usize)| places[*parameter].map(|k| (place, k));
-            let chosen = asked.iter().enumerate().filter_map(known).collect();
-            for parameter in parameters {
-                places[*parameter] = None;
-            }
-            chosen
-        };
-        columns.parameters.iter().map(of_channel).collect()
-    }
-
     fn without_given(&self, equations: NormalEquations, kept: usize) -> NormalEquations {
         if self.given.is_empty() {
             return equations;
@@ -177,40 +155,4 @@ impl BlockEquations {
         let others: Vec<usize> = (kept.len()..kept.len() + self.given.len()).collect();
         equations.given(&kept, &others, &self.values)
     }
-}
-
-/// Adds one channel's Gram matrix of `[columns | residual]` over `n` samples to equations of the chosen columns.
-pub fn add_channel(
-    equations: &mut NormalEquations,
-    gram: &DMatrix<f64>,
-    n: usize,
-    chosen: &[(usize, usize)],
-    weight: f64,
-) {
-    if !(weight > 0.0 && weight.is_finite()) {
-        return;
-    }
-    let last = gram.ncols() - 1;
-    for (q, j) in chosen {
-        for (p, i) in chosen {
-            equations.gram[(*p, *q)] += weight * gram[(*i, *j)];
-        }
-        equations.right[*q] += weight * gram[(*j, last)];
-    }
-    equations.square += weight * gram[(last, last)];
-    equations.n += n as f64;
-}
-
-/// Gram matrix of a channel over all blocks with the number of samples, each block weighted by `weight`; `None` without any.
-pub fn sum(evidence: &Evidence, channel: usize, weight: impl Fn(usize) -> f64) -> Option<(DMatrix<f64>, usize)> {
-    let mut total: Option<(DMatrix<f64>, usize)> = None;
-    for b in 0..evidence.layout.blocks {
-        let Some(block) = evidence.get(b, channel) else {
-            continue;
-        };
-        let (gram, n) = total.get_or_insert_with(|| (DMatrix::zeros(block.gram.nrows(), block.gram.ncols()), 0));
-        gram.zip_apply(&block.gram, |sum, own| *sum += weight(b) * own);
-        *n += block.n;
-    }
-    total
 }

@@ -1,8 +1,9 @@
 //! One log's share in a question: its evidence, and where its parameters stand among those of all logs.
 
-use imufit_fit::evidence::Evidence;
 use imufit_model::sensor::CHANNELS;
 use imufit_model::sensor_model::Slot;
+
+use crate::evidence::Evidence;
 
 /// Evidence of one log with its noise.
 #[derive(Clone)]
@@ -22,20 +23,6 @@ pub struct Part {
 }
 
 impl Part {
-    /// The only log of a question: its slots are those of the question.
-    pub fn alone(white: Evidence, raw: Evidence, variance: [f64; CHANNELS], floors: [f64; CHANNELS]) -> Self {
-        let slots = (0..white.layout.model.slots().len()).collect();
-        let loudness = vec![vec![1.0; white.layout.blocks]; CHANNELS];
-        Self {
-            white,
-            raw,
-            variance,
-            loudness,
-            floors,
-            slots,
-        }
-    }
-
     /// Weight of each channel in whitened equations: observations then have unit variance.
     pub fn weights(&self) -> [f64; CHANNELS] {
         self.variance

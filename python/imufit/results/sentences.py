@@ -1,12 +1,16 @@
-"""Sentences from descriptions and figures."""
+"""The sentences of a diagnosis, from descriptions of effects and figures."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from imufit.figures import quantity
-from imufit.results import Candidate, DataFault, Disagreement, EffectCard, Judged, Parameter, Unexplained
+from imufit.results.data_fault import DataFault
+from imufit.results.diagnosis import NOT_TESTABLE, PASSED, Candidate, Diagnosis
+from imufit.results.disagreement import Disagreement
+from imufit.results.effect_card import EffectCard
 from imufit.results.judged import left_out
+from imufit.results.parameter import Parameter
 
 
 def _capital(text: str) -> str:
@@ -20,7 +24,6 @@ def leading(parameters: Sequence[Parameter]) -> Parameter | None:
 
 
 DOUBTS = {
-    "differs between halves": "the two halves of the log disagree about it by more than chance",
     "implausible size": "no sensor of this kind has so much of it",
     "negative delay": "it would have to read what is yet to come",
 }
@@ -29,7 +32,7 @@ DOUBTS = {
 
 def explanation(card: EffectCard, candidate: Candidate) -> str:
     """One candidate in a sentence: the physics, its size, what adding it should bring."""
-    if candidate.status == "not testable here":
+    if candidate.status == NOT_TESTABLE:
         why = "no such motion or temperature, or inside the model already"
         return f"{_capital(card.name)}: this log cannot show it ({why})."
     text = f"{_capital(card.name)}: {card.physics}." if card.physics else f"{_capital(card.name)}."
@@ -40,12 +43,8 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
             text += f" (typically {quantity.quantity(top.typical, top.unit)})"
         text += "."
     before, after = candidate.held_out_before, candidate.held_out_after
-    if candidate.status == "passed":
+    if candidate.status == PASSED:
         text += f" Adding it should cut the held-out error from {before:.3f} to {after:.3f} of the noise floor."
-    elif candidate.status == "differs between halves":
-        text += (
-            " But the two halves of the log disagree about it by more than chance, so it is no property of the sensor."
-        )
     elif candidate.status == "negative delay":
         text += (
             " It would have to read what is yet to come: that is not the sensor, but rows that are stamped too late,"
@@ -58,64 +57,75 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
     return text
 
 
-def verdict(
-    word: str,
-    best: Candidate | None,
-    card: EffectCard | None,
-    rivals: Sequence[str],
-    unexplained: Sequence[Unexplained],
-    doubtful: Candidate | None = None,
-) -> str:
-    """Give the answer in a sentence or two."""
-    left = ""
-    if unexplained:
-        first = unexplained[0]
-        left = f"{first.channel} still depends on {first.covariate} ({first.shape})"
-    if word == "adequate":
-        return "Nothing that this log can show is missing: the residual is at its noise floor as far as can be told."
-    if word == "unknown":
-        text = (
-            f"Something is missing that no effect of the catalogue explains: {left}."
-            if left
-            else "Something is missing."
-        )
-        if doubtful is not None and not left and best is None:
-            text += f" {doubtful.effect} comes nearest, but {DOUBTS[doubtful.status]}."
-        if best is not None:
-            text += f" {best.effect} would take a part of it, but not most."
-        return text
-    if best is None or card is None:
-        raise ValueError(f"verdict {word} needs a candidate")
-    if word == "ambiguous":
-        return (
-            f"{best.effect} or {' or '.join(rivals)} is missing: each explains this log, "
-            f"and {best.effect} adds nothing to what {' or '.join(rivals)} explains."
-        )
-    text = f"{best.effect} is missing. {best.explanation}"
-    return f"{text} Apart from it, {left}." if left else text
-
-
 OFF_FLOOR = 1.2
 """Held-out error over the noise from which on a residual is no longer said to be at its noise floor."""
 
 
-def above_floor(ratio: float) -> str:
-    """Say that no effect is missing for certain, although the residual is larger than the noise."""
-    return (
-        f"No effect is missing for certain, but the residual stands at {ratio:.2f} times the noise: the noise is "
-        "stronger or more coloured than stated, or something is left that goes with nothing in the log."
-    )
+def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: int, spoilt: bool) -> str:
+    """Give an answer in a few sentences: the verdict, logs that disagree, sensors that were not judged.
 
-
-def with_judged(text: str, sensors: Sequence[Judged], *, adequate: bool) -> str:
-    """Put in front which sensors an adequate answer is about, where others were not judged; behind any other answer."""
-    missing = left_out(sensors)
+    Parameters
+    ----------
+    found : Diagnosis
+        The answer.
+    best : Candidate or None
+        The effect that stands out, be it named or not.
+    ratio : float
+        Held-out residual over the noise.
+    untold : int
+        Number of effects that only a reference would show.
+    spoilt : bool
+        The logs differ so much that there is no answer for all of them.
+    """
+    adequate = found.verdict == "adequate"
+    text = _adequate(found, ratio, untold) if adequate else _missing(found, best)
+    if found.disagrees:
+        text = _with_disagreements(text, found.disagrees, spoilt=spoilt)
+    missing = left_out(found.judged)
     if not missing:
         return text
     if not adequate:
-        return f"{text} {missing[0].upper()}{missing[1:]}."
-    judged = ", ".join(item.sensor for item in sensors if item.judged)
-    return f"{judged}: nothing missing; {missing}. {text}" if judged else f"{missing[0].upper()}{missing[1:]}. {text}"
+        return f"{text} {_capital(missing)}."
+    judged = ", ".join(item.sensor for item in found.judged if item.judged)
+    return f"{judged}: nothing missing; {missing}. {text}" if judged else f"{_capital(missing)}. {text}"
+
+
+def _adequate(found: Diagnosis, ratio: float, untold: int) -> str:
+    """Say that nothing is missing, as far as the logs can tell."""
+    if "rests" in found.evidence:
+        text = "Nothing that this log can show without a reference attitude is missing"
+        if ratio > OFF_FLOOR:
+            return f"{text}: what is left stands at {ratio:.1f} times the noise, but no effect lowers that for certain."
+        return f"{text}; {untold} effects it cannot show at all." if untold else f"{text}."
+    if ratio > OFF_FLOOR:
+        return (
+            f"No effect is missing for certain, but the residual stands at {ratio:.2f} times the noise: the noise is "
+            "stronger or more coloured than stated, or something is left that goes with nothing in the log."
+        )
+    return "Nothing that this log can show is missing: the residual is at its noise floor as far as can be told."
+
+
+def _missing(found: Diagnosis, best: Candidate | None) -> str:
+    """Say what is missing."""
+    left = ""
+    if found.unexplained:
+        first = found.unexplained[0]
+        left = f"{first.channel} still depends on {first.covariate} ({first.shape})"
+    if found.verdict == "unknown" or best is None:
+        text = "Something is missing"
+        text += f" that no effect of the catalogue explains: {left}." if left else "."
+        doubtful = next((candidate for candidate in found.candidates if candidate.status in DOUBTS), None)
+        if doubtful is not None and not left and best is None:
+            text += f" {doubtful.effect} comes nearest, but {DOUBTS[doubtful.status]}."
+        return text if best is None else f"{text} {best.effect} would take a part of it, but not most."
+    if found.verdict == "ambiguous":
+        rivals = " or ".join(found.ambiguous_with)
+        return (
+            f"{best.effect} or {rivals} is missing: each explains this log, "
+            f"and {best.effect} adds nothing to what {rivals} explains."
+        )
+    text = f"{best.effect} is missing. {best.explanation}"
+    return f"{text} Apart from it, {left}." if left else text
 
 
 def spoilt(faults: Sequence[DataFault]) -> str:
@@ -126,7 +136,7 @@ def spoilt(faults: Sequence[DataFault]) -> str:
     return f"The data{f' of {logs}' if logs else ''} are at fault, not the sensor ({kinds}). {said}"
 
 
-def with_disagreements(text: str, found: Sequence[Disagreement], *, spoilt: bool) -> str:
+def _with_disagreements(text: str, found: Sequence[Disagreement], *, spoilt: bool) -> str:
     """Put logs that disagree into the answer: in its place where they spoil it, else after it."""
     about = list(dict.fromkeys(item.effect for item in found))
     if spoilt:
@@ -148,9 +158,14 @@ def _differences(found: Sequence[Disagreement]) -> str:
     return "; ".join(map(str, found))
 
 
-def experiment(best: EffectCard, rivals: Sequence[EffectCard]) -> str:
+def unshown(effect: str, reason: str) -> str:
+    """Say of an effect that a log cannot show it, and why."""
+    return f"This log cannot show {effect}: {reason}."
+
+
+def experiment(cards: Sequence[EffectCard]) -> str:
     """Say what would separate candidates that this log cannot tell apart."""
-    parts = [f"for {card.id}, {card.confirm}" for card in (best, *rivals) if card.confirm]
+    parts = [f"for {card.id}, {card.confirm}" for card in cards if card.confirm]
     if not parts:
         return "Record a log with another motion, in more attitudes and over a wider range of temperature."
     return "Record another log that separates them: " + "; ".join(parts) + "."

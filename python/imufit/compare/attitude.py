@@ -89,7 +89,8 @@ def attitude_comparison(
         if kept.sum() < MIN_ROWS:
             return None
     before, after = ({part: e[kept] for part, e in errors.items()} for errors in (before, after))
-    quantities = {name: x[kept] for name, x in _quantities(log).items()}
+    # A sensor whose readings stand in other rows than the reference says nothing of these.
+    quantities = {name: x[kept] for name, x in _quantities(log).items() if np.isfinite(x[kept]).any()}
     tilts = [v[kept] for v in _tilts(run, filter_name)]
     dependences = sorted(
         (d for d in _dependences(after, tilts, log.t[kept], quantities) if d.share > CHANCE * d.error),

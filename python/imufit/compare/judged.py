@@ -9,11 +9,6 @@ from imufit.fit.log_evidence import LogEvidence
 from imufit.fit.passes import CHANNELS
 from imufit.results import Judged
 
-FAR_ABOVE = 3.0
-"""Residual over stated noise and noise of the reference together from which on the stated noise is refuted: a stated
-density is right within a third on data sheets (typical against largest values), and noise that grows with the rate is
-2.3 times that of a sensor at rest on a turntable (`imufit grade --set nothing --seed 3720005`)."""
-
 
 def judged(analysis: Analysis) -> tuple[Judged, ...]:
     """Say of each sensor that any log has whether its readings were compared with the reference.
@@ -43,27 +38,3 @@ def _of_log(evidence: LogEvidence, sensor: str) -> str | None:
     if not any(evidence.floors[k] > 0.0 for k in channels if np.isfinite(evidence.floors[k])):
         return "the readings never change"
     return None
-
-
-def above_stated_noise(evidence: LogEvidence) -> dict[int, float]:
-    """Residual that no effect explains over the stated noise, by channel index, where that is far above one.
-
-    The noise of the reference counts as stated: nobody else knows it.
-
-    Parameters
-    ----------
-    evidence : LogEvidence
-        Evidence of a log.
-    """
-    found = {}
-    for index, channel in enumerate(CHANNELS):
-        stated = evidence.surveyed.log.metadata.noise.get(channel[:3])
-        variance = evidence.raw_variance[index]
-        if not stated or not np.isfinite(variance):
-            continue
-        step = evidence.facts.steps[index // 3][index % 3]
-        known = stated**2 + evidence.facts.ideal_noise[index // 3] ** 2 + step**2 / 12.0
-        ratio = float(np.sqrt(variance / known))
-        if ratio > FAR_ABOVE:
-            found[index] = ratio
-    return found

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use imufit_fit::evidence::Evidence;
-use imufit_fit::whitening;
 use imufit_model::sensor::{CHANNELS, Sensor};
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use crate::evidence::Evidence;
 use crate::part::Part;
+use crate::whitening;
 
 /// The zero of a magnetometer wanders by no more than so many noise floors from block to block.
 const FARTHEST: f64 = 1.0;
@@ -21,7 +21,7 @@ pub enum Walk {
     Zero,
     /// Sums along directions within a block, whose rows are projections of a vector: its three zeros each make steps. Block
     /// and direction of each sum.
-    Vector(Arc<Vec<(usize, Vector3<f64>)>>),
+    Vector(Arc<[(usize, Vector3<f64>)]>),
 }
 
 /// Covariance of the means of two blocks of a walk that makes a unit step in the time of a block, and starts with the log.
@@ -64,7 +64,7 @@ pub struct ChannelSums {
     pub most: f64,
 }
 
-/// Block sums of every channel of a log over all `parameters`, among which its own have their places. A magnetometer has no zero that wanders far, and what does is a misfit, which the walk would hide.
+/// Block sums of every channel of a log over all `parameters`, among which its own have their places.
 pub fn channel_sums(
     log: usize,
     part: &Part,
@@ -72,97 +72,90 @@ pub fn channel_sums(
     places: &[usize],
     parameters: usize,
 ) -> Vec<ChannelSums> {
-    let (white, floors) = (&part.white, &part.floors);
-    let blocks = white.layout.blocks;
-    let mut out: Vec<ChannelSums> = Vec::new();
-    for channel in (0..CHANNELS).filter(|c| weights[*c] > 0.0) {
-        if (0..blocks).any(|b| white.get(b, channel).is_some_and(|block| block.axes.is_some())) {
-            out.push(vector_sums(log, white, channel, weights[channel], places, parameters));
-            continue;
-        }
-        let mut sums = DMatrix::zeros(blocks, parameters);
-        let (mut right, mut count) = (DVector::zeros(blocks), DVector::zeros(blocks));
+    let white = &part.white;
+    let of = |channel: usize| {
         let active = &white.layout.model.active()[channel];
-        for b in 0..blocks {
-            let Some(block) = white.get(b, channel) else { continue };
-            // A loud block tells less of its mean.
-            let quiet = 1.0 / part.loudness[channel][b];
-            count[b] = quiet * block.n as f64;
-            for (k, p) in active.iter().enumerate() {
-                sums[(b, places[*p])] = quiet * block.sum[k];
-            }
-            right[b] = quiet * block.sum[active.len()];
-        }
-        let sensor = channel / 3;
-        let most = if sensor != Sensor::Mag.index() || white.layout.facts.rests {
-            f64::INFINITY
-        } else {
-            (3 * sensor..3 * sensor + 3)
-                .map(|c| (FARTHEST * floors[c]).powi(2) * weights[c] * whitening::gain(&white.layout.filters[c], 0.0))
-                .filter(|v| v.is_finite() && *v > 0.0)
-                .fold(0.0, f64::max)
+        let directions = directions(white, channel);
+        // Number of samples, and sums of columns and residual.
+        let rows: Vec<(f64, DVector<f64>)> = match &directions {
+            Some(directions) => directions.iter().map(|told| (told.count, told.sums.clone())).collect(),
+            None => (0..white.layout.blocks)
+                .map(|b| {
+                    // A loud block tells less of its mean.
+                    let quiet = 1.0 / part.loudness[channel][b];
+                    white.get(b, channel).map_or_else(
+                        || (0.0, DVector::zeros(active.len() + 1)),
+                        |block| (quiet * block.n as f64, quiet * &block.sum),
+                    )
+                })
+                .collect(),
         };
-        out.push(ChannelSums {
+        let mut sums = DMatrix::zeros(rows.len(), parameters);
+        for (k, (_, own)) in rows.iter().enumerate() {
+            for (p, value) in active.iter().zip(own.iter()) {
+                sums[(k, places[*p])] = *value;
+            }
+        }
+        ChannelSums {
             log,
             channel,
             weight: weights[channel],
             sums,
-            right,
-            count,
-            walk: Walk::Zero,
-            most,
-        });
-    }
-    out
+            right: DVector::from_iterator(rows.len(), rows.iter().map(|(_, own)| own[active.len()])),
+            count: DVector::from_iterator(rows.len(), rows.iter().map(|(n, _)| *n)),
+            walk: directions.map_or(Walk::Zero, |told| {
+                Walk::Vector(told.iter().map(|told| (told.block, told.direction)).collect())
+            }),
+            most: most(part, weights, channel / 3),
+        }
+    };
+    (0..CHANNELS).filter(|c| weights[*c] > 0.0).map(of).collect()
 }
 
-/// The same for a channel whose rows are projections of a vector: sums along the directions that each block tells of.
-fn vector_sums(
-    log: usize,
-    white: &Evidence,
-    channel: usize,
-    weight: f64,
-    places: &[usize],
-    parameters: usize,
-) -> ChannelSums {
-    let active = &white.layout.model.active()[channel];
-    let (mut directions, mut count, mut rows, mut right) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for b in 0..white.layout.blocks {
-        let Some(axes) = white.get(b, channel).and_then(|block| block.axes.as_ref()) else {
-            continue;
-        };
+/// Largest variance of a step of a sensor's zero, in units of the noise of a sample. A magnetometer has no zero that wanders far, and what
+/// does is a misfit, which the walk would hide.
+fn most(part: &Part, weights: &[f64; CHANNELS], sensor: usize) -> f64 {
+    let layout = &part.white.layout;
+    if sensor != Sensor::Mag.index() || layout.facts.rests {
+        return f64::INFINITY;
+    }
+    (3 * sensor..3 * sensor + 3)
+        .map(|c| (FARTHEST * part.floors[c]).powi(2) * weights[c] * whitening::gain(&layout.filters[c], 0.0))
+        .filter(|v| v.is_finite() && *v > 0.0)
+        .fold(0.0, f64::max)
+}
+
+/// What a block tells of a zero that is a vector, along one direction.
+struct Told {
+    block: usize,
+    direction: Vector3<f64>,
+    count: f64,
+    /// Sums of columns and residual.
+    sums: DVector<f64>,
+}
+
+/// The directions that the blocks tell of where a channel's rows are projections of a vector; `None` where they are not.
+fn directions(white: &Evidence, channel: usize) -> Option<Vec<Told>> {
+    let mut found = None;
+    for (block, axes) in white
+        .of_channel(channel)
+        .filter_map(|(b, own)| Some((b, own.axes.as_ref()?)))
+    {
         let eigen = axes.square.symmetric_eigen();
         let least = SEEN * eigen.eigenvalues.max();
-        for (k, value) in eigen.eigenvalues.iter().enumerate().filter(|(_, v)| **v > least) {
+        let seen = eigen.eigenvalues.iter().enumerate().filter(|(_, v)| **v > least);
+        let told = seen.map(|(k, value)| {
             let direction: Vector3<f64> = eigen.eigenvectors.column(k).into_owned();
-            let sums = axes.sum.tr_mul(&direction);
-            let mut row = DVector::zeros(parameters);
-            for (k, p) in active.iter().enumerate() {
-                row[places[*p]] = sums[k];
+            Told {
+                block,
+                direction,
+                count: *value,
+                sums: axes.sum.tr_mul(&direction),
             }
-            rows.push(row.transpose());
-            right.push(sums[active.len()]);
-            count.push(*value);
-            directions.push((b, direction));
-        }
+        });
+        found.get_or_insert_with(Vec::new).extend(told);
     }
-    let sums = if rows.is_empty() {
-        DMatrix::zeros(0, parameters)
-    } else {
-        DMatrix::from_rows(&rows)
-    };
-    let count = DVector::from_vec(count);
-    let walk = Walk::Vector(Arc::new(directions.clone()));
-    ChannelSums {
-        log,
-        channel,
-        weight,
-        sums,
-        right: DVector::from_vec(right),
-        count,
-        walk,
-        most: f64::INFINITY,
-    }
+    found
 }
 
 impl ChannelSums {
@@ -179,22 +172,13 @@ impl ChannelSums {
     /// The same with other sums.
     #[must_use]
     pub fn with_sums(&self, sums: DMatrix<f64>) -> Self {
-        Self {
-            log: self.log,
-            channel: self.channel,
-            weight: self.weight,
-            sums,
-            right: self.right.clone(),
-            count: self.count.clone(),
-            walk: self.walk.clone(),
-            most: self.most,
-        }
+        Self { sums, ..self.clone() }
     }
 
     /// The same once some parameters have been given values: what these explain is taken off the residual.
     #[must_use]
     pub fn given(&self, parameters: &[usize], values: &[f64]) -> Self {
-        let mut out = self.with_sums(self.sums.clone());
+        let mut out = self.clone();
         out.right -= self.columns(parameters) * DVector::from_column_slice(values);
         out
     }

@@ -1,0 +1,196 @@
+"""The sentences on faults of the data: what shows a fault, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from imufit.figures import quantity
+from imufit.log.contents import SENSOR_NAMES
+
+Array = NDArray[np.float64]
+
+AXES: Final = "xyz"
+UNITS: Final = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
+
+Words = tuple[str, str]
+"""Evidence and remedy."""
+
+
+def falls(sensor: str, before: float, after: float) -> str:
+    """Say how the residual falls, as a share of the reading's RMS; of shares of the sum of squares."""
+    first, last = (100.0 * float(np.sqrt(share)) for share in (before, after))
+    return f"from {first:.3g} to {last:.2g} % of {sensor}"
+
+
+def changed(change: Words, left: Sequence[str], alike: Words | None) -> Words:
+    """Say how a log has to be read, and what looks the same."""
+    text = f"{change[0]} Read so, the residual falls {', '.join(left)}."
+    if alike is not None:
+        text += f" Here this looks the same: {alike[0][0].lower()}{alike[0][1:]} {alike[1]}"
+    return text, change[1]
+
+
+def mount(sensors: Sequence[str], matrix: Array, excited: str) -> Words:
+    """Say that all sensors are turned alike; one that is excited stands for the others."""
+    turned_back = ",".join(mapping(sensor, matrix) for sensor in sensors)
+    return (
+        "The axes of every sensor are turned against the body that the reference describes: "
+        f"{_shown(excited, matrix)}, and so on.",
+        f"Turn them back with --map '{turned_back}', or multiply the reference from the right by a turn of "
+        f"{_turn(matrix.T)}.",
+    )
+
+
+def frame(name: str, declared: str) -> Words:
+    """Say that the reference is in another frame."""
+    return f"The reference is in the frame {name}, not {declared} as the log says.", f'Declare frame = "{name}".'
+
+
+INVERSE: Final = (
+    "The reference attitude is the inverse: it takes vectors of the reference frame into the body, or its angle "
+    "counts the other way.",
+    "Conjugate it: --map ref_qx=-ref_qx,ref_qy=-ref_qy,ref_qz=-ref_qz.",
+)
+SCALAR_LAST: Final = (
+    "The reference attitude has its scalar last.",
+    "Put the scalar first: --map ref_qw=ref_qz,ref_qx=ref_qw,ref_qy=ref_qx,ref_qz=ref_qy.",
+)
+INVERSE_SCALAR_LAST: Final = (
+    "The reference attitude has its scalar last, and is the inverse: it takes vectors of the reference frame into "
+    "the body.",
+    "Put the scalar first and conjugate it: --map ref_qw=ref_qz,ref_qx=-ref_qw,ref_qy=-ref_qx,ref_qz=-ref_qy.",
+)
+
+
+def axes(sensor: str, matrix: Array, left: str, other: str) -> Words:
+    """Say which axes of a sensor are exchanged or turned round; `other` is another remedy."""
+    if np.array_equal(matrix, -np.eye(3)):
+        what = f"{sensor} reads the opposite of what it should on every axis"
+        if sensor == "acc":
+            what += ": gravity instead of specific force, or a reference whose vertical axis points the other way"
+    else:
+        handed = "" if np.linalg.det(matrix) > 0.0 else " (a left-handed set of axes)"
+        name = SENSOR_NAMES[sensor]
+        what = f"The axes of the {name} are exchanged or turned round{handed}: {_shown(sensor, matrix)}"
+    remedy = f"Put them right with --map '{mapping(sensor, matrix)}'{', or: ' + other if other else '.'}"
+    return f"{what}. Read so, the residual falls {left}.", remedy
+
+
+def _shown(sensor: str, matrix: Array) -> str:
+    """Say what each axis of a sensor shows, such as ``gyr_x shows -y``, where it is not its own."""
+    other = [i for i in range(3) if not np.array_equal(matrix[i], np.eye(3)[i])]
+    return ", ".join(f"{sensor}_{AXES[i]} shows {_signed(matrix[i], '')}" for i in other)
+
+
+def mapping(sensor: str, matrix: Array) -> str:
+    """Return the mapping of columns that undoes a signed permutation, such as ``gyr_x=gyr_y,gyr_y=gyr_x``.
+
+    Parameters
+    ----------
+    sensor : str
+        Its prefix.
+    matrix : ndarray
+        (3, 3) signed permutation P: the reading is P times the true vector.
+    """
+    back = matrix.T
+    other = [i for i in range(3) if not np.array_equal(back[i], np.eye(3)[i])]
+    return ",".join(f"{sensor}_{AXES[i]}={_signed(back[i], f'{sensor}_')}" for i in other)
+
+
+def _turn(matrix: Array) -> str:
+    """Say a rotation as angle and axis."""
+    vector = Rotation.from_matrix(matrix).as_rotvec()
+    angle = float(np.linalg.norm(vector))
+    axis = vector / max(angle, 1e-12)
+    named = [k for k in range(3) if abs(abs(axis[k]) - 1.0) < 1e-6]
+    if named:
+        return f"{np.degrees(angle):.0f} deg about {'-' if axis[named[0]] < 0 else ''}{AXES[named[0]]}"
+    numbers = ", ".join(f"{value:.3g}" for value in axis)
+    return f"{np.degrees(angle):.0f} deg about ({numbers})"
+
+
+def _signed(row: Array, prefix: str) -> str:
+    k = int(np.argmax(np.abs(row)))
+    return f"{'-' if row[k] < 0.0 else ''}{prefix}{AXES[k]}"
+
+
+def wrong_unit(sensor: str, ratio: float, words: str, unit: str, factor: float) -> Words:
+    """Say in which unit a sensor seems to read."""
+    size = f"{ratio:.4g} times what it should" if ratio < 1.0 else f"{ratio:.4g} times too much"
+    columns = ",".join(f"{sensor}_{a}={sensor}_{a}[{unit}]" for a in "xyz")
+    remedy = (
+        f"Declare the unit: --map '{columns}', or convert the readings."
+        if unit
+        else f"Divide the readings of {sensor} by {factor:.6g}."
+    )
+    return f"{sensor} reads {size} on every axis alike, which looks like {words}.", remedy
+
+
+def angle_in_degrees(ratio: float) -> Words:
+    """Say that the commanded angle of a rig is in degrees, by the gyroscope's ratio to it."""
+    faster = f"The reference turns {1.0 / ratio:.4g} times as fast as the gyroscope"
+    return f"{faster}: ref_angle is in degrees.", "Declare the unit: --map 'ref_angle=ref_angle[deg]'."
+
+
+def stuck(sensor: str, axes: str, rows: int, span: tuple[float, float], moved: float) -> Words:
+    """Say that a value stood still."""
+    which = f"{sensor}_{axes}" if len(axes) == 1 else f"{sensor} ({', '.join(axes)})"
+    return (
+        f"{which} repeats one value in {rows} rows at {quantity.span(*span)}, while by the reference it should have "
+        f"changed by {quantity.quantity(moved, UNITS[sensor])}.",
+        "Look for a bus that hangs or a buffer that is read without a new sample; record again.",
+    )
+
+
+def duplicate(sensors: Sequence[str], rows: int, span: tuple[float, float], lag: float) -> Words:
+    """Say that a block of samples was recorded twice."""
+    return (
+        f"The {rows} rows at {quantity.span(*span)} repeat the samples of {' '.join(sensors)} of "
+        f"{quantity.quantity(lag, 's')} before, bit for bit.",
+        "Delete the copy, and look for a buffer that is written twice.",
+    )
+
+
+def backlog(rows: int, span: tuple[float, float], rate: float, usual: float, *, moved: bool) -> Words:
+    """Say that rows are stamped with their arrival."""
+    harmless = "" if moved else " The body was at rest, so they do no harm here."
+    return (
+        f"{rows} rows at {quantity.span(*span)} come at {rate:.0f} a second instead of {usual:.0f}: their times are "
+        f"those of arrival, not of sampling.{harmless}",
+        "Let the sensor stamp its samples, or cut these rows off.",
+    )
+
+
+def clipped(channel: str, end: float, rows: int, span: tuple[float, float]) -> Words:
+    """Say that readings stand at the end of a range."""
+    sensor = channel[:3]
+    return (
+        f"{channel} stands at the end of its range, {quantity.quantity(end, UNITS[sensor])}, in {rows} rows at "
+        f"{quantity.span(*span)}.",
+        f"Set a larger range, or move less; {sensor}.saturation models the loss.",
+    )
+
+
+def wrapped(sensor: str, end: float, again: int, beyond: int) -> Words:
+    """Say that readings beyond the range came in again at the other end."""
+    return (
+        f"Beyond {quantity.quantity(end, UNITS[sensor])} the readings of {sensor} come in again at the other end of "
+        f"the range: in {again} of {beyond} samples in which the reference shows more than that.",
+        "Set a larger range; or find where the reading is cut to fewer bits, and record again.",
+    )
+
+
+def knock(when: float, width: float, turn: Sequence[float]) -> Words:
+    """Say that the mount shifted at one instant, known to within a width, by a turn in rad about each axis."""
+    angle = np.degrees(np.linalg.norm(turn))
+    axes = ", ".join(quantity.quantity(value, "rad") for value in turn)
+    return (
+        f"From {when:.4g} s on (within {width:.2g} s) every sensor is turned by {angle:.3g} deg against the reference "
+        f"(x y z {axes}): the mount shifted, or the reference jumped.",
+        f"Fasten sensor and markers, and record again, or cut the log in two at {when:.4g} s.",
+    )
