@@ -6,7 +6,7 @@ a turn takes, or of play in a drive.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -64,49 +64,35 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
     for slot, item in items.items():
         if item.status == Status.PASSED and slot not in in_its_place:
             others = others.with_effect(ids[slot])
-    without = evidence_of(fit, others)
-    evidence = _guarded(without, {slot: evidence_of(fit, others.with_effect(ids[slot])) for slot in close})
+    without = tried(fit, others)
+    evidence = _guarded(without, {slot: tried(fit, others.with_effect(ids[slot])) for slot in close})
     most = max(evidence.values())
     # Where columns say all, a fit tells by the error alone: freedom alone does not tell one cause from another.
     equal = {slot for slot in close if np.isfinite(evidence[slot]) and not _curved(analysis, slot)}
-    return [(slot, (most if slot in equal else ln) - without[0]) for slot, ln in evidence.items()]
+    return [(slot, (most if slot in equal else ln) - without.ln_evidence) for slot, ln in evidence.items()]
 
 
-def likelier(fit: FittedStack, slot: int) -> str | None:
-    """Return the effect that explains more in the place of one of the model, by a fit of each; None if none does.
-
-    Parameters
-    ----------
-    fit : FittedStack
-        The model.
-    slot : int
-        Slot of the effect.
-    """
-    analysis = fit.analysis
-    ids = analysis.slots
-    if not _curved(analysis, slot):
-        return None
-    candidates = [other for other in analysis.candidate_slots if _curved(analysis, other)]
-    near = analysis.problem.alike(analysis.fitted_slots, slot, candidates, NEAR)
-    if not near:
-        return None
-    others = fit.model.without_effect(ids[slot])
-    fits = {other: evidence_of(fit, others.with_effect(ids[other])) for other in [*near, slot]}
-    evidence = _guarded(evidence_of(fit, others), fits)
-    best = max(evidence, key=lambda other: evidence[other])
-    more = evidence[best] - evidence[slot]
-    return ids[best] if more > analysis.problem.threshold(len(analysis.candidates)) else None
+def _guarded(without: Tried, fits: dict[int, Tried]) -> dict[int, float]:
+    """Return log evidences by slot, minus infinity where another fit takes off more of the error by what counts."""
+    lowest = min(each.held_out for each in fits.values())
+    return {
+        slot: each.ln_evidence if as_low(each.held_out, lowest, without.held_out) else -np.inf
+        for slot, each in fits.items()
+    }
 
 
-def _guarded(without: tuple[float, float], fits: dict[int, tuple[float, float]]) -> dict[int, float]:
-    """Return log evidences by slot, minus infinity where another fit takes off more of the error by what counts.
+def as_low(error: float, lowest: float, start: float) -> bool:
+    """Return whether a held-out error is as low as the lowest one but for what does not count.
 
     The evidence of a large log rests on the noise at frequencies that hold little of the error; where the error is not
     the same, it decides. Noise of the reference is no part of what a fit takes off.
+
+    Parameters
+    ----------
+    error, lowest, start : float
+        The error, the lowest one, and that without what lowers it.
     """
-    lowest = min(error for _, error in fits.values())
-    least = lowest**2 + LESS * max(without[1] ** 2 - lowest**2, 0.0)
-    return {slot: ln if error**2 <= least else -np.inf for slot, (ln, error) in fits.items()}
+    return error**2 <= lowest**2 + LESS * max(start**2 - lowest**2, 0.0)
 
 
 def matters(before: float, after: float) -> bool:
@@ -120,8 +106,26 @@ def matters(before: float, after: float) -> bool:
     return before - after >= MATTERS * before
 
 
-def evidence_of(fit: FittedStack, model: EffectStack) -> tuple[float, float]:
-    """Return the log evidence of a model around its best parameters, and its held-out error.
+class Tried(NamedTuple):
+    """A stack fitted in place of another one.
+
+    Attributes
+    ----------
+    ln_evidence : float
+        Log of its marginal likelihood.
+    held_out : float
+        Its held-out error.
+    analysis : Analysis
+        Its evidence, without columns of effects that are not in it.
+    """
+
+    ln_evidence: float
+    held_out: float
+    analysis: Analysis
+
+
+def tried(fit: FittedStack, model: EffectStack) -> Tried:
+    """Fit another stack, and return its log evidence around its best parameters.
 
     The reference may have lost fast motion or not: such a loss equals the difference, of second order, between a late
     sensor and a sluggish one.
@@ -131,12 +135,12 @@ def evidence_of(fit: FittedStack, model: EffectStack) -> tuple[float, float]:
     fit : FittedStack
         Where to start from.
     model : EffectStack
-        The model.
+        The stack.
     """
     known = fit.analysis.candidates
     lost = [key for key, effect in known.items() if effect.reference_part == "bandwidth" and key not in model.effects]
     analysis, estimate = fit.analysis.solved_for(model, fit.own, only=lost)
-    return fit.analysis.ln_likelihood(analysis), estimate.held_out
+    return Tried(fit.analysis.ln_likelihood(analysis), estimate.held_out, analysis)
 
 
 def _curved(analysis: Analysis, slot: int) -> bool:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from imufit.compare import attitude_comparison, comparison
 from imufit.diagnose.add import add
 from imufit.diagnose.curved import matters
 from imufit.diagnose.diagnose import diagnose
-from imufit.diagnose.revise import Swap, revise
+from imufit.diagnose.revise import revise
 from imufit.fit import FittedStack
 from imufit.progress import Progress, silent
 from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
@@ -41,11 +41,11 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
     """
     climb = Climb(start)
     climb.up()
-    tried: set[Swap] = set()
+    seen: set[frozenset[str]] = set()
     revisions: list[Revision] = []
-    while (revision := revise(climb.fit, [step.effect for step in climb.steps], tried)) is not None:
-        revisions.append(revision)
-        climb = climb.again(revision)
+    while way := revise(climb.fit, [step.effect for step in climb.steps], start.ratio, seen):
+        revisions += way
+        climb = climb.again(way)
         climb.up()
     fit, diagnosis, worst = climb.fit, climb.diagnosis, start.worst
     whole = start.analysis.judged_by == "reference"
@@ -111,11 +111,12 @@ class Climb:
             self._take(addition)
             self.diagnosis = diagnose(self.fit)
 
-    def again(self, revision: Revision) -> Climb:
-        """Return the same way from the same start with one effect replaced or left out."""
+    def again(self, revisions: Sequence[Revision]) -> Climb:
+        """Return the same way from the same start with effects replaced or left out."""
         effects = [step.effect for step in self.steps]
-        at = effects.index(revision.removed)
-        effects[at : at + 1] = [] if revision.by is None else [revision.by]
+        for revision in revisions:
+            at = effects.index(revision.removed)
+            effects[at : at + 1] = [] if revision.by is None else [revision.by]
         other = Climb(self.start, self.first)
         for effect in effects:
             other._take(add(other.fit, effect))

@@ -1,26 +1,27 @@
-"""Swaps and drops: effects that later ones made needless, or less apt than another."""
+"""Exchanges and drops: whether a stack near the one that was climbed to is likelier, by a fit of each."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from imufit.diagnose.curved import likelier, matters
+from imufit.diagnose.curved import Tried, as_low, tried
 from imufit.results import Revision
 
 if TYPE_CHECKING:
     from imufit.fit import FittedStack
+    from imufit.model import EffectStack
 
-Swap = tuple[str | None, str | None]
-"""An effect and what takes its place, if anything."""
+MORE = 1.0
+"""Log odds by which another stack must be likelier: less is within what the iteration leaves open."""
 
 
-def revise(fit: FittedStack, added: Sequence[str], tried: set[Swap]) -> Revision | None:
-    """Return the first swap or drop that a fit confirms.
+def revise(fit: FittedStack, added: Sequence[str], start: float, seen: set[frozenset[str]]) -> list[Revision]:
+    """Return how to get from a stack to the likeliest of those near it; empty if none is likelier.
 
-    The evidence proposes, to first order; the fit of the other stack decides: a swap must lower the held-out error, a
-    drop must not raise it. Where columns say little of an effect's full size, the marginal likelihood of the fits
-    proposes and decides.
+    Each differs by one effect that is not there or stands in the place of another, and then lacks what this made
+    needless. The columns propose, to first order; the marginal likelihood of the fits decides, every effect with the
+    odds against it. The held-out error must agree: that of the likelier stack is as low, but for what does not count.
 
     Parameters
     ----------
@@ -28,31 +29,56 @@ def revise(fit: FittedStack, added: Sequence[str], tried: set[Swap]) -> Revision
         The model with all that was added.
     added : sequence of str
         Effects that may be taken out again: what the user began with stays.
-    tried : set of tuple
-        What was proposed before; what is proposed now is put in.
+    start : float
+        Held-out error before anything was added.
+    seen : set of frozenset of str
+        Stacks that were tried before; those tried now are put in.
     """
     analysis = fit.analysis
     ids = analysis.slots
     members = [slot for slot in analysis.fitted_slots if ids[slot] in added]
     if len(members) < 2:
-        return None
-    for slot, better in analysis.problem.revisions(analysis.fitted_slots, members, analysis.candidate_slots):
-        removed, by = ids[slot], None if better is None else ids[better]
-        if (removed, by) in tried:
-            continue
-        tried |= {(removed, by), (by, removed)}
-        model = fit.model.without_effect(removed)
-        other = fit.moved(model if by is None else model.with_effect(by))
-        if matters(fit.ratio, other.ratio) if by else not matters(other.ratio, fit.ratio):
-            return Revision(removed, by, fit.ratio, other.ratio)
-    for slot in members:
-        removed = ids[slot]
-        if (removed, removed) in tried:
-            continue
-        tried.add((removed, removed))
-        by = likelier(fit, slot)
-        if by is not None:
-            tried.add((by, by))
-            other = fit.moved(fit.model.without_effect(removed).with_effect(by))
-            return Revision(removed, by, fit.ratio, other.ratio)
-    return None
+        return []
+    search = _Search(fit, frozenset(added), start, seen)
+    for slot, other in analysis.problem.revisions(analysis.fitted_slots, members, analysis.candidate_slots):
+        search.ask(ids[slot], None if other is None else ids[other])
+    return search.way
+
+
+class _Search:
+    """The likeliest stack so far, and the way there."""
+
+    def __init__(self, fit: FittedStack, free: frozenset[str], start: float, seen: set[frozenset[str]]) -> None:
+        self.fit, self.free, self.start, self.seen = fit, free, start, seen
+        self.odds = fit.analysis.problem.threshold(len(fit.analysis.candidates))
+        self.first = tried(fit, fit.model)
+        self.most = self._likelihood(fit.model, self.first) + MORE
+        self.way: list[Revision] = []
+        seen.add(frozenset(fit.model.effects))
+
+    def ask(self, removed: str, by: str | None) -> None:
+        """Try the stack with an effect in the place of another, or without it, then without what is needless there."""
+        model = self.fit.model.without_effect(removed)
+        model = model if by is None else model.with_effect(by)
+        way = [(removed, by)]
+        while frozenset(model.effects) not in self.seen:
+            self.seen.add(frozenset(model.effects))
+            found = tried(self.fit, model)
+            likelihood = self._likelihood(model, found)
+            if likelihood > self.most and as_low(found.held_out, self.first.held_out, self.start):
+                self.most = likelihood
+                errors = self.first.held_out, found.held_out
+                self.way = [Revision(effect, instead, *errors) for effect, instead in way]
+            ids = found.analysis.slots
+            members = [slot for slot in found.analysis.fitted_slots if ids[slot] in self.free - {by}]
+            needless = found.analysis.problem.needless(found.analysis.fitted_slots, members)
+            if needless is None:
+                return
+            model = model.without_effect(ids[needless])
+            way.append((ids[needless], None))
+
+    def _likelihood(self, model: EffectStack, found: Tried) -> float:
+        """Log of the probability of a stack, up to a constant; a loss of the reference may be there in any."""
+        known = self.fit.analysis.candidates
+        named = [key for key in model.effects if key not in known or known[key].reference_part != "bandwidth"]
+        return found.ln_evidence - self.odds * len(named)

@@ -181,11 +181,16 @@ class Analysis:
         of : Analysis
             The other stack; its rows are counted as those of this one, since a stack may lack some at the ends.
         """
-        logs = [each.with_own_noise() for each in of.logs]
+        step = of.estimate().step
+        logs = [each.with_noise_after(of.own_step(k, step)) for k, each in enumerate(of.logs)]
         problem = _problem(logs, of.model, of.unnamed, [*of.candidates, *of.probes])
-        size = sum(own.ln_noise(each.counts) for own, each in zip(logs, self.logs, strict=True))
+        size = sum(
+            own.ln_noise(each.counts) - own.ln_smoothing(each.counts) for own, each in zip(logs, self.logs, strict=True)
+        )
         square = 0.5 * sum(sum(each.counts) for each in logs)
-        return size + square + problem.ln_evidence(of.fitted_slots, of.candidate_slots)
+        members = len(of.model.effects)
+        along = of.fitted_slots[members:]
+        return size + square + problem.ln_evidence(along, of.fitted_slots[:members], of.candidate_slots)
 
     def of_logs(self, chosen: Sequence[int]) -> Analysis:
         """Return the same evidence of some of the logs alone; effects that none of them can tell of are left out."""

@@ -112,13 +112,15 @@ class LogEvidence:
         plain = cls(surveyed, slots, raw, raw, raw_variance, raw_variance, loudness, floors, filters, faults)
         return plain._whitened(step)
 
-    def with_own_noise(self) -> LogEvidence:
-        """Return the evidence with the noise of its own residual; that of rests is their scatter."""
-        if isinstance(self.passes, RestPasses):
-            return self
-        step, variance, loudness = _imufit.saturate(self.raw)
-        variance = _not_below_steps(self.facts, variance)
-        return replace(self, raw_variance=variance, variance=variance, loudness=loudness)._whitened(step)
+    def with_noise_after(self, step: Array) -> LogEvidence:
+        """Return the evidence with the noise of the residual after a step of all parameters; that of rests is their scatter.
+
+        Parameters
+        ----------
+        step : numpy.ndarray
+            Step of every parameter.
+        """
+        return self if isinstance(self.passes, RestPasses) else self._whitened(step)
 
     def _whitened(self, step: Array) -> LogEvidence:
         """Return evidence that stands in for its whitened form, whitened; `step` leaves only its noise."""
@@ -142,6 +144,26 @@ class LogEvidence:
         known = (k for k in range(len(CHANNELS)) if counts[k] and self.variance[k] > 0.0)
         of = (counts[k] * (np.log(self.variance[k]) + np.mean(np.log(self.loudness[k]))) for k in known)
         return -0.5 * float(sum(of))
+
+    def ln_smoothing(self, counts: Sequence[int]) -> float:
+        """Log of what the effects raise the density of so many samples by as they smooth the noise of the reference.
+
+        A sensor that is called sluggish or weak leaves less of that noise in the residual, whatever it is. With the noise
+        of each channel the log density changes by half of what its variance changes by, per sample.
+
+        Parameters
+        ----------
+        counts : sequence of int
+            Samples of each channel.
+        """
+        if isinstance(self.passes, RestPasses):
+            return 0.0
+        noise = self.facts.reference_noise
+        own = np.array(self.white.reference_variance(*noise))
+        ideal = np.array(_empty(self.surveyed, {}, [], {}, self.filters).reference_variance(*noise))
+        variance = np.maximum(np.where(np.isfinite(self.variance), self.variance, np.inf), ideal)
+        known = variance > 0.0
+        return float(np.sum(0.5 * np.array(counts)[known] * ((ideal - own) / variance)[known]))
 
     @property
     def counts(self) -> list[int]:

@@ -11,6 +11,7 @@ pub mod noise;
 pub mod normal_equations;
 pub mod part;
 pub mod profile;
+pub mod reference_noise;
 pub mod reference_width;
 pub mod residual;
 pub mod rests;

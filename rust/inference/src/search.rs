@@ -14,7 +14,7 @@ use crate::asked::{Asked, Prior};
 
 use crate::problem::Question;
 use crate::problem::indices;
-use crate::stack::{Criterion, Stack, log_sum_exp};
+use crate::stack::{Criterion, Stack, ln_prior, log_sum_exp};
 use crate::varying;
 use crate::verdict::Plausible;
 
@@ -39,6 +39,8 @@ pub struct Search<'a> {
     pub model: Vec<usize>,
     /// Slots of the candidates.
     pub candidates: Vec<usize>,
+    /// Slots of candidates whose columns promise more than a fit keeps: they are not there.
+    pub refuted: Vec<usize>,
     asked: HashMap<usize, Asked>,
     /// Log Bayes factor from which on a candidate is there: the odds against one of so many.
     pub threshold: f64,
@@ -77,6 +79,7 @@ impl<'a> Search<'a> {
             criterion,
             model: model.to_vec(),
             candidates: candidates.to_vec(),
+            refuted: Vec::new(),
             asked,
             threshold: threshold(candidates.len()),
         }
@@ -226,7 +229,12 @@ impl<'a> Search<'a> {
 
     /// True if a candidate is there.
     pub fn there(&self, weighed: &Weighed) -> bool {
-        weighed.testable && weighed.plausible == Plausible::Yes && weighed.ln_bayes >= self.threshold
+        weighed.plausible == Plausible::Yes && self.explains(weighed)
+    }
+
+    /// True if a candidate explains as much as one that is there, whether sensors can have its parameters or not.
+    pub fn explains(&self, weighed: &Weighed) -> bool {
+        weighed.testable && weighed.ln_bayes >= self.threshold && !self.refuted.contains(&weighed.slot)
     }
 
     /// Log Bayes factor of a member beside the others where it may vary from block to block as well; `stack` is that of all members.
@@ -301,13 +309,22 @@ impl<'a> Search<'a> {
         Some(members)
     }
 
-    /// Log of the marginal likelihood of the model, where each of the candidates may be there or not, one as likely as the other.
-    pub fn ln_evidence(&self) -> Option<f64> {
-        let stack = self.stack(&[])?;
-        let weighed = self.weigh_all(&stack, &[]);
+    /// Log of the marginal likelihood of the model and some members, with the prior density of these at their present values (Laplace's
+    /// approximation); each of the candidates may be there or not, one as likely as the other.
+    pub fn ln_evidence(&self, members: &[usize]) -> Option<f64> {
+        let stack = self.stack(members)?;
+        let weighed = self.weigh_all(&stack, members);
         let possible = weighed.iter().filter(|w| w.plausible == Plausible::Yes);
         let of = |w: &Weighed| log_sum_exp(&[0.0, w.ln_bayes]) - LN_2;
-        Some(stack.ln_z + possible.map(of).sum::<f64>())
+        let prior = |slot: &usize| {
+            let asked = Asked::slot(self.criterion, *slot);
+            let values = &self.criterion.problem.slots[*slot].parameters;
+            match &asked.prior {
+                Prior::Normal(deviation) => ln_prior(values, deviation) - asked.trials,
+                Prior::Known(_) => -asked.trials,
+            }
+        };
+        Some(stack.ln_z + members.iter().map(prior).sum::<f64>() + possible.map(of).sum::<f64>())
     }
 
     /// Log evidence of some members over the model alone: each beside those before it.

@@ -668,6 +668,16 @@ impl Prior {
     }
 }
 
+/// Log of the prior density of parameters at some values, over that of the widest of its normal parts at zero.
+pub fn ln_prior(values: &[f64], deviation: &[f64]) -> f64 {
+    let of_size = |size: f64| {
+        let cost = |(value, deviation): (&f64, &f64)| 0.5 * (value / (size * deviation)).powi(2) + size.ln();
+        let open = values.iter().zip(deviation).filter(|(_, deviation)| **deviation > 0.0);
+        -open.map(cost).sum::<f64>()
+    };
+    log_sum_exp(&SIZES.map(of_size)) - (SIZES.len() as f64).ln()
+}
+
 /// Log Bayes factor that is expected of parameters of which one has a value, each seen by itself.
 fn expected_ln_bayes(information: &[f64], deviation: &[f64], parameter: usize, value: f64) -> f64 {
     let of_size = |size: f64| {

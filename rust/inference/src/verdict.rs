@@ -103,7 +103,7 @@ pub struct Finding {
 #[derive(Clone, Debug, Default)]
 pub struct Known {
     /// Log Bayes factors of candidates whose columns say little of their full size, from a fit with each of them and one without: these
-    /// decide among them.
+    /// decide among them, and whether any is there.
     pub fitted: Vec<(usize, f64)>,
     /// Share of noise in the column of the log that a candidate reads.
     pub column_noise: Vec<(usize, f64)>,
@@ -193,7 +193,10 @@ pub fn decide(
 ) -> Option<Verdict> {
     let fitted = &known.fitted;
     let criterion = Criterion::new(problem);
-    let search = Search::new(&criterion, model, candidates);
+    let mut search = Search::new(&criterion, model, candidates);
+    if fitted.iter().all(|(_, ln)| *ln < search.threshold) {
+        search.refuted = fitted.iter().map(|(slot, _)| *slot).collect();
+    }
     let unnamed = if probes.is_empty() {
         Vec::new()
     } else {
@@ -265,7 +268,7 @@ pub fn decide(
     }
     let impossible = too_large
         || (search.weigh_all(&stack, &members).iter())
-            .any(|w| w.testable && w.plausible == Plausible::TooLarge && w.ln_bayes >= search.threshold);
+            .any(|w| w.plausible == Plausible::TooLarge && search.explains(w));
     let disagreements = disagreements(search, &members, &weighed);
     // What one log has alone spoils the answer only if there is no other. Of two logs nobody can say which is wrong.
     let spoilt = (disagreements.first())
@@ -371,7 +374,7 @@ fn named(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>)> {
 /// are asked again without it.
 fn disagreements(search: &Search, members: &[usize], weighed: &[Weighed]) -> Vec<Disagreement> {
     let equations = agreement::by_log(search);
-    let there = |w: &&Weighed| w.testable && w.ln_bayes >= search.threshold && !members.contains(&w.slot);
+    let there = |w: &&Weighed| search.explains(w) && !members.contains(&w.slot);
     let in_part = weighed.iter().filter(there).map(|w| w.slot);
     let asked = search.model.iter().chain(members).copied().chain(in_part);
     asked
@@ -419,7 +422,7 @@ fn rivals_of(search: &Search, members: &[usize], best: usize, known: &Known) -> 
     let own = search.weigh(&rest, best)?;
     let possible = |w: &&Weighed| {
         let sign = matches!(w.plausible, Plausible::Yes | Plausible::OtherSign);
-        w.testable && sign && w.ln_bayes >= search.threshold
+        sign && search.explains(w)
     };
     let rivals = weighed.iter().filter(possible).filter(|w| {
         let with: Vec<usize> = others.iter().copied().chain([w.slot]).collect();

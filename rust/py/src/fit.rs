@@ -7,6 +7,7 @@ use imufit_fit::bins::Bins;
 use imufit_fit::evidence::{Evidence, Layout};
 use imufit_fit::noise::Autocovariance;
 use imufit_fit::profile::{self, Profile};
+use imufit_fit::reference_noise;
 use imufit_fit::survey::{Given, Survey};
 use imufit_fit::whitening::filter_from_autocovariance;
 use imufit_model::rig::Rig;
@@ -167,6 +168,13 @@ impl PyEvidence {
         let mut layout = (*self.0.layout).clone();
         layout.filters = filters;
         Ok(Self(Evidence::new(Arc::new(layout))))
+    }
+
+    /// Variance that white noise of the reference (attitude in rad, position in m) gives to the whitened residual of each of the nine
+    /// channels, through the effects of the evidence.
+    fn reference_variance(&self, attitude: f64, position: f64) -> PyResult<Vec<f64>> {
+        let found = reference_noise::variance(&self.0.layout, attitude, position).map_err(from_effect)?;
+        Ok(found.to_vec())
     }
 
     /// Blocks of time that the evidence is kept in.

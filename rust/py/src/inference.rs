@@ -121,10 +121,8 @@ impl PyProblem {
     /// Fits the slots given: step and standard error (k,) of each of their k parameters, SI units; full step (p,) of
     /// all; held-out and training residual RMS over noise floor; whitened held-out sum of squares of each fold.
     fn estimate<'py>(&self, py: Python<'py>, slots: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
+        self.known(&slots)?;
         let all = &self.0.slots;
-        if slots.iter().any(|s| *s >= all.len()) {
-            return Err(value_error("there is no such slot"));
-        }
         let parameters = parameters_of(slots.iter().map(|s| &all[*s]));
         let (fitted, base) = py.detach(|| {
             (
@@ -166,17 +164,8 @@ impl PyProblem {
         column_noise: Vec<(usize, f64)>,
         seen: Vec<Seen>,
     ) -> PyResult<PyVerdict> {
-        let slots = self.0.slots.len();
         let pairs = fitted.iter().chain(&column_noise).map(|(slot, _)| slot);
-        if model
-            .iter()
-            .chain(&candidates)
-            .chain(&probes)
-            .chain(pairs)
-            .any(|s| *s >= slots)
-        {
-            return Err(value_error("there is no such slot"));
-        }
+        self.known(model.iter().chain(&candidates).chain(&probes).chain(pairs))?;
         if seen.iter().any(|(_, channel, _, _)| *channel >= CHANNELS) {
             return Err(value_error("there is no such channel"));
         }
@@ -202,15 +191,19 @@ impl PyProblem {
         Ok(PyVerdict::new(&self.0, found))
     }
 
-    /// Log of the marginal likelihood of all logs under the slots given, their parameters near their present values; each of the
-    /// `possible` slots may be there or not.
-    fn ln_evidence(&self, py: Python<'_>, slots: Vec<usize>, possible: Vec<usize>) -> PyResult<f64> {
-        if slots.iter().chain(&possible).any(|s| *s >= self.0.slots.len()) {
-            return Err(value_error("there is no such slot"));
-        }
+    /// Log of the marginal likelihood of all logs under the `members`, their parameters near their present values, beside the slots `along`
+    /// that are always fitted; each of the `possible` slots may be there or not.
+    fn ln_evidence(
+        &self,
+        py: Python<'_>,
+        along: Vec<usize>,
+        members: Vec<usize>,
+        possible: Vec<usize>,
+    ) -> PyResult<f64> {
+        self.known(along.iter().chain(&members).chain(&possible))?;
         let found = py.detach(|| {
             let criterion = Criterion::new(&self.0);
-            Search::new(&criterion, &slots, &possible).ln_evidence()
+            Search::new(&criterion, &along, &possible).ln_evidence(&members)
         });
         found.ok_or_else(|| value_error("the normal equations cannot be solved"))
     }
@@ -218,17 +211,15 @@ impl PyProblem {
     /// What zeros do beside the slots given at the likeliest strength: (log, channel index, standard deviation of a walk's step over a
     /// block, that of the scatter of block means besides, both in the channel's unit, time of a block, s).
     fn zero_noise(&self, py: Python<'_>, slots: Vec<usize>) -> PyResult<Vec<ZeroNoise>> {
-        if slots.iter().any(|s| *s >= self.0.slots.len()) {
-            return Err(value_error("there is no such slot"));
-        }
+        self.known(&slots)?;
         let parameters = parameters_of(slots.iter().map(|s| &self.0.slots[*s]));
         let found = py.detach(|| stack::zero_noise(&self.0, &parameters));
         let row = |z: &stack::ZeroNoise| (z.log, z.channel, z.walk, z.scatter, z.block);
         Ok(found.iter().map(row).collect())
     }
 
-    /// Slots among `members` of the model that are needless beside its others, or that one of the `candidates` had better
-    /// replace: pairs of a slot and what does better in its place, or None.
+    /// Slots among `members` of the model that may be needless beside its others, or that one of the `candidates` may replace: pairs of a
+    /// slot and what may do better in its place, or None.
     fn revisions(
         &self,
         py: Python<'_>,
@@ -236,14 +227,7 @@ impl PyProblem {
         members: Vec<usize>,
         candidates: Vec<usize>,
     ) -> PyResult<Vec<(usize, Option<usize>)>> {
-        let known = self.0.slots.len();
-        if [&model, &members, &candidates]
-            .into_iter()
-            .flatten()
-            .any(|s| *s >= known)
-        {
-            return Err(value_error("there is no such slot"));
-        }
+        self.known(model.iter().chain(&members).chain(&candidates))?;
         let found = py.detach(|| revision::revisions(&self.0, &model, &members, &candidates));
         Ok(found.iter().map(|r| (r.slot, r.by)).collect())
     }
@@ -254,23 +238,10 @@ impl PyProblem {
         search::threshold(candidates)
     }
 
-    /// Candidates that explain at least a share of what an effect of the model explains, each in its place.
-    fn alike(
-        &self,
-        py: Python<'_>,
-        model: Vec<usize>,
-        slot: usize,
-        candidates: Vec<usize>,
-        share: f64,
-    ) -> PyResult<Vec<usize>> {
-        if [model.as_slice(), &[slot], &candidates]
-            .concat()
-            .iter()
-            .any(|s| *s >= self.0.slots.len())
-        {
-            return Err(value_error("there is no such slot"));
-        }
-        Ok(py.detach(|| revision::alike(&self.0, &model, slot, &candidates, share)))
+    /// The slot among `members` of the model that its others make needless most of all, to first order; None if none is.
+    fn needless(&self, py: Python<'_>, model: Vec<usize>, members: Vec<usize>) -> PyResult<Option<usize>> {
+        self.known(model.iter().chain(&members))?;
+        Ok(py.detach(|| revision::needless(&self.0, &model, &members)))
     }
 
     /// Residual of one log at a step (p,) of all parameters: RMS and mean by channel and block, and binned panels, in the
@@ -325,6 +296,13 @@ impl PyProblem {
 }
 
 impl PyProblem {
+    fn known<'a>(&self, slots: impl IntoIterator<Item = &'a usize>) -> PyResult<()> {
+        if slots.into_iter().any(|s| *s >= self.0.slots.len()) {
+            return Err(value_error("there is no such slot"));
+        }
+        Ok(())
+    }
+
     /// A log and the places of its parameters.
     fn part(&self, log: usize) -> PyResult<(&Part, &[usize])> {
         let found = self.0.parts.get(log).zip(self.0.places.get(log));
