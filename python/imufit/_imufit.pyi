@@ -605,6 +605,7 @@ class Problem:
         candidates: Sequence[int],
         probes: Sequence[int] = ...,
         fitted: Sequence[tuple[int, float]] = ...,
+        refuted: Sequence[int] = ...,
         column_noise: Sequence[tuple[int, float]] = ...,
         seen: Sequence[tuple[int | None, int, float, str]] = ...,
     ) -> Verdict: ...

@@ -102,13 +102,17 @@ def _decided(fit: FittedStack, excluded: Sequence[str]) -> Verdict:
     slots = [slot for slot in analysis.candidate_slots if analysis.slots[slot] not in excluded]
     asked = analysis.fitted_slots, slots, analysis.probe_slots
     noise = column_noise(analysis)
+    refuted: list[int] = []
     result = analysis.problem.diagnose(*asked, column_noise=noise)
-    fits = fitted(fit, result)
+    odds = analysis.problem.threshold(len(analysis.candidates))
+    while (fits := fitted(fit, result)) and all(ln < odds for _, ln in fits):
+        refuted += [slot for slot, _ in fits]
+        result = analysis.problem.diagnose(*asked, refuted=refuted, column_noise=noise)
     seen = seen_in_rows(analysis)
     if result.best is None:
         seen += fast_changes(analysis, fit.estimate.step)
     if fits or seen:
-        result = analysis.problem.diagnose(*asked, fitted=fits, column_noise=noise, seen=seen)
+        result = analysis.problem.diagnose(*asked, fitted=fits, refuted=refuted, column_noise=noise, seen=seen)
     return result
 
 

@@ -161,7 +161,9 @@ class LogEvidence:
         noise = self.facts.reference_noise
         own = np.array(self.white.reference_variance(*noise))
         ideal = np.array(_empty(self.surveyed, {}, [], {}, self.filters).reference_variance(*noise))
-        variance = np.maximum(np.where(np.isfinite(self.variance), self.variance, np.inf), ideal)
+        variance = np.where(np.isfinite(self.variance), self.variance, np.inf)
+        # A reference said to be noisier than the whole residual is not, or its noise is not white: the less is it believed.
+        variance = np.maximum(variance, ideal**2 / np.maximum(variance, np.finfo(float).tiny))
         known = variance > 0.0
         return float(np.sum(0.5 * np.array(counts)[known] * ((ideal - own) / variance)[known]))
 

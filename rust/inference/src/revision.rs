@@ -23,23 +23,27 @@ pub struct Revision {
 /// Effects among `members` of the model that may be needless, or that one of the candidates may replace.
 pub fn revisions(problem: &Problem, model: &[usize], members: &[usize], candidates: &[usize]) -> Vec<Revision> {
     let curved = |slot: usize| problem.slots[slot].effect.strongly_curved();
-    let of = |slot| {
-        competition(problem, model, slot, candidates, |search, weighed, own| {
-            let replaces = |w: &&Weighed| {
-                let unsure = curved(w.slot) && w.testable && w.ln_bayes >= NEAR * own;
-                w.slot != slot && (unsure || search.there(w) && w.ln_bayes > own + search.threshold)
+    let sensors = |slot: usize| problem.slots[slot].effect.sensors();
+    let of = |slot: &usize| {
+        competition(problem, model, *slot, candidates, |search, weighed, own| {
+            let best = weighed.iter().find(|w| search.there(w));
+            let better = best.filter(|w| w.slot != *slot && w.ln_bayes > own + search.threshold);
+            let near = |w: &&Weighed| {
+                let shared = sensors(w.slot).iter().any(|s| sensors(*slot).contains(s));
+                w.slot != *slot && curved(w.slot) && curved(*slot) && shared && w.testable && w.ln_bayes >= NEAR * own
             };
-            let swaps = weighed.iter().filter(replaces).map(|w| Some(w.slot));
-            let drop = (curved(slot) || own < search.threshold).then_some(None);
-            Some(drop.into_iter().chain(swaps).map(|by| Revision { slot, by }).collect())
+            let mut swaps: Vec<usize> = better
+                .into_iter()
+                .chain(weighed.iter().filter(near))
+                .map(|w| w.slot)
+                .collect();
+            swaps.dedup();
+            let drop = (curved(*slot) || own < search.threshold).then_some(None);
+            let all = drop.into_iter().chain(swaps.into_iter().map(Some));
+            Some(all.map(|by| Revision { slot: *slot, by }).collect::<Vec<_>>())
         })
     };
-    members
-        .iter()
-        .copied()
-        .filter_map(of)
-        .flat_map(|all: Vec<_>| all)
-        .collect()
+    members.iter().filter_map(of).flatten().collect()
 }
 
 /// The effect among `members` of the model that the others make needless most of all, to first order.

@@ -28,6 +28,9 @@ const ROUNDS: usize = 3;
 const DOUBT: f64 = 50.0;
 /// Hardly any sensor has an effect this many times its prior deviation.
 const BEYOND: f64 = 20.0;
+/// Variance of the scatter of block means, over that of the noise of their samples, from which on a body that nobody watches translates: what
+/// other missing effects leave of their second order scatters by 0.2.
+const TRANSLATES: f64 = 1.0;
 /// No axis reads so much of itself, or of another, too much.
 const LARGEST_GAIN: f64 = 0.3;
 
@@ -224,7 +227,7 @@ impl<'a> Search<'a> {
             let facts = &part.white.layout.facts;
             facts.position_smoothing.is_none() && !facts.rests && facts.rig.is_none()
         };
-        by_motion && problem.parts.iter().any(unknown) && stack.strength(Sensor::Acc.index()).scatter > 0.0
+        by_motion && problem.parts.iter().any(unknown) && stack.strength(Sensor::Acc.index()).scatter >= TRANSLATES
     }
 
     /// True if a candidate is there.

@@ -103,8 +103,10 @@ pub struct Finding {
 #[derive(Clone, Debug, Default)]
 pub struct Known {
     /// Log Bayes factors of candidates whose columns say little of their full size, from a fit with each of them and one without: these
-    /// decide among them, and whether any is there.
+    /// decide among them.
     pub fitted: Vec<(usize, f64)>,
+    /// Candidates of which a fit keeps nothing that their columns promise: they are not there.
+    pub refuted: Vec<usize>,
     /// Share of noise in the column of the log that a candidate reads.
     pub column_noise: Vec<(usize, f64)>,
     /// Lines of the spectrum and random telegraph noise of a residual.
@@ -194,9 +196,7 @@ pub fn decide(
     let fitted = &known.fitted;
     let criterion = Criterion::new(problem);
     let mut search = Search::new(&criterion, model, candidates);
-    if fitted.iter().all(|(_, ln)| *ln < search.threshold) {
-        search.refuted = fitted.iter().map(|(slot, _)| *slot).collect();
-    }
+    search.refuted.clone_from(&known.refuted);
     let unnamed = if probes.is_empty() {
         Vec::new()
     } else {

@@ -150,9 +150,9 @@ impl PyProblem {
     }
 
     /// Which effect is missing from the model of slots `model`, among the slots `candidates`; what none of them explains is
-    /// asked of the slots `probes`. `fitted` holds log Bayes factors of candidates from fits of their own, by slot; `column_noise` the share of
+    /// asked of the slots `probes`. `fitted` holds log Bayes factors of candidates from fits of their own, by slot; `refuted` those of which a fit keeps nothing; `column_noise` the share of
     /// noise in the column that a candidate reads; `seen` what rows show besides: (log or None, channel index, log Bayes factor, shape).
-    #[pyo3(signature = (model, candidates, probes=Vec::new(), fitted=Vec::new(), column_noise=Vec::new(), seen=Vec::new()))]
+    #[pyo3(signature = (model, candidates, probes=Vec::new(), fitted=Vec::new(), refuted=Vec::new(), column_noise=Vec::new(), seen=Vec::new()))]
     #[allow(clippy::too_many_arguments)] // one name for each thing that is known
     fn diagnose(
         &self,
@@ -161,6 +161,7 @@ impl PyProblem {
         candidates: Vec<usize>,
         probes: Vec<usize>,
         fitted: Vec<(usize, f64)>,
+        refuted: Vec<usize>,
         column_noise: Vec<(usize, f64)>,
         seen: Vec<Seen>,
     ) -> PyResult<PyVerdict> {
@@ -183,6 +184,7 @@ impl PyProblem {
             });
         let known = verdict::Known {
             fitted,
+            refuted,
             column_noise,
             seen: seen.collect(),
         };
