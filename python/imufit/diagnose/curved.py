@@ -74,7 +74,7 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
 
 def _guarded(without: Tried, fits: dict[int, Tried]) -> dict[int, float]:
     """Return log evidences by slot, minus infinity where another fit takes off more of the error by what counts."""
-    lowest = min(each.held_out for each in fits.values())
+    lowest = min((each.held_out for each in fits.values() if np.isfinite(each.ln_evidence)), default=np.inf)
     return {
         slot: each.ln_evidence if as_low(each.held_out, lowest, without.held_out) else -np.inf
         for slot, each in fits.items()

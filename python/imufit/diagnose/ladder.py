@@ -8,7 +8,7 @@ from imufit.compare import attitude_comparison, comparison
 from imufit.diagnose.add import add
 from imufit.diagnose.curved import matters
 from imufit.diagnose.diagnose import diagnose
-from imufit.diagnose.revise import revise
+from imufit.diagnose.revise import revise, settled
 from imufit.fit import FittedStack
 from imufit.progress import Progress, silent
 from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
@@ -47,6 +47,8 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
         revisions += way
         climb = climb.again(way)
         climb.up()
+    if unsettled := climb.unsettled():
+        climb = climb.again([Revision(effect, None, climb.fit.ratio, climb.fit.ratio) for effect in unsettled])
     fit, diagnosis, worst = climb.fit, climb.diagnosis, start.worst
     whole = start.analysis.judged_by == "reference"
     return Ladder(
@@ -86,12 +88,16 @@ class Climb:
         What is missing from it.
     first : Diagnosis
         What was missing at the start.
+    tied : dict
+        For each effect that was added though others explained the log as well: these others. What is found beside it
+        may tell them apart.
     """
 
     def __init__(self, start: FittedStack, first: Diagnosis | None = None) -> None:
         self.start = self.fit = start
         self.steps: list[Step] = []
         self.first = self.diagnosis = first or diagnose(start)
+        self.tied: dict[str, tuple[str, ...]] = {}
 
     def up(self) -> None:
         """Add what is missing, until nothing is or the log cannot tell what."""
@@ -108,8 +114,17 @@ class Climb:
                 futile.add(effect)
                 continue
             futile.clear()
+            alike = (self.diagnosis.best, *self.diagnosis.ambiguous_with)
+            if effect in alike and len(alike) > 1:
+                self.tied[effect] = tuple(other for other in alike if other is not None and other != effect)
             self._take(addition)
             self.diagnosis = diagnose(self.fit)
+
+    def unsettled(self) -> list[str]:
+        """List the effects of the model that others may still stand for: only a model that lacks nothing tells them."""
+        lacks_nothing = self.diagnosis.verdict == "adequate"
+        tied = self.tied.items()
+        return [effect for effect, rivals in tied if not (lacks_nothing and settled(self.fit, effect, rivals))]
 
     def again(self, revisions: Sequence[Revision]) -> Climb:
         """Return the same way from the same start with effects replaced or left out."""
@@ -118,6 +133,11 @@ class Climb:
             at = effects.index(revision.removed)
             effects[at : at + 1] = [] if revision.by is None else [revision.by]
         other = Climb(self.start, self.first)
+        other.tied = dict(self.tied)
+        for revision in revisions:
+            rivals = other.tied.pop(revision.removed, ())
+            if rivals and revision.by is not None:
+                other.tied[revision.by] = tuple({*rivals, revision.removed} - {revision.by})
         for effect in effects:
             other._take(add(other.fit, effect))
         other.diagnosis = diagnose(other.fit)
@@ -132,6 +152,8 @@ class Climb:
 def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] = ()) -> str | None:
     """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well.
 
+    Where others do, it is what stands out whichever of them is there; where nothing does, the first of them.
+
     Parameters
     ----------
     fit : FittedStack
@@ -144,8 +166,8 @@ def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] 
     if diagnosis.verdict in ("adequate", "unknown") or diagnosis.without:
         return None
     if diagnosis.verdict == "ambiguous":
-        effect = _beside_the_unsure(fit)
-        return None if effect in futile else effect
+        offered = (_beside_the_unsure(fit), diagnosis.best, *diagnosis.ambiguous_with)
+        return next((effect for effect in offered if effect is not None and effect not in futile), None)
     passed = [c for c in diagnosis.candidates if c.status == PASSED and c.effect not in futile]
     return passed[0].effect if passed else None
 

@@ -45,6 +45,28 @@ def revise(fit: FittedStack, added: Sequence[str], start: float, seen: set[froze
     return search.way
 
 
+def settled(fit: FittedStack, effect: str, rivals: Sequence[str]) -> bool:
+    """Return whether an effect of a model is likelier than each of its rivals in its place, by a fit of each.
+
+    Parameters
+    ----------
+    fit : FittedStack
+        The model.
+    effect : str
+        One of its effects.
+    rivals : sequence of str
+        What explained the log as well when the effect was added.
+    """
+    search = _Search(fit, frozenset(), fit.ratio, set())
+    others = fit.model.without_effect(effect)
+    for rival in rivals:
+        if rival not in fit.model.effects:
+            model = others.with_effect(rival)
+            if search.likelihood(model, tried(fit, model)) > search.most - search.odds:
+                return False
+    return True
+
+
 class _Search:
     """The likeliest stack so far, and the way there."""
 
@@ -52,7 +74,7 @@ class _Search:
         self.fit, self.free, self.start, self.seen = fit, free, start, seen
         self.odds = fit.analysis.problem.threshold(len(fit.analysis.candidates))
         self.first = tried(fit, fit.model)
-        self.most = self._likelihood(fit.model, self.first) + MORE
+        self.most = self.likelihood(fit.model, self.first) + MORE
         self.way: list[Revision] = []
         seen.add(frozenset(fit.model.effects))
 
@@ -64,7 +86,7 @@ class _Search:
         while frozenset(model.effects) not in self.seen:
             self.seen.add(frozenset(model.effects))
             found = tried(self.fit, model)
-            likelihood = self._likelihood(model, found)
+            likelihood = self.likelihood(model, found)
             if likelihood > self.most and as_low(found.held_out, self.first.held_out, self.start):
                 self.most = likelihood
                 errors = self.first.held_out, found.held_out
@@ -77,7 +99,7 @@ class _Search:
             model = model.without_effect(ids[needless])
             way.append((ids[needless], None))
 
-    def _likelihood(self, model: EffectStack, found: Tried) -> float:
+    def likelihood(self, model: EffectStack, found: Tried) -> float:
         """Log of the probability of a stack, up to a constant; a loss of the reference may be there in any."""
         known = self.fit.analysis.candidates
         named = [key for key in model.effects if key not in known or known[key].reference_part != "bandwidth"]

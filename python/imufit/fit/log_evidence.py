@@ -113,7 +113,7 @@ class LogEvidence:
         return plain._whitened(step)
 
     def with_noise_after(self, step: Array) -> LogEvidence:
-        """Return the evidence with the noise of the residual after a step of all parameters; that of rests is their scatter.
+        """Return the evidence with the noise of the residual after a step; that of rests is their scatter.
 
         Parameters
         ----------
@@ -148,8 +148,8 @@ class LogEvidence:
     def ln_smoothing(self, counts: Sequence[int]) -> float:
         """Log of what the effects raise the density of so many samples by as they smooth the noise of the reference.
 
-        A sensor that is called sluggish or weak leaves less of that noise in the residual, whatever it is. With the noise
-        of each channel the log density changes by half of what its variance changes by, per sample.
+        A sensor that is called sluggish or weak leaves less of that noise in the residual, whatever it is. The log
+        density of a sample changes by half the part of its variance that is left out.
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class LogEvidence:
         own = np.array(self.white.reference_variance(*noise))
         ideal = np.array(_empty(self.surveyed, {}, [], {}, self.filters).reference_variance(*noise))
         variance = np.where(np.isfinite(self.variance), self.variance, np.inf)
-        # A reference said to be noisier than the whole residual is not, or its noise is not white: the less is it believed.
+        # A reference that would be noisier than the residual has no white noise: the less is it believed.
         variance = np.maximum(variance, ideal**2 / np.maximum(variance, np.finfo(float).tiny))
         known = variance > 0.0
         return float(np.sum(0.5 * np.array(counts)[known] * ((ideal - own) / variance)[known]))

@@ -26,6 +26,8 @@ const MOST: usize = 12;
 const ROUNDS: usize = 3;
 /// Log Bayes factors at the likeliest noise and integrated over it differ by less than this: the noise that a stack leaves out explains no more.
 const DOUBT: f64 = 50.0;
+/// Log odds against a sign that sensors hardly ever have: one in a thousand seems to be early, where stamps are late.
+const OTHER_SIGN: f64 = 7.0;
 /// Hardly any sensor has an effect this many times its prior deviation.
 const BEYOND: f64 = 20.0;
 /// Variance of the scatter of block means, over that of the noise of their samples, from which on a body that nobody watches translates: what
@@ -322,12 +324,34 @@ impl<'a> Search<'a> {
         let prior = |slot: &usize| {
             let asked = Asked::slot(self.criterion, *slot);
             let values = &self.criterion.problem.slots[*slot].parameters;
-            match &asked.prior {
-                Prior::Normal(deviation) => ln_prior(values, deviation) - asked.trials,
-                Prior::Known(_) => -asked.trials,
-            }
+            let density = match &asked.prior {
+                Prior::Normal(deviation) => ln_prior(values, deviation),
+                Prior::Known(_) => 0.0,
+            };
+            density + self.ln_possible(members, *slot, &asked) - asked.trials
         };
         Some(stack.ln_z + members.iter().map(prior).sum::<f64>() + possible.map(of).sum::<f64>())
+    }
+
+    /// Log of the probability that sensors have an effect of the sign and the size that it has at present.
+    fn ln_possible(&self, members: &[usize], slot: usize, asked: &Asked) -> f64 {
+        let of = &self.criterion.problem.slots[slot];
+        if of.effect.sign() == Sign::Any || of.parameters.iter().all(|v| *v >= 0.0) {
+            return 0.0;
+        }
+        let others = self.stack_without(members, slot);
+        let error = |k: usize, information: &DMatrix<f64>| 1.0 / information[(k, k)].max(f64::MIN_POSITIVE).sqrt();
+        let Some(equations) = others.and_then(|stack| stack.equations(asked)) else {
+            return 0.0;
+        };
+        let parameters: Vec<(f64, f64)> = (of.parameters.iter().enumerate())
+            .map(|(k, v)| (*v, error(k, &equations.information)))
+            .collect();
+        match self.plausible(slot, &parameters) {
+            Plausible::No => f64::NEG_INFINITY,
+            Plausible::OtherSign => -OTHER_SIGN,
+            Plausible::Yes | Plausible::TooLarge => 0.0,
+        }
     }
 
     /// Log evidence of some members over the model alone: each beside those before it.
