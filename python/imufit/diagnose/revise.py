@@ -16,6 +16,10 @@ MORE = 1.0
 """Log odds by which another stack must be likelier: less is within what the iteration leaves open."""
 
 
+SETTLED = 3.0
+"""Log odds by which an effect must be likelier than one that once explained the log as well: twenty to one."""
+
+
 def revise(fit: FittedStack, added: Sequence[str], start: float, seen: set[frozenset[str]]) -> list[Revision]:
     """Return how to get from a stack to the likeliest of those near it; empty if none is likelier.
 
@@ -62,7 +66,7 @@ def settled(fit: FittedStack, effect: str, rivals: Sequence[str]) -> bool:
     for rival in rivals:
         if rival not in fit.model.effects:
             model = others.with_effect(rival)
-            if search.likelihood(model, tried(fit, model)) > search.most - search.odds:
+            if search.likelihood(model, tried(fit, model)) > search.most - SETTLED:
                 return False
     return True
 

@@ -26,8 +26,8 @@ const MOST: usize = 12;
 const ROUNDS: usize = 3;
 /// Log Bayes factors at the likeliest noise and integrated over it differ by less than this: the noise that a stack leaves out explains no more.
 const DOUBT: f64 = 50.0;
-/// Log odds against a sign that sensors hardly ever have: one in a thousand seems to be early, where stamps are late.
-const OTHER_SIGN: f64 = 7.0;
+/// Log odds against a sign that sensors hardly ever have: one in a hundred seems to be early, where stamps are late.
+const OTHER_SIGN: f64 = 4.6;
 /// Hardly any sensor has an effect this many times its prior deviation.
 const BEYOND: f64 = 20.0;
 /// Variance of the scatter of block means, over that of the noise of their samples, from which on a body that nobody watches translates: what

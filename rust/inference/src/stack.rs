@@ -776,6 +776,14 @@ mod tests {
     }
 
     #[test]
+    fn the_prior_density_of_all_values_adds_up_to_one() {
+        let (deviation, step) = (2.0, 1e-3);
+        let density = |v: f64| ln_prior(&[v], &[deviation]).exp() / (deviation * (2.0 * std::f64::consts::PI).sqrt());
+        let total: f64 = (-12_000..=12_000).map(|k| density(f64::from(k) * step) * step).sum();
+        assert!((total - 1.0).abs() < 1e-4, "{total}");
+    }
+
+    #[test]
     fn a_wide_prior_costs_what_it_is_wider_and_nothing_is_no_evidence() {
         let none = Beside {
             information: DMatrix::from_element(1, 1, 1e4),
