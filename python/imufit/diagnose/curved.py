@@ -22,7 +22,7 @@ NEAR = 0.7
 """Share of an effect's log Bayes factor from which on a fit may show that another candidate explains more (0.74 for a
 reference that is 85 ms late, on a robot's arm; columns say that the accelerometer is)."""
 MATTERS = 0.002
-"""Share of the held-out error that counts: a smaller gain does not justify a swap, or keeping an effect."""
+"""Share of the held-out error that counts: less does not justify an effect of which no parameter is certain."""
 LESS = 0.01
 """Part of what the best fit takes off the square of the held-out error by which another may take off less: a late
 reference and a gyroscope that would have to be early and sluggish differ by 0.1 % where smoothing the reference's noise
