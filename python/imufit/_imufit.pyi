@@ -588,6 +588,7 @@ class _Residual(TypedDict):
 
 @final
 class Problem:
+    NEAR: float
     def __new__(
         cls,
         logs: Sequence[

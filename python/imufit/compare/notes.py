@@ -82,7 +82,7 @@ def _of_rests(evidence: LogEvidence, passes: RestPasses) -> list[str]:
             "its body does not, nor whether the table is level."
         )
     if rests.rests and "gyr" in rests.sensors and not rests.turns:
-        limits.append("Without turns between rests nothing is told of the gyroscope's scale and axes.")
+        limits.append("Without turns between rests the gyroscope's scale and axes are not determined.")
     if "mag" in rests.sensors:
         limits.append("Of mag.soft_iron only the symmetric part shows, without a scale common to all axes.")
     untold = sorted(key for key, reason in evidence.surveyed.refused.items() if reason == NEEDS_REFERENCE)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from imufit._imufit import Status, Verdict
+from imufit._imufit import Problem, Status, Verdict
 from imufit.model.catalogue import find_effect
 
 if TYPE_CHECKING:
@@ -18,11 +18,6 @@ if TYPE_CHECKING:
     from imufit.fit.analysis import Analysis
     from imufit.model import EffectStack
 
-NEAR = 0.7
-"""Share of an effect's log Bayes factor from which on a fit may show that another candidate explains more (0.74 for a
-reference that is 85 ms late, on a robot's arm; columns say that the accelerometer is)."""
-MATTERS = 0.002
-"""Share of the held-out error that counts: less does not justify an effect of which no parameter is certain."""
 LESS = 0.01
 """Part of what the best fit takes off the square of the held-out error by which another may take off less: a late
 reference and a gyroscope that would have to be early and sluggish differ by 0.1 % where smoothing the reference's noise
@@ -49,7 +44,7 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
         return []
     items = {item.slot: item for item in result.candidates}
     alike = {second for _, second, _ in result.correlations}
-    near = {slot for slot in alike if items[slot].ln_bayes >= NEAR * items[best].ln_bayes}
+    near = {slot for slot in alike if items[slot].ln_bayes >= Problem.NEAR * items[best].ln_bayes}
     named = {best, *result.rivals}
     in_its_place = {*named, *near, *(slot for slot in items if ids[slot] in analysis.found)}
     close = [
@@ -85,7 +80,7 @@ def as_low(error: float, lowest: float, start: float) -> bool:
     """Return whether a held-out error is as low as the lowest one but for what does not count.
 
     The evidence of a large log rests on the noise at frequencies that hold little of the error; where the error is not
-    the same, it decides. Noise of the reference is no part of what a fit takes off.
+    the same, it decides. Only the fall of the error is compared, since the error holds noise of the reference as well.
 
     Parameters
     ----------
@@ -93,17 +88,6 @@ def as_low(error: float, lowest: float, start: float) -> bool:
         The error, the lowest one, and that without what lowers it.
     """
     return error**2 <= lowest**2 + LESS * max(start**2 - lowest**2, 0.0)
-
-
-def matters(before: float, after: float) -> bool:
-    """Return whether a held-out error falls by enough to count.
-
-    Parameters
-    ----------
-    before, after : float
-        Held-out errors.
-    """
-    return before - after >= MATTERS * before
 
 
 class Tried(NamedTuple):
@@ -140,7 +124,7 @@ def tried(fit: FittedStack, model: EffectStack) -> Tried:
     known = fit.analysis.candidates
     lost = [key for key, effect in known.items() if effect.reference_part == "bandwidth" and key not in model.effects]
     analysis, estimate = fit.analysis.solved_for(model, fit.own, only=lost)
-    return Tried(fit.analysis.ln_likelihood(analysis), estimate.held_out, analysis)
+    return Tried(fit.analysis.ln_likelihood(analysis, estimate), estimate.held_out, analysis)
 
 
 def _curved(analysis: Analysis, slot: int) -> bool:

@@ -6,7 +6,6 @@ from collections.abc import Collection, Sequence
 
 from imufit.compare import attitude_comparison, comparison
 from imufit.diagnose.add import add
-from imufit.diagnose.curved import matters
 from imufit.diagnose.diagnose import diagnose
 from imufit.diagnose.revise import revise, settled
 from imufit.fit import FittedStack
@@ -15,6 +14,8 @@ from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
 from imufit.results.diagnosis import PASSED
 
 MAX_STEPS = 12
+MATTERS = 0.002
+"""Share of the held-out error that counts: less does not justify an effect of which no parameter is certain."""
 TOLD = 2.0
 """Standard errors that at least one parameter of an addition must be away from zero."""
 
@@ -45,10 +46,10 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
     revisions: list[Revision] = []
     while way := revise(climb.fit, [step.effect for step in climb.steps], start.ratio, seen):
         revisions += way
-        climb = climb.again(way)
+        climb = climb.again([(revision.removed, revision.by) for revision in way])
         climb.up()
     if unsettled := climb.unsettled():
-        climb = climb.again([Revision(effect, None, climb.fit.ratio, climb.fit.ratio) for effect in unsettled])
+        climb = climb.again([(effect, None) for effect in unsettled])
     fit, diagnosis, worst = climb.fit, climb.diagnosis, start.worst
     whole = start.analysis.judged_by == "reference"
     return Ladder(
@@ -89,8 +90,7 @@ class Climb:
     first : Diagnosis
         What was missing at the start.
     tied : dict
-        For each effect that was added though others explained the log as well: these others. What is found beside it
-        may tell them apart.
+        Rivals of each effect that was added at `ambiguous`. An effect that is found later may separate them.
     """
 
     def __init__(self, start: FittedStack, first: Diagnosis | None = None) -> None:
@@ -109,7 +109,7 @@ class Climb:
             expected = next(c.held_out_after for c in self.diagnosis.candidates if c.effect == effect)
             addition = add(self.fit, effect, expected)
             lower = addition.after < addition.before
-            if not (lower and (_told(addition) or matters(addition.before, addition.after))):
+            if not (lower and (_told(addition) or _matters(addition))):
                 # What the evidence promised, the fit did not keep: the next one may.
                 futile.add(effect)
                 continue
@@ -126,18 +126,17 @@ class Climb:
         tied = self.tied.items()
         return [effect for effect, rivals in tied if not (lacks_nothing and settled(self.fit, effect, rivals))]
 
-    def again(self, revisions: Sequence[Revision]) -> Climb:
-        """Return the same way from the same start with effects replaced or left out."""
+    def again(self, changes: Sequence[tuple[str, str | None]]) -> Climb:
+        """Return the same way from the same start with effects replaced by others, or left out (None)."""
         effects = [step.effect for step in self.steps]
-        for revision in revisions:
-            at = effects.index(revision.removed)
-            effects[at : at + 1] = [] if revision.by is None else [revision.by]
         other = Climb(self.start, self.first)
         other.tied = dict(self.tied)
-        for revision in revisions:
-            rivals = other.tied.pop(revision.removed, ())
-            if rivals and revision.by is not None:
-                other.tied[revision.by] = tuple({*rivals, revision.removed} - {revision.by})
+        for removed, by in changes:
+            at = effects.index(removed)
+            effects[at : at + 1] = [] if by is None else [by]
+            rivals = other.tied.pop(removed, ())
+            if rivals and by is not None:
+                other.tied[by] = tuple(rival for rival in (*rivals, removed) if rival != by)
         for effect in effects:
             other._take(add(other.fit, effect))
         other.diagnosis = diagnose(other.fit)
@@ -188,6 +187,11 @@ def _beside_the_unsure(fit: FittedStack) -> str | None:
 def _told(addition: Addition) -> bool:
     """Return whether the fit tells any parameter of what was added from zero."""
     return any(not abs(p.value) <= TOLD * p.standard_error for p in addition.parameters)
+
+
+def _matters(addition: Addition) -> bool:
+    """Return whether the held-out error falls by enough to count."""
+    return addition.before - addition.after >= MATTERS * addition.before
 
 
 def _sentence(start: float, end: float, steps: list[Step], diagnosis: Diagnosis) -> str:

@@ -14,10 +14,8 @@ if TYPE_CHECKING:
 
 MORE = 1.0
 """Log odds by which another stack must be likelier: less is within what the iteration leaves open."""
-
-
-SETTLED = 3.0
-"""Log odds by which an effect must be likelier than one that once explained the log as well: twenty to one."""
+SETTLED = 2.0
+"""Log odds by which an effect must be likelier than each rival that it had when it was added: seven to one."""
 
 
 def revise(fit: FittedStack, added: Sequence[str], start: float, seen: set[frozenset[str]]) -> list[Revision]:
@@ -59,16 +57,20 @@ def settled(fit: FittedStack, effect: str, rivals: Sequence[str]) -> bool:
     effect : str
         One of its effects.
     rivals : sequence of str
-        What explained the log as well when the effect was added.
+        Its rivals when it was added.
     """
-    search = _Search(fit, frozenset(), fit.ratio, set())
+    own = _likelihood(fit, fit.model, tried(fit, fit.model))
     others = fit.model.without_effect(effect)
-    for rival in rivals:
-        if rival not in fit.model.effects:
-            model = others.with_effect(rival)
-            if search.likelihood(model, tried(fit, model)) > search.most - SETTLED:
-                return False
-    return True
+    models = (others.with_effect(rival) for rival in rivals if rival not in fit.model.effects)
+    return all(_likelihood(fit, model, tried(fit, model)) <= own - SETTLED for model in models)
+
+
+def _likelihood(fit: FittedStack, model: EffectStack, found: Tried) -> float:
+    """Log of the probability of a stack, up to a constant; a loss of the reference may be there in any."""
+    analysis = fit.analysis
+    known = analysis.candidates
+    named = [key for key in model.effects if key not in known or known[key].reference_part != "bandwidth"]
+    return found.ln_evidence - analysis.problem.threshold(len(known)) * len(named)
 
 
 class _Search:
@@ -76,9 +78,8 @@ class _Search:
 
     def __init__(self, fit: FittedStack, free: frozenset[str], start: float, seen: set[frozenset[str]]) -> None:
         self.fit, self.free, self.start, self.seen = fit, free, start, seen
-        self.odds = fit.analysis.problem.threshold(len(fit.analysis.candidates))
         self.first = tried(fit, fit.model)
-        self.most = self.likelihood(fit.model, self.first) + MORE
+        self.most = _likelihood(fit, fit.model, self.first) + MORE
         self.way: list[Revision] = []
         seen.add(frozenset(fit.model.effects))
 
@@ -90,7 +91,7 @@ class _Search:
         while frozenset(model.effects) not in self.seen:
             self.seen.add(frozenset(model.effects))
             found = tried(self.fit, model)
-            likelihood = self.likelihood(model, found)
+            likelihood = _likelihood(self.fit, model, found)
             if likelihood > self.most and as_low(found.held_out, self.first.held_out, self.start):
                 self.most = likelihood
                 errors = self.first.held_out, found.held_out
@@ -102,9 +103,3 @@ class _Search:
                 return
             model = model.without_effect(ids[needless])
             way.append((ids[needless], None))
-
-    def likelihood(self, model: EffectStack, found: Tried) -> float:
-        """Log of the probability of a stack, up to a constant; a loss of the reference may be there in any."""
-        known = self.fit.analysis.candidates
-        named = [key for key in model.effects if key not in known or known[key].reference_part != "bandwidth"]
-        return found.ln_evidence - self.odds * len(named)

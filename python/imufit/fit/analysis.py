@@ -170,7 +170,7 @@ class Analysis:
             problem=_problem(evidence, model, self.unnamed, columns),
         )
 
-    def ln_likelihood(self, of: Analysis) -> float:
+    def ln_likelihood(self, of: Analysis, estimate: Estimate) -> float:
         """Log of the marginal likelihood of the logs under another stack, with the noise that its own residual has.
 
         A stack changes the noise, too: what smooths the ideal reading smooths the noise of the reference. Each of the
@@ -180,9 +180,10 @@ class Analysis:
         ----------
         of : Analysis
             The other stack; its rows are counted as those of this one, since a stack may lack some at the ends.
+        estimate : Estimate
+            Its best parameters.
         """
-        step = of.estimate().step
-        logs = [each.with_noise_after(of.own_step(k, step)) for k, each in enumerate(of.logs)]
+        logs = [each.with_noise_after(of.own_step(k, estimate.step)) for k, each in enumerate(of.logs)]
         problem = _problem(logs, of.model, of.unnamed, [*of.candidates, *of.probes])
         size = sum(
             own.ln_noise(each.counts) - own.ln_smoothing(each.counts) for own, each in zip(logs, self.logs, strict=True)

@@ -9,7 +9,7 @@ use crate::stack::Criterion;
 
 /// Share of an effect's log Bayes factor from which on a fit may show that another candidate explains more (0.74 for a reference that is 85
 /// ms late, on a robot's arm; columns say that the accelerometer is).
-const NEAR: f64 = 0.7;
+pub const NEAR: f64 = 0.7;
 
 /// An effect of the model that perhaps need not be there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -234,6 +234,10 @@ impl PyProblem {
         Ok(found.iter().map(|r| (r.slot, r.by)).collect())
     }
 
+    /// Share of an effect's log Bayes factor from which on a fit may show that another candidate explains more.
+    #[classattr]
+    const NEAR: f64 = revision::NEAR;
+
     /// Log Bayes factor from which on one of so many candidates is there.
     #[staticmethod]
     fn threshold(candidates: usize) -> f64 {
