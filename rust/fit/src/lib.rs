@@ -12,6 +12,7 @@ pub mod normal_equations;
 pub mod part;
 pub mod profile;
 pub mod reference_noise;
+pub mod reference_step;
 pub mod reference_width;
 pub mod residual;
 pub mod rests;

@@ -16,6 +16,7 @@ use imufit_model::window::Window;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::bins::{Bins, CovariateSamples};
+use crate::reference_step::ReferenceStep;
 use crate::reference_width::{self, SampledRow, SampledRows};
 use crate::rounding::SensorSteps;
 use crate::travel::Travel;
@@ -59,6 +60,7 @@ pub struct Survey {
     field: (Vector3<f64>, usize),
     attitude_width: Bandwidth,
     position_width: Bandwidth,
+    reference_step: ReferenceStep,
     has_position: bool,
     origin: Option<Vector3<f64>>,
     width_rows: SampledRows,
@@ -189,6 +191,7 @@ impl Survey {
             field: (Vector3::zeros(), 0),
             attitude_width: Bandwidth::of_attitude(),
             position_width: Bandwidth::of_position(),
+            reference_step: ReferenceStep::default(),
             has_position: false,
             origin: None,
             width_rows: SampledRows::new(),
@@ -263,11 +266,11 @@ impl Survey {
                 self.field.0 += q * Vector3::new(m[0], m[1], m[2]);
                 self.field.1 += 1;
             }
-            if let (Some(travel), Some(q)) = (self.travel.as_mut(), window.attitude) {
-                let q = &q[4 * i..4 * i + 4];
-                let measured = window.reference_exact.is_none_or(|e| e[i] > 0.5);
-                if measured && q.iter().all(|v| v.is_finite()) {
-                    let q = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
+            let measured = window.reference_exact.is_none_or(|e| e[i] > 0.5);
+            let known = attitude_at(window, i).filter(|q| measured && q.coords.iter().all(|v| v.is_finite()));
+            if let Some(q) = known {
+                self.reference_step.add(q);
+                if let Some(travel) = self.travel.as_mut() {
                     travel.add(window.t[i], &q);
                 }
             }
@@ -395,6 +398,7 @@ impl Survey {
             position_bends: position_columns.map(|s| self.position_width.for_bends(s)),
             reference_dt: self.attitude_width.spacing().unwrap_or(dt),
             reference_packet: self.attitude_width.packet(),
+            reference_step: self.reference_step.finish(),
             ranges: [None; 3],
             steps,
             steps_crossed,

@@ -9,7 +9,7 @@ use imufit_fit::evidence::Layout;
 use imufit_fit::normal_equations::NormalEquations;
 use imufit_fit::part::{self, Part};
 use imufit_fit::whitening;
-use imufit_model::card::{Affine, Found};
+use imufit_model::card::{Affine, Found, Parameter};
 use imufit_model::sensor::Sensor;
 use imufit_model::sensor_model::Slot;
 use nalgebra::{DMatrix, DVector};
@@ -171,6 +171,24 @@ impl Problem {
     /// Whitened equations of the whole log for some parameters.
     pub fn total(&self, parameters: &[usize]) -> NormalEquations {
         self.equations.total(parameters)
+    }
+
+    /// Angles of the reference, and how far each may be off because its encoders have steps: an axis that stands still keeps one error of
+    /// rounding, whose deviation is the step over the root of twelve.
+    pub fn rounded(&self) -> Vec<(usize, f64)> {
+        let steps = self.parts.iter().map(|part| part.white.layout.facts.reference_step);
+        let deviation = steps.fold(0.0, f64::max) / 12.0_f64.sqrt();
+        let of = |slot: &Slot| {
+            let card = slot.effect.card();
+            let angles = card.parameters.iter().enumerate();
+            let stands = |p: &Parameter| p.unit == "rad" && p.found == Found::Steps;
+            let (first, of_reference) = (slot.first, card.traits.reference.is_some());
+            let places = angles
+                .filter(|(_, p)| of_reference && stands(p))
+                .map(|(k, _)| (first + k, deviation));
+            places.collect::<Vec<_>>()
+        };
+        self.slots.iter().filter(|_| deviation > 0.0).flat_map(of).collect()
     }
 
     /// Slots of the gains of single axes, and how far each may seem off because what it is held against is noisy.

@@ -41,8 +41,8 @@ pub struct Criterion<'a> {
     pub modes: Vec<Modes>,
     /// Every strength of the noise.
     pub strengths: Vec<Strength>,
-    /// Gains that the noise of the reference makes uncertain: parameter and deviation.
-    attenuated: Vec<(usize, f64)>,
+    /// Gains that the noise of the reference makes uncertain, and angles that its steps do: parameter and deviation.
+    uncertain: Vec<(usize, f64)>,
     /// Parameters of a heading of the reference that wanders by one radian.
     pub heading: Vec<usize>,
     /// Number of samples of a channel, on average.
@@ -71,14 +71,15 @@ impl<'a> Criterion<'a> {
     pub fn new(problem: &'a Problem) -> Self {
         let all: Vec<usize> = (0..problem.plausible.len()).collect();
         let total = problem.total(&all);
-        let uncertain = problem.attenuated().into_iter().flat_map(|(slot, shares)| {
+        let gains = problem.attenuated().into_iter().flat_map(|(slot, shares)| {
             let first = problem.slots[slot].first;
             (0..3).map(move |axis| (first + axis, shares[axis]))
         });
         let deviation = |(j, share): (usize, f64)| (j, (ATTENUATION * share).hypot(lost(problem, &total, j)));
-        let attenuated: Vec<(usize, f64)> = uncertain
+        let uncertain: Vec<(usize, f64)> = gains
             .map(deviation)
             .filter(|(_, deviation)| *deviation > ATTENUATION_SEEN)
+            .chain(problem.rounded())
             .collect();
         let wanders = |s: &&Slot| s.effect.card().traits.reference == Some(ReferencePart::Heading);
         let heading = parameters_of(problem.slots.iter().filter(wanders));
@@ -93,7 +94,7 @@ impl<'a> Criterion<'a> {
             total,
             modes: zeros::modes(problem),
             strengths: zeros::strengths(),
-            attenuated,
+            uncertain,
             heading,
         }
     }
@@ -211,7 +212,7 @@ impl<'a> Stack<'a> {
         let all: Vec<(usize, f64)> = parameters
             .iter()
             .copied()
-            .chain(criterion.attenuated.iter().copied().filter(|(j, _)| !known.contains(j)))
+            .chain(criterion.uncertain.iter().copied().filter(|(j, _)| !known.contains(j)))
             .chain(criterion.heading.iter().map(|j| (*j, 1.0)))
             .collect();
         let columns: Vec<usize> = all.iter().map(|(j, _)| *j).collect();

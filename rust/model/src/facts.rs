@@ -84,6 +84,8 @@ pub struct LogFacts {
     pub reference_dt: f64,
     /// Samples of the reference that come in one packet; 1 where every sample has a stamp of its own.
     pub reference_packet: usize,
+    /// Smallest turn from one sample of the reference to the next where some do not turn at all, rad: the step of its encoders; 0 elsewhere.
+    pub reference_step: f64,
     /// Where the range of each sensor ends, if readings are cut off there; m/s^2, rad/s, uT.
     pub ranges: [Option<f64>; 3],
     /// Step between readings of each sensor along each axis where it is coarse against the noise, 0 elsewhere; m/s^2, rad/s, uT.
@@ -158,6 +160,7 @@ impl LogFacts {
             shaking_varies: true,
             reference_dt: dt,
             reference_packet: 1,
+            reference_step: 0.0,
             ranges: [None; 3],
             steps: [[0.0; 3]; 3],
             steps_crossed: [[false; 3]; 3],
@@ -212,6 +215,7 @@ impl LogFacts {
             shaking_varies: true,
             reference_dt: dt,
             reference_packet: 1,
+            reference_step: 0.0,
             ranges: [None; 3],
             steps: [[0.0; 3]; 3],
             steps_crossed: [[false; 3]; 3],

@@ -22,6 +22,7 @@ pub mod reference_clock;
 pub mod rest_channels;
 pub mod rig;
 pub mod rotation_rates;
+pub mod seen_bends;
 pub mod sensor;
 pub mod sensor_model;
 pub mod sharpened;

@@ -249,8 +249,13 @@ impl<'a> LocalReference<'a> {
             .derivatives(&self.knots.t[first..last], at, s, &self.values, 1)
     }
 
-    /// A fit around `at` with its values, for judging how wide the polynomial may be.
-    pub fn local_fit(&mut self, at: f64, s: Smoothing, of_attitude: bool) -> Option<(LocalFit, Vec<[f64; 3]>)> {
+    /// Times of the knots, s.
+    pub fn times(&self) -> &[f64] {
+        &self.knots.t
+    }
+
+    /// A fit around `at` with its values and its first knot, for judging how wide the polynomial may be.
+    pub fn local_fit(&mut self, at: f64, s: Smoothing, of_attitude: bool) -> Option<(LocalFit, Vec<[f64; 3]>, usize)> {
         let (first, last) = if of_attitude {
             let (_, first, last) = self.rotations(at, s.half_width)?;
             (first, last)
@@ -260,6 +265,7 @@ impl<'a> LocalReference<'a> {
         Some((
             LocalFit::new(&self.knots.t[first..last], at, s, usize::from(!of_attitude))?,
             self.values.clone(),
+            first,
         ))
     }
 }

@@ -105,6 +105,7 @@ fn every_built_in_effect_keeps_the_contract() {
         shaking_varies: true,
         reference_dt: 0.01,
         reference_packet: 1,
+        reference_step: 0.0,
         ranges: [None; 3],
         steps: [[0.0; 3]; 3],
         steps_crossed: [[false; 3]; 3],

@@ -108,6 +108,7 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
         shaking_varies: true,
         reference_dt: 0.01,
         reference_packet: 1,
+        reference_step: 0.0,
         ranges: [None; 3],
         steps: [[0.0; 3]; 3],
         steps_crossed: [[false; 3]; 3],

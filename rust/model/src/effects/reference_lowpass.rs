@@ -49,7 +49,7 @@ impl Effect for Lowpass {
     }
 
     fn not_testable(&self, facts: &LogFacts) -> Option<String> {
-        let coarse = [Some(facts.attitude_columns), facts.position_columns]
+        let coarse = [Some(facts.attitude_bends), facts.position_bends]
             .iter()
             .flatten()
             .any(|width| width.degree < LEAST_DEGREE);

@@ -1,0 +1,163 @@
+//! How much of the second derivative of a reference's angular rate the gyroscope sees as well: what it does not see is noise.
+//!
+//! A reference that was filtered has little noise from one sample to the next and yet much of it where the body moves, so that its own
+//! scatter does not tell what its derivatives are worth. The gyroscope does: its readings are integrated to angles, the same polynomial
+//! is put through both, and the derivatives of one are regressed on those of the other. A gain, a mount that is turned and a delay of the
+//! gyroscope do not count.
+
+use nalgebra::{Cholesky, SMatrix, Vector3};
+
+use crate::rotation_rates::rates;
+use crate::sensor::Sensor;
+use crate::window::Window;
+
+/// Readings further apart than so many usual steps have an unknown turn between them.
+const GAP: f64 = 2.5;
+/// Angles of the gyroscope that the reference is held against: three axes, each before, at and after the time asked for.
+const ANGLES: usize = 9;
+/// Part of their own squares added to the equations, so that an axis about which nothing turns can be solved for.
+const RIDGE: f64 = 1e-9;
+/// So many rows for each coefficient at least.
+const ROWS: usize = 10;
+
+/// Angles about the body's axes by the gyroscope, at times given.
+pub struct Turns {
+    /// About each axis, at all times: before, at and after each; rad.
+    angles: [Vec<[f64; 3]>; 3],
+    /// Number of the stretch without gaps; angles of two stretches have nothing in common. `None` where the gyroscope does not reach.
+    stretch: Vec<Option<usize>>,
+    /// Variance that noise of the gyroscope from one reading to the next gives to the turn in a second, rad^2/s, summed over the axes.
+    noise: f64,
+    /// Time between neighbouring times given, s.
+    step: f64,
+}
+
+impl Turns {
+    /// Of the gyroscope of a window at ascending times, and so much before and after them; `None` without a gyroscope.
+    pub fn of(window: &Window, times: &[f64], apart: f64) -> Option<Self> {
+        let y = window.reading(Sensor::Gyr)?;
+        let rate = |i: usize| Vector3::new(y[3 * i], y[3 * i + 1], y[3 * i + 2]);
+        let rows: Vec<usize> = (0..window.len())
+            .filter(|i| rate(*i).iter().all(|v| v.is_finite()))
+            .collect();
+        let t: Vec<f64> = rows.iter().map(|i| window.t[*i]).collect();
+        let widest = GAP * crate::knots::usual_step(&t);
+        let (mut angle, mut stretch) = (vec![Vector3::zeros(); t.len()], vec![0; t.len()]);
+        for k in 1..t.len() {
+            let h = t[k] - t[k - 1];
+            angle[k] = angle[k - 1] + (rate(rows[k - 1]) + rate(rows[k])) * (0.5 * h);
+            stretch[k] = stretch[k - 1] + usize::from(h > widest);
+        }
+        // Between two readings the rate goes straight from one to the other.
+        let at = |time: f64, k: usize| {
+            let (h, passed) = (t[k + 1] - t[k], time - t[k]);
+            angle[k] + rate(rows[k]) * passed + (rate(rows[k + 1]) - rate(rows[k])) * (0.5 * passed * passed / h)
+        };
+        let place = |time: f64| {
+            let k = t.partition_point(|v| *v <= time).checked_sub(1)?;
+            (k + 1 < t.len() && stretch[k] == stretch[k + 1]).then_some(k)
+        };
+        // Fourth differences of a motion are small, those of white noise have 70 times its variance.
+        let fourth = |w: &[usize]| {
+            let of = [1.0, -4.0, 6.0, -4.0, 1.0];
+            w.iter()
+                .zip(of)
+                .map(|(i, c)| rate(*i) * c)
+                .sum::<Vector3<f64>>()
+                .norm_squared()
+                / 70.0
+        };
+        let scatter = rows.windows(5).map(fourth).sum::<f64>() / rows.len().saturating_sub(4).max(1) as f64;
+        let mut turns = Self {
+            noise: scatter * crate::knots::usual_step(&t),
+            step: apart,
+            angles: Default::default(),
+            stretch: Vec::with_capacity(times.len()),
+        };
+        for time in times {
+            let places = [-apart, 0.0, apart].map(|shift| place(time + shift).map(|k| (time + shift, k)));
+            let known = places
+                .iter()
+                .all(|p| p.is_some_and(|(_, k)| Some(stretch[k]) == places[0].map(|(_, k)| stretch[k])));
+            turns.stretch.push(places[0].filter(|_| known).map(|(_, k)| stretch[k]));
+            for (series, p) in turns.angles.iter_mut().zip(places) {
+                series.push(p.map_or([f64::NAN; 3], |(time, k)| at(time, k).into()));
+            }
+        }
+        Some(turns)
+    }
+
+    /// Variance that noise of the gyroscope gives to what weights make of the angles, summed over the axes.
+    fn noise(&self, weights: &[f64]) -> f64 {
+        let mut later = 0.0;
+        let squares = weights.iter().skip(1).rev().map(|w| {
+            later += w;
+            later * later
+        });
+        squares.sum::<f64>() * self.noise * self.step
+    }
+
+    /// What weights of the knots from `first` on make of them: about three axes, before, at and after.
+    fn combined(&self, weights: &[f64], first: usize) -> Option<SMatrix<f64, ANGLES, 1>> {
+        let last = first + weights.len() - 1;
+        self.stretch[first].filter(|s| Some(*s) == self.stretch[last])?;
+        let mut out = SMatrix::<f64, ANGLES, 1>::zeros();
+        for (place, series) in self.angles.iter().enumerate() {
+            // Of angles that grow without bound only what passes within the polynomial counts.
+            let origin = series[first];
+            for (w, v) in weights.iter().zip(&series[first..=last]) {
+                for axis in 0..3 {
+                    out[3 * place + axis] += w * (v[axis] - origin[axis]);
+                }
+            }
+        }
+        Some(out)
+    }
+}
+
+/// Regression of the reference's derivative on that of the gyroscope.
+#[derive(Clone, Debug, Default)]
+pub struct SeenBends {
+    gram: SMatrix<f64, ANGLES, ANGLES>,
+    cross: SMatrix<f64, ANGLES, 3>,
+    square: Vector3<f64>,
+    /// Sum of the variances that noise of the gyroscope gives.
+    noise: f64,
+    rows: usize,
+}
+
+impl SeenBends {
+    /// Adds a row: the first three derivatives of the reference's rotation vector, the weights of the third, and the first knot that they
+    /// belong to.
+    pub fn add(&mut self, turns: &Turns, derivatives: [[f64; 3]; 3], weights: &[f64], first: usize) {
+        let Some(x) = turns
+            .combined(weights, first)
+            .filter(|x| x.iter().all(|v| v.is_finite()))
+        else {
+            return;
+        };
+        let [d, dd, ddd] = derivatives.map(Vector3::from);
+        let y = rates(Vector3::zeros(), d, dd, ddd).alpha_rate;
+        self.gram += x * x.transpose();
+        self.cross += x * y.transpose();
+        self.square += y.component_mul(&y);
+        self.noise += turns.noise(weights);
+        self.rows += 1;
+    }
+
+    /// Part of the mean square that the gyroscope does not see, less what its own noise leaves unseen; `None` where too little is known.
+    pub fn unseen(&self) -> Option<f64> {
+        let total = self.square.sum();
+        if self.rows < ROWS * ANGLES || total <= 0.0 {
+            return None;
+        }
+        let mut gram = self.gram;
+        for j in 0..ANGLES {
+            gram[(j, j)] += RIDGE * gram.trace() / ANGLES as f64;
+        }
+        let factor = Cholesky::new(gram)?;
+        let explained: f64 = self.cross.component_mul(&factor.solve(&self.cross)).sum();
+        let freedom = (self.rows - ANGLES) as f64 / self.rows as f64;
+        Some(((total - explained) / freedom - self.noise).max(0.0) / total)
+    }
+}
