@@ -121,10 +121,8 @@ class Climb:
             self.diagnosis = diagnose(self.fit)
 
     def unsettled(self) -> list[str]:
-        """List the effects of the model that others may still stand for: only a model that lacks nothing tells them."""
-        lacks_nothing = self.diagnosis.verdict == "adequate"
-        tied = self.tied.items()
-        return [effect for effect, rivals in tied if not (lacks_nothing and settled(self.fit, effect, rivals))]
+        """List the effects of the model that others may still stand for."""
+        return [effect for effect, rivals in self.tied.items() if not settled(self.fit, effect, rivals)]
 
     def again(self, changes: Sequence[tuple[str, str | None]]) -> Climb:
         """Return the same way from the same start with effects replaced by others, or left out (None)."""

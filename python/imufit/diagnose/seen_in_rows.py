@@ -27,7 +27,12 @@ def seen_in_rows(analysis: Analysis) -> list[Seen]:
         Evidence of the logs.
     """
     found = [
-        (log, index, 0.5 * ratio**2, f"it stands at {ratio:.1f} times its stated noise")
+        (
+            log,
+            index,
+            0.5 * evidence.counts[index] * (1.0 - 1.0 / ratio**2),
+            f"it stands at {ratio:.1f} times its stated noise",
+        )
         for log, evidence in enumerate(analysis.logs)
         if not isinstance(evidence.passes, RestPasses)
         for index, ratio in _above_stated_noise(evidence).items()

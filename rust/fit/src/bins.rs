@@ -1,5 +1,8 @@
 //! Bins of every covariate, in which the residual is averaged: any dependence shows there, whatever its shape.
 
+use std::ops::Range;
+
+use imufit_model::sensor::Sensor;
 use imufit_model::sensor_model::Evaluation;
 
 /// Bins per covariate, at most.
@@ -23,6 +26,11 @@ const FIXED: [&str; 9] = [
     "omega_z",
     "omega_norm",
 ];
+
+/// Places of the components of the specific force among the covariates, ...
+pub const FORCES: Range<usize> = 2..5;
+/// ... and of those of the angular rate with its size.
+pub const RATES: Range<usize> = 5..9;
 
 /// Edges of the bins of every covariate.
 #[derive(Clone, Debug)]
@@ -49,6 +57,15 @@ pub struct CovariateSamples {
 }
 
 impl Bins {
+    /// Places of what a sensor measures among the covariates, axis by axis; `None` for the field.
+    pub const fn measured(sensor: Sensor) -> Option<Range<usize>> {
+        match sensor {
+            Sensor::Acc => Some(FORCES),
+            Sensor::Gyr => Some(RATES.start..RATES.end - 1),
+            Sensor::Mag => None,
+        }
+    }
+
     /// Names of the covariates of a log with these columns of its own.
     pub fn covariate_names(own: &[String]) -> Vec<String> {
         FIXED

@@ -1,6 +1,5 @@
 //! First pass over a log: what has to be known of the whole before evidence is taken.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use imufit_model::bandwidth::Bandwidth;
@@ -15,7 +14,7 @@ use imufit_model::vibration;
 use imufit_model::window::Window;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::bins::{Bins, CovariateSamples};
+use crate::bins::{Bins, CovariateSamples, FORCES, RATES};
 use crate::reference_step::ReferenceStep;
 use crate::reference_width::{self, SampledRow, SampledRows};
 use crate::rounding::SensorSteps;
@@ -158,11 +157,6 @@ fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
-
-/// Places of the components of the specific force among the covariates, ...
-const FORCES: Range<usize> = 2..5;
-/// ... and of those of the angular rate with its size.
-const RATES: Range<usize> = 5..9;
 
 /// Puts the components of vectors, and their size where there is a place for it, in the place of other samples, if there are any.
 fn put(samples: &mut [Vec<f64>], vectors: &[Vector3<f64>]) {

@@ -3,6 +3,8 @@
 
 use std::f64::consts::TAU;
 
+use imufit_fit::bins::Bins;
+use imufit_model::sensor::Sensor;
 use nalgebra::{DMatrix, DVector};
 
 use crate::asked::Asked;
@@ -50,20 +52,18 @@ pub enum Course {
     },
     /// What lags behind a covariate.
     Lag {
-        /// Its name.
-        covariate: String,
-        /// Its place among the bins.
-        index: usize,
+        /// Its name and its place among the bins: one for all axes, or one for each axis.
+        behind: Vec<(String, usize)>,
         /// Time constant, blocks.
         blocks: f64,
     },
 }
 
 impl Course {
-    /// Its values in each block (blocks x parameters); those of a lag follow its covariate.
-    fn columns(&self, blocks: usize, means: impl Fn(usize) -> Option<DVector<f64>>) -> DMatrix<f64> {
+    /// Its values in each block (blocks x parameters), for each axis where it has some for each; those of a lag follow its covariate.
+    fn columns(&self, blocks: usize, means: impl Fn(usize) -> Option<DVector<f64>>) -> Vec<DMatrix<f64>> {
         let of_time = |value: &dyn Fn(usize) -> f64| DMatrix::from_fn(blocks, 1, |b, _| value(b));
-        match *self {
+        vec![match *self {
             Self::Level { begin, end } => of_time(&|b| since(begin, b) - since(end, b)),
             Self::Transient { middle, width } => of_time(&|b| {
                 let away = (b as f64 + 0.5 - middle) / width;
@@ -75,18 +75,33 @@ impl Course {
                 [phase.cos(), phase.sin()][k]
             }),
             Self::Lag {
-                index,
+                ref behind,
                 blocks: forgotten,
-                ..
-            } => means(index).map_or_else(
-                || DMatrix::zeros(blocks, 1),
-                |means| {
-                    let past = past(&means, forgotten);
+            } => {
+                let of = |(_, index): &(String, usize)| {
+                    let past = past(&means(*index)?, forgotten);
                     // A constant is a bias, which has a name.
-                    of_time(&|b| past[b] - past.mean())
-                },
-            ),
+                    Some(of_time(&|b| past[b] - past.mean()))
+                };
+                return behind
+                    .iter()
+                    .map(|b| of(b).unwrap_or_else(|| DMatrix::zeros(blocks, 1)))
+                    .collect();
+            }
+        }]
+    }
+
+    /// Place among the bins of the covariate that one of its axes lags behind.
+    fn behind(&self, axis: usize) -> Option<usize> {
+        match self {
+            Self::Lag { behind, .. } => Some(of_axis(behind, axis).1),
+            _ => None,
         }
+    }
+
+    /// True if each axis has a course of its own.
+    fn is_of_each_axis(&self) -> bool {
+        matches!(self, Self::Lag { behind, .. } if behind.len() > 1)
     }
 
     /// Number of its columns.
@@ -97,10 +112,10 @@ impl Course {
         }
     }
 
-    /// The covariate that the course is of.
-    pub fn covariate(&self) -> &str {
+    /// The covariate that the course is of on one axis.
+    pub fn covariate(&self, axis: usize) -> &str {
         match self {
-            Self::Lag { covariate, .. } => covariate,
+            Self::Lag { behind, .. } => &of_axis(behind, axis).0,
             _ => "t",
         }
     }
@@ -123,6 +138,11 @@ impl Course {
             Self::Lag { blocks, .. } => format!("it lags behind by {:.1} s", time(blocks) - time(0.0)),
         }
     }
+}
+
+/// What there is for an axis: of its own, or the one for all.
+fn of_axis<T>(all: &[T], axis: usize) -> &T {
+    &all[if all.len() > 1 { axis } else { 0 }]
 }
 
 /// Part of a block that lies behind a time, blocks from the start.
@@ -166,11 +186,12 @@ fn families(blocks: usize) -> [Vec<Course>; 4] {
     ]
 }
 
-/// Columns that are constant within each block, the same course on each of some channels with a size of its own.
-fn asked(criterion: &Criterion, channels: &[usize], columns: &DMatrix<f64>) -> Asked {
-    let m = columns.ncols();
+/// Columns that are constant within each block, a course on each of some channels with a size of its own.
+fn asked(criterion: &Criterion, channels: &[usize], columns: &[DMatrix<f64>]) -> Asked {
+    let m = columns[0].ncols();
     let mut out = Asked::zeros(criterion, channels.len() * m);
     for (k, channel) in channels.iter().enumerate() {
+        let columns = of_axis(columns, criterion.problem.sums[*channel].channel % 3);
         let sums = &criterion.problem.sums[*channel];
         let root = sums.weight.sqrt();
         let weighted = DMatrix::from_diagonal(&sums.count) * columns;
@@ -209,7 +230,7 @@ pub fn likeliest(stack: &Stack, channels: &[usize], least: f64) -> Vec<Found> {
         return Vec::new();
     };
     let blocks = criterion.problem.sums[first].count.len();
-    let unit = DMatrix::identity(blocks, blocks);
+    let unit = [DMatrix::identity(blocks, blocks)];
     let sensor = criterion.modes[first].sensor();
     let views = |channel: &usize| stack.views(&asked(criterion, &[*channel], &unit), sensor);
     let views: Vec<Vec<Beside>> = channels.iter().map(views).collect();
@@ -217,18 +238,22 @@ pub fn likeliest(stack: &Stack, channels: &[usize], least: f64) -> Vec<Found> {
     if channels.len() > 1 {
         groups.push((0..channels.len()).collect());
     }
-    let families = families(blocks).into_iter().chain([lags(criterion, first)]);
+    let lags = [lags(criterion, first), lags_of_each_axis(criterion, first)];
+    let axis = |k: usize| criterion.problem.sums[channels[k]].channel % 3;
+    let families = families(blocks).into_iter().chain(lags);
     let mut found = Vec::new();
     for family in families.filter(|f| !f.is_empty()) {
         let tried = (family.len() as f64).ln();
         let of = |course: &Course| course.columns(blocks, |index| block_means(criterion, first, index));
-        let columns: Vec<DMatrix<f64>> = family.iter().map(of).collect();
+        let columns: Vec<Vec<DMatrix<f64>>> = family.iter().map(of).collect();
         // Half the square that each course explains, by channel and view.
-        let scores: Vec<Vec<Vec<f64>>> = views
-            .iter()
-            .map(|own| own.iter().map(|view| explained(view, &columns)).collect())
-            .collect();
-        for group in &groups {
+        let of_channel = |(k, own): (usize, &Vec<Beside>)| {
+            let columns: Vec<&DMatrix<f64>> = columns.iter().map(|c| of_axis(c, axis(k))).collect();
+            own.iter().map(|view| explained(view, &columns)).collect()
+        };
+        let scores: Vec<Vec<Vec<f64>>> = views.iter().enumerate().map(of_channel).collect();
+        let together = family[0].is_of_each_axis();
+        for group in groups.iter().filter(|group| group.len() > 1 || !together) {
             let of_group: Vec<usize> = group.iter().map(|k| channels[*k]).collect();
             let mut chosen: Vec<usize> = Vec::new();
             for view in 0..group.iter().map(|k| scores[*k].len()).min().unwrap_or(0) {
@@ -246,8 +271,8 @@ pub fn likeliest(stack: &Stack, channels: &[usize], least: f64) -> Vec<Found> {
             let weighed = chosen.into_iter().filter_map(|i| {
                 let mut asked = asked(criterion, &of_group, &columns[i]);
                 let mut bins = None;
-                if let Course::Lag { index, .. } = family[i] {
-                    (asked, bins) = beside_bins(criterion, &of_group, index, asked, &columns[i]);
+                if matches!(family[i], Course::Lag { .. }) {
+                    (asked, bins) = beside_bins(criterion, &of_group, &family[i], asked, &columns[i]);
                 }
                 asked.trials = tried;
                 if stack.at_most(&asked) - tried < least {
@@ -270,12 +295,12 @@ pub fn likeliest(stack: &Stack, channels: &[usize], least: f64) -> Vec<Found> {
 }
 
 /// Half of the square that the columns of each course explain, all courses of a family having as many.
-fn explained(view: &Beside, courses: &[DMatrix<f64>]) -> Vec<f64> {
+fn explained(view: &Beside, courses: &[&DMatrix<f64>]) -> Vec<f64> {
     let columns: Vec<_> = courses.iter().flat_map(|course| course.column_iter()).collect();
     let all = DMatrix::from_columns(&columns);
     let products = &view.information * &all;
     let right = all.tr_mul(&view.score);
-    let of = |(k, course): (usize, &DMatrix<f64>)| {
+    let of = |(k, course): (usize, &&DMatrix<f64>)| {
         let m = course.ncols();
         let own = course.tr_mul(&products.columns(k * m, m));
         let right = right.rows(k * m, m);
@@ -289,15 +314,18 @@ fn explained(view: &Beside, courses: &[DMatrix<f64>]) -> Vec<f64> {
 fn beside_bins(
     criterion: &Criterion,
     channels: &[usize],
-    index: usize,
-    course: Asked,
-    columns: &DMatrix<f64>,
+    course: &Course,
+    asked: Asked,
+    columns: &[DMatrix<f64>],
 ) -> (Asked, Option<Asked>) {
     let problem = criterion.problem;
-    let m = columns.ncols();
-    let (mut out, mut alone) = (course, None);
+    let m = course.parameters();
+    let (mut out, mut alone) = (asked, None);
     for (k, place) in channels.iter().enumerate() {
         let sums = &problem.sums[*place];
+        let axis = sums.channel % 3;
+        let Some(index) = course.behind(axis) else { continue };
+        let columns = of_axis(columns, axis);
         let covariate = Covariate::of_log(problem, sums.log, index);
         let contrasts = covariate.contrasts(problem);
         let Some((q, bins)) = contrasts.zip(bins::asked(criterion, sums.channel, &covariate)) else {
@@ -324,12 +352,34 @@ fn lags(criterion: &Criterion, channel: usize) -> Vec<Course> {
     let varying = names.filter(|(index, _)| block_means(criterion, channel, *index).is_some());
     let of = |(index, name): (usize, &String)| {
         FORGOTTEN.map(|blocks| Course::Lag {
-            covariate: name.clone(),
-            index,
+            behind: vec![(name.clone(), index)],
             blocks,
         })
     };
     varying.flat_map(of).collect()
+}
+
+/// Lags of every axis behind what it measures itself, as of a spring that creeps: one noise of the zeros counts for all axes of a sensor,
+/// so that what acts on each of them shows in all at once.
+fn lags_of_each_axis(criterion: &Criterion, channel: usize) -> Vec<Course> {
+    let sums = &criterion.problem.sums[channel];
+    let bins = &criterion.problem.parts[sums.log].white.layout.bins;
+    let Some(own) = Bins::measured(Sensor::ALL[sums.channel / 3]) else {
+        return Vec::new();
+    };
+    let behind: Vec<(String, usize)> = own.map(|index| (bins.names[index].clone(), index)).collect();
+    if behind
+        .iter()
+        .any(|(_, index)| block_means(criterion, channel, *index).is_none())
+    {
+        return Vec::new();
+    }
+    FORGOTTEN
+        .map(|blocks| Course::Lag {
+            behind: behind.clone(),
+            blocks,
+        })
+        .into()
 }
 
 /// Block means of the rank of a covariate; `None` where they do not vary.

@@ -101,7 +101,7 @@ pub fn contrasts(problem: &Problem, covariate: &Covariate) -> Option<DMatrix<f64
 /// Log Bayes factor of what an unnamed cause has in common in all blocks beside some members, where it may vary from block to block.
 pub fn varying(search: &Search, stack: &Stack, members: &[usize], unnamed: &Unnamed) -> f64 {
     match &unnamed.origin {
-        Origin::Probe(slot) => search.varying_beside(stack, members, *slot, &unnamed.asked),
+        Origin::Probe(slot) => search.varying_beside(stack, members, *slot, &unnamed.asked).common,
         Origin::Bins(parts) => {
             let columns = search.beside(stack, members);
             let columns: Vec<usize> = columns.iter().map(|(j, _)| *j).collect();
@@ -113,7 +113,7 @@ pub fn varying(search: &Search, stack: &Stack, members: &[usize], unnamed: &Unna
                 let question = bins::question(search.criterion.problem, &columns, *channel, covariate)?;
                 let own = first..first + question.precision.len() - question.model;
                 first = own.end;
-                Some(search.varying_of(stack, members, question, &deviation[own], 0.0))
+                Some(search.varying_of(stack, members, question, &deviation[own], 0.0).common)
             };
             parts.iter().filter_map(&mut of_part).sum()
         }

@@ -15,7 +15,7 @@ use crate::asked::{Asked, Prior};
 use crate::problem::Question;
 use crate::problem::indices;
 use crate::stack::{Criterion, Stack, ln_prior, log_sum_exp};
-use crate::varying;
+use crate::varying::{self, Varying};
 use crate::verdict::Plausible;
 
 /// Log odds that something is there before a name is given: one false name in a thousand logs, were all components of the noise right.
@@ -242,18 +242,18 @@ impl<'a> Search<'a> {
         weighed.testable && weighed.ln_bayes >= self.threshold && !self.refuted.contains(&weighed.slot)
     }
 
-    /// Log Bayes factor of a member beside the others where it may vary from block to block as well; `stack` is that of all members.
-    pub fn varying(&self, stack: &Stack, members: &[usize], slot: usize) -> f64 {
+    /// Log Bayes factors of a member beside the others where it may vary from block to block as well; `stack` is that of all members.
+    pub fn varying(&self, stack: &Stack, members: &[usize], slot: usize) -> Varying {
         let others = without(members, slot);
-        self.asked
-            .get(&slot)
-            .map_or(f64::INFINITY, |asked| self.varying_beside(stack, &others, slot, asked))
+        self.asked.get(&slot).map_or(Varying::STEADY, |asked| {
+            self.varying_beside(stack, &others, slot, asked)
+        })
     }
 
     /// The same of any slot beside some members; `stack` has the noise.
-    pub fn varying_beside(&self, stack: &Stack, members: &[usize], slot: usize, asked: &Asked) -> f64 {
+    pub fn varying_beside(&self, stack: &Stack, members: &[usize], slot: usize, asked: &Asked) -> Varying {
         let Prior::Normal(deviation) = &asked.prior else {
-            return f64::INFINITY;
+            return Varying::STEADY;
         };
         let problem = self.criterion.problem;
         let own = indices(&problem.slots, &[slot]);
@@ -282,12 +282,17 @@ impl<'a> Search<'a> {
         mut question: Question,
         deviation: &[f64],
         trials: f64,
-    ) -> f64 {
+    ) -> Varying {
         for (k, (_, deviation)) in self.beside(stack, members).iter().enumerate() {
             question.precision[k] = deviation.powi(-2);
         }
         let strength = |sensor| stack.strength(sensor);
-        varying::ln_bayes(&question, deviation, &self.criterion.modes, strength).map_or(f64::INFINITY, |ln| ln - trials)
+        varying::ln_bayes(&question, deviation, &self.criterion.modes, strength).map_or(Varying::STEADY, |found| {
+            Varying {
+                common: found.common - trials,
+                ..found
+            }
+        })
     }
 
     /// The effects that are there beside one another, in the order in which they were found.

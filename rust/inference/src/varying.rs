@@ -43,14 +43,30 @@ fn factor(modes: &Modes, strength: Strength, count: &DVector<f64>) -> DMatrix<f6
     })
 }
 
-/// Log Bayes factor of the common part of what a question asks about (prior deviations `deviation`), where it may vary from block to
-/// block besides; `strength` is the noise of each sensor's zeros.
+/// Log Bayes factors of the two parts of a coefficient.
+#[derive(Clone, Copy, Debug)]
+pub struct Varying {
+    /// Of the common part, where it may vary from block to block besides.
+    pub common: f64,
+    /// Of a part that varies, beside the common one.
+    pub varies: f64,
+}
+
+impl Varying {
+    /// Of what cannot vary.
+    pub const STEADY: Self = Self {
+        common: f64::INFINITY,
+        varies: f64::NEG_INFINITY,
+    };
+}
+
+/// Of what a question asks about (prior deviations `deviation`); `strength` is the noise of each sensor's zeros.
 pub fn ln_bayes(
     question: &Question,
     deviation: &[f64],
     modes: &[Modes],
     strength: impl Fn(usize) -> Strength,
-) -> Option<f64> {
+) -> Option<Varying> {
     let (p, m) = (question.model, question.precision.len() - question.model);
     let channels: Vec<usize> = (0..question.sums.len())
         .filter(|c| {
@@ -76,7 +92,11 @@ pub fn ln_bayes(
         with.push(ln_z + prior.ln_bayes(&beside));
     }
     debug_assert_eq!(m, deviation.len());
-    Some(log_sum_exp(&with) - log_sum_exp(&without))
+    let varies = log_sum_exp(&with[1..]) - ((with.len() - 1) as f64).ln() - with[0];
+    Some(Varying {
+        common: log_sum_exp(&with) - log_sum_exp(&without),
+        varies,
+    })
 }
 
 /// Takes the noise of one channel's zeros out of equations.

@@ -237,9 +237,26 @@ pub fn decide(
     }
     unexplained.sort_by(|a, b| b.1.total_cmp(&a.1));
     let search = &inquiry.search;
-    // Where more is left than effects explain, their names are those of the nearest shapes.
     let acts = |slot: usize, sensor: &Sensor| problem.slots[slot].effect.sensors().contains(sensor);
-    let mut unclear = unclear(&inquiry, &members, &before, &unexplained, None);
+    let cause = |unnamed: &Unnamed, ln: f64| (sensors_of(problem, &unnamed.origin), ln);
+    let instead: Vec<Shown> = (inquiry.unnamed.iter().zip(&before))
+        .map(|(unnamed, ln)| cause(unnamed, *ln))
+        .collect();
+    // A coefficient that differs between blocks has a cause without a name, too.
+    let varying = |slot: &usize| (*slot, search.varying(&stack, &members, *slot).varies);
+    let varying: Vec<(usize, f64)> = members
+        .par_iter()
+        .map(varying)
+        .filter(|(_, ln)| *ln >= threshold)
+        .collect();
+    let of_slot = |(slot, ln): &(usize, f64)| (problem.slots[*slot].effect.sensors().to_vec(), *ln);
+    let of_channel = |f: &Finding| (vec![Sensor::ALL[f.channel / 3]], f.ln_bayes);
+    let left: Vec<Shown> = (unexplained.iter().map(|(k, ln)| cause(&inquiry.unnamed[*k], *ln)))
+        .chain(known.seen.iter().map(of_channel))
+        .chain(varying.iter().map(of_slot))
+        .collect();
+    // Where more is left than effects explain, their names are those of the nearest shapes.
+    let mut unclear = unclear(&inquiry, &members, &instead, &left, None);
     // What people see is the error: the effect that lowers it most comes first. None does that foretells worse than nothing: then the noise
     // is not what the evidence takes it for.
     let base = held_out_of(search, None);
@@ -264,7 +281,7 @@ pub fn decide(
         );
         members.iter_mut().filter(|m| **m == first).for_each(|m| *m = most.0);
         best = Some(most.0);
-        unclear = self::unclear(&inquiry, &members, &before, &unexplained, Some(*most));
+        unclear = self::unclear(&inquiry, &members, &instead, &left, Some(*most));
     }
     let impossible = too_large
         || (search.weigh_all(&stack, &members).iter())
@@ -286,7 +303,8 @@ pub fn decide(
     let found = unexplained
         .iter()
         .flat_map(|(k, ln)| told(problem, &stack, &inquiry.unnamed[*k], *ln));
-    let mut findings: Vec<Finding> = known.seen.iter().cloned().chain(found).collect();
+    let differing = varying.iter().map(|(slot, ln)| differs(problem, *slot, *ln));
+    let mut findings: Vec<Finding> = known.seen.iter().cloned().chain(found).chain(differing).collect();
     findings.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
     let findings = strongest(findings);
     Some(Verdict {
@@ -301,32 +319,35 @@ pub fn decide(
     })
 }
 
-/// Sensors in which named effects explain less than [`NAMED_SHARE`] of all that is explained, or less than one unnamed cause alone would.
-/// `fitted`: a member whose columns say little, and what it explains by a fit.
+/// Sensors that show a cause without a name, and its log Bayes factor.
+type Shown = (Vec<Sensor>, f64);
+
+/// Sensors in which named effects explain less than [`NAMED_SHARE`] of all that is explained, or less than one unnamed cause would in their
+/// place (`instead`). `left`: unnamed causes beside them. `fitted`: a member whose columns say little, and what it explains by a fit.
 fn unclear(
     inquiry: &Inquiry,
     members: &[usize],
-    before: &[f64],
-    unexplained: &[(usize, f64)],
+    instead: &[Shown],
+    left: &[Shown],
     fitted: Option<(usize, f64)>,
 ) -> Vec<Sensor> {
     let search = &inquiry.search;
     let problem = search.criterion.problem;
-    let shows = |k: usize, sensor: &Sensor| sensors_of(problem, &inquiry.unnamed[k].origin).contains(sensor);
     let of = |sensor: &&Sensor| {
         let acts = |slot: &usize| problem.slots[*slot].effect.sensors().contains(sensor);
         let own: Vec<usize> = members.iter().copied().filter(acts).collect();
         let columns = search.evidence(&own);
-        let named = match fitted.filter(|(slot, _)| own.contains(slot)) {
-            // A fit may show that columns promise too little; what it explains is less where others have explained a part of it.
+        let curved = |slot: usize| problem.slots[slot].effect.strongly_curved();
+        let named = match fitted.filter(|(slot, _)| own.contains(slot) && curved(*slot)) {
+            // A fit may show that columns taken at one point promise too little; what it explains is less where others have explained a part.
             Some((slot, ln)) => columns.max(search.evidence(&search::without(&own, slot)) + ln),
             None => columns,
         };
-        let left = unexplained.iter().filter(|(k, _)| shows(*k, sensor)).map(|(_, ln)| *ln);
-        let left = left.fold(0.0, f64::max);
-        let alone = (0..before.len()).filter(|k| shows(*k, sensor)).map(|k| before[k]);
-        let alone = alone.fold(0.0, f64::max);
-        named < NAMED_SHARE * (named + left) || alone - inquiry.threshold > named
+        let most = |causes: &[Shown]| {
+            let of_sensor = causes.iter().filter(|(sensors, _)| sensors.contains(sensor));
+            of_sensor.map(|(_, ln)| *ln).fold(0.0, f64::max)
+        };
+        named < NAMED_SHARE * (named + most(left)).max(most(instead) - inquiry.threshold)
     };
     Sensor::ALL.iter().filter(of).copied().collect()
 }
@@ -352,7 +373,7 @@ fn named(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>)> {
         let stack = search.stack(&members)?;
         let least = members
             .par_iter()
-            .map(|m| (*m, search.varying(&stack, &members, *m)))
+            .map(|m| (*m, search.varying(&stack, &members, *m).common))
             .min_by(|a, b| a.1.total_cmp(&b.1));
         match least {
             Some((member, ln)) if ln < search.threshold => members.retain(|m| *m != member),
@@ -620,7 +641,7 @@ fn told(problem: &Problem, stack: &Stack, unnamed: &Unnamed, ln_bayes: f64) -> V
                 let words = course.words(|at| facts.t_start + block * at, blocks);
                 common(
                     sums.channel,
-                    course.covariate().to_string(),
+                    course.covariate(sums.channel % 3).to_string(),
                     several.then_some(sums.log),
                     words,
                 )
@@ -641,6 +662,25 @@ fn told(problem: &Problem, stack: &Stack, unnamed: &Unnamed, ln_bayes: f64) -> V
             }
         }
     }]
+}
+
+/// What looks like an effect and is not the same in all blocks, in words.
+fn differs(problem: &Problem, slot: usize, ln_bayes: f64) -> Finding {
+    let effect = &problem.slots[slot].effect;
+    let channels: Vec<usize> = (effect.sensors().iter())
+        .flat_map(|s| 3 * s.index()..3 * s.index() + 3)
+        .filter(|channel| problem.sums.iter().any(|sums| sums.channel == *channel))
+        .collect();
+    Finding {
+        channel: channels.first().copied().unwrap_or_default(),
+        covariate: "t".to_string(),
+        log: None,
+        ln_bayes,
+        drop: 2.0 * ln_bayes,
+        channels,
+        shape: format!("what looks like {} is not the same all the time", effect.card().id),
+        probe: None,
+    }
 }
 
 /// What the bins of some channels show, those first that show it most.
