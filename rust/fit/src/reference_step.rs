@@ -49,3 +49,33 @@ impl ReferenceStep {
 
 /// Turns up to this, rad, are rounding of a quaternion in double precision.
 const ROUNDING: f64 = 1e-14;
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    /// Step of a body that rests for a second, then turns to and fro slowly, as an encoder of this resolution shows.
+    fn step(of: Option<f64>) -> f64 {
+        let mut found = ReferenceStep::default();
+        for i in 0..2000 {
+            let t = f64::from(i) * 0.01;
+            let angle = if t < 1.0 {
+                0.3
+            } else {
+                0.3 + 0.2 * (1.0 - (t - 1.0).cos())
+            };
+            let shown = of.map_or(angle, |step| (angle / step).round() * step);
+            found.add(UnitQuaternion::from_scaled_axis(Vector3::x() * shown));
+        }
+        found.finish()
+    }
+
+    #[test]
+    fn an_encoder_shows_its_step_and_a_body_that_begins_to_move_has_none() {
+        assert!((step(Some(2e-3)) - 2e-3).abs() < 1e-9);
+        assert!(step(None) < 1e-4);
+        assert!(ReferenceStep::default().finish() == 0.0);
+    }
+}

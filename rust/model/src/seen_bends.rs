@@ -161,3 +161,71 @@ impl SeenBends {
         Some(((total - explained) / freedom - self.noise).max(0.0) / total)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::reference::LocalReference;
+    use crate::smoothing::Smoothing;
+
+    const WIDTH: Smoothing = Smoothing::uniform(6, 15).tapered();
+
+    /// Part of the third derivative that a gyroscope does not see and the part that white noise of the reference makes, of a body that
+    /// swings about z twice a second. `late`: the gyroscope, s; `noise`: of the reference, rad.
+    fn unseen(late: f64, noise: f64) -> (f64, f64) {
+        let t: Vec<f64> = (0..4000).map(|i| f64::from(i) * 0.01).collect();
+        // Park and Miller's generator, twelve uniform numbers to a normal one.
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state * 16807 % 2_147_483_647;
+            state as f64 / 2_147_483_647.0
+        };
+        let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+        let mut q = Vec::new();
+        let mut gyr = Vec::new();
+        for t in &t {
+            let error = Vector3::new(normal(), normal(), normal()) * noise;
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * (0.5 * (TAU * 2.0 * t).sin()));
+            let turn = turn * UnitQuaternion::from_scaled_axis(error);
+            q.extend([turn.w, turn.i, turn.j, turn.k]);
+            gyr.extend([0.0, 0.0, 0.5 * TAU * 2.0 * (TAU * 2.0 * (t - late)).cos()]);
+        }
+        let window = Window {
+            attitude: Some(&q),
+            readings: [None, Some(&gyr), None],
+            ..Window::over(&t)
+        };
+        let mut reference = LocalReference::attitude(&window, None).expect("an attitude");
+        let turns = Turns::of(&window, reference.times(), reference.spacing()).expect("a gyroscope");
+        let (mut seen, mut square, mut white) = (SeenBends::default(), 0.0, 0.0);
+        for row in (100..3900).step_by(3) {
+            let (fit, values, first) = reference.local_fit(t[row], WIDTH, true).expect("within the log");
+            let weights = fit.weights();
+            let derivatives: [[f64; 3]; 3] = std::array::from_fn(|order| {
+                std::array::from_fn(|axis| weights.iter().zip(&values).map(|(w, v)| w[order + 1] * v[axis]).sum())
+            });
+            let third: Vec<f64> = weights.iter().map(|w| w[3]).collect();
+            square += derivatives[2].iter().map(|v| v * v).sum::<f64>();
+            white += 3.0 * noise * noise * third.iter().map(|w| w * w).sum::<f64>();
+            seen.add(&turns, derivatives, &third, first);
+        }
+        (seen.unseen().expect("enough rows"), white / square)
+    }
+
+    #[test]
+    fn a_gyroscope_sees_all_of_a_motion_without_noise_even_when_it_is_late() {
+        assert!(unseen(0.0, 0.0).0 < 1e-5);
+        assert!(unseen(0.004, 0.0).0 < 1e-3);
+    }
+
+    #[test]
+    fn what_it_does_not_see_is_the_noise_of_the_reference() {
+        let (unseen, white) = unseen(0.0, 5e-3);
+        assert!(white > 0.02, "{white}");
+        assert!((unseen / white - 1.0).abs() < 0.1, "{unseen} {white}");
+    }
+}
