@@ -250,9 +250,7 @@ pub fn decide(
         .filter(|(_, ln)| *ln >= threshold)
         .collect();
     let of_slot = |(slot, ln): &(usize, f64)| (problem.slots[*slot].effect.sensors().to_vec(), *ln);
-    let of_channel = |f: &Finding| (vec![Sensor::ALL[f.channel / 3]], f.ln_bayes);
     let left: Vec<Shown> = (unexplained.iter().map(|(k, ln)| cause(&inquiry.unnamed[*k], *ln)))
-        .chain(known.seen.iter().map(of_channel))
         .chain(varying.iter().map(of_slot))
         .collect();
     // Where more is left than effects explain, their names are those of the nearest shapes.
