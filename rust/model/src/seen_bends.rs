@@ -1,9 +1,9 @@
 //! How much of the second derivative of a reference's angular rate the gyroscope sees as well: what it does not see is noise.
 //!
-//! A reference that was filtered has little noise from one sample to the next and yet much of it where the body moves, so that its own
-//! scatter does not tell what its derivatives are worth. The gyroscope does: its readings are integrated to angles, the same polynomial
-//! is put through both, and the derivatives of one are regressed on those of the other. A gain, a mount that is turned and a delay of the
-//! gyroscope do not count.
+//! A filtered reference has little noise from one sample to the next. It may have much noise at the frequencies of the motion, which its own
+//! scatter does not show. The gyroscope shows that noise. Its readings are integrated to angles, and the same polynomial is put through
+//! the angles and through the reference. Then the reference's derivative is regressed on that of the gyroscope. A gain, a turned mount
+//! and a delay of the gyroscope change nothing.
 
 use nalgebra::{Cholesky, SMatrix, Vector3};
 
@@ -151,11 +151,8 @@ impl SeenBends {
         if self.rows < ROWS * ANGLES || total <= 0.0 {
             return None;
         }
-        let mut gram = self.gram;
-        for j in 0..ANGLES {
-            gram[(j, j)] += RIDGE * gram.trace() / ANGLES as f64;
-        }
-        let factor = Cholesky::new(gram)?;
+        let ridge = RIDGE * self.gram.trace() / ANGLES as f64;
+        let factor = Cholesky::new(self.gram + SMatrix::identity() * ridge)?;
         let explained: f64 = self.cross.component_mul(&factor.solve(&self.cross)).sum();
         let freedom = (self.rows - ANGLES) as f64 / self.rows as f64;
         Some(((total - explained) / freedom - self.noise).max(0.0) / total)

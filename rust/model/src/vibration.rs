@@ -122,7 +122,7 @@ mod tests {
     fn fast_shaking_counts_and_motion_does_not() {
         let n = 600;
         let t: Vec<f64> = (0..n).map(|i| f64::from(i) * 0.01).collect();
-        // Motion at 1.5 Hz all the time; shaking at 31 Hz, of which 13 rows hold four periods, on two axes in the second half.
+        // Motion at 1.5 Hz all the time. In the second half two axes shake at 31 Hz: 13 rows hold four periods.
         let acc: Vec<f64> = t
             .iter()
             .flat_map(|t| {
