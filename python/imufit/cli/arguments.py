@@ -9,6 +9,8 @@ from typing import Any, TypeVar
 
 import click
 
+from imufit.whole_file import identity
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 LOG_ENDINGS = (".parquet", ".csv", ".npz")
@@ -91,7 +93,7 @@ def logs_argument(command: Command) -> Command:
 
 def _each_once(_ctx: click.Context, _param: click.Parameter, logs: tuple[Path, ...]) -> tuple[Path, ...]:
     """Refuse a file that is named twice: its rows must not count twice."""
-    known = [path.resolve() for path in logs]
+    known = [identity(path) for path in logs]
     for k, path in enumerate(logs):
         if known[k] in known[:k]:
             raise click.UsageError(f"{str(path)!r} is named twice: each log counts once")
@@ -166,17 +168,28 @@ def model_output(command: Command) -> Command:
 
 
 def keep_inputs(inputs: Iterable[Path | None], outputs: Iterable[Path | None]) -> None:
-    """Refuse outputs that would overwrite an input or each other.
+    """Refuse outputs that would overwrite an input, the metadata beside an input, or each other.
+
+    Files are compared, not names: a link to an input is that input.
 
     Raises
     ------
     click.UsageError
         Names the file.
     """
-    taken = {path.resolve() for path in inputs if path is not None}
-    for path in outputs:
-        if path is None or str(path) == "-":
-            continue
-        if path.resolve() in taken:
+    given = [path for path in inputs if path is not None]
+    taken = {identity(path) for path in given}
+    beside = {identity(path) for path in _sidecars(given) if path.exists()}
+    written = [path for path in outputs if path is not None and str(path) != "-"]
+    for path in written:
+        if identity(path) in taken | beside:
             raise click.UsageError(f"{str(path)!r} would be overwritten: give each output its own file")
-        taken.add(path.resolve())
+        taken.add(identity(path))
+    for path in _sidecars(path for path in written if path.suffix.lower() != ".parquet"):
+        if identity(path) in taken:
+            raise click.UsageError(f"{str(path)!r} would be overwritten by a log's metadata: give each its own name")
+
+
+def _sidecars(paths: Iterable[Path]) -> list[Path]:
+    """Where the metadata of those files that are logs stand, as in `imufit.log.metadata.sidecar_path`."""
+    return [path.with_suffix(".toml") for path in paths if path.suffix.lower() in LOG_ENDINGS]

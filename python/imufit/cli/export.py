@@ -10,6 +10,7 @@ from imufit.cli import engine
 from imufit.cli.arguments import EXISTING, OutputFile, effects_from_option, json_option, keep_inputs
 from imufit.cli.names import FORMS, Known
 from imufit.cli.output import Output
+from imufit.whole_file import write_text
 
 
 @click.command(short_help="A model as C, Arduino sketch, Python for imufusion or ahrs, JSON.")
@@ -34,7 +35,7 @@ def export(model: Path, *, form: str, output: Path | None, json_file: Path | Non
     out = Output(json_file)
     text = engine.export(model, form)
     if output is not None:
-        output.write_text(text, encoding="utf-8")
+        write_text(output, text)
         out.wrote(output)
     elif str(json_file) != "-":
         click.echo(text, nl=False)

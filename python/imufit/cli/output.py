@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from imufit.whole_file import whole_file, write_text
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -77,19 +79,20 @@ class Output:
         if str(self._json_file) == "-":
             sys.stdout.write(text)
         else:
-            self._json_file.write_text(text, encoding="utf-8")
+            write_text(self._json_file, text)
             self.wrote(self._json_file)
 
     def html(self, path: Path | None, page: str) -> None:
         """Write a page."""
         if path is not None:
-            path.write_text(page, encoding="utf-8")
+            write_text(path, page)
             self.wrote(path)
 
     def plot(self, path: Path | None, figure: Figure) -> None:
         """Write a figure."""
         if path is not None:
-            figure.savefig(path, dpi=150)
+            with whole_file(path) as file:
+                figure.savefig(file, format=path.suffix[1:].lower(), dpi=150)
             self.wrote(path)
 
     def wrote(self, path: Path) -> None:

@@ -6,6 +6,7 @@ import array
 import errno
 import fcntl
 import os
+import secrets
 import select
 import socket
 import termios
@@ -94,9 +95,8 @@ class Pty:
         os.set_blocking(self._master, False)
         self._since = float("inf")
         if self._link is not None:
-            new = self._link.with_name(f".{self._link.name}.{os.getpid()}")
-            new.unlink(missing_ok=True)
-            new.symlink_to(self._name)
+            new = self._link.with_name(f".{self._link.name}.{secrets.token_hex(8)}")
+            new.symlink_to(self._name)  # fails where anything stands already
             new.replace(self._link)
 
     def attached(self) -> bool:

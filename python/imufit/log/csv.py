@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +18,7 @@ from imufit.errors import InputError
 from imufit.log.check import number_from_text
 from imufit.log.csv_layout import NOT_DATA, is_comment, read_layout, split_line, text_of
 from imufit.log.metadata import Metadata, write_sidecar
+from imufit.whole_file import whole_file
 
 _BLOCK: Final = 4 << 20
 _EMPTY: Final = ["", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None"]
@@ -226,14 +228,16 @@ def write_csv(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metadata)
             raise InputError(
                 "CSV cannot hold line breaks in text", file=path, column=name, remedy="Write .parquet or .npz."
             )
-    write_sidecar(path, metadata)
     arrays = [
         pa.array(column, pa.string())
         if column.dtype == object
         else pa.array(column, pa.float64(), mask=np.isnan(column))
         for column in table.values()
     ]
-    with path.open("w", newline="", encoding="utf-8") as header:
-        csv.writer(header, lineterminator="\n").writerow(table)
-    with path.open("ab") as file:
+    header = io.StringIO()
+    csv.writer(header, lineterminator="\n").writerow(table)
+    with whole_file(path) as file:
+        file.write(header.getvalue().encode())
         pacsv.write_csv(pa.Table.from_arrays(arrays, list(table)), file, pacsv.WriteOptions(include_header=False))
+        file.flush()
+        write_sidecar(path, metadata)  # only when all rows found room

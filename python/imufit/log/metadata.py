@@ -13,6 +13,7 @@ from typing import Any, Final, Literal, cast
 import tomli_w
 
 from imufit.errors import InputError
+from imufit.whole_file import write_text
 
 Frame = Literal["NED", "ENU", "NWU"]
 FRAMES: Final = ("NED", "ENU", "NWU")
@@ -142,7 +143,7 @@ def write_sidecar(path: Path, metadata: Metadata) -> None:
                 file=sidecar,
                 remedy="Write the log under another name.",
             )
-    sidecar.write_text(tomli_w.dumps(_without_none(metadata.to_mapping())), encoding="utf-8")
+    write_text(sidecar, tomli_w.dumps(_without_none(metadata.to_mapping())))
 
 
 def _without_none(value: Any) -> Any:

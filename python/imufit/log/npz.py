@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.log.columns import GROUPS
 from imufit.log.metadata import Metadata, mapping_from_json, write_sidecar
+from imufit.whole_file import whole_file
 
 _BATCH: Final = 65_536
 _METADATA: Final = "metadata"
@@ -166,12 +167,16 @@ def write_npz(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metadata)
         raise InputError(
             "an NPZ log cannot hold a column of that name", file=path, column=_METADATA, remedy="Rename it."
         )
-    write_sidecar(path, metadata)
     arrays = {**table, _METADATA: np.array(metadata.to_json())}
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-        for name, column in arrays.items():
-            array = (
-                np.array(["" if cell is None else cell for cell in column], str) if column.dtype == object else column
-            )
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
-                npy.write_array(file, np.asarray(array, order="C"), allow_pickle=False)
+    with whole_file(path) as whole:
+        with zipfile.ZipFile(whole, "w", zipfile.ZIP_STORED) as archive:
+            for name, column in arrays.items():
+                array = np.array(["" if cell is None else cell for cell in column], str) if _is_text(column) else column
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                    npy.write_array(file, np.asarray(array, order="C"), allow_pickle=False)
+        whole.flush()
+        write_sidecar(path, metadata)  # only when all columns found room
+
+
+def _is_text(column: NDArray[Any]) -> bool:
+    return bool(column.dtype == object)

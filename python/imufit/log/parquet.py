@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.metadata import Metadata, mapping_from_json, sidecar_path, write_sidecar
+from imufit.whole_file import whole_file
 
 _KEY: Final = b"imufit"
 _BATCH: Final = 65_536
@@ -119,8 +120,10 @@ def write_parquet(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metad
         [pa.field(name, array.type) for name, array in zip(table, arrays, strict=True)],
         metadata={_KEY: metadata.to_json().encode()},
     )
-    if sidecar_path(path).exists():
-        write_sidecar(path, metadata)
-    pq.write_table(
-        pa.Table.from_arrays(arrays, schema=schema), path, row_group_size=_ROW_GROUP, write_page_checksum=True
-    )
+    with whole_file(path) as file:
+        pq.write_table(
+            pa.Table.from_arrays(arrays, schema=schema), file, row_group_size=_ROW_GROUP, write_page_checksum=True
+        )
+        if sidecar_path(path).exists():
+            file.flush()
+            write_sidecar(path, metadata)  # only when all rows found room

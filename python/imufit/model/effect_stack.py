@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-import tomli_w
-
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.model.catalogue import find_effect
+from imufit.model.model_file import ModelFile
 from imufit.results import Parameter
-
-KIND = "imufit sensor model"
-FORMAT = 1
 
 
 class EffectStack:
@@ -139,18 +134,14 @@ class EffectStack:
         Parameters
         ----------
         path : str or Path
-            The file; one that exists is replaced.
+            The file; one that exists is replaced. It is written whole or not at all.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
         """
-        document: dict[str, Any] = {"kind": KIND, "format": FORMAT, "effects": list(self.effects)}
-        if self.constants:
-            document["constants"] = self.constants
-        document["parameters"] = self.parameters
-        document["units"] = {
-            key: {name: unit for name, unit, _ in effect.parameters} for key, effect in self._effects.items()
-        }
-        if self.standard_errors:
-            document["standard_errors"] = self.standard_errors
-        Path(path).write_bytes(tomli_w.dumps(document).encode())
+        ModelFile(list(self.effects), self.parameters, self.constants, self.standard_errors).write(path)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -164,36 +155,15 @@ class EffectStack:
         Raises
         ------
         InputError
-            The file is missing, no model, of a later format, or has a wrong unit or parameter.
+            The file is missing, cut off, no model, of a later format, lacks a parameter, or has a wrong unit or
+            parameter.
         """
-        file = Path(path)
+        held = ModelFile.read(path)
         try:
-            document = tomllib.loads(file.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(
-                f"the model cannot be read ({error.strerror})", file=file, remedy="Check the name."
-            ) from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InputError(f"this is no TOML: {error}", file=file) from None
-        if document.get("kind") != KIND:
-            raise InputError(f'the key kind is {document.get("kind")!r}, not "{KIND}"', file=file)
-        if document.get("format") != FORMAT:
-            raise InputError(f"format {document.get('format')!r} is not known", file=file, remedy="Update imufit.")
-        try:
-            model = cls(
-                document.get("effects", []),
-                document.get("parameters", {}),
-                constants=document.get("constants", {}),
-                standard_errors=document.get("standard_errors", {}),
-            )
+            model = cls(held.effects, held.parameters, constants=held.constants, standard_errors=held.standard_errors)
+            held.check_complete()
         except InputError as error:
-            raise InputError(error.problem, file=file, remedy=error.remedy) from None
-        for key, units in document.get("units", {}).items():
-            for name, unit, _ in find_effect(key).parameters:
-                if units.get(name, unit) != unit:
-                    raise InputError(
-                        f"{key} {name} is in {units[name]}, not in {unit}", file=file, remedy="Convert the value."
-                    )
+            raise InputError(error.problem, file=path, remedy=error.remedy) from None
         return model
 
     def __repr__(self) -> str:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
-import tomli_w
-
 from imufit.errors import InputError
 from imufit.replay.replay import SETTINGS
+from imufit.whole_toml import read_toml, write_toml
 
 
 def write_settings(settings: Mapping[str, Mapping[str, float]], path: str | Path) -> None:
@@ -22,10 +20,15 @@ def write_settings(settings: Mapping[str, Mapping[str, float]], path: str | Path
     settings : mapping of mappings
         Filter (or "replay" for the rules), name, value.
     path : str or Path
-        File to write.
+        File to write; one that exists is replaced. It is written whole or not at all.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
     """
     plain = {group: {name: float(value) for name, value in values.items()} for group, values in settings.items()}
-    Path(path).write_text(tomli_w.dumps(plain), encoding="utf-8")
+    write_toml(path, plain)
 
 
 def read_settings(path: str | Path) -> dict[str, dict[str, float]]:
@@ -39,13 +42,10 @@ def read_settings(path: str | Path) -> dict[str, dict[str, float]]:
     Raises
     ------
     InputError
-        No TOML, an unknown filter or setting, or a value that is no number; the place is named.
+        No TOML, cut off, an unknown filter or setting, or a value that is no number; the place is named.
     """
     path = Path(path)
-    try:
-        groups = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"not valid TOML ({error})", file=path) from None
+    groups, _ = read_toml(path, "the file of settings")
     settings: dict[str, dict[str, float]] = {}
     for group, values in groups.items():
         _known("filter", group, SETTINGS, path)

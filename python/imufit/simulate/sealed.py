@@ -11,6 +11,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from imufit.whole_file import write_text
+
 HEADER = "imufit sealed truth, format 1: what was done to this log; `imufit reveal LOG` opens it"
 
 
@@ -82,7 +84,7 @@ def seal(truth: Truth, log_path: str | Path) -> Path:
     packed = base64.b64encode(zlib.compress(json.dumps(truth.to_json()).encode(), 9)).decode()
     lines = [packed[i : i + 76] for i in range(0, len(packed), 76)]
     path = sealed_path(log_path)
-    path.write_text("\n".join([HEADER, *lines]) + "\n", encoding="utf-8")
+    write_text(path, "\n".join([HEADER, *lines]) + "\n")
     return path
 
 

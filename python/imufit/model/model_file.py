@@ -1,0 +1,172 @@
+"""The file of a model: what stands in it, and that nothing is missing from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from imufit.errors import InputError
+from imufit.model.catalogue import find_effect
+from imufit.whole_toml import HOW_TO_END, read_toml, write_toml
+
+KIND = "imufit sensor model"
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """What the file of a model holds.
+
+    Attributes
+    ----------
+    effects : list of str
+        Ids of the effects.
+    parameters : dict of str to dict of str to float
+        Every parameter of every effect, SI units.
+    constants : dict
+        Means that effects count from, see `imufit.model.EffectStack`.
+    standard_errors : dict of str to dict of str to float
+        As far as they are known, SI units.
+    units : dict of str to dict of str to str
+        Units that the file states.
+    marked : bool
+        Whether it ends in the mark of `imufit.whole_toml`.
+    """
+
+    effects: list[str]
+    parameters: dict[str, dict[str, float]]
+    constants: dict[str, Any] = field(default_factory=dict)
+    standard_errors: dict[str, dict[str, float]] = field(default_factory=dict)
+    units: dict[str, dict[str, str]] = field(default_factory=dict)
+    marked: bool = True
+
+    def write(self, path: str | Path) -> None:
+        """Write the file, whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that exists is replaced.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        document: dict[str, Any] = {"kind": KIND, "format": FORMAT, "effects": self.effects}
+        if self.constants:
+            document["constants"] = self.constants
+        document["parameters"] = self.parameters
+        document["units"] = {key: _units(key) for key in self.effects}
+        if self.standard_errors:
+            document["standard_errors"] = self.standard_errors
+        write_toml(path, document)
+
+    @classmethod
+    def read(cls, path: str | Path) -> ModelFile:
+        """Read a model's file.
+
+        Parameters
+        ----------
+        path : str or Path
+            A file that :meth:`write` wrote, or one written or changed by hand in its form.
+
+        Raises
+        ------
+        InputError
+            The file is missing, cut off, no model, of a later format, or something in it is no table or number.
+        """
+        file = Path(path)
+        document, marked = read_toml(file, "the model")
+        if document.get("kind") != KIND:
+            raise InputError(f'the key kind is {document.get("kind")!r}, not "{KIND}"', file=file)
+        if document.get("format") != FORMAT:
+            raise InputError(f"format {document.get('format')!r} is not known", file=file, remedy="Update imufit.")
+        effects = document.get("effects")
+        if not isinstance(effects, list) or not all(isinstance(key, str) for key in effects):
+            raise InputError("the key effects is no list of names", file=file, remedy='Write effects = ["gyr.bias"].')
+        try:
+            return cls(
+                effects,
+                _tables(document.get("parameters", {}), "parameters"),
+                _constants(document.get("constants", {})),
+                _standard_errors(document.get("standard_errors", {})),
+                _tables(document.get("units", {}), "units"),
+                marked,
+            )
+        except InputError as error:
+            raise InputError(error.problem, file=file, remedy=error.remedy) from None
+
+    def check_complete(self) -> None:
+        """Refuse a model of which something is missing, or may be missing, and one in other units.
+
+        Raises
+        ------
+        InputError
+            Names it.
+        """
+        for key in self.effects:
+            for name, unit in _units(key).items():
+                if name not in self.parameters.get(key, {}):
+                    raise InputError(
+                        f"parameter {name} of {key} is missing",
+                        remedy=f"Is the file cut off? Otherwise write {name} = VALUE in {unit} below its effect.",
+                    )
+                given = self.units.get(key, {}).get(name, unit)
+                if given != unit:
+                    raise InputError(f"{key} {name} is in {given}, not in {unit}", remedy="Convert the value.")
+        if not self.marked:
+            self._check_nothing_is_cut()
+
+    def _check_nothing_is_cut(self) -> None:
+        """Refuse a file without a mark where something that belongs to the model may have stood behind its end."""
+        for words, table in (("units", self.units), ("standard errors", self.standard_errors)):
+            for key in self.effects if table else ():
+                if _units(key).keys() != table.get(key, {}).keys():
+                    raise InputError(f"{words} of {key} are not complete: is the file cut off?", remedy=HOW_TO_END)
+        known = set(self.constants.get("covariate_means", {}))
+        known |= {"temp"} if "temperature_mean" in self.constants else set()
+        for effect in map(find_effect, self.effects):
+            column = effect.centred_column
+            if column is not None and column not in known:
+                raise InputError(
+                    f"constants do not tell the mean of {column}, which {effect.id} counts from: is the file cut off?",
+                    remedy=HOW_TO_END,
+                )
+
+
+def _units(effect_id: str) -> dict[str, str]:
+    return {name: unit for name, unit, _ in find_effect(effect_id).parameters}
+
+
+def _table(value: Any, name: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(f"{name} is {value!r}, not a table", remedy=f"Write [{name}] above what belongs to it.")
+    return value
+
+
+def _tables(value: Any, name: str) -> dict[str, dict[str, Any]]:
+    return {key: _table(item, f'{name}."{key}"') for key, item in _table(value, name).items()}
+
+
+def _constants(value: Any) -> dict[str, Any]:
+    constants = dict(_table(value, "constants"))
+    if "temperature_mean" in constants:
+        _check_number(constants["temperature_mean"], "temperature_mean")
+    for name, mean in _table(constants.get("covariate_means", {}), "constants.covariate_means").items():
+        _check_number(mean, f"the mean of {name}")
+    return constants
+
+
+def _standard_errors(value: Any) -> dict[str, dict[str, float]]:
+    errors = _tables(value, "standard_errors")
+    for key, numbers in errors.items():
+        for name, number in numbers.items():
+            _check_number(number, f"the standard error of {key} {name}")
+    return errors
+
+
+def _check_number(value: Any, name: str) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{name} is {value!r}, not a number")
