@@ -10,6 +10,7 @@
 
 use imufit_attitude::Quaternion;
 use nalgebra::{Vector2, Vector3};
+use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::columns::{Columns, Row};
@@ -193,13 +194,14 @@ impl Known {
     }
 }
 
-/// All settings over the log. `look` is called between two windows of rows and ends the pass with an error of its own.
-pub fn run<E: From<FilterError>>(
+/// All settings over the log, on the threads of `pool`. `look` is called between two windows of rows and ends the pass with an error of its own.
+pub fn run<E: From<FilterError> + Send>(
     description: &'static Description,
     settings: &[Vec<(String, f64)>],
     conditions: Conditions,
     columns: &Columns<'_>,
     judgement: &Judgement<'_>,
+    pool: &ThreadPool,
     mut look: impl FnMut() -> Result<(), E>,
 ) -> Result<Vec<Vec<Score>>, E> {
     let Conditions {
@@ -234,8 +236,10 @@ pub fn run<E: From<FilterError>>(
         });
     }
     for first in (0..n).step_by(WINDOW) {
-        trials.par_iter_mut().try_for_each(|trial| {
-            (first..(first + WINDOW).min(n)).try_for_each(|k| trial.take(k, &columns.row(k), judgement, &known))
+        pool.install(|| {
+            trials.par_iter_mut().try_for_each(|trial| {
+                (first..(first + WINDOW).min(n)).try_for_each(|k| trial.take(k, &columns.row(k), judgement, &known))
+            })
         })?;
         look()?;
     }
@@ -296,6 +300,7 @@ mod tests {
             },
             &columns,
             &judgement,
+            &rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap(),
             || Ok(()),
         )
         .unwrap()

@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyList;
 
 use crate::arrays::Column;
+use crate::computing::compute;
 use crate::errors::value_error;
 
 type Deviations<'py> = (Bound<'py, PyArray1<f64>>, Vec<usize>);
@@ -24,7 +25,7 @@ fn allan_deviation<'py>(
 ) -> PyResult<Deviations<'py>> {
     let columns = columns(pieces)?;
     let values = columns.iter().map(Column::values).collect::<PyResult<Vec<_>>>()?;
-    let found = py.detach(|| allan_variance(&values, &factors));
+    let found = compute(py, || allan_variance(&values, &factors))?;
     let deviations = found.iter().map(|variance| variance.value.sqrt()).collect();
     Ok((
         PyArray1::from_vec(py, deviations),
@@ -55,7 +56,7 @@ fn allan_freedom(kind: &str, samples: usize, factor: usize) -> PyResult<f64> {
 fn block_scatter(py: Python<'_>, pieces: &Bound<'_, PyList>, rows: usize) -> PyResult<f64> {
     let columns = columns(pieces)?;
     let values = columns.iter().map(Column::values).collect::<PyResult<Vec<_>>>()?;
-    Ok(py.detach(|| scatter(&values, rows)))
+    compute(py, || scatter(&values, rows))
 }
 
 /// Adds this file's functions to the module.

@@ -143,7 +143,9 @@ fn fill_array<D: numpy::ndarray::Dimension, R: Send>(
     fill: impl Send + FnOnce(&mut [f64]) -> R,
 ) -> PyResult<R> {
     let values = array.as_slice_mut()?;
-    Ok(py.detach(|| fill(values)))
+    #[allow(clippy::disallowed_methods)] // it looks for Ctrl-C, which Python tells the thread that asked
+    let filled = py.detach(|| fill(values));
+    Ok(filled)
 }
 
 /// Three numbers `[x, y, z]`, finite, from any sequence.

@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Mask, Rows, filled_rows};
+use crate::computing::compute;
 use crate::errors::from_attitude;
 
 type Table<'py> = PyResult<Bound<'py, PyArray2<f64>>>;
@@ -190,7 +191,7 @@ fn attitude_rmse<'py>(
     let mask = Mask::optional_with_rows("mask", mask, "estimate", estimate.len())?;
     let (a, b) = (estimate.values()?, reference.values()?);
     let flags = mask.as_ref().map(Mask::values).transpose()?;
-    let Some(rmse) = py.detach(|| Rmse::over(a, b, flags)).map_err(from_attitude)? else {
+    let Some(rmse) = compute(py, || Rmse::over(a, b, flags))?.map_err(from_attitude)? else {
         return Ok(None);
     };
     let errors = PyDict::new(py);

@@ -17,6 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{Column, Rows, vector};
+use crate::computing::compute;
 use crate::errors::{input_error, value_error};
 
 /// Criteria by name, the others at their defaults.
@@ -96,7 +97,7 @@ fn find_rests<'py>(
         let side = |v: &f64| if *v >= 0.0 { Side::new(*v as usize) } else { None };
         values.iter().map(side).collect()
     });
-    let found = py.detach(|| rests::find(&readings, sides.as_deref(), &criteria));
+    let found = compute(py, || rests::find(&readings, sides.as_deref(), &criteria))?;
     let dict = PyDict::new(py);
     let poses: PyResult<Vec<_>> = found.poses.iter().map(|pose| pose_dict(py, pose)).collect();
     dict.set_item("poses", PyList::new(py, poses?)?)?;
@@ -270,9 +271,10 @@ fn vector_calibration<'py>(
         scale_temperature: temperatures.is_some() && scale_temperature,
         ..Form::FULL
     };
-    let solution = py
-        .detach(|| vector_cost::fit(&items, form, tilts.is_some(), gravity, leave_out))
-        .map_err(|error| from_calibration(py, error))?;
+    let solution = compute(py, || {
+        vector_cost::fit(&items, form, tilts.is_some(), gravity, leave_out)
+    })?
+    .map_err(|error| from_calibration(py, error))?;
     solution_dict(py, &solution, &solution.affine())
 }
 
@@ -333,9 +335,10 @@ fn magnitude_calibration<'py>(
     } else {
         Weighing::Readings
     };
-    let solution = py
-        .detach(|| norm_cost::fit(&items, form, ups.is_some(), length, weighing, leave_out))
-        .map_err(|error| from_calibration(py, error))?;
+    let solution = compute(py, || {
+        norm_cost::fit(&items, form, ups.is_some(), length, weighing, leave_out)
+    })?
+    .map_err(|error| from_calibration(py, error))?;
     solution_dict(py, &solution, &solution.affine())
 }
 
@@ -382,9 +385,7 @@ fn turn_calibration<'py>(
     let gyr = Rows::<3>::with_rows("gyr", gyr, "t", t.len())?;
     let bias = Vector3::from(vector("bias", bias)?);
     let turns = turns_of(t.values()?, gyr.values()?, &spans)?;
-    let solution = py
-        .detach(|| turns::fit(&turns))
-        .map_err(|error| from_calibration(py, error))?;
+    let solution = compute(py, || turns::fit(&turns))?.map_err(|error| from_calibration(py, error))?;
     let dict = solution_dict(py, &solution, &turns::affine(&solution, &bias))?;
     let before: Vec<f64> = turns.iter().map(|turn| turn.angle(&Matrix3::identity())).collect();
     dict.set_item("before", PyArray1::from_vec(py, before))?;

@@ -11,6 +11,7 @@ use numpy::{PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::computing::compute;
 use crate::errors::{from_effect, input_error, input_error_in_row, value_error};
 use crate::model::PyEffect;
 use crate::window::ChunkArrays;
@@ -59,12 +60,11 @@ fn correct_readings<'py>(
     let frame: Frame = frame.parse().map_err(value_error)?;
     let arrays = ChunkArrays::new(chunk)?;
     let window = arrays.window()?;
-    let corrected = py
-        .detach(|| {
-            let facts = LogFacts::without_reference(&window, frame, covariates, &covariate_means, temperature_mean);
-            correct(&window, &facts, &effects)
-        })
-        .map_err(|error| from_correction(py, error))?;
+    let corrected = compute(py, || {
+        let facts = LogFacts::without_reference(&window, frame, covariates, &covariate_means, temperature_mean);
+        correct(&window, &facts, &effects)
+    })?
+    .map_err(|error| from_correction(py, error))?;
     let readings = corrected
         .readings
         .iter()

@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{Bytes, table};
+use crate::computing::compute;
 use crate::errors::input_error;
 
 type Table<'py, T> = Bound<'py, PyArray2<T>>;
@@ -36,7 +37,7 @@ fn mpu6050_decode<'py>(
         Frame::WithoutTemperature
     };
     let scales = Scales::new(afs_sel, fs_sel).map_err(|error| input_error(py, error))?;
-    let found = py.detach(|| mpu6050::decode(bytes, frame, &scales));
+    let found = compute(py, || mpu6050::decode(bytes, frame, &scales))?;
     let readings = found.map_err(|error| input_error(py, error))?;
     Ok((
         table::<_, 3>(py, readings.acc)?,

@@ -18,6 +18,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::computing::compute;
 use crate::errors::{from_effect, value_error};
 use crate::model::{PyEffect, PyFacts};
 use crate::rests::RestArrays;
@@ -68,7 +69,7 @@ impl PySurvey {
     fn add(&mut self, py: Python<'_>, chunk: &Bound<'_, PyDict>) -> PyResult<()> {
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
-        py.detach(|| self.0.add(&window));
+        compute(py, || self.0.add(&window))?;
         Ok(())
     }
 
@@ -131,7 +132,7 @@ impl PyEvidence {
     fn add(&mut self, py: Python<'_>, chunk: &Bound<'_, PyDict>) -> PyResult<()> {
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
-        py.detach(|| self.0.add(&window)).map_err(from_effect)
+        compute(py, || self.0.add(&window))?.map_err(from_effect)
     }
 
     /// Adds what the rests of a log tell: `stills`, `poses`, `path` and `field` as chunks; `rest` and `block` of each
@@ -139,7 +140,7 @@ impl PyEvidence {
     fn add_rests(&mut self, py: Python<'_>, rests: &Bound<'_, PyDict>) -> PyResult<()> {
         let arrays = RestArrays::new(rests)?;
         let rests = arrays.rests(Some(self.0.layout.blocks))?;
-        py.detach(|| self.0.add_rests(&rests)).map_err(from_effect)
+        compute(py, || self.0.add_rests(&rests))?.map_err(from_effect)
     }
 
     /// Variance of a row of each of the nine channels, from stretches of rests that follow each other; NaN where too few do.
@@ -147,7 +148,7 @@ impl PyEvidence {
         let arrays = RestArrays::new(rests)?;
         let rests = arrays.rests(None)?;
         let layout = &self.0.layout;
-        let scatter = py.detach(|| rests.scatter(&layout.model, &layout.facts));
+        let scatter = compute(py, || rests.scatter(&layout.model, &layout.facts))?;
         scatter.map(|v| v.to_vec()).map_err(from_effect)
     }
 
@@ -233,24 +234,27 @@ impl PyProfile {
     fn add(&mut self, py: Python<'_>, chunk: &Bound<'_, PyDict>) -> PyResult<()> {
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
-        py.detach(|| self.0.add(&window)).map_err(from_effect)
+        compute(py, || self.0.add(&window))?.map_err(from_effect)
     }
 
     /// Adds what the rests of a log tell, see `Evidence.add_rests`.
     fn add_rests(&mut self, py: Python<'_>, rests: &Bound<'_, PyDict>) -> PyResult<()> {
         let arrays = RestArrays::new(rests)?;
         let rests = arrays.rests(None)?;
-        py.detach(|| self.0.add_rests(&rests)).map_err(from_effect)
+        compute(py, || self.0.add_rests(&rests))?.map_err(from_effect)
     }
 }
+
+/// Number of a trial, the candidate's parameters, their standard deviations, drop of the sum of squares.
+type BestTrial = (usize, Vec<f64>, Vec<f64>, f64);
 
 /// Number of the best trial of searches over several logs for the same trials, the candidate's parameters as a step finds
 /// them, their standard deviation where they are the mean of trials of that size (else zero), and the drop of the sum of squares in units of the noise; None where no sample can be used.
 #[pyfunction]
-fn best_trial(py: Python<'_>, profiles: Vec<PyRef<'_, PyProfile>>) -> Option<(usize, Vec<f64>, Vec<f64>, f64)> {
+fn best_trial(py: Python<'_>, profiles: Vec<PyRef<'_, PyProfile>>) -> PyResult<Option<BestTrial>> {
     let logs: Vec<&Profile> = profiles.iter().map(|p| &p.0).collect();
-    let best = py.detach(|| profile::best(&logs))?;
-    Some((best.trial, best.parameters, best.spread, best.gain))
+    let best = compute(py, || profile::best(&logs))?;
+    Ok(best.map(|best| (best.trial, best.parameters, best.spread, best.gain)))
 }
 
 /// Residual of each of the nine channels over the core rows of a chunk, (rows,), SI units (magnetometer uT), after a
@@ -268,9 +272,7 @@ fn evaluate<'py>(
     }
     let arrays = ChunkArrays::new(chunk)?;
     let window = arrays.window()?;
-    let residuals = py
-        .detach(|| layout.model.residuals(&window, &layout.facts, &step))
-        .map_err(from_effect)?;
+    let residuals = compute(py, || layout.model.residuals(&window, &layout.facts, &step))?.map_err(from_effect)?;
     Ok(residuals
         .into_iter()
         .map(|r| r.map(|r| PyArray1::from_vec(py, r)))
@@ -301,8 +303,7 @@ impl PyAutocovariance {
         }
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
-        py.detach(|| self.0.add(&window, &evidence.0, &step))
-            .map_err(from_effect)
+        compute(py, || self.0.add(&window, &evidence.0, &step))?.map_err(from_effect)
     }
 
     /// Whitening filter of each of the nine channels, its taps; empty where the residual is white.

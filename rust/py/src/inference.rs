@@ -13,6 +13,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::computing::compute;
 use crate::errors::value_error;
 use crate::fit::PyEvidence;
 use crate::verdict::PyVerdict;
@@ -24,8 +25,7 @@ type Saturated<'py> = (Bound<'py, PyArray1<f64>>, Vec<f64>, Vec<Vec<f64>>);
 /// over that of its channel (channels, blocks)).
 #[pyfunction]
 fn saturate<'py>(py: Python<'py>, evidence: &PyEvidence) -> PyResult<Saturated<'py>> {
-    let fitted = py
-        .detach(|| saturated::fit_all(&evidence.0))
+    let fitted = compute(py, || saturated::fit_all(&evidence.0))?
         .ok_or_else(|| value_error("the normal equations cannot be solved: the log holds no usable samples"))?;
     Ok((
         PyArray1::from_slice(py, fitted.step.as_slice()),
@@ -104,7 +104,7 @@ impl PyProblem {
                 return Err(value_error(format!("the logs have different effects in slot {number}")));
             }
         }
-        Ok(Self(py.detach(|| Problem::new(parts, &own))))
+        Ok(Self(compute(py, || Problem::new(parts, &own))?))
     }
 
     /// For each of a log's own parameters its place among those of all logs.
@@ -124,12 +124,12 @@ impl PyProblem {
         self.known(&slots)?;
         let all = &self.0.slots;
         let parameters = parameters_of(slots.iter().map(|s| &all[*s]));
-        let (fitted, base) = py.detach(|| {
+        let (fitted, base) = compute(py, || {
             (
                 estimate::estimate(&self.0, &parameters),
                 held_out::held_out(&self.0.question(&parameters, &[], &DMatrix::zeros(0, 0))),
             )
-        });
+        })?;
         let fitted = fitted.ok_or_else(|| value_error("the normal equations cannot be solved"))?;
         let mut step = DVector::zeros(self.0.plausible.len());
         for (k, p) in parameters.iter().enumerate() {
@@ -188,7 +188,7 @@ impl PyProblem {
             column_noise,
             seen: seen.collect(),
         };
-        let found = py.detach(|| verdict::decide(&self.0, &model, &candidates, &probes, &known));
+        let found = compute(py, || verdict::decide(&self.0, &model, &candidates, &probes, &known))?;
         let found = found.ok_or_else(|| value_error("the normal equations cannot be solved"))?;
         Ok(PyVerdict::new(&self.0, found))
     }
@@ -203,10 +203,10 @@ impl PyProblem {
         possible: Vec<usize>,
     ) -> PyResult<f64> {
         self.known(along.iter().chain(&members).chain(&possible))?;
-        let found = py.detach(|| {
+        let found = compute(py, || {
             let criterion = Criterion::new(&self.0);
             Search::new(&criterion, &along, &possible).ln_evidence(&members)
-        });
+        })?;
         found.ok_or_else(|| value_error("the normal equations cannot be solved"))
     }
 
@@ -215,7 +215,7 @@ impl PyProblem {
     fn zero_noise(&self, py: Python<'_>, slots: Vec<usize>) -> PyResult<Vec<ZeroNoise>> {
         self.known(&slots)?;
         let parameters = parameters_of(slots.iter().map(|s| &self.0.slots[*s]));
-        let found = py.detach(|| stack::zero_noise(&self.0, &parameters));
+        let found = compute(py, || stack::zero_noise(&self.0, &parameters))?;
         let row = |z: &stack::ZeroNoise| (z.log, z.channel, z.walk, z.scatter, z.block);
         Ok(found.iter().map(row).collect())
     }
@@ -230,7 +230,7 @@ impl PyProblem {
         candidates: Vec<usize>,
     ) -> PyResult<Vec<(usize, Option<usize>)>> {
         self.known(model.iter().chain(&members).chain(&candidates))?;
-        let found = py.detach(|| revision::revisions(&self.0, &model, &members, &candidates));
+        let found = compute(py, || revision::revisions(&self.0, &model, &members, &candidates))?;
         Ok(found.iter().map(|r| (r.slot, r.by)).collect())
     }
 
@@ -247,7 +247,7 @@ impl PyProblem {
     /// The slot among `members` of the model that its others make needless most of all, to first order; None if none is.
     fn needless(&self, py: Python<'_>, model: Vec<usize>, members: Vec<usize>) -> PyResult<Option<usize>> {
         self.known(model.iter().chain(&members))?;
-        Ok(py.detach(|| revision::needless(&self.0, &model, &members)))
+        compute(py, || revision::needless(&self.0, &model, &members))
     }
 
     /// Residual of one log at a step (p,) of all parameters: RMS and mean by channel and block, and binned panels, in the

@@ -5,6 +5,7 @@ mod allan;
 mod arrays;
 mod attitude;
 mod calibration;
+mod computing;
 mod correction;
 mod device;
 mod errors;

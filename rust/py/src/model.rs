@@ -12,6 +12,7 @@ use imufit_model::sensor::Sensor;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::computing::compute;
 use crate::errors::from_effect;
 use crate::window::ChunkArrays;
 
@@ -197,8 +198,7 @@ impl PyEffect {
         let arrays = ChunkArrays::new(chunk)?;
         let window = arrays.window()?;
         let py = chunk.py();
-        py.detach(|| contract::check(&self.0, &at, &window, &facts.facts))
-            .map_err(from_effect)
+        compute(py, || contract::check(&self.0, &at, &window, &facts.facts))?.map_err(from_effect)
     }
 }
 

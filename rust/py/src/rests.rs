@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::computing::compute;
 use crate::errors::{from_effect, value_error};
 use crate::model::{PyEffect, PyFacts};
 use crate::window::ChunkArrays;
@@ -114,7 +115,7 @@ fn rests_tell(py: Python<'_>, effect: &PyEffect, facts: &PyFacts, rests: &Bound<
         let model = SensorModel::new(Vec::new(), vec![(effect.0.clone(), trial)], &facts.facts)?;
         rests.tell(&model, &facts.facts)
     };
-    py.detach(told).map_err(from_effect)
+    compute(py, told)?.map_err(from_effect)
 }
 
 /// Facts of a log without a reference. `rows`: number, first and last time (s), time between them (s). `field`: length of the

@@ -8,6 +8,7 @@ use numpy::{PyArray3, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use crate::arrays::Rows;
+use crate::computing::pool;
 use crate::errors::{from_filters, value_error};
 use crate::replay_arguments::{Readings, look, sorted, start_of, surroundings};
 
@@ -82,7 +83,10 @@ fn filter_trials<'py>(
     };
     let description = filter::find(name).map_err(from_filters)?;
     let settings: Vec<_> = settings.into_iter().map(|each| sorted(Some(each))).collect();
-    let scores = py.detach(|| trials::run(description, &settings, conditions, &columns, &judgement, look))?;
+    let pool = pool(py)?;
+    let scored = || trials::run(description, &settings, conditions, &columns, &judgement, &pool, look);
+    #[allow(clippy::disallowed_methods)] // it looks for Ctrl-C on this thread
+    let scores = py.detach(scored)?;
     let nested: Vec<Vec<Vec<f64>>> = scores
         .iter()
         .map(|parts| parts.iter().map(|score| numbers(score).to_vec()).collect())

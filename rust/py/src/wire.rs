@@ -43,6 +43,7 @@ macro_rules! decoder_class {
 
             /// Takes some bytes, which may begin and end anywhere.
             fn feed(&mut self, py: Python<'_>, data: &[u8]) {
+                #[allow(clippy::disallowed_methods)] // a few bytes, hundreds of times a second: on this thread
                 py.detach(|| self.0.feed(data));
             }
 
