@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.errors import InputError
-from imufit.fit.log_evidence import LogEvidence, Values
+from imufit.fit.log_evidence import LogEvidence, Values, evidence_again
 from imufit.fit.profile import Found, search
 from imufit.fit.rest_passes import RestPasses
 from imufit.fit.surveyed_log import SurveyedLog, survey
@@ -18,8 +19,9 @@ from imufit.fit.users_effects import check_users_effects
 from imufit.log import LogSource
 from imufit.log.several import name_of
 from imufit.model.catalogue import each_log_has_its_own, effects, find_effect, unnamed_effects
+from imufit.model.effect import registered
 from imufit.model.effect_stack import EffectStack
-from imufit.progress import Progress
+from imufit.progress import Progress, silent
 from imufit.results import DataFault
 
 Array = NDArray[np.float64]
@@ -417,6 +419,90 @@ class Analysis:
             analysis = analysis.around(*analysis.moved_to(estimate), lean=True)
             estimate = analysis.estimate()
         return analysis, estimate
+
+
+@dataclass(frozen=True, eq=False)
+class KeptAnalysis:
+    """An analysis without its evidence, as it goes into a pickle: from the logs the same evidence is taken again.
+
+    Attributes
+    ----------
+    together : tuple of LogSource
+        Logs that were surveyed together.
+    numbers : tuple of int
+        Which of them the analysis is of.
+    evidence : tuple of dict
+        What is known of each of these without another pass, see `imufit.fit.log_evidence.evidence_again`.
+    model, own, unnamed, found
+        As those of the analysis.
+    candidates, probes : tuple of str
+        Ids.
+    users : tuple of Effect
+        Effects of the user's among the candidates.
+    """
+
+    together: tuple[LogSource, ...]
+    numbers: tuple[int, ...]
+    evidence: tuple[dict[str, Any], ...]
+    model: EffectStack
+    own: tuple[dict[str, list[float]], ...]
+    unnamed: tuple[str, ...]
+    candidates: tuple[str, ...]
+    probes: tuple[str, ...]
+    found: dict[str, Found]
+    users: tuple[_imufit.Effect, ...]
+
+    @classmethod
+    def of(cls, analysis: Analysis) -> KeptAnalysis:
+        """Keep what is needed of an analysis.
+
+        Parameters
+        ----------
+        analysis : Analysis
+            The analysis.
+        """
+        places = [each.surveyed.place for each in analysis.logs]
+        evidence = [
+            {
+                item.name: getattr(each, item.name)
+                for item in fields(each)
+                if item.name not in ("surveyed", "raw", "white")
+            }
+            | {"one": each.raw is each.white}
+            for each in analysis.logs
+        ]
+        users = tuple(effect for key, effect in analysis.candidates.items() if key in registered())
+        return cls(
+            places[0][0],
+            tuple(number for _, number in places),
+            tuple(evidence),
+            analysis.model,
+            analysis.own,
+            analysis.unnamed,
+            tuple(analysis.candidates),
+            analysis.probes,
+            analysis.found,
+            users,
+        )
+
+    def restored(self) -> Analysis:
+        """Take the evidence of the logs again.
+
+        Raises
+        ------
+        InputError
+            The file of a log cannot be read any more.
+        """
+        surveyed = survey(self.model, self.together, silent, keep_constants=False)
+        chosen = [surveyed[number] for number in self.numbers]
+        logs = [
+            evidence_again(each, _fitted(each, self.model, self.unnamed, own), like, self.found)
+            for each, own, like in zip(chosen, self.own, self.evidence, strict=True)
+        ]
+        known = {key: effect for each in chosen for key, effect in each.effects.items()}
+        candidates = {key: known[key] for key in self.candidates}
+        problem = _problem(logs, self.model, self.unnamed, [*candidates, *self.probes])
+        return Analysis(tuple(logs), self.model, self.own, self.unnamed, candidates, self.probes, self.found, problem)
 
 
 def _by_slot(analysis: Analysis, slots: Sequence[int], parameters: Array) -> dict[int, Array]:

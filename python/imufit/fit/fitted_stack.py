@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from imufit.errors import InputError
-from imufit.fit.analysis import Analysis, Estimate
+from imufit.fit.analysis import Analysis, Estimate, KeptAnalysis
 from imufit.log.several import Logs, logs_of, name_of
 from imufit.model.catalogue import each_log_has_its_own, find_effect
 from imufit.model.effect_stack import EffectStack
@@ -47,7 +47,8 @@ class FittedStack:
     """
 
     def __init__(self, analysis: Analysis, estimate: Estimate) -> None:
-        self.analysis = analysis
+        self._analysis: Analysis | KeptAnalysis = analysis
+        self._logs = tuple(each.surveyed.log for each in analysis.logs)
         self.estimate = estimate
         self.model, self.own = analysis.moved_to(estimate)
         self.ratio = estimate.held_out
@@ -90,9 +91,21 @@ class FittedStack:
         return type(self)(analysis, analysis.estimate())
 
     @property
+    def analysis(self) -> Analysis:
+        """Evidence of the logs around the fitted parameters; a fit that was pickled takes it from its logs again."""
+        if isinstance(self._analysis, KeptAnalysis):
+            self._analysis = self._analysis.restored()
+        return self._analysis
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the evidence, which the logs give again when it is asked for."""
+        kept = self._analysis if isinstance(self._analysis, KeptAnalysis) else KeptAnalysis.of(self._analysis)
+        return {**self.__dict__, "_analysis": kept}
+
+    @property
     def logs(self) -> tuple[LogSource, ...]:
         """The logs."""
-        return tuple(each.surveyed.log for each in self.analysis.logs)
+        return self._logs
 
     @property
     def by_log(self) -> tuple[LogParameters, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -199,6 +200,33 @@ class LogEvidence:
             raw = passes.evidence(plain, facts, "taking evidence as it stands")
         # The noise is that of the first evidence, which every effect of the catalogue was fitted to.
         return replace(self, slots=(*fitted, *asked), raw=raw, white=white)
+
+
+def evidence_again(
+    surveyed: SurveyedLog, fitted: Values, like: Mapping[str, Any], found: Mapping[str, Found]
+) -> LogEvidence:
+    """Take evidence that was taken before once more, with the noise that was found then.
+
+    Parameters
+    ----------
+    surveyed : SurveyedLog
+        The log.
+    fitted : mapping of str to list of float
+        Effects that it was taken around, the model's and the unnamed ones, with their parameters.
+    like : mapping
+        Every attribute of that evidence but `surveyed` and the evidence itself; ``one``: plain and whitened were one.
+    found : mapping of str to Found
+        What searches found for the other effects.
+    """
+    known = {name: value for name, value in like.items() if name != "one"}
+    asked = [key for key in like["slots"] if key not in fitted]
+    white = _empty(surveyed, fitted, asked, found, like["filters"])
+    surveyed.passes.evidence(white, surveyed.facts, "taking evidence")
+    raw = white
+    if not like["one"]:
+        plain = white.with_filters([[] for _ in CHANNELS])
+        raw = surveyed.passes.evidence(plain, surveyed.facts, "taking evidence as it stands")
+    return LogEvidence(surveyed=surveyed, raw=raw, white=white, **known)
 
 
 def _empty(

@@ -40,6 +40,8 @@ class SurveyedLog:
         Dependences without a name that it can be asked about, see `rust/model/src/probes`.
     faults : tuple of DataFault
         What is wrong with its data, as far as rows, units and frames show.
+    place : tuple
+        The logs that were surveyed together, whose facts depend on each other, and its number among them.
     """
 
     passes: Passes
@@ -49,16 +51,22 @@ class SurveyedLog:
     refused: dict[str, str]
     probes: dict[str, _imufit.Effect]
     faults: tuple[DataFault, ...] = ()
+    place: tuple[tuple[LogSource, ...], int] = ((), 0)
 
     @classmethod
     def of(
-        cls, passes: Passes, facts: _imufit.Facts, coverage: dict[str, float], faults: tuple[DataFault, ...] = ()
+        cls,
+        passes: Passes,
+        facts: _imufit.Facts,
+        coverage: dict[str, float],
+        faults: tuple[DataFault, ...] = (),
+        place: tuple[tuple[LogSource, ...], int] = ((), 0),
     ) -> SurveyedLog:
         """Ask a log of which effects it can tell.
 
         Parameters
         ----------
-        passes, facts, coverage, faults
+        passes, facts, coverage, faults, place
             As the attributes.
         """
         own = [name for name in coverage if name != "temp"]
@@ -74,7 +82,7 @@ class SurveyedLog:
         testable = {key: effect for key, effect in offered.items() if reasons[key] is None}
         refused = {key: reason for key, reason in reasons.items() if reason is not None and key not in unnamed}
         probes = {effect.id: effect for effect in _imufit.probes(facts)}
-        return cls(passes, facts, coverage, testable, refused, probes, faults)
+        return cls(passes, facts, coverage, testable, refused, probes, faults, place)
 
     @property
     def columns(self) -> dict[str, _imufit.Effect]:
@@ -135,8 +143,8 @@ def survey(
         facts = [each.with_bins_of(facts[:k] + facts[k + 1 :]) for k, each in enumerate(facts)]
     _check_sensors(logs, facts)
     return [
-        SurveyedLog.of(each, found, coverage, wrong)
-        for each, found, (_, coverage), wrong in zip(passes, facts, surveys, faults, strict=True)
+        SurveyedLog.of(each, found, coverage, wrong, (tuple(logs), number))
+        for number, (each, found, (_, coverage), wrong) in enumerate(zip(passes, facts, surveys, faults, strict=True))
     ]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copyreg
+import pickle
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,6 +29,8 @@ AFFINE = {
 """Parts of a gain and an offset, each with the stage and the parameters that it can have."""
 
 _registered: dict[str, _imufit.Effect] = {}
+_written: dict[str, tuple[Function, tuple[Any, ...]]] = {}
+"""Function and card of each, by id."""
 
 
 @dataclass(frozen=True)
@@ -177,12 +181,34 @@ def effect(
             "confirm": confirm,
         }
         columns = [(key, unit, sizes.get(key)) for key, unit in units.items()]
-        _registered[effect_id] = _imufit.python_effect(
-            effect_id, prefix, columns, words, stage, list(needs), traits, _call(effect_id, function, len(columns))
-        )
+        _register(function, (effect_id, prefix, columns, words, stage, list(needs), traits))
         return function
 
     return decorate
+
+
+def _register(function: Function, card: tuple[Any, ...]) -> _imufit.Effect:
+    effect_id, columns = card[0], card[2]
+    made = _imufit.python_effect(*(*card, _call(effect_id, function, len(columns))))
+    _registered[effect_id], _written[effect_id] = made, (function, card)
+    return made
+
+
+def _restored(effect_id: str, function: Function, card: tuple[Any, ...]) -> _imufit.Effect:
+    """Return a pickled effect; the import of its function's module may have defined it already."""
+    return _registered.get(effect_id) or _register(function, card)
+
+
+def _pickled(effect: _imufit.Effect) -> tuple[Any, ...]:
+    """Effects go into a pickle by their id; a user's with its card, and with its function as functions are pickled."""
+    if effect.id in _registered:
+        return _restored, (effect.id, *_written[effect.id])
+    if _imufit.find_effect(effect.id) is not None:
+        return _imufit.find_effect, (effect.id,)
+    raise pickle.PicklingError(f"the effect {effect.id} belongs to a log and is not pickled without it")
+
+
+copyreg.pickle(_imufit.Effect, _pickled)
 
 
 def _check_affine(effect_id: str, affine: str, stage: str, parameters: set[str], needs: Sequence[str]) -> None:
@@ -228,3 +254,4 @@ def registered() -> dict[str, _imufit.Effect]:
 def forget(effect_id: str) -> None:
     """Take a user-written effect out of the catalogue again."""
     _registered.pop(effect_id, None)
+    _written.pop(effect_id, None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -86,18 +86,16 @@ class Stream:
             first = initial.as_quat()[[3, 0, 1, 2]] if isinstance(initial, Rotation) else initial
             q0 = np.asarray(first, dtype=np.float64).tolist()
         self.sensors = tuple(sensors)
-        self._filters = {
-            name: _imufit.Filter(
-                name,
-                frame=frame,
-                gravity=gravity,
-                mag_reference=None if mag_reference is None else [float(x) for x in mag_reference],
-                settings=dict(chosen.get(name, {})),
-                rules=dict(chosen.get("replay", {})),
-                initial=q0,
-            )
-            for name in filters
+        surroundings: dict[str, Any] = {
+            "frame": frame,
+            "gravity": gravity,
+            "mag_reference": None if mag_reference is None else [float(x) for x in mag_reference],
+            "rules": dict(chosen.get("replay", {})),
+            "initial": q0,
         }
+        self._skipped_before: dict[str, dict[str, int]] = {}
+        self._made = {name: {**surroundings, "settings": dict(chosen.get(name, {}))} for name in filters}
+        self._filters = {name: _imufit.Filter(name, **given) for name, given in self._made.items()}
 
     @property
     def filters(self) -> tuple[str, ...]:
@@ -171,7 +169,7 @@ class Stream:
     @property
     def skipped(self) -> dict[str, int]:
         """Reason and number of rows of which something was not used, the largest of all filters."""
-        every = [running.skipped for running in self._filters.values()]
+        every = list(self._skipped().values())
         return {
             reason: max(one.get(reason, 0) for one in every) for reason in dict.fromkeys(r for o in every for r in o)
         }
@@ -191,10 +189,35 @@ class Stream:
         for name, values in state.items():
             self._filters[name].state = np.ascontiguousarray(values, dtype=np.float64)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """How the filters were made, how far they are, and what they skipped: the stream goes on to the bit."""
+        return {
+            "sensors": self.sensors,
+            "made": self._made,
+            "state": self.state,
+            "skipped": self._skipped(),
+        }
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        self.sensors = kept["sensors"]
+        self._made = kept["made"]
+        self._filters = {name: _imufit.Filter(name, **given) for name, given in self._made.items()}
+        self.state = kept["state"]
+        self._skipped_before = kept["skipped"]
+
     def reset(self) -> None:
         """Go back to before the first row."""
         for running in self._filters.values():
             running.reset()
+        self._skipped_before = {}
+
+    def _skipped(self) -> dict[str, dict[str, int]]:
+        """Rows skipped by each filter, by reason, those before the stream was pickled among them."""
+        both = {}
+        for name, running in self._filters.items():
+            before, now = self._skipped_before.get(name, {}), running.skipped
+            both[name] = {reason: before.get(reason, 0) + now.get(reason, 0) for reason in {**before, **now}}
+        return both
 
     def _of_sensors(self, given: Mapping[str, T | None], missing: T) -> dict[str, T]:
         """Pick the readings of the stream's sensors, `missing` where there is none."""
