@@ -61,10 +61,8 @@ def section(found: list[Kill], span: float, seed: int) -> str:
     ]
     table = "\n".join(["| | |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows)])
     load = os.getloadavg()[0] / (os.cpu_count() or 1)
-    return (
-        f"{table}\n\n`python benches/kills.py --kills {len(found)} --span {span:g} --seed {seed}`, {RATE:.0f} samples a "
-        f"second, load of the machine {load:.1f} per core."
-    )
+    command = f"`python benches/kills.py --kills {len(found)} --span {span:g} --seed {seed}`"
+    return f"{table}\n\n{command}, {RATE:.0f} samples a second, load of the machine {load:.1f} per core."
 
 
 def main() -> None:

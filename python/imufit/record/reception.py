@@ -173,6 +173,11 @@ class Reception:
         return {**nothing, **of_form, **whole, "bytes": self._bytes}
 
     @property
+    def unexplained(self) -> int:
+        """Samples that were given up since nothing said what they hold, also where no form is known."""
+        return int(self._frames.counts()["unexplained"])
+
+    @property
     def nothing_whole(self) -> str:
         """Why nothing could be decoded so far; empty if something was."""
         frames, lines = self._frames.counts(), self._lines.counts()

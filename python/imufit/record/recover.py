@@ -95,7 +95,7 @@ def _explain(begun: Beginning, wanted: Path, port: str | None) -> None:
     if not rows and port is not None:
         rows = _announced_now(reception, last.opening)
     rows += reception.finish()
-    if not rows and (waiting := reception.counts["unexplained"]):
+    if not rows and (waiting := reception.unexplained):
         raise InputError(
             f"{waiting} samples are in it, but the recording was killed before the device said what they hold",
             file=beginning_path(wanted),
