@@ -36,7 +36,7 @@ def written(log, pieces):
     file = BeginningFile(beginning_path(log), ABOUT)
     for piece in pieces:
         file.keep(piece)
-    file.close(needless=False)
+    file.close()
     return beginning_path(log)
 
 

@@ -56,6 +56,7 @@ class BeginningFile:
         self._room = MOST
         # a disk that stalls must not keep the line from being read
         self._writer = ThreadPoolExecutor(1)
+        self._over = False
         self._last: Future[None] | None = None
         self._append(_MARK + json.dumps({**about, "version": _VERSION}).encode() + b"\n")
 
@@ -72,18 +73,16 @@ class BeginningFile:
             head = _HEAD.pack(chunk.arrival, chunk.opening, len(chunk.data), zlib.crc32(chunk.data))
             self._append(head + chunk.data)
 
-    def close(self, *, needless: bool) -> None:
-        """Close the file.
+    def discard(self) -> None:
+        """Delete the file, some time until `close`: every row of it is written elsewhere."""
+        if not self._over:
+            self._over = True
+            self._writer.submit(self.path.unlink, missing_ok=True)
 
-        Parameters
-        ----------
-        needless : bool
-            Whether every row of it is written elsewhere: then it is deleted.
-        """
+    def close(self) -> None:
+        """Close the file once everything is written."""
         self._writer.shutdown()
         os.close(self._file)
-        if needless:
-            self.path.unlink(missing_ok=True)
 
     def _append(self, data: bytes) -> None:
         if self._last is not None and self._last.done():

@@ -136,8 +136,7 @@ class Journal:
         """Write the bytes that were read as they are, until rows that came out of them are written."""
         if self.n > 0:
             if self._beginning is not None:
-                self._beginning.close(needless=True)
-                self._beginning = None
+                self._beginning.discard()
             return
         chunk = self._reception.chunk
         if chunk is None:
@@ -152,10 +151,9 @@ class Journal:
             raise DiskError(f"{path} cannot be written ({error.strerror or error})") from None
 
     def close(self) -> None:
-        """Close the files; bytes that nothing explained are no recording."""
+        """Close the files."""
         if self._beginning is not None:
-            self._beginning.close(needless=True)
-            self._beginning = None
+            self._beginning.close()
         for part in self._parts:
             part.close()
 
