@@ -19,6 +19,8 @@ from imufit.record import recover
 PROGRAM = (sys.executable, "-c", "import sys; from imufit.cli.app import main; sys.exit(main())")
 RATE = 500.0
 """Samples a second."""
+LONGEST = 60.0
+"""Time after which a recorder ends by itself, s: one that is left behind would read the next device of that name."""
 STARTED = 30.0
 """Longest time for a recorder to open the port, s."""
 
@@ -64,7 +66,7 @@ def kill_one(device: Emulator, wait: float, folder: Path) -> Kill:
     """
     before, log = device.summary(), folder / "log.parquet"
     recorder = subprocess.Popen(
-        [*PROGRAM, "record", device.port, "-o", str(log), "--quiet"],
+        [*PROGRAM, "record", device.port, "-o", str(log), "--quiet", "--duration", str(LONGEST)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -76,6 +78,7 @@ def kill_one(device: Emulator, wait: float, folder: Path) -> Kill:
             assert recorder.poll() is None, "the recorder ended"
             time.sleep(0.0005)
         time.sleep(wait)
+        assert recorder.poll() is None, recorder.communicate()
     finally:
         at = time.time()
         recorder.kill()
