@@ -180,6 +180,10 @@ class World:
     def close(self):
         pass
 
+    @staticmethod
+    def write(_request):
+        """A device that does not listen: it announces itself when it likes."""
+
     def read(self, most):
         """What pyserial's read gives: bytes that have come, or an error."""
         data = self._follow(most)

@@ -98,6 +98,8 @@ class Program:
     def __init__(self, library: Path) -> None:
         self.library = ctypes.CDLL(str(library))
         self.library.host_now.restype = ctypes.c_double
+        self.library.host_ask.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_uint]
+        self.ask(0.0, count=0)
         self.library.host_run.argtypes = [
             ctypes.c_double,
             ctypes.c_double,
@@ -114,6 +116,10 @@ class Program:
 
     def now(self) -> float:
         return float(self.library.host_now())
+
+    def ask(self, first: float, every: float = 0.0, count: int = 1) -> None:
+        """Ask for announcements in the next run: first, and how far apart, s."""
+        self.library.host_ask(first, every, count)
 
     def run(self, seconds: float, start: int = 1, begin: float = 0.0) -> bytes:
         """Run it from its start; the bytes that it sent meanwhile."""

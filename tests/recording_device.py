@@ -66,6 +66,15 @@ class Pty:
             with contextlib.suppress(BlockingIOError):
                 data = data[os.write(self._ours, data) :]
 
+    def heard(self, seconds):
+        """What the listener says in that time."""
+        said, end = b"", time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            ready, _, _ = select.select([self._ours], [], [], left)
+            if ready:
+                said += os.read(self._ours, 4096)
+        return said
+
     def close(self):
         os.close(self._ours)
         os.close(self._theirs)

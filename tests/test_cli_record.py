@@ -5,6 +5,7 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import imufit
@@ -15,6 +16,13 @@ from recording_device import Pty, Sender, values_of
 
 PROGRAM = (sys.executable, "-c", "import sys; from imufit.cli.app import main; sys.exit(main())")
 PATIENCE = 60.0
+
+
+@pytest.fixture
+def again():
+    line = Pty()
+    yield line
+    line.close()
 
 
 @pytest.fixture
@@ -66,6 +74,35 @@ def sent_until(process, pty, device, part, size):
         n += 20
         time.sleep(0.02)
     return n
+
+
+def test_a_recording_that_is_killed_before_the_device_announced_itself_asks_it_afterwards(pty, again, tmp_path, capsys):
+    log, part, first = (tmp_path / f"walk.parquet{end}" for end in ("", ".part", ".part0"))
+    process, device = Process("record", pty.port, "-o", log), Sender()
+    head, samples = device.announce(), device.samples(range(300))
+    process.until(part.exists)
+    pty.heard(0.1)
+    pty.send(samples)
+    process.until(lambda: first.exists() and first.stat().st_size > len(samples))
+    process.end(signal.SIGKILL)
+    code, out, err = run(capsys, "recover", log)
+    assert (code, out) == (2, "")
+    assert "300 samples are in it" in err[0]
+    assert "--port PORT" in err[0]
+
+    def answer():
+        if b"\0" in again.heard(1.0):
+            again.send(head + device.samples(range(5000, 5010)))
+
+    plugged_in = threading.Thread(target=answer)
+    plugged_in.start()
+    code, out, err = run(capsys, "recover", log, "--port", again.port, "--json", "-")
+    plugged_in.join()
+    assert (code, err) == (0, [])
+    told = json.loads(out)
+    assert (told["n"], told["ended"], told["gaps"], told["port"]) == (300, "crash", [], pty.port)
+    np.testing.assert_array_equal(imufit.read(log).acc, values_of(range(300))[:, :3])
+    assert list(tmp_path.iterdir()) == [log]
 
 
 def test_a_recording_that_is_killed_is_recovered(pty, tmp_path, capsys):

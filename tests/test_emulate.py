@@ -2,10 +2,12 @@
 
 import os
 import threading
+import time
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import serial
 from emulated import intact, keys, read
 from imufit import InputError, Log
 from imufit.emulate import Clock, Emulator, open_source, parse_fault
@@ -37,6 +39,25 @@ def test_every_sample_arrives_once_and_holds_what_the_scenario_measures(on):
     sent = np.column_stack([v for group in source.groups.values() for v in group.values()])
     np.testing.assert_allclose(values, sent, rtol=1e-6)
     assert batch["rates"][0] == 500.0
+
+
+@pytest.mark.parametrize("on", ENDS)
+@pytest.mark.parametrize(("form", "answers"), [("binary", 1), ("text", 0)])
+def test_a_device_that_is_asked_announces_itself_at_once(on, form, answers):
+    def count_of(line, seconds):
+        data, end = b"", time.monotonic() + seconds
+        while time.monotonic() < end:
+            data += line.read(65536)
+            time.sleep(0.005)
+        return data.count(b"acc_x")
+
+    with (
+        Emulator(walk(), on=on, form=form, rate=100.0, wait=True) as device,
+        serial.serial_for_url(device.port, timeout=0) as line,
+    ):
+        assert count_of(line, 0.4) == 1
+        line.write(b"\0")
+        assert count_of(line, 0.2) == answers
 
 
 @pytest.mark.parametrize(

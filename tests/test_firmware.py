@@ -72,6 +72,26 @@ def test_it_announces_itself_at_the_start_and_once_a_second(gy86):
     assert len(times) == 5
 
 
+@pytest.mark.parametrize("name", ["uno_mpu6050", "stm32f4_gy86"])
+def test_it_announces_itself_when_it_is_asked(folder, name):
+    program = Program(folder / f"{name}.so")
+    program.ask(0.4)
+    program.run(1.3)
+    times = [t for t, frame in program.sent if b" MPU6050" in frame or b" GY-86" in frame]
+    np.testing.assert_allclose(times, [0.0, 0.4], atol=0.005, err_msg="the next one is due at 1.4 s")
+
+
+def test_whoever_asks_without_a_pause_takes_no_sample_away(gy86):
+    gy86.ask(0.5, every=0.001, count=2500)
+    decoder = decoded(gy86.run(3.0))
+    (batch,) = decoder.take()
+    assert len(batch["stamps"]) > 2800
+    assert decoder.counts()["lost"] == 0
+    times, sizes = np.array([(t, len(frame)) for t, frame in gy86.sent]).T
+    assert sizes[times > 0.5].sum() < 2.5 * 46080 * 0.75
+    assert sum(b"STM32F4 GY-86" in frame for _, frame in gy86.sent) == pytest.approx(2.5 / 0.05, abs=2)
+
+
 @pytest.mark.parametrize(
     ("fault", "said"), [(NO_ANSWER, "MPU6050: no answer"), (STUCK, "MPU6050: the bus does not go on")]
 )

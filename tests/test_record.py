@@ -152,6 +152,43 @@ def test_a_line_that_is_unplugged_in_a_frame_goes_on_when_it_is_back(plug, tmp_p
     assert (gap.reason, gap.frames, gap.t_start, gap.t_end) == ("unplugged", 2, log.t[99], log.t[100])
 
 
+def test_a_line_is_open_again_at_once_however_long_it_was_away(plug, tmp_path):
+    recorder = Recorder(plug.port, tmp_path / "a.parquet")
+    plug.plug()
+    device = Sender()
+    plug.send(device.announce() + device.samples(range(10)))
+    recorder.until(lambda: recorder.seen == 10)
+    plug.unplug(gone=True)
+    time.sleep(3.3)
+    back = time.monotonic()
+    plug.plug()
+    assert time.monotonic() - back < 0.3
+    plug.send(device.samples(range(10, 20)))
+    recorder.until(lambda: recorder.seen == 20)
+    assert recorder.result().gaps[0].reason == "unplugged"
+
+
+def test_a_device_is_asked_what_its_samples_hold_until_it_says_so(pty, tmp_path):
+    device = Sender()
+    head, early = device.announce(), device.samples(range(50))
+    recorder = Recorder(pty.port, tmp_path / "a.parquet")
+    pty.send(early)
+    assert pty.heard(0.25) in (b"\0" * 2, b"\0" * 3)
+    pty.send(head)
+    recorder.until(lambda: recorder.seen == 50)
+    pty.heard(0.05)
+    assert pty.heard(0.25) == b""
+    recorder.result()
+
+
+def test_a_device_that_is_said_to_send_text_is_not_asked(pty, tmp_path):
+    recorder = Recorder(pty.port, tmp_path / "a.parquet", form="text")
+    assert pty.heard(0.25) == b""
+    pty.send(TEXT.encode() + text_rows(range(10)))
+    recorder.until(lambda: recorder.seen >= 9)
+    recorder.result()
+
+
 def test_what_arrived_before_a_line_broke_is_not_lost_with_it(plug, tmp_path):
     """The device sends its last rows and is gone at once: they are read all the same."""
     device = Sender()

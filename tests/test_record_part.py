@@ -5,6 +5,8 @@ import multiprocessing
 import os
 import resource
 import signal
+import subprocess
+import sys
 import tempfile
 import threading
 from pathlib import Path
@@ -290,3 +292,29 @@ def test_nothing_is_written_behind_a_batch_that_failed(tmp_path, monkeypatch):
         file.write(rows(20, 10), told(10))
     file.close()
     assert read_part(tmp_path / "a.part").rows.n == 10
+
+
+FIRST_BATCH = """
+import sys
+from pathlib import Path
+import numpy as np
+from imufit.record import record
+from imufit.record.arrived import Announced, Arrived
+from imufit.record.part import PartFile
+before = set(sys.modules)
+file = PartFile(Path(sys.argv[1]))
+device = Announced("binary", "d", 1e-6, ("acc_x",))
+file.begin(device, {})
+whole = (np.zeros(1, kind) for kind in (np.uint32, np.uint8, np.uint32, np.uint16, np.uint32))
+file.write(Arrived(device, np.zeros(1), *whole, np.zeros((1, 1))), {})
+file.close()
+print(*sorted(set(sys.modules) - before))
+"""
+
+
+def test_the_first_batch_waits_for_no_package_to_be_loaded(tmp_path):
+    """Loading pandas takes a fifth of a second, and much more on a busy machine: so long nothing would be read."""
+    command = [sys.executable, "-c", FIRST_BATCH, str(tmp_path / "a.parquet.part")]
+    loaded = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+    assert "pandas" not in loaded
+    assert len(loaded) < 5

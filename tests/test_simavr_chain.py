@@ -5,12 +5,14 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
 import imufit
 import numpy as np
 import pytest
+import serial
 from firmware_host import make
 
 G = 9.80665
@@ -114,6 +116,19 @@ def test_the_angles_are_those_of_the_simulated_tilt(recorded, tmp_path):
         for name in FILTERS:
             found = np.degrees(table.loc[last, [f"{name}_roll", f"{name}_pitch"]].to_numpy(dtype=float))
             np.testing.assert_allclose(found, [roll, pitch], atol=0.05, err_msg=name)
+
+
+def test_it_announces_itself_when_it_is_asked(folder):
+    def count_of(line, seconds):
+        data, end = b"", time.monotonic() + seconds
+        while time.monotonic() < end:
+            data += line.read(4096)
+        return data.count(b"Uno MPU6050")
+
+    with device(folder, "--seconds", 3) as port, serial.Serial(port, timeout=0.02) as line:
+        assert count_of(line, 0.4) == 1
+        line.write(b"\0")
+        assert count_of(line, 0.3) == 1
 
 
 def test_a_sensor_whose_wires_come_off_comes_back(folder, tmp_path):

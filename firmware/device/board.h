@@ -14,6 +14,9 @@ uint32_t board_ticks(void);
 /* Sends a whole frame, or, if the line is behind, nothing: then false. Returns at once. */
 bool board_send(const uint8_t *bytes, uint16_t n);
 
+/* Whether the computer has asked for the announcement, by a byte 0, since this was last called. Returns at once. */
+bool board_asked(void);
+
 /* What came of a transfer on the bus. None takes longer than a few milliseconds, whatever the bus does. */
 enum bus {
     BUS_OK,

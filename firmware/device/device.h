@@ -24,6 +24,7 @@ struct device {
     struct wire wire;
     struct presence imu_is, magnetometer_is;
     uint32_t announced;
+    bool wanted;    /* the computer has asked for an announcement */
     uint32_t asked; /* ticks when the magnetometer was last told to measure */
     bool measuring;
 };

@@ -15,6 +15,8 @@ static transfer reads, writes;
 static line sends;
 static uint8_t start;
 static uint64_t now, end; /* ns */
+static uint64_t asks_next, asks_every; /* ns */
+static unsigned asks_left;
 static jmp_buf out;
 
 const uint32_t board_tick_ns = HOST_TICK_NS;
@@ -35,6 +37,14 @@ void host_run(double from, double seconds, uint8_t number, transfer read, transf
         program();
 }
 
+/* When the computer asks for announcements in the run to come: first, how far apart (s), how often. */
+void host_ask(double first, double every, unsigned count)
+{
+    asks_next = (uint64_t)(first * 1e9);
+    asks_every = (uint64_t)(every * 1e9);
+    asks_left = count;
+}
+
 double host_now(void)
 {
     return (double)now * 1e-9;
@@ -51,6 +61,16 @@ uint32_t board_ticks(void)
 bool board_send(const uint8_t *bytes, uint16_t n)
 {
     return sends(bytes, n);
+}
+
+bool board_asked(void)
+{
+    bool asked = asks_left > 0 && now >= asks_next;
+    if (asked) {
+        asks_next += asks_every;
+        asks_left--;
+    }
+    return asked;
 }
 
 enum bus board_read(uint8_t address, uint8_t reg, uint8_t *values, uint8_t n)

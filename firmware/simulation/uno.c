@@ -143,6 +143,15 @@ static bool has_reader(const struct simulation *s)
     return poll(&state, 1, 0) == 0 || !(state.revents & POLLHUP);
 }
 
+/* Passes on what the reader says. */
+static void line_hears(const struct simulation *s, struct avr_irq_t *input)
+{
+    struct pollfd state = {.fd = s->terminal, .events = POLLIN};
+    uint8_t byte;
+    if (poll(&state, 1, 0) == 1 && state.revents & POLLIN && read(s->terminal, &byte, 1) == 1)
+        avr_raise_irq(input, byte);
+}
+
 /* The serial line sends a byte: to nobody, if nobody listens. */
 static void line_says(struct avr_irq_t *irq, uint32_t value, void *parameter)
 {
@@ -256,6 +265,7 @@ int main(int count, char **arguments)
     uint32_t flags = 0; /* no copy of the line to standard output */
     avr_ioctl(s.avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
     avr_irq_register_notify(avr_io_getirq(s.avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), line_says, &s);
+    struct avr_irq_t *input = avr_io_getirq(s.avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
     open_terminal(&s);
 
     while (!has_reader(&s))
@@ -265,8 +275,10 @@ int main(int count, char **arguments)
         int state = avr_run(s.avr);
         if (state == cpu_Done || state == cpu_Crashed)
             give_up("the processor has stopped");
-        if (!fast && s.avr->cycle >= next) {
-            pace(&s, &begin);
+        if (s.avr->cycle >= next) {
+            line_hears(&s, input);
+            if (!fast)
+                pace(&s, &begin);
             next = s.avr->cycle + CLOCK / 1000;
         }
     }

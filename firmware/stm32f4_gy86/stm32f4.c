@@ -56,8 +56,10 @@ static void start_line(void)
 {
     give_pin(GPIOA, 2, 7);
     give_pin(GPIOA, 3, 7);
+    /* Pulled up: a pin that nothing is wired to receives nothing. */
+    GPIOA->pupdr = (GPIOA->pupdr & ~(3u << 2 * 3)) | 1u << 2 * 3;
     USART2_BRR = (stm32f4_bus_clock + BAUD / 2) / BAUD;
-    USART2_CR1 = USART_CR1_UE | USART_CR1_TE;
+    USART2_CR1 = USART_CR1_UE | USART_CR1_TE | USART_CR1_RE;
     NVIC_ISER[USART2_INTERRUPT / 32] = BIT(USART2_INTERRUPT % 32);
 }
 
@@ -114,6 +116,18 @@ void usart2_interrupt(void)
         USART2_DR = byte;
     else
         USART2_CR1 &= ~USART_CR1_TXEIE;
+}
+
+bool board_asked(void)
+{
+    bool asked = false;
+    uint32_t state;
+    while ((state = USART2_SR) & USART_SR_RXNE) {
+        uint8_t byte = (uint8_t)USART2_DR;
+        /* A line that is held low is no byte. */
+        asked |= byte == 0 && !(state & USART_SR_FE);
+    }
+    return asked;
 }
 
 bool board_send(const uint8_t *bytes, uint16_t n)

@@ -38,7 +38,7 @@ void uno_start(void)
     UCSR0A = _BV(U2X0);
     UBRR0 = BAUD_REGISTER;
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
-    UCSR0B = _BV(TXEN0);
+    UCSR0B = _BV(TXEN0) | _BV(RXEN0);
     uno_bus_start();
     sei();
 }
@@ -63,6 +63,18 @@ uint32_t board_ticks(void)
             high++;
     }
     return (uint32_t)high << 16 | low;
+}
+
+bool board_asked(void)
+{
+    bool asked = false;
+    uint8_t state;
+    while ((state = UCSR0A) & _BV(RXC0)) {
+        uint8_t byte = UDR0;
+        /* A line that is held low is no byte. */
+        asked |= byte == 0 && !(state & _BV(FE0));
+    }
+    return asked;
 }
 
 bool board_send(const uint8_t *bytes, uint16_t n)

@@ -16,14 +16,17 @@ from imufit.cli.output import Output
 @click.option(
     "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="LOG", help="Log to write; without it the one meant to be."
 )
+@click.option("--port", metavar="PORT", help="The device, to ask what samples hold that came before it said so.")
 @click.option("--force", is_flag=True, help="Overwrite LOG if it is there already.")
 @click.option("--keep", is_flag=True, help="Keep the .part files.")
 @json_option
-def recover(file: Path, *, output: Path | None, force: bool, keep: bool, json_file: Path | None) -> None:
+def recover(
+    file: Path, *, output: Path | None, port: str | None, force: bool, keep: bool, json_file: Path | None
+) -> None:
     """Make the log of FILE, a LOG.part that `imufit record` left. Every whole batch is saved."""
     keep_inputs([file], [output, json_file])
     out = Output(json_file)
-    result = engine.recover(file, output, force=force, keep=keep)
+    result = engine.recover(file, output, port=port, force=force, keep=keep)
     out.say(result.sentence, bold=True)
     out.say(*result.sentences()[1:])
     out.table(result.gap_table())

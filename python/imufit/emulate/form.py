@@ -46,6 +46,15 @@ class Form(Protocol):
     def announce(self) -> bytes:
         """Return what says what rows hold."""
 
+    def asks(self, said: bytes) -> bool:
+        """Return whether a reader asks for the announcement.
+
+        Parameters
+        ----------
+        said : bytes
+            What it said.
+        """
+
     def rows(self, stamps: NDArray[np.uint32], values: Array) -> tuple[bytes, NDArray[np.uint64]]:
         """Return rows as bytes, and where each ends.
 
@@ -97,6 +106,10 @@ class Binary:
         self.sequence += 1
         return self._encoder.announce()
 
+    def asks(self, said: bytes) -> bool:
+        """Return whether a byte 0 came, as docs/wire.md has it."""
+        return self.end in said
+
     def rows(self, stamps: NDArray[np.uint32], values: Array) -> tuple[bytes, NDArray[np.uint64]]:
         """Return samples as frames, and where each ends."""
         self.sequence += len(stamps)
@@ -133,6 +146,10 @@ class Text:
         """Return the header: ticks of a millisecond are called t_ms, all others become t_us."""
         time = "t_ms" if self._tick == 1_000_000 else "t_us"
         return (",".join([time, *self._device.columns]) + "\r\n").encode()
+
+    def asks(self, said: bytes) -> bool:
+        """Return False: a sketch that prints text listens to nobody."""
+        return False
 
     def rows(self, stamps: NDArray[np.uint32], values: Array) -> tuple[bytes, NDArray[np.uint64]]:
         """Return lines, and where each ends; what is not there is an empty cell."""

@@ -19,6 +19,8 @@ from imufit.errors import InputError
 
 SETTLING = 0.1
 """Time (s) that a reader gets before anything is sent: pyserial throws away what is there when it opens a port."""
+HEARD = 4096
+"""Bytes of a reader that are looked at at once."""
 QUEUED = 0.02
 """Time (s) in which the system passes on what was written to a pty."""
 _PREFIX = "socket://"
@@ -52,6 +54,9 @@ class Line(Protocol):
         int
             Bytes that were taken; 0 if the reader does not read, or has gone.
         """
+
+    def heard(self) -> bytes:
+        """Return what the reader has said since this was last asked."""
 
     def drain(self, patience: float) -> None:
         """Wait until the reader has read what was written, for at most `patience` (s)."""
@@ -126,6 +131,13 @@ class Pty:
             return 0
         return self.write(data, 0.0)
 
+    def heard(self) -> bytes:
+        """Return what the reader has said since this was last asked."""
+        try:
+            return os.read(self._master, HEARD)
+        except OSError:  # nothing, or nobody
+            return b""
+
     def drain(self, patience: float) -> None:
         """Wait until the reader has read what was written, for at most `patience` (s)."""
         until = time.monotonic() + patience
@@ -171,6 +183,7 @@ class Socket:
         self._server: socket.socket | None = None
         self._reader: socket.socket | None = None
         self._since = 0.0
+        self._heard = b""
 
     @property
     def address(self) -> str:
@@ -205,15 +218,20 @@ class Socket:
                 return False
             self._reader.setblocking(False)
             self._reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._heard = b""
             self._since = time.monotonic()
         return self._reader is not None and time.monotonic() - self._since >= SETTLING
 
-    @staticmethod
-    def _left(reader: socket.socket) -> bool:
-        """Return whether the reader has closed its end; what it says is thrown away."""
+    def heard(self) -> bytes:
+        """Return what the reader has said since this was last asked."""
+        said, self._heard = self._heard, b""
+        return said
+
+    def _left(self, reader: socket.socket) -> bool:
+        """Return whether the reader has closed its end; the last of what it says is kept until it is asked for."""
         try:
-            while data := reader.recv(4096):
-                del data
+            while data := reader.recv(HEARD):
+                self._heard = (self._heard + data)[-HEARD:]
         except BlockingIOError:
             return False
         except OSError:

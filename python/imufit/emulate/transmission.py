@@ -85,6 +85,7 @@ class Transmission:
         self._row, self._announce_at, self._plug_at = 0, 0.0, -np.inf
         # Whether the next byte begins a frame for the reader.
         self._clear, self._greeted = True, False
+        self._asked = False
         self.counts: Counter[str] = Counter()
         self.struck: list[Fault] = []
         self.starts = 1
@@ -112,8 +113,10 @@ class Transmission:
             if self._plug_at > -np.inf and t >= self._plug_at:
                 self._plug_at = -np.inf
                 self._is.line.open()
-            if t >= self._announce_at:
+            self._asked |= self._form.asks(self._is.line.heard())
+            if t >= self._announce_at or (self._asked and self._is.line.attached()):
                 self._announce()
+                self._asked = False
                 self._announce_at = t + self._form.every
             faults = schedule.due(t)
             if faults:

@@ -1,4 +1,4 @@
-"""Rows as they come from a line: what the device says they hold, the numbers, and when they arrived."""
+"""Bytes and rows as they come from a line: what the device says they hold, the numbers, and when they arrived."""
 
 from __future__ import annotations
 
@@ -12,6 +12,26 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FORMS: Final = ("binary", "text")
+_ROWS: Final = ("arrival", "opening", "start", "stamps", "sequence", "lost", "values")
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Bytes as they were read at once.
+
+    Attributes
+    ----------
+    arrival : float
+        When, s on the clock of `time.monotonic`.
+    opening : int
+        How often the line was opened anew before.
+    data : bytes
+        At least one.
+    """
+
+    arrival: float
+    opening: int
+    data: bytes
 
 
 @dataclass(frozen=True)
@@ -87,8 +107,17 @@ class Arrived:
         parts : sequence of Arrived
             At least one.
         """
-        names = ("arrival", "opening", "start", "stamps", "sequence", "lost", "values")
-        return cls(parts[0].announced, *(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+        return cls(parts[0].announced, *(np.concatenate([getattr(p, name) for p in parts]) for name in _ROWS))
+
+    def where(self, wanted: NDArray[np.bool_]) -> Arrived:
+        """Return some of the rows.
+
+        Parameters
+        ----------
+        wanted : (n,) array of bool
+            Which.
+        """
+        return Arrived(self.announced, *(getattr(self, name)[wanted] for name in _ROWS))
 
 
 def of_frames(batch: Any, arrival: Array, opening: NDArray[np.uint32]) -> Arrived:

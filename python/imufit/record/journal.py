@@ -1,4 +1,4 @@
-"""What a running recording writes: rows in parts, a batch every quarter of a second."""
+"""What a running recording writes: bytes until rows come out of them, then rows, a batch five times a second."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from typing import Any, Final
 from imufit.errors import InputError
 from imufit.log.metadata import Frame
 from imufit.record.arrived import Arrived
+from imufit.record.beginning import BeginningFile, beginning_path
 from imufit.record.columns import Columns
 from imufit.record.finish import utc_now
-from imufit.record.part import PartFile, part_path, parts_of
+from imufit.record.part import PartFile, part_path
 from imufit.record.reception import Reception
 
-EVERY: Final = 0.25
-"""Time after which rows are written, s: what a crash may cost."""
+EVERY: Final = 0.2
+"""Time after which rows are written, s: with the time that reading and writing take, a crash costs less than 0.25 s."""
 
 
 class DiskError(InputError):
@@ -25,6 +26,8 @@ class DiskError(InputError):
 
 class Journal:
     """The parts of a recording; another one begins when the device announces other columns.
+
+    Until the first rows are in a part, the bytes themselves are kept: a device may announce itself late.
 
     Parameters
     ----------
@@ -60,13 +63,15 @@ class Journal:
         self._texts: list[tuple[float, str]] = []
         self._lost_since: float | None = None
         self._next = 0.0
-        if parts_of(log):
-            raise InputError(
-                "an earlier recording left this part",
-                file=part_path(log),
-                remedy=f"Run imufit recover {part_path(log)} first, or delete it.",
-            )
+        for left in (part_path(log), beginning_path(log)):
+            if left.exists():
+                raise InputError(
+                    "an earlier recording left this part",
+                    file=left,
+                    remedy=f"Run imufit recover {left} first, or delete it.",
+                )
         self._parts = [self._made(1)]
+        self._beginning: BeginningFile | None = None
 
     def _made(self, number: int) -> PartFile:
         path = part_path(self._log, number)
@@ -98,6 +103,7 @@ class Journal:
             The device announces columns of which no log can be made. What came before stays.
         """
         now = time.monotonic()
+        self._keep_beginning()
         self._texts += [(now, text) for text in texts]
         for part in rows:
             if self._held and self._held[-1].announced != part.announced:
@@ -126,8 +132,28 @@ class Journal:
         for part in self._parts:
             self._guarded(part, part.settle)
 
+    def _keep_beginning(self) -> None:
+        """Write the bytes that were read as they are, until rows that came out of them are written."""
+        if self.n > 0:
+            if self._beginning is not None:
+                self._beginning.discard()
+            return
+        chunk = self._reception.chunk
+        if chunk is None:
+            return
+        path = beginning_path(self._log)
+        try:
+            if self._beginning is None:
+                how = {**self._reception.told, "baud": self._reception.line.baud}
+                self._beginning = BeginningFile(path, {"about": self._about, "how": how})
+            self._beginning.keep(chunk)
+        except OSError as error:
+            raise DiskError(f"{path} cannot be written ({error.strerror or error})") from None
+
     def close(self) -> None:
         """Close the files."""
+        if self._beginning is not None:
+            self._beginning.close()
         for part in self._parts:
             part.close()
 

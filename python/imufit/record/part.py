@@ -159,7 +159,7 @@ class PartFile:
         raw = [np.empty(0, k) if rows is None else getattr(rows, name) for name, k in _RAW.items()]
         values = np.empty((width, 0)) if rows is None else np.ascontiguousarray(rows.values.T)
         columns = [*raw, *values]
-        batch = pa.RecordBatch.from_arrays([pa.array(c) for c in columns], schema=self._schema)
+        batch = pa.RecordBatch.from_arrays([_array(c) for c in columns], schema=self._schema)
         note = json.dumps({**told, "check": _check(columns)}).encode()
         self._stream.write_batch(batch, custom_metadata={_KEY: note})
         self._append(0 if rows is None else rows.n)
@@ -210,6 +210,12 @@ class PartFile:
             raise
         self._whole += done
         self.rows += rows
+
+
+def _array(column: NDArray[Any]) -> Any:
+    """Return a column as Arrow has it; pa.array would load pandas first, while the line is not read."""
+    whole = np.ascontiguousarray(column)
+    return pa.Array.from_buffers(pa.from_numpy_dtype(whole.dtype), whole.size, [None, pa.py_buffer(whole)])
 
 
 def _schema(announced: Announced) -> Any:

@@ -11,12 +11,16 @@ import numpy as np
 
 from imufit import _imufit
 from imufit.errors import InputError
-from imufit.record.arrived import FORMS, Arrived, of_frames, of_lines
+from imufit.record.arrived import FORMS, Arrived, Chunk, of_frames, of_lines
 from imufit.record.transport import Line
 
 PAUSE: Final = (0.006, 0.012)
 """Shortest and longest wait between two reads, s: irregular, so that no rate of a device falls in step with it."""
 
+ASK_EVERY: Final = 0.1
+"""Time between two requests to a device that has not said yet what its samples hold, s."""
+ASK_FOR: Final = 1.0
+"""Time for which it is asked after the line was opened, s: then it announces itself by itself, or speaks no frames."""
 _DOUBTFUL: Final = 50
 
 
@@ -36,6 +40,10 @@ class Reception:
     ----------
     form : str or None
         The form, once it is known.
+    told : dict
+        ``form`` and ``header`` as they were given.
+    chunk : Chunk or None
+        What the last read brought; None if it was nothing.
     """
 
     def __init__(self, line: Line, form: str = "auto", header: str | None = None) -> None:
@@ -47,7 +55,11 @@ class Reception:
                 "a header names the columns of text, not of binary frames", remedy="Leave one of them out."
             )
         self.form: str | None = "text" if header is not None else None if form == "auto" else form
-        self._opening = line.opening
+        self.told = {"form": form, "header": header}
+        self.chunk: Chunk | None = None
+        self._decoded = line.opening
+        self._opening = -1  # of the line as it was read last: not at all
+        self._asking = (0.0, 0.0)  # when to ask next, and until when
         self._bytes = 0
         self._damaged: int | None = None
         self._texts: list[str] = []
@@ -65,26 +77,49 @@ class Reception:
         """Read once; return what has become whole."""
         data = self.line.read()
         now = time.monotonic()
-        # what came before the line was lost was decoded then
-        if self.line.opening != self._opening:
-            self._opening = self.line.opening
+        self.chunk = Chunk(now, self.line.opening, data) if data else None
+        rows = [] if self.chunk is None else self.take_in(self.chunk)
+        self._ask(now, known=bool(rows))
+        return rows
+
+    def take_in(self, chunk: Chunk) -> list[Arrived]:
+        """Decode bytes that were read, now or earlier; return what has become whole.
+
+        Parameters
+        ----------
+        chunk : Chunk
+            The bytes, in the order in which they were read.
+        """
+        if chunk.opening != self._decoded:
+            # half a frame from before the line was lost does not go on
+            self._decoded = chunk.opening
             self._frames.interrupted()
             self._lines.interrupted()
-        if not data:
-            return []
-        self._bytes += len(data)
+        self._bytes += len(chunk.data)
         if self.form != "text":
-            self._frames.feed(data)
-            self._feeds.append((now, self._opening))
+            self._frames.feed(chunk.data)
+            self._feeds.append((chunk.arrival, chunk.opening))
         if self.form != "binary":
-            self._lines.feed(data)
-        return self._taken(now)
+            self._lines.feed(chunk.data)
+        return self._taken(chunk.arrival)
+
+    def _ask(self, now: float, *, known: bool) -> None:
+        """Ask the device to announce itself, from each opening of the line until it is known what its samples hold."""
+        if self.line.opening != self._opening and self.line.lost_since is None:
+            self._opening = self.line.opening
+            self._asking = (now, now + ASK_FOR)
+        if known or self.form == "text":
+            self._asking = (np.inf, now)
+        if self._asking[0] <= now <= self._asking[1]:
+            self._asking = (now + ASK_EVERY, self._asking[1])
+            self.line.ask()
 
     def finish(self) -> list[Arrived]:
         """Nothing more is read: return samples that still wait for an announcement, if there ever was one.
 
         Half a frame that is left is no damage: it is this end that cuts it.
         """
+        self.chunk = None
         if self.form is not None:
             self._damaged = self.counts["damaged"]
         if self.form != "text":
@@ -101,7 +136,7 @@ class Reception:
                 self._doubtful = []
             self._texts += texts
         if self.form != "binary":
-            rows = [of_lines(batch, now, self._opening) for batch in self._lines.take()]
+            rows = [of_lines(batch, now, self._decoded) for batch in self._lines.take()]
             if self.form is None and rows:
                 self.form = "text"
             texts = self._lines.take_texts()
@@ -136,6 +171,11 @@ class Reception:
         of_form = {} if self.form is None else (self._lines if self.form == "text" else self._frames).counts()
         whole = {} if self._damaged is None else {"damaged": self._damaged}
         return {**nothing, **of_form, **whole, "bytes": self._bytes}
+
+    @property
+    def unexplained(self) -> int:
+        """Samples that were given up since nothing said what they hold, also where no form is known."""
+        return int(self._frames.counts()["unexplained"])
 
     @property
     def nothing_whole(self) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 from imufit.errors import InputError
 from imufit.log.metadata import Frame
 from imufit.record.arrived import Arrived
+from imufit.record.beginning import beginning_path
 from imufit.record.finish import check_target, log_of, unreadable, write_log
 from imufit.record.journal import DiskError, Journal
 from imufit.record.live_rows import check_mapping
@@ -143,6 +144,8 @@ def _finished(
 ) -> Recording:
     """Make the log of the parts, and delete them."""
     why, problem = end
+    # bytes that nothing explained are no recording; of others the rows are in the parts
+    beginning_path(path).unlink(missing_ok=True)
     if journal.n == 0:
         for part in journal.paths:
             part.unlink(missing_ok=True)

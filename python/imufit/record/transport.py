@@ -20,8 +20,13 @@ _FAILURES: Final = (OSError, ValueError, _TerminalError)
 
 BLOCK: Final = 1 << 16
 """Bytes read at once at most."""
-BACKOFF: Final = (0.1, 2.0)
-"""Shortest and longest wait between two attempts to open a lost line, s."""
+RETRY: Final = 0.1
+"""Wait between two attempts to open a lost line, s: the same however long it is away, so that what a device sends once
+it is back is read from its first quarter of a second on."""
+REQUEST: Final = b"\x00"
+"""What asks a device to announce itself (docs/wire.md): the end of a frame, which is no command of anything else."""
+
+_STUCK: Final = 0.01  # longest wait for a line that takes no byte, s: shorter than the time between two reads
 
 
 class Line:
@@ -54,7 +59,6 @@ class Line:
         self.lost_since: float | None = None
         self.why = ""
         self._serial: serial.SerialBase | None = None
-        self._wait = BACKOFF[0]
         self._next_try = 0.0
 
     def open(self) -> None:
@@ -81,6 +85,12 @@ class Line:
             self._lost(error)
             return b""
 
+    def ask(self) -> None:
+        """Ask the device to announce itself; one that does not listen is asked in vain."""
+        if self._serial is not None:
+            with contextlib.suppress(OSError):  # a line that breaks now is found lost when it is read
+                self._serial.write(REQUEST)
+
     def close(self) -> None:
         """Close the line."""
         if self._serial is not None:
@@ -92,7 +102,9 @@ class Line:
         import serial  # noqa: PLC0415 - only who records needs it
 
         # exclusive: two readers of one port would take each other's bytes
-        line = serial.serial_for_url(self.port, do_not_open=True, baudrate=self.baud, timeout=0, exclusive=True)
+        line = serial.serial_for_url(
+            self.port, do_not_open=True, baudrate=self.baud, timeout=0, write_timeout=_STUCK, exclusive=True
+        )
         if self.port.lower().startswith("socket:"):
             # what comes with the connection is no rest of an earlier one, as it may be with a serial port
             line.reset_input_buffer = lambda: None  # type: ignore[method-assign]
@@ -103,8 +115,7 @@ class Line:
         self.close()
         self.why = str(error)
         self.lost_since = time.monotonic()
-        self._wait = BACKOFF[0]
-        self._next_try = self.lost_since + self._wait
+        self._next_try = self.lost_since + RETRY
 
     def _reopen(self) -> bool:
         """Try to open the line again, if it is time for that."""
@@ -114,8 +125,7 @@ class Line:
             self._serial = self._opened()
         except _FAILURES as error:
             self.why = str(error)
-            self._wait = min(2.0 * self._wait, BACKOFF[1])
-            self._next_try = time.monotonic() + self._wait
+            self._next_try = time.monotonic() + RETRY
             return False
         self.lost_since = None
         self.opening += 1
