@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -12,11 +10,15 @@ import tomli_w
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.log.columns import LARGEST_COVARIATE
+from imufit.log.documents import table_from_toml
 from imufit.model.catalogue import find_effect
+from imufit.printable import NAME, printable
 from imufit.results import Parameter
 
 KIND = "imufit sensor model"
 FORMAT = 1
+_NUMBER = "Write a number in SI units."
 
 
 class EffectStack:
@@ -168,31 +170,53 @@ class EffectStack:
         """
         file = Path(path)
         try:
-            document = tomllib.loads(file.read_text(encoding="utf-8"))
+            document = table_from_toml(file, "Correct it: as it stands it is no TOML, so no model.")
         except OSError as error:
             raise InputError(
                 f"the model cannot be read ({error.strerror})", file=file, remedy="Check the name."
             ) from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InputError(f"this is no TOML: {error}", file=file) from None
         if document.get("kind") != KIND:
             raise InputError(f'the key kind is {document.get("kind")!r}, not "{KIND}"', file=file)
         if document.get("format") != FORMAT:
             raise InputError(f"format {document.get('format')!r} is not known", file=file, remedy="Update imufit.")
         try:
-            model = cls(
-                document.get("effects", []),
-                document.get("parameters", {}),
-                constants=document.get("constants", {}),
-                standard_errors=document.get("standard_errors", {}),
-            )
+            return cls._from_document(document)
         except InputError as error:
             raise InputError(error.problem, file=file, remedy=error.remedy) from None
-        for key, units in document.get("units", {}).items():
+
+    @classmethod
+    def _from_document(cls, document: Mapping[str, Any]) -> Self:
+        """Check every value that the file of a model may hold, and make the model."""
+        effects = document.get("effects", [])
+        if not isinstance(effects, list) or not all(isinstance(key, str) for key in effects):
+            raise InputError("effects is no list of names", remedy='Write for example effects = ["gyr.bias"].')
+        errors, constants = _table(document, "standard_errors"), _table(document, "constants")
+        for key in errors:
+            for name, error in _table(errors, key, "standard_errors.").items():
+                if isinstance(error, bool) or not isinstance(error, int | float):
+                    raise InputError(f"standard_errors.{key}.{name} is {_shown(error)}, not a number", remedy=_NUMBER)
+        means = _table(constants, "covariate_means", "constants.")
+        means["the temperature"] = constants.get("temperature_mean", 0.0)
+        for name, mean in means.items():
+            if not _is_usable(mean):
+                raise InputError(
+                    f"constants: the mean of {name} is {_shown(mean)}, not a finite number", remedy=_NUMBER
+                )
+        parameters = _table(document, "parameters")
+        model = cls(
+            effects,
+            {key: _table(parameters, key, "parameters.") for key in parameters},
+            constants=constants,
+            standard_errors=errors,
+        )
+        all_units = _table(document, "units")
+        for key in all_units:
+            units = _table(all_units, key, "units.")
             for name, unit, _ in find_effect(key).parameters:
                 if units.get(name, unit) != unit:
                     raise InputError(
-                        f"{key} {name} is in {units[name]}, not in {unit}", file=file, remedy="Convert the value."
+                        f"{key} {name} is in {printable(str(units[name]), NAME)}, not in {unit}",
+                        remedy="Convert the value.",
                     )
         return model
 
@@ -200,11 +224,28 @@ class EffectStack:
         return f"{type(self).__name__}([{', '.join(map(repr, self.effects))}])"
 
 
+def _table(holder: Mapping[str, Any], key: str, of: str = "") -> dict[str, Any]:
+    """Return a table of the file; empty where it is not there."""
+    table = holder.get(key, {})
+    if not isinstance(table, Mapping):
+        raise InputError(f"{of}{key} is {_shown(table)}, not a table", remedy=f"Write [{of}{key}] above its values.")
+    return dict(table)
+
+
+def _shown(value: Any) -> str:
+    return printable(repr(value), NAME)
+
+
+def _is_usable(value: Any) -> bool:
+    """Whether something is a number that can be worked with."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_COVARIATE
+
+
 def _values(effect: _imufit.Effect, given: Mapping[str, float]) -> list[float]:
     names = [name for name, _, _ in effect.parameters]
     for name, value in given.items():
         if name not in names:
             raise InputError(f"{effect.id} has no parameter {name}", remedy=f"It has {', '.join(names)}.")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(f"{effect.id} {name} is {value!r}, not a finite number")
+        if not _is_usable(value):
+            raise InputError(f"{effect.id} {name} is {_shown(value)}, not a finite number", remedy=_NUMBER)
     return [float(given.get(name, 0.0)) for name in names]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
 import tomli_w
 
 from imufit.errors import InputError
+from imufit.log.documents import table_from_toml
 from imufit.replay.replay import SETTINGS
 
 
@@ -42,10 +42,7 @@ def read_settings(path: str | Path) -> dict[str, dict[str, float]]:
         No TOML, an unknown filter or setting, or a value that is no number; the place is named.
     """
     path = Path(path)
-    try:
-        groups = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"not valid TOML ({error})", file=path) from None
+    groups = table_from_toml(path)
     settings: dict[str, dict[str, float]] = {}
     for group, values in groups.items():
         _known("filter", group, SETTINGS, path)
