@@ -182,3 +182,11 @@ def test_time_of_day_of_a_table_is_not_told_to_be_sorted(tmp_path: Path) -> None
     said = message(path)
     assert "row 20 (line 22), column t" in said
     assert "add 86400 s to t from this row on" in said
+
+
+def test_time_in_which_no_sensor_could_sample_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    pd.DataFrame({**COLUMNS, "t": np.arange(N) * 1e-9}).to_csv(path, index=False)
+    assert "more than any sensor samples: t is not in s" in message(path)
+    pd.DataFrame({**COLUMNS, "t": np.arange(N) * 1e-5}).to_csv(path, index=False)
+    assert read(path).n == N

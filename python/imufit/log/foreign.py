@@ -126,6 +126,7 @@ def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> Plan
             if column in names or (column == ROW and ROW not in names):
                 return _planned(target, column, sign=sign, unit=given, names=names, place=place)
     wanted = bare.lstrip("+-").strip()
+    names = [printable(name, NAME) for name in names]
     close = nearest(wanted, names, n=3)
     raise place.error(
         f"column {wanted} is not in the file, but the mapping takes {target} from it",
