@@ -68,7 +68,7 @@ def test_a_plateau_reached_slowly_is_an_end_if_the_noise_is_gone_there(seed):
 def test_model_with_the_end_of_a_range_is_held_against_a_log_that_never_comes_there():
     rng = np.random.default_rng(2)
     n = 2000
-    turn = Rotation.from_euler("z", np.sin(np.arange(n) / 100))
+    turn = Rotation.from_rotvec(np.outer(np.sin(np.arange(n) / 100), [0.0, 0.0, 1.0]))
     rate = np.stack([np.zeros(n), np.zeros(n), np.cos(np.arange(n) / 100)], axis=1)
     log = Log.from_arrays(
         np.arange(n) / 100,
