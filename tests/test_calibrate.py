@@ -393,6 +393,13 @@ def without_noise_of_hands():
     yield "six, each twice", twice, "magnitude", "6 different poses are too few"
     ring = [np.array([np.cos(a), np.sin(a), 0.0]) for a in np.arange(12) * 0.52]
     yield "a circle", log_of(sensor, course(ring), names="acc"), "magnitude", "cannot be found from"
+    yield "a circle, what to do", log_of(sensor, course(ring), names="acc"), "magnitude", "+z -z never pointed up"
+    errors = np.random.default_rng(1).normal(size=(8, 3))
+    sides = ("+x", "+y", "-y", "+z", "-z", "+x", "+y", "+z")
+    hand = [UP[side] + 0.1 * e for side, e in zip(sides, errors, strict=True)]
+    eight = log_of(sensor, course([v / np.linalg.norm(v) for v in hand]), names="acc")
+    yield "eight, held by hand", eight, None, "the 8 poses show 5 different positions (nearest sides"
+    yield "eight, what to do", eight, None, "Record also -x up, on a level table for 3 s each"
     yield "no sensor", Log.from_arrays(plain["t"], temp=np.ones(len(plain["t"]))), None, "there is nothing to calibrate"
 
 

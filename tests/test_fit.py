@@ -331,3 +331,27 @@ def test_a_model_is_compared_as_it_is():
 def test_chance_is_not_said_to_depend_on_anything():
     logs = [simulate.simulate("handheld", {}, seed, 40.0).to_log() for seed in range(5)]
     assert sum(len(SensorModel().compare(log).where) for log in logs) <= 2
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('[constants]\ntemperature_mean = "warm"', "the mean of the temperature is 'warm', not a finite number"),
+        ('[constants.covariate_means]\nvbat = "full"', "the mean of vbat is 'full', not a finite number"),
+        ("[constants]\ncovariate_means = 3", "constants.covariate_means is 3, not a table"),
+        ('[standard_errors."gyr.bias"]\nx = "small"', "standard_errors.gyr.bias.x is 'small', not a number"),
+        ("[standard_errors]\nx = 3", "standard_errors.x is 3, not a table"),
+        ("[[extra]]\n[units]\n'gyr.bias' = 3", "units.gyr.bias is 3, not a table"),
+        ("[parameters]\n'gyr.bias' = 3", "parameters.gyr.bias is 3, not a table"),
+        ("[parameters.'gyr.bias']\nx = 1e308", "gyr.bias x is 1e+308, not a finite number"),
+        (f"[parameters.'gyr.bias']\nx = 1{'0' * 400}", "x is an integer of more than 64 bits"),
+        (f"x = {'[' * 5000}{']' * 5000}", "stand within one another"),
+    ],
+)
+def test_text_and_tables_in_place_of_a_model_files_numbers_are_refused(tmp_path, line, words):
+    path = tmp_path / "model.toml"
+    path.write_text(f'kind = "imufit sensor model"\nformat = 1\neffects = ["gyr.bias"]\n{line}\n')
+    with pytest.raises(InputError) as caught:
+        SensorModel.load(path)
+    assert str(caught.value).startswith("model.toml: ")
+    assert words in str(caught.value)

@@ -12,10 +12,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from imufit.log import Log, LogSource, Metadata, concatenate, gaps, open_log, read
+from imufit.log.columns import LARGEST, LARGEST_COVARIATE
 from scipy.spatial.transform import Rotation
 
-finite = st.floats(allow_nan=False, allow_infinity=False, width=64)
-reading = st.one_of(finite, st.just(float("nan")))
+
+def readings(column: str) -> st.SearchStrategy[float]:
+    """Any number that the column may hold."""
+    largest = LARGEST.get(column, LARGEST_COVARIATE)
+    return st.one_of(st.floats(-largest, largest), st.just(float("nan")))
+
+
 words = st.text(st.characters(codec="utf-8", exclude_characters="\0\r\n"), max_size=6).map(lambda s: s and f"w {s}")
 
 
@@ -51,11 +57,12 @@ def logs(draw: st.DrawFn, least: int = 1) -> Log:
     t[0] -= 0.3  # whole numbers alone would be taken for ticks
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
 
-    def columns(k: int) -> Any:
-        some = draw(st.lists(reading, min_size=1, max_size=20))
+    def columns(k: int, column: str) -> Any:
+        some = draw(st.lists(readings(column), min_size=1, max_size=20))
         return rng.choice(np.array(some), size=(n, k) if k else n)
 
-    optional = {name: columns(k) for name, k in (("mag", 3), ("temp", 0), ("ref_p", 3)) if draw(st.booleans())}
+    kinds = (("mag", 3, "mag_x"), ("temp", 0, "temp"), ("ref_p", 3, "ref_px"))
+    optional = {name: columns(k, first) for name, k, first in kinds if draw(st.booleans())}
     if draw(st.booleans()):
         q = Rotation.random(n, rng=rng).as_quat(scalar_first=True)
         q[rng.random(n) < 0.2] = np.nan
@@ -66,7 +73,7 @@ def logs(draw: st.DrawFn, least: int = 1) -> Log:
         st.fixed_dictionaries(
             {"frame": st.sampled_from(["NED", "ENU", "NWU"]), "gravity": st.floats(0.1, 30.0)},
             optional={
-                "mag_reference": st.lists(finite, min_size=3, max_size=3),
+                "mag_reference": st.lists(st.floats(-1e8, 1e8), min_size=3, max_size=3),
                 "sensor": st.text(st.characters(codec="utf-8", exclude_categories=["Cc"]), max_size=8),
                 "noise": st.dictionaries(st.sampled_from(["acc", "gyr"]), st.floats(0.0, 1e3)),
                 "licence": st.text("abc \"'\\", max_size=5),
@@ -75,13 +82,12 @@ def logs(draw: st.DrawFn, least: int = 1) -> Log:
         )
     )
     metadata["mag_reference"] = metadata.get("mag_reference", [20.0, 0.0, 40.0])
-    acc = columns(3)
-    acc[:] = np.clip(acc, -1e300, 1e300)
+    acc = columns(3, "acc_x")
     return Log.from_arrays(
         t,
         acc=acc,
         pose=pose,
-        covariates={"motor_current": columns(0)},
+        covariates={"motor_current": columns(0, "motor_current")},
         labels=labels if any(labels["state"]) else {},
         **optional,
         **metadata,

@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
+from imufit import SensorModel
 from imufit.fit.range_end import RangeEnd
+from imufit.log import Log
+from scipy.spatial.transform import Rotation
 
 STEP = 1e-3
 
@@ -60,3 +63,21 @@ def test_a_plateau_reached_slowly_is_an_end_if_the_noise_is_gone_there(seed):
     readings = np.round((course[:, None] * [1.0, 0.5, -0.4] + 3 * STEP * rng.normal(size=(4500, 3))) / STEP) * STEP
     assert end(readings) is None
     assert end(np.minimum(readings, 3.2)) == 3.2
+
+
+def test_model_with_the_end_of_a_range_is_held_against_a_log_that_never_comes_there():
+    rng = np.random.default_rng(2)
+    n = 2000
+    turn = Rotation.from_rotvec(np.outer(np.sin(np.arange(n) / 100), [0.0, 0.0, 1.0]))
+    rate = np.stack([np.zeros(n), np.zeros(n), np.cos(np.arange(n) / 100)], axis=1)
+    log = Log.from_arrays(
+        np.arange(n) / 100,
+        acc=[0.0, 0.0, -9.80665] + 0.02 * rng.normal(size=(n, 3)),
+        gyr=rate + 1e-3 * rng.normal(size=(n, 3)),
+        reference=turn.as_quat(scalar_first=True),
+    )
+    ends = {"acc.saturation": {"range": 500.0}, "gyr.saturation": {"range": 100.0}}
+    plain = SensorModel(["gyr.bias"])
+    model = SensorModel(["gyr.bias", *ends], ends)
+    assert model.compare(log).sensors == pytest.approx(plain.compare(log).sensors)
+    assert model.fit(log).model.parameters["gyr.saturation"] == {"range": 100.0}

@@ -6,13 +6,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from imufit.printable import NAME, printable
+
 
 class InputError(ValueError):
     """Input that cannot be used, told in one line.
 
     The message reads ``file: row R, column C: problem. Remedy.``, with the parts that apply. Rows are counted from 0
     and are data rows as in the table; for text files the line of the file (counted from 1) stands behind it, as in
-    ``row 57 (line 59)``.
+    ``row 57 (line 59)``. The parts may hold text from files: the message shows it printable and bounded.
 
     Parameters
     ----------
@@ -40,11 +42,11 @@ class InputError(ValueError):
         remedy: str | None = None,
         line: int | None = None,
     ) -> None:
-        self.problem = problem
+        self.problem = printable(problem, keep="\n\t\r")
         self.file = None if file is None else str(file)
         self.row = row
         self.column = column
-        self.remedy = remedy
+        self.remedy = None if remedy is None else printable(remedy, keep="\n\t\r")
         self.line = line
         super().__init__(self._message())
 
@@ -54,9 +56,11 @@ class InputError(ValueError):
             where.append(f"row {self.row}" + ("" if self.line is None else f" (line {self.line})"))
         elif self.line is not None:
             where.append(f"line {self.line}")
-        if self.column is not None and not self.problem.startswith(f"column {self.column} "):
-            where.append(f"column {self.column}")
-        parts = [Path(self.file).name] if self.file else []
+        if self.column is not None:
+            column = printable(self.column, NAME)
+            if not self.problem.startswith(f"column {column} "):
+                where.append(f"column {column}")
+        parts = [printable(Path(self.file).name, NAME)] if self.file else []
         parts += [", ".join(where)] if where else []
         text = ": ".join([*parts, self.problem])
         if not text.endswith((".", "?", "!")):

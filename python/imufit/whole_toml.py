@@ -12,7 +12,6 @@ by hand needs neither, but has to end with a whole line; whether all is in it is
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from typing import Any
 import tomli_w
 
 from imufit.errors import InputError
+from imufit.log.documents import table_from_toml
 from imufit.whole_file import write_text
 
 LAST = "last"
@@ -78,14 +78,10 @@ def read_toml(path: str | Path, what: str) -> tuple[dict[str, Any], bool]:
     """
     file = Path(path)
     try:
+        document = table_from_toml(file, f"If it is cut off: {AGAIN.lower()}")
         text = file.read_bytes().decode("utf-8")
-        document = tomllib.loads(text)
     except OSError as error:
         raise InputError(f"{what} cannot be read ({error.strerror})", file=file, remedy="Check the name.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"this is no TOML, or not valid TOML: {error}", file=file, remedy=f"If it is cut off: {AGAIN.lower()}"
-        ) from None
     if not document:
         raise InputError(f"{what} is empty", file=file, remedy=AGAIN)
     marked = END in document

@@ -116,7 +116,7 @@ class _Session:
             mean = np.nan if temperature is None or temperature.mean is None else temperature.mean
             try:
                 if name == "acc":
-                    sensors["acc"], temperature = self._accelerometer(cost)
+                    sensors["acc"], temperature = self._accelerometer_told(cost)
                 elif name == "gyr" and (gyr := self._gyroscope(sensors.get("acc"), mean)) is not None:
                     sensors["gyr"] = gyr
                 elif name == "mag":
@@ -146,6 +146,13 @@ class _Session:
             texts = [f"pose {pose.number} ({pose.name}): {pose.reason}" for pose in left_out[:6]]
             more = f"; and {len(left_out) - 6} more" if len(left_out) > 6 else ""
             self.notes.append(f"Left out: {'; '.join(texts)}{more}.")
+
+    def _accelerometer_told(self, cost: str | None) -> tuple[SensorCalibration, Temperature | None]:
+        """Calibrate the accelerometer; where the equations do not suffice, say what that means on the table."""
+        try:
+            return self._accelerometer(cost)
+        except InputError as error:
+            raise error if error.file is not None else checks.too_few_positions(self.used, error, self.file) from None
 
     def _accelerometer(self, cost: str | None) -> tuple[SensorCalibration, Temperature | None]:
         self.poses, flips = checks.check_labels(self.poses, self.file)

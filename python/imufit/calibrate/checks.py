@@ -105,3 +105,28 @@ def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
             file=str(file),
             remedy=f"Record also {' '.join(missing)} up.",
         )
+
+
+def too_few_positions(poses: Sequence[Pose], error: InputError, file: object) -> InputError:
+    """Make the error for poses whose equations do not tell the unknowns.
+
+    Parameters
+    ----------
+    poses : sequence of Pose
+        The usable ones.
+    error : InputError
+        What the fit said: unknowns and equations.
+    file : object
+        To name in the error.
+    """
+    count = distinct(np.array([pose.direction for pose in poses]))
+    sides = {pose.name for pose in poses}
+    seen, missing = ([side for side in SIDES if (side in sides) == there] for there in (True, False))
+    never = f"; {' '.join(missing)} never pointed up" if missing else ""
+    positions = f"{count} different position{'' if count == 1 else 's'}"
+    remedy = f"Record also {' '.join(missing)} up" if missing else "Record each of the six sides up"
+    return InputError(
+        f"{error.problem}: the {len(poses)} poses show {positions} (nearest sides {' '.join(seen)} up{never})",
+        file=str(file),
+        remedy=f"{remedy}, on a level table for 3 s each, or at least nine attitudes, some of them oblique.",
+    )

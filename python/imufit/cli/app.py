@@ -32,9 +32,12 @@ from imufit.cli.replay import replay
 from imufit.cli.reveal import reveal
 from imufit.cli.simulate import simulate
 from imufit.cli.tune import tune
+from imufit.printable import MESSAGE, printable
 
 SUCCESS, INTERNAL, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 DEBUG = "IMUFIT_DEBUG"
+_LONGEST_MESSAGE = 3 * MESSAGE
+"""Characters: place, problem and remedy, each of which is bounded."""
 
 
 class Commands(click.Group):
@@ -163,7 +166,7 @@ def _unusable(error: Exception) -> str | None:
 
 def _fail(message: str, code: int) -> int:
     """Print one line on standard error."""
-    sys.stderr.write(f"imufit: {' '.join(message.split())}\n")
+    sys.stderr.write(f"imufit: {printable(' '.join(message.split()), _LONGEST_MESSAGE)}\n")
     return code
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -15,6 +16,71 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 LOG_ENDINGS = (".parquet", ".csv", ".npz")
 PLOT_ENDINGS = (".png", ".svg", ".pdf")
+
+
+LARGEST_NUMBER = 1e9
+"""Largest number an option takes: 30 years in seconds, and beyond every rate in Hz and every share in ppm."""
+LARGEST_WHOLE = 2**63 - 1
+"""Largest whole number an option takes: seeds and counts have 64 bits below."""
+
+
+class Real(click.FloatRange):
+    """A number within bounds, refused where it is none, infinite, or too large to be meant.
+
+    Parameters
+    ----------
+    min, max : float, optional
+        Bounds; without them plus and minus `LARGEST_NUMBER`.
+    min_open : bool
+        Whether `min` itself is refused.
+    """
+
+    def __init__(self, min: float = -LARGEST_NUMBER, max: float = LARGEST_NUMBER, min_open: bool = False) -> None:
+        super().__init__(min=min, max=max, min_open=min_open)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number."""
+        number = float(super(click.FloatRange, self).convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is no number to count with", param, ctx)
+        return float(super().convert(number, param, ctx))
+
+
+class Whole(click.IntRange):
+    """A whole number within bounds.
+
+    Parameters
+    ----------
+    min, max : int
+        Bounds.
+    """
+
+    def __init__(self, min: int, max: int = LARGEST_WHOLE) -> None:
+        super().__init__(min=min, max=max)
+
+
+class NamedFile(click.Path):
+    """A file to be read, by a name that a file can have.
+
+    Parameters
+    ----------
+    exists : bool
+        Whether it must be there.
+    """
+
+    def __init__(self, exists: bool = False) -> None:
+        super().__init__(exists=exists, dir_okay=False, readable=True, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path."""
+        _check_name(self, value, param, ctx)
+        return super().convert(value, param, ctx)
+
+
+def _check_name(kind: click.ParamType, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> None:  # type: ignore[type-arg]
+    """Refuse what can name no file: whatever looks for it would fail in its own way."""
+    if "\0" in str(value):
+        kind.fail("a file's name cannot hold the character NUL", param, ctx)
 
 
 class OutputFile(click.ParamType):  # type: ignore[type-arg]
@@ -36,6 +102,7 @@ class OutputFile(click.ParamType):  # type: ignore[type-arg]
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Return the path."""
+        _check_name(self, value, param, ctx)
         path = Path(value)
         if str(value) == "-" and self.standard_output:
             return path
@@ -57,13 +124,14 @@ class OutputDirectory(click.ParamType):  # type: ignore[type-arg]
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Return the path."""
+        _check_name(self, value, param, ctx)
         path = Path(value)
         if path.exists() and not path.is_dir():
             self.fail(f"{str(path)!r} is a file, not a directory", param, ctx)
         return path
 
 
-EXISTING = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+EXISTING = NamedFile(exists=True)
 
 
 def map_option(command: Command) -> Command:

@@ -12,6 +12,8 @@ from imufit.cli.arguments import (
     EXISTING,
     LOG_ENDINGS,
     OutputFile,
+    Real,
+    Whole,
     json_option,
     keep_inputs,
     map_option,
@@ -37,11 +39,9 @@ from imufit.cli.output import Output
     multiple=True,
     help="Calibrate this sensor only. Repeatable.",
 )
-@click.option(
-    "--hold", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="Shortest pose, s (default 0.6)."
-)
+@click.option("--hold", type=Real(min=0.0, min_open=True), metavar="S", help="Shortest pose, s (default 0.6).")
 @click.option("--live", "port", metavar="PORT", help="Guide through a calibration of the device there.")
-@click.option("--baud", type=click.IntRange(min=1), metavar="BAUD", help="Bits per second of PORT (default 115200).")
+@click.option("--baud", type=Whole(min=1), metavar="BAUD", help="Bits per second of PORT (default 115200).")
 @click.option("--form", type=click.Choice(["auto", "binary", "text"]), help="What PORT sends (default auto).")
 @click.option("--header", metavar="NAMES", help="Columns of text without a header, such as t_ms,acc_x,acc_y,acc_z.")
 @click.option(
@@ -51,11 +51,11 @@ from imufit.cli.output import Output
     help="Where to keep what PORT sent (default: beside the model, .parquet).",
 )
 @click.option(
-    "--rests", type=click.IntRange(min=6), metavar="N", help="Good rests wanted of PORT, the six sides among them (6)."
+    "--rests", type=Whole(min=6), metavar="N", help="Good rests wanted of PORT, the six sides among them (6)."
 )
 @click.option(
     "--give-up",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=Real(min=0.0, min_open=True),
     metavar="S",
     help="End after so long without anything new from PORT, s (default 300).",
 )

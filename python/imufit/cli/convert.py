@@ -10,6 +10,7 @@ import click
 from imufit.cli import engine
 from imufit.cli.arguments import EXISTING, LOG_ENDINGS, OutputFile, json_option, keep_inputs, map_option
 from imufit.cli.output import Output
+from imufit.printable import NAME, printable
 
 if TYPE_CHECKING:
     from imufit.log import Contents
@@ -54,7 +55,8 @@ def _table(found: Contents) -> Table:
 
 def _row(column: ColumnContents) -> tuple[str, ...]:
     if column.labels:
-        shown = " ".join(column.labels[:_LABELS]) + (" ..." if len(column.labels) > _LABELS else "")
+        first = [printable(label, NAME) for label in column.labels[:_LABELS]]
+        shown = " ".join(first) + (" ..." if len(column.labels) > _LABELS else "")
         return column.name, shown, str(column.samples), "", "", ""
     numbers = ("-" if value is None else f"{value:.4g}" for value in (column.low, column.median, column.high))
     return column.name, column.unit, str(column.samples), *numbers

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import OutputDirectory, json_option
+from imufit.cli.arguments import OutputDirectory, Whole, json_option
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reveal import truth_rows
@@ -36,7 +36,7 @@ def choice(diagnosis: Diagnosis) -> str | None:
     help="Where the log, report.html and ladder.png go.",
 )
 @click.option(
-    "--seed", type=click.IntRange(min=0), default=3, show_default=True, help="Picks the effect, the motion, the noise."
+    "--seed", type=Whole(min=0), default=3, show_default=True, help="Picks the effect, the motion, the noise."
 )
 @json_option
 def demo(*, directory: Path, seed: int, json_file: Path | None) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import OutputFile, json_option, keep_inputs, map_option
+from imufit.cli.arguments import NamedFile, OutputFile, Real, Whole, json_option, keep_inputs, map_option
 from imufit.cli.output import Output
 from imufit.cli.simulate import chosen_effects
 
@@ -51,27 +51,23 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
 @click.option("--on", default="pty", show_default=True, metavar="pty|socket://127.0.0.1:PORT", help="Where it is read.")
 @click.option(
     "--link",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=NamedFile(),
     metavar="PATH",
     help="Symbolic link to the pty, which stays the same when the device is unplugged.",
 )
 @click.option("--device", type=click.Choice(DEVICES), default="floats", show_default=True, help="What it sends.")
 @click.option("--form", type=click.Choice(FORMS), default="binary", show_default=True, help="Frames or lines of text.")
 @click.option("--rate", type=NumberOr("max"), metavar="HZ|max", help="Samples a second; max: what --baud carries.")
-@click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="Time until it ends, s.")
+@click.option("--duration", type=Real(min=0.0, min_open=True), metavar="S", help="Time until it ends, s.")
 @click.option("--loop", is_flag=True, help="Begin again after the last sample; for ever without --duration.")
 @click.option(
     "--speed", type=NumberOr("max"), default=1.0, metavar="X|max", help="Times faster than real; max: as it is read."
 )
-@click.option("--baud", type=click.IntRange(min=300), metavar="BAUD", help="What the line carries, bits a second.")
-@click.option("--tick", type=click.IntRange(1, 10**9), default=1000, metavar="NS", help="Tick of its clock, ns (1000).")
-@click.option("--clock-drift", type=float, default=0.0, metavar="PPM", help="By how much its clock goes fast.")
-@click.option(
-    "--clock-jitter", type=click.FloatRange(min=0.0), default=0.0, metavar="S", help="Noise of its stamps, s."
-)
-@click.option(
-    "--clock-start", type=click.IntRange(0, 2**32 - 1), default=0, metavar="TICKS", help="Where its clock begins."
-)
+@click.option("--baud", type=Whole(min=300), metavar="BAUD", help="What the line carries, bits a second.")
+@click.option("--tick", type=Whole(1, 10**9), default=1000, metavar="NS", help="Tick of its clock, ns (1000).")
+@click.option("--clock-drift", type=Real(), default=0.0, metavar="PPM", help="By how much its clock goes fast.")
+@click.option("--clock-jitter", type=Real(min=0.0), default=0.0, metavar="S", help="Noise of its stamps, s.")
+@click.option("--clock-start", type=Whole(0, 2**32 - 1), default=0, metavar="TICKS", help="Where its clock begins.")
 @click.option(
     "--fault",
     "faults",
@@ -89,7 +85,7 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
     metavar="ID[:NAME=VALUE,...]",
     help="Effect of a scenario's sensor, SI units; without values they are drawn. Repeatable.",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, metavar="SEED", help="Seed of everything random.")
+@click.option("--seed", type=Whole(min=0), default=0, metavar="SEED", help="Seed of everything random.")
 @click.option("--wait/--no-wait", default=None, help="Switch it on when somebody reads (a socket) or at once (a pty).")
 @click.option(
     "--sent", type=OutputFile((".parquet",)), metavar="FILE", help="Keep every sample with what became of it, .parquet."

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import json_option
+from imufit.cli.arguments import Whole, json_option
 from imufit.cli.names import Known
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
@@ -24,9 +24,9 @@ from imufit.cli.progress import ProgressBar
     help="Kind of logs; repeatable. Without it all of them: one, small, one-realistic, small-realistic, nothing, two, "
     "outside, confounded, separated, columns.",
 )
-@click.option("--logs", type=click.IntRange(min=1), default=20, show_default=True, help="Logs of each set.")
-@click.option("--seed", type=click.IntRange(min=0), help="Of the first log of each set; fresh without it.")
-@click.option("--processes", type=click.IntRange(min=1), help="Logs at a time; one per processor without it.")
+@click.option("--logs", type=Whole(min=1), default=20, show_default=True, help="Logs of each set.")
+@click.option("--seed", type=Whole(min=0), help="Of the first log of each set; fresh without it.")
+@click.option("--processes", type=Whole(min=1), help="Logs at a time; one per processor without it.")
 @json_option
 def grade(*, sets: tuple[str, ...], logs: int, seed: int | None, processes: int | None, json_file: Path | None) -> None:
     """Diagnose many simulated logs without knowing what was done to them, and mark the answers.

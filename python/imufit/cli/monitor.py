@@ -10,10 +10,11 @@ import click
 import numpy as np
 
 from imufit.cli import engine
-from imufit.cli.arguments import EXISTING, effects_from_option, json_option, keep_inputs, map_option
+from imufit.cli.arguments import EXISTING, Real, effects_from_option, json_option, keep_inputs, map_option
 from imufit.cli.names import FILTERS, KnownList
 from imufit.cli.output import Output
 from imufit.cli.port import duration_option, frame_option, port_argument
+from imufit.printable import printable
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 @click.option("--plain", is_flag=True, help="Lines of numbers instead of a table; so it is where there is no terminal.")
 @click.option(
     "--updates",
-    type=click.FloatRange(min=0.1, max=20.0),
+    type=Real(min=0.1, max=20.0),
     default=10.0,
     show_default=True,
     metavar="HZ",
@@ -110,7 +111,7 @@ class _Lines:
     def show(self, state: MonitorState) -> None:
         """Print a line, and the header before the first one."""
         for text in state.messages:
-            click.echo(f"device: {_printable(text)}", err=True)
+            click.echo(f"device: {printable(text)}", err=True)
         if not self._wanted or not state.n:
             return
         header = ("t_s", "rate_hz", "lost", "damaged", *(f"{f}_{a}_deg" for f in state.angles for a in _ANGLES))
@@ -122,11 +123,6 @@ class _Lines:
 
 
 _ANGLES = ("roll", "pitch", "yaw")
-
-
-def _printable(text: str) -> str:
-    """Return text without what would steer a terminal."""
-    return "".join(c if c.isprintable() else " " for c in text)
 
 
 class _Screen:
@@ -148,7 +144,7 @@ class _Screen:
     def show(self, state: MonitorState) -> None:
         """Renew the table."""
         for text in state.messages:
-            self._live.console.print(f"device: {_printable(text)}")
+            self._live.console.print(f"device: {printable(text)}")
         self._live.update(_table(state), refresh=True)
 
 
@@ -169,7 +165,7 @@ def _table(state: MonitorState) -> Table:
     elif state.trouble:
         words.append(state.trouble)
     table = Table(
-        title=Text(_printable(state.device)) if state.device else None,
+        title=Text(printable(state.device)) if state.device else None,
         title_justify="left",
         caption=Text("  ".join(words)),
         caption_justify="left",

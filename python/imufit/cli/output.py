@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from imufit.printable import printable
 from imufit.whole_file import whole_file, write_text
 
 if TYPE_CHECKING:
@@ -17,6 +18,13 @@ if TYPE_CHECKING:
     from imufit.results import Table
 
 _WIDTH_OF_FILES = 150
+_LONGEST_TEXT = 20_000
+"""Characters of a paragraph or a line; names within are bounded where they are read, this is for what is not."""
+
+
+def _harmless(text: str) -> str:
+    """Escape what a terminal would obey: names and labels come from files."""
+    return printable(text, _LONGEST_TEXT, keep="\n\t")
 
 
 class Output:
@@ -40,12 +48,12 @@ class Output:
         """Print sentences, one paragraph each."""
         for sentence in sentences:
             if sentence:
-                self._console.print(sentence, style="bold" if bold else None)
+                self._console.print(_harmless(sentence), style="bold" if bold else None)
 
     def lines(self, lines: Iterable[str]) -> None:
         """Print lines as they are, however long."""
         for line in lines:
-            self._console.print(line, soft_wrap=True)
+            self._console.print(_harmless(line), soft_wrap=True)
 
     def table(self, table: Table, limit: int | None = None) -> None:
         """Print a table, if it has rows."""
@@ -56,14 +64,20 @@ class Output:
         from rich.text import Text  # noqa: PLC0415
 
         rich_table = RichTable(
-            title=Text(table.title) if table.title else None, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
+            title=Text(_harmless(table.title)) if table.title else None,
+            title_justify="left",
+            box=box.SIMPLE_HEAD,
+            pad_edge=False,
         )
         for place, (name, right) in enumerate(zip(table.names, table.right, strict=True)):
             rich_table.add_column(
-                Text(name), justify="right" if right else "left", no_wrap=place == 0 or right, overflow="fold"
+                Text(_harmless(name)),
+                justify="right" if right else "left",
+                no_wrap=place == 0 or right,
+                overflow="fold",
             )
         for row in table.rows[:limit]:
-            rich_table.add_row(*(Text(cell) for cell in row))
+            rich_table.add_row(*(Text(_harmless(cell)) for cell in row))
         self._console.print(rich_table)
 
     def tables(self, tables: Iterable[Table]) -> None:

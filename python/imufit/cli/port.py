@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import click
 
+from imufit.cli.arguments import Real, Whole
 from imufit.cli.names import FRAMES, Known
 
 frame_option = click.option(
@@ -34,9 +35,9 @@ def port_argument(command: Command) -> Command:
         show_default=True,
         help="Form of the wire protocol.",
     )(command)
-    command = click.option(
-        "--baud", type=click.IntRange(min=1), default=115200, show_default=True, help="Bits per second."
-    )(command)
+    command = click.option("--baud", type=Whole(min=1), default=115200, show_default=True, help="Bits per second.")(
+        command
+    )
     return click.argument("port", metavar="PORT")(command)
 
 
@@ -44,10 +45,10 @@ def duration_option(command: Command) -> Command:
     """Add --duration and --give-up."""
     command = click.option(
         "--give-up",
-        type=click.FloatRange(min=0.0),
+        type=Real(min=0.0),
         metavar="S",
         help="Stop when the line was lost for so long; without it wait for ever.",
     )(command)
     return click.option(
-        "--duration", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="Stop after so many seconds."
+        "--duration", type=Real(min=0.0, min_open=True), metavar="S", help="Stop after so many seconds."
     )(command)

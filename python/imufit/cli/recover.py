@@ -7,12 +7,12 @@ from pathlib import Path
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs
+from imufit.cli.arguments import LOG_ENDINGS, NamedFile, OutputFile, json_option, keep_inputs
 from imufit.cli.output import Output
 
 
 @click.command(short_help="A log of what a recording left that was killed or ran out of disk.")
-@click.argument("file", metavar="FILE", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("file", metavar="FILE", type=NamedFile())
 @click.option(
     "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="LOG", help="Log to write; without it the one meant to be."
 )

@@ -12,6 +12,7 @@ from imufit.cli.arguments import (
     EXISTING,
     LOG_ENDINGS,
     OutputFile,
+    Real,
     effects_from_option,
     json_option,
     keep_inputs,
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--band",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=Real(min=0.0, min_open=True),
     default=0.1,
     show_default=True,
     metavar="DEG",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,14 +70,10 @@ def read_answer(path: Path) -> dict[str, Any]:
         The file is not such a JSON.
     """
     from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.log.documents import table_from_json_file  # noqa: PLC0415
 
-    try:
-        answer = json.loads(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise InputError("this is not a JSON text file", file=path) from None
-    except json.JSONDecodeError as error:
-        raise InputError(f"this is not JSON: {error.msg}", file=path, line=error.lineno) from None
-    if not isinstance(answer, dict) or "verdict" not in answer:
+    answer = table_from_json_file(path)
+    if "verdict" not in answer:
         raise InputError("this is not the JSON of `imufit diagnose` or `imufit ladder`: it has no verdict", file=path)
     return answer
 

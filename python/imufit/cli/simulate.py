@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option
+from imufit.cli.arguments import LOG_ENDINGS, OutputFile, Real, Whole, json_option
 from imufit.cli.names import FRAMES, Known, unknown
 from imufit.cli.output import Output
 
@@ -79,7 +79,7 @@ def chosen_effects(texts: Sequence[str]) -> dict[str, dict[str, float] | None]:
     metavar="ID[:NAME=VALUE,...]",
     help="Effect to put in, SI units; without values they are drawn. Repeatable.",
 )
-@click.option("--hidden", type=click.IntRange(min=0), metavar="SEED", help="Let this seed pick the effect, untold.")
+@click.option("--hidden", type=Whole(min=0), metavar="SEED", help="Let this seed pick the effect, untold.")
 @click.option(
     "--fault",
     type=Known("fault", engine.faults),
@@ -87,9 +87,9 @@ def chosen_effects(texts: Sequence[str]) -> dict[str, dict[str, float] | None]:
     help="Fault of the data to put in besides, such as stuck or knock.",
 )
 @click.option("--size", type=Known("size", lambda: SIZES), metavar="|".join(SIZES), help="Size of drawn effects.")
-@click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="Length, s.")
-@click.option("--rate", type=click.FloatRange(min=0.0, min_open=True), metavar="HZ", help="Samples per second.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="SEED", help="Seed of motion and noise.")
+@click.option("--duration", type=Real(min=0.0, min_open=True), metavar="S", help="Length, s.")
+@click.option("--rate", type=Real(min=0.0, min_open=True), metavar="HZ", help="Samples per second.")
+@click.option("--seed", type=Whole(min=0), metavar="SEED", help="Seed of motion and noise.")
 @click.option(
     "--frame", type=Known("frame", lambda: FRAMES), metavar="|".join(FRAMES), default="NED", show_default=True
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import OutputFile, json_option, keep_inputs, log_argument, plot_option
+from imufit.cli.arguments import OutputFile, Real, json_option, keep_inputs, log_argument, plot_option
 from imufit.cli.names import FILTERS, Known
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
@@ -40,7 +40,7 @@ from imufit.cli.settings import set_option, settings_from
 )
 @click.option(
     "--horizon",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=Real(min=0.0, min_open=True),
     default=1.0,
     show_default=True,
     metavar="S",

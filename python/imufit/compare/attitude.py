@@ -69,7 +69,9 @@ def attitude_comparison(
         None where the log has no attitude, no sensor that the filter needs, or too few rows, or where the model cannot
         be undone.
     """
-    if not isinstance(log, Log) or log.ref_q is None or log.acc is None or log.gyr is None:
+    if not isinstance(log, Log) or log.ref_q is None:
+        return None
+    if any(readings is None or not np.isfinite(readings).all(axis=1).any() for readings in (log.acc, log.gyr)):
         return None
     run = replay(log, [filter_name], progress=progress)
     kept = _kept(run, filter_name)

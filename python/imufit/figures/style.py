@@ -5,10 +5,14 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
+from matplotlib.category import StrCategoryFormatter
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.ticker import FixedFormatter, FuncFormatter
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.backend_bases import RendererBase
 
 # Fonts that figures do not use are no concern of the reader.
 logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
@@ -26,6 +30,32 @@ AXES = {"x": BLUE, "y": VERMILION, "z": GREEN}
 LINES = {"x": "-", "y": "--", "z": "-."}
 
 
+class PlainFigure(Figure):
+    """Figure in which text is text: a dollar in the name of a column begins no formula.
+
+    Only the numbers along an axis, which matplotlib itself writes as powers of ten, stay formulas.
+    """
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw it.
+
+        Parameters
+        ----------
+        renderer : RendererBase
+            Where to.
+        """
+        numbers = set()
+        for axes in self.axes:
+            for axis in (axes.xaxis, axes.yaxis):
+                for which, formatter in ((False, axis.get_major_formatter()), (True, axis.get_minor_formatter())):
+                    if not isinstance(formatter, FixedFormatter | FuncFormatter | StrCategoryFormatter):
+                        numbers.update(axis.get_ticklabels(minor=which))
+        for text in self.findobj(Text):
+            if text not in numbers:
+                text.set_parse_math(False)
+        super().draw(renderer)
+
+
 def new_figure(width: float, height: float) -> Figure:
     """Empty figure on white whose parts never overlap.
 
@@ -39,7 +69,7 @@ def new_figure(width: float, height: float) -> Figure:
     Figure
         Not registered with pyplot: nothing keeps it alive but its user.
     """
-    figure = Figure(figsize=(width, height), dpi=100, layout="constrained")
+    figure = PlainFigure(figsize=(width, height), dpi=100, layout="constrained")
     figure.patch.set_facecolor("white")
     return figure
 
@@ -65,7 +95,7 @@ def new_grid(rows: int, columns: int, width: float, height: float) -> tuple[Figu
     """
     left, right, top, bottom, head = 0.74, 0.12, 0.3, 0.48, 0.5
     whole, tall = width * columns, height * rows + head
-    figure = Figure(figsize=(whole, tall), dpi=100)
+    figure = PlainFigure(figsize=(whole, tall), dpi=100)
     figure.patch.set_facecolor("white")
     inner, high = width - left - right, height - top - bottom
     figure.subplots_adjust(

@@ -155,6 +155,8 @@ class Passes:
             self.covariates = [name for name in self.covariates if name not in empty]
             return self.survey()
         if still := readings.still(MIN_ROWS):
+            if set(still) == set(readings.read()):
+                raise self._motionless(still)
             # Such readings have no noise to weigh them by, and tell no more than that they are less than a step.
             self.empty += [
                 f"Every reading of the {SENSOR_NAMES[sensor]} is the same: it is left out." for sensor in still
@@ -164,9 +166,35 @@ class Passes:
         facts = survey.finish()
         if not facts.sensors:
             raise InputError("no sensor of the log has a sample", file=log.path)
+        if self._leave_out_flat(readings, facts):
+            return self.survey()
         for sensor, dead in readings.dead():
             self.empty.append(f"{' and '.join(dead)} has no value in any row: {sensor} is left out.")
         return facts, dict(zip(names, known / log.n, strict=True))
+
+    def _leave_out_flat(self, readings: ReadingsSeen, facts: _imufit.Facts) -> bool:
+        """Leave sensors out of which one axis never moves, and say whether there are any."""
+        # Of a sensor with coarse steps an axis may well stay on one of them; its noise is a part of the step.
+        flat = {
+            sensor: axes
+            for sensor, axes in readings.flat(MIN_ROWS).items()
+            if sensor in facts.sensors and not any(facts.steps[list(SENSOR_NAMES).index(sensor)])
+        }
+        if flat and set(flat) == set(facts.sensors):
+            raise self._motionless([axis for axes in flat.values() for axis in axes])
+        for sensor, axes in flat.items():
+            self.empty.append(f"Every reading of {' and '.join(axes)} is the same: {sensor} is left out.")
+            self._left_out.append((sensor, 0, self.log.n))
+        return bool(flat)
+
+    def _motionless(self, names: Sequence[str]) -> InputError:
+        """Make the error for a log whose readings have no noise at all."""
+        return InputError(
+            f"no effect can be judged, because no reading of {' or '.join(names)} ever changes: without noise there is "
+            "nothing to weigh a deviation by",
+            file=self.log.path,
+            remedy="Record the readings with all their digits, while the sensor turns.",
+        )
 
     def ranges(self) -> tuple[dict[str, float], dict[str, float]]:
         """Where readings of accelerometer and gyroscope may be cut off, and their largest readings, m/s^2 and rad/s."""

@@ -40,8 +40,19 @@ class ReadingsSeen:
         return found
 
     def still(self, fewest: int) -> list[str]:
-        """Sensors with at least `fewest` readings, all of them the same; none where no other sensor says anything."""
+        """Sensors with at least `fewest` readings, all of them the same."""
         read = [sensor for sensor, counts in self._counts.items() if counts.min() >= fewest]
-        still = [sensor for sensor in read if np.array_equal(self._least[sensor], self._most[sensor])]
-        others = [sensor for sensor, counts in self._counts.items() if counts.all() and sensor not in still]
-        return still if others else []
+        return [sensor for sensor in read if np.array_equal(self._least[sensor], self._most[sensor])]
+
+    def flat(self, fewest: int) -> dict[str, list[str]]:
+        """Axes whose readings are all the same, by sensor, where another axis of that sensor has others."""
+        flat = {
+            sensor: [f"{sensor}_{'xyz'[k]}" for k in np.flatnonzero(self._least[sensor] == self._most[sensor])]
+            for sensor, counts in self._counts.items()
+            if counts.min() >= fewest
+        }
+        return {sensor: axes for sensor, axes in flat.items() if 0 < len(axes) < 3}
+
+    def read(self) -> list[str]:
+        """Sensors with readings on all axes."""
+        return [sensor for sensor, counts in self._counts.items() if counts.all()]

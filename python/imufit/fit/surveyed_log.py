@@ -132,7 +132,8 @@ def survey(
     surveys = [each.survey() for each in passes]
     facts = [found for found, _ in surveys]
     ranges = _ranges(passes)
-    facts = [each.with_ranges(**ranges) for each in facts]
+    # A log that never comes to the end of the range says nothing of it: there the model's is the one to go by.
+    facts = [each.with_ranges(**{**_ranges_of(model), **ranges}) for each in facts]
     faults = [data_faults(each, found, ranges) for each, found in zip(passes, facts, strict=True)]
     if keep_constants and model.constants:
         constants = model.constants.get("temperature_mean"), model.constants.get("covariate_means")
@@ -171,6 +172,12 @@ def _ranges(passes: Sequence[Passes]) -> dict[str, float]:
         for sensor, value in most.items():
             largest[sensor] = max(largest.get(sensor, 0.0), value)
     return {sensor: end for sensor, end in ends.items() if largest[sensor] <= end * (1.0 + 1e-6)}
+
+
+def _ranges_of(model: EffectStack) -> dict[str, float]:
+    """Where the ranges of the sensors end by the model; without those it does not give a value."""
+    given = {sensor: model.parameters.get(f"{sensor}.saturation", {}).get("range", 0.0) for sensor in ("acc", "gyr")}
+    return {sensor: end for sensor, end in given.items() if end > 0.0}
 
 
 def _means(facts: Sequence[_imufit.Facts]) -> tuple[float | None, dict[str, float]]:

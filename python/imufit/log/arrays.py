@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
 from imufit.log.assemble import group_fields
-from imufit.log.check import check_finite, check_poses, checked_labels
+from imufit.log.check import check_poses, check_readings, checked_labels, truth_value
 from imufit.log.columns import CONTRACT, GROUPS
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
@@ -73,6 +73,9 @@ def fields_from_arrays(
         Fields as in `imufit.log.Log`.
     """
     place = Place()
+    for name, values in {"t": t, **given}.items():
+        if values is not None and np.asarray(values).dtype == np.bool_:
+            raise truth_value("", name, None, place)
     time = contiguous(t, "t")
     if time.ndim != 1:
         raise InputError(f"the array has shape {time.shape}, but (n,) is wanted", file="log", column="t")
@@ -87,7 +90,7 @@ def fields_from_arrays(
             raise place.error("a covariate cannot have the name of a log column", column=name, remedy="Rename it.")
         numbers[name] = contiguous(values, name, (time.size,))
     for column, numeric in numbers.items():
-        check_finite(numeric, column, 0, place)
+        check_readings(numeric, column, column, 0, place)
     cells = {name: checked_labels(np.array(column, dtype=object)) for name, column in text.items()}
     check_poses(cells.get("pose", np.empty(0, object)), 0, place)
     repair = scan.finish()

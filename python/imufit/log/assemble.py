@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.log.check import check_finite, check_poses, checked_attitude, checked_labels, numbers_from_text
+from imufit.log.check import (
+    check_poses,
+    check_readings,
+    checked_attitude,
+    checked_labels,
+    numbers_from_text,
+    truth_value,
+)
 from imufit.log.columns import GROUPS, NUMERIC
 from imufit.log.foreign import Plan, PlannedColumn
 from imufit.log.metadata import Metadata
@@ -23,6 +30,24 @@ RawBlock = Mapping[str, NDArray[Any]]
 def time_of(plan: Plan, block: RawBlock, start: int, rows: int, place: Place) -> NDArray[np.float64]:
     """Time stamps of one block in s, (n,), before any repair."""
     return _numbers(plan.time, block, start, rows, place)
+
+
+def check_truth_values(plan: Plan, truths: Mapping[str, tuple[int | None, str]], place: Place) -> None:
+    """Refuse truth values where a measurement is wanted; of a covariate, such as a switch, they are 1 and 0.
+
+    Parameters
+    ----------
+    plan : Plan
+        Which file column becomes which column of the log.
+    truths : mapping
+        First row with a truth value, and that value, of each file column that has one.
+    place : Place
+        To name the file in errors.
+    """
+    for column in plan.columns:
+        if column.target in NUMERIC and column.source is not None and column.source in truths:
+            row, text = truths[column.source]
+            raise truth_value(text, column.source, row, place)
 
 
 def fields_of(
@@ -67,7 +92,7 @@ def fields_of(
             text[column.target] = checked_labels(raw)
         else:
             values = _numbers(column, block, start, rows, place)
-            check_finite(values, column.source or column.target, start, place)
+            check_readings(values, column.target, column.source or column.target, start, place)
             numbers[column.target] = values
     t = repair.apply(time_of(plan, block, start, rows, place), start)
     return group_fields(t, numbers, text, start=start, metadata=metadata, place=place)

@@ -7,8 +7,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.log.columns import GROUPS, POSES
+from imufit.errors import InputError
+from imufit.log.columns import GROUPS, LARGEST, LARGEST_COVARIATE, POSES
 from imufit.log.place import Place
+from imufit.printable import NAME, printable
 
 UNIT_TOLERANCE: Final = 1e-3
 _EXACT: Final = 1e-12
@@ -16,8 +18,15 @@ _MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--"})
 _BOOLEAN: Final = {"true": 1.0, "false": 0.0}
 
 
-def number_from_text(cell: Any) -> float:
+def number_from_text(cell: Any, *, truth: bool = False) -> float:
     """Read one cell; empty and the usual words for a missing value give NaN.
+
+    Parameters
+    ----------
+    cell : object
+        Text, or None where nothing stands.
+    truth : bool
+        Whether true and false are read as 1 and 0: so they are of a switch, but a sensor measures neither.
 
     Raises
     ------
@@ -30,11 +39,28 @@ def number_from_text(cell: Any) -> float:
     folded = text.lower()
     if folded in _MISSING:
         return float("nan")
-    if folded in _BOOLEAN:
+    if truth and folded in _BOOLEAN:
         return _BOOLEAN[folded]
     if "_" in text:
         raise ValueError(text)
     return float(text)
+
+
+def is_truth(cell: Any) -> bool:
+    """Whether a cell says true or false."""
+    return str(cell).strip().lower() in _BOOLEAN
+
+
+def truth_value(text: str, column: str, row: int | None, place: Place) -> InputError:
+    """Make the error for a truth value, or without row for a column of them, where a measurement is wanted."""
+    return place.error(
+        "the column holds truth values, no measurements"
+        if row is None
+        else f"{text!r} is a truth value, not a measurement",
+        row=row,
+        column=column,
+        remedy="Write a number, or leave the cell empty for a missing sample.",
+    )
 
 
 def numbers_from_text(cells: NDArray[np.object_], column: str, start: int, place: Place) -> NDArray[np.float64]:
@@ -49,20 +75,44 @@ def numbers_from_text(cells: NDArray[np.object_], column: str, start: int, place
             remedy = "Write a number, or leave the cell empty for a missing sample."
             if text.count(",") == 1 and "." not in text:
                 remedy = "Write a decimal point, not a comma."
+            if text.lower() in _BOOLEAN:
+                raise truth_value(text, column, start + i, place) from None
             raise place.error(f"{shown!r} is not a number", row=start + i, column=column, remedy=remedy) from None
     return values
 
 
-def check_finite(values: NDArray[np.float64], column: str, start: int, place: Place) -> None:
-    """Refuse infinite values; NaN is a missing sample."""
-    bad = np.flatnonzero(np.isinf(values))
-    if bad.size:
-        raise place.error(
-            f"{values[bad[0]]} is not a reading",
-            row=start + int(bad[0]),
-            column=column,
-            remedy="Write NaN (or leave the cell empty) for a missing sample.",
-        )
+def check_readings(values: NDArray[np.float64], target: str, column: str, start: int, place: Place) -> None:
+    """Refuse values that nothing can have measured, infinite ones first; NaN is a missing sample.
+
+    Whatever works on a log relies on it: squares of readings and their sums are finite.
+
+    Parameters
+    ----------
+    values : (n,) array
+        In SI units.
+    target : str
+        Column of the log.
+    column : str
+        Column of the file, to be named.
+    start : int
+        Row of the log at which the block begins.
+    place : Place
+        To name the file in errors.
+    """
+    largest = LARGEST.get(target, LARGEST_COVARIATE)
+    bad = np.flatnonzero(np.abs(values) > largest)
+    if not bad.size:
+        return
+    value = values[bad[0]]
+    remedy = "Write NaN (or leave the cell empty) for a missing sample."
+    if np.isinf(value):
+        problem = f"{value} is not a reading"
+    elif target in LARGEST:
+        problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that {target} can measure"
+        remedy += " Or is it another unit? --map takes it."
+    else:
+        problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that is measured"
+    raise place.error(problem, row=start + int(bad[0]), column=column, remedy=remedy)
 
 
 def checked_attitude(q: NDArray[np.float64], start: int, place: Place) -> NDArray[np.float64]:
@@ -126,7 +176,7 @@ def check_poses(poses: NDArray[np.object_], start: int, place: Place) -> None:
     for i, pose in enumerate(poses):
         if pose is not None and pose not in POSES:
             raise place.error(
-                f"{pose!r} is not a pose",
+                f"{printable(pose, NAME)!r} is not a pose",
                 row=start + i,
                 column="pose",
                 remedy=f"Write one of {' '.join(POSES)} (that body axis points up), or nothing.",

@@ -33,6 +33,30 @@ CONTRACT: Final[tuple[str, ...]] = (
 
 NUMERIC: Final = frozenset(CONTRACT) - {"pose"}
 
+LARGEST: Final[dict[str, float]] = {
+    # ns since 1970 are 2e18; check_units says so with the mapping, so they must come through
+    "t": 1e19,
+    # m/s^2; the most robust shock sensors end at 2e5 g. Raw counts of 24 bits come through, for check_units to name.
+    **dict.fromkeys(GROUPS["acc"], 1e7),
+    # rad/s; a dentist's drill turns at 5e4. Raw counts of 24 bits come through.
+    **dict.fromkeys(GROUPS["gyr"], 1e7),
+    # uT; the strongest lasting magnets have 45 T = 4.5e7 uT
+    **dict.fromkeys(GROUPS["mag"], 1e8),
+    # degC; no sensor lives at 1e3, but raw counts of 16 bits may stand unconverted in a column that nobody uses
+    "temp": 1e6,
+    # a unit quaternion; how far from one is told by checked_attitude
+    **dict.fromkeys(GROUPS["ref_q"], 1e7),
+    # m; the moon is at 4e8, and earth-centred positions are 6.4e6
+    **dict.fromkeys(GROUPS["ref_p"], 1e9),
+    # rad; a spindle of 1e5 rad/s for an hour
+    "ref_angle": 1e9,
+}
+"""Largest absolute value of each column that can be meant, SI units."""
+
+LARGEST_COVARIATE: Final = 1e30
+"""Largest absolute value of a column of unknown unit. Counters of 64 bits end at 1.8e19, and no quantity in SI units
+comes near; what lies beyond is a filler such as FLT_MAX. Fourth powers of 1e9 rows still have room in a float64."""
+
 POSES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 _SENSOR_WORDS: Final = {

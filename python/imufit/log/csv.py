@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,7 +15,7 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
-from imufit.log.check import number_from_text
+from imufit.log.check import is_truth, number_from_text
 from imufit.log.csv_layout import NOT_DATA, is_comment, read_layout, split_line, text_of
 from imufit.log.metadata import Metadata, write_sidecar
 from imufit.whole_file import whole_file
@@ -42,12 +42,13 @@ class CsvSource:
         self.n = 0
         # "number": read as such; "word": numbers that need the slow way (True, blanks); "text": not numbers
         self._kinds = dict.fromkeys(self.names, "number")
+        self.truths: dict[str, tuple[int | None, str]] = {}
 
     def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
         """Find out what each column holds, and give the named columns block by block."""
         start = 0
         for data in self._data():
-            table = self._parse_learning(data)
+            table = self._parse_learning(data, start)
             if table.num_rows:
                 yield start, table.num_rows, {name: self._array(table, name) for name in columns}
             start += table.num_rows
@@ -127,20 +128,26 @@ class CsvSource:
             raise self._unclosed()
         return table
 
-    def _parse_learning(self, data: bytes) -> Any:
-        """Parse a block; a column that turns out not to be plain numbers changes its kind."""
+    def _parse_learning(self, data: bytes, start: int) -> Any:
+        """Parse the block from row `start` on; a column that turns out not to be plain numbers changes its kind."""
         while True:
             try:
                 table = self._parse(data, list(self.names))
             except pa.ArrowInvalid as error:
-                found = _FAILED.search(str(error))
-                if not found:
+                failed = _FAILED.search(str(error))
+                if not failed:
                     raise InputError(f"the table cannot be parsed ({error})", file=self._path) from None
-                self._kinds[self.names[int(found[1])]] = "word"
+                self._kinds[self.names[int(failed[1])]] = "word"
                 continue
             for name, kind in self._kinds.items():
-                if kind == "word" and not _all_numbers(table.column(name)):
+                if kind != "word":
+                    continue
+                cells = table.column(name).to_pylist()
+                if not _all_numbers(cells):
                     self._kinds[name] = "text"
+                elif name not in self.truths:
+                    found = next(((start + k, cell.strip()) for k, cell in enumerate(cells) if is_truth(cell)), None)
+                    self.truths |= {} if found is None else {name: found}
             return table
 
     def _array(self, table: Any, name: str) -> NDArray[Any]:
@@ -150,7 +157,7 @@ class CsvSource:
             return np.asarray(column.to_numpy(), dtype=np.float64)
         cells = column.to_pylist()
         if kind == "word":
-            return np.array([number_from_text(cell) for cell in cells], dtype=np.float64)
+            return np.array([number_from_text(cell, truth=True) for cell in cells], dtype=np.float64)
         text = np.empty(len(cells), dtype=object)
         text[:] = cells
         return text
@@ -199,10 +206,10 @@ class CsvSource:
         return next((line for k, (line, _) in enumerate(self._rows()) if k == row), None)
 
 
-def _all_numbers(column: Any) -> bool:
+def _all_numbers(cells: Iterable[str | None]) -> bool:
     try:
-        for cell in column.to_pylist():
-            number_from_text(cell)
+        for cell in cells:
+            number_from_text(cell, truth=True)
     except ValueError:
         return False
     return True

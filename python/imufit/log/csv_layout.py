@@ -113,7 +113,7 @@ def _separator(lines: list[str]) -> tuple[str, int]:
 
 def _numeric(field: str) -> bool:
     try:
-        return number_from_text(field) is not None and field != ""
+        return number_from_text(field, truth=True) is not None and field != ""
     except ValueError:
         return False
 

@@ -12,6 +12,7 @@ from imufit.errors import InputError
 from imufit.log.columns import CONTRACT, GROUPS, SENSORS, meant, nearest
 from imufit.log.place import Place
 from imufit.log.units import Conversion, conversion, unit_in_header
+from imufit.printable import NAME, printable
 
 ROW: Final = "row"
 """Name that stands for the row number in a mapping, when the file has no column of that name."""
@@ -84,22 +85,33 @@ def plan_columns(names: Sequence[str], mapping: Mapping[str, str] | None, place:
     InputError
         A column is missing, misspelt, there twice, or mapped from a column that is not there.
     """
+    shown = {name: printable(name, NAME) for name in names}
     for index, name in enumerate(names):
         if name in names[:index]:
-            raise place.error(f"column {name} is there twice", column=name, remedy="Rename or delete one of them.")
+            raise place.error(
+                f"column {shown[name]} is there twice", column=name, remedy="Rename or delete one of them."
+            )
     mapped = [_resolve(target, text, names, place) for target, text in (mapping or {}).items()]
     targets = {column.target for column in mapped}
     used = {column.source for column in mapped}
-    kept = [PlannedColumn(name, name, Conversion()) for name in names if name not in targets | used]
+    kept = [PlannedColumn(shown[name], name, Conversion()) for name in names if name not in targets | used]
     for column in mapped:
         if column.target not in CONTRACT and column.target != column.source and (close := meant(column.target)):
             raise place.error(
                 f"the mapping makes a column {column.target}; did you mean {close}?", column=column.target
             )
-    lost = [name for name in names if name in targets - used]
+    lost = [shown[name] for name in names if name in targets - used]
+    changed = [column.target for column in kept if column.target != column.source]
+    for index, name in enumerate(changed):
+        if name in changed[:index] or name in names or name in targets:
+            raise place.error(f"column {name} is there twice", column=name, remedy="Give these columns other names.")
     columns = [*mapped, *kept]
-    _check_complete([column.target for column in columns], [n for n in names if n not in used], place)
+    _check_complete([column.target for column in columns], [shown[n] for n in names if n not in used], place)
     notes = tuple(f"{place.name}: column {name} left out: the mapping gives that name to another" for name in lost)
+    notes += tuple(
+        f"{place.name}: column {name} has another name in the file, which is too long or cannot be printed"
+        for name in changed
+    )
     return Plan(tuple(columns), notes)
 
 
@@ -107,10 +119,14 @@ def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> Plan
     """Find the column, sign and unit that a mapping's source text means."""
     bare, unit = _bracket(text)
     for name, given in ((text.strip(), None), (bare, unit)):
-        for sign, column in _signed(name):
+        for sign, given_name in _signed(name):
+            column = given_name
+            if column not in names:
+                column = next((each for each in names if printable(each, NAME) == given_name), column)
             if column in names or (column == ROW and ROW not in names):
                 return _planned(target, column, sign=sign, unit=given, names=names, place=place)
     wanted = bare.lstrip("+-").strip()
+    names = [printable(name, NAME) for name in names]
     close = nearest(wanted, names, n=3)
     raise place.error(
         f"column {wanted} is not in the file, but the mapping takes {target} from it",

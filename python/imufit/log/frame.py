@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.log.assemble import fields_of, time_of
+from imufit.log.assemble import check_truth_values, fields_of, time_of
 from imufit.log.foreign import plan_columns
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
@@ -42,6 +42,9 @@ def fields_from_frame(df: pd.DataFrame, mapping: Mapping[str, str] | None, metad
     if df.empty:
         raise place.error("the table has no rows")
     block = {name: _column(df.iloc[:, names.index(name)]) for name in plan.sources}
+    truths = {name: (None, "") for name, cells in block.items() if cells.dtype == np.bool_}
+    check_truth_values(plan, truths, place)
+    block = {name: cells if cells.dtype == object else cells.astype(np.float64) for name, cells in block.items()}
     scan = TimeScan(place)
     scan.add(time_of(plan, block, 0, len(df), place))
     repair = scan.finish()
@@ -55,9 +58,11 @@ def fields_from_frame(df: pd.DataFrame, mapping: Mapping[str, str] | None, metad
 
 
 def _column(column: pd.Series[Any]) -> NDArray[Any]:
-    """Give (n,) float64 for anything numeric, (n,) objects for everything else; always a copy."""
+    """Give (n,) bool for truth values, (n,) float64 for other numbers, (n,) objects for the rest; always a copy."""
     import pandas as pd  # noqa: PLC0415  heavy, and only needed here
 
+    if column.dtype == np.bool_:
+        return column.to_numpy(copy=True)
     if pd.api.types.is_numeric_dtype(column.dtype) and not pd.api.types.is_complex_dtype(column.dtype):
         return column.to_numpy(dtype=np.float64, na_value=np.nan, copy=True)
     cells = np.empty(len(column), dtype=object)

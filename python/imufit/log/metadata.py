@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -13,12 +12,17 @@ from typing import Any, Final, Literal, cast
 import tomli_w
 
 from imufit.errors import InputError
+from imufit.log.columns import GROUPS, LARGEST
+from imufit.log.documents import table_from_json, table_from_toml
+from imufit.printable import NAME, printable
 from imufit.whole_file import write_text
 
 Frame = Literal["NED", "ENU", "NWU"]
 FRAMES: Final = ("NED", "ENU", "NWU")
 AXES: Final = ("x", "y", "z")
 STANDARD_GRAVITY: Final = 9.80665
+SMALLEST_GRAVITY: Final = 1e-3
+"""m/s^2; the moons of Mars have 3e-3. What is smaller is a slip, and a division by it tells nothing."""
 
 
 @dataclass(frozen=True)
@@ -99,13 +103,7 @@ class Metadata:
 
 def mapping_from_json(text: str | bytes, file: Path) -> dict[str, Any]:
     """Read metadata that is kept as JSON inside a log file."""
-    try:
-        values = json.loads(text)
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"the metadata are not valid JSON ({error})", file=file, column="imufit") from None
-    if not isinstance(values, dict):
-        raise InputError("the metadata are not a JSON object", file=file, column="imufit")
-    return values
+    return table_from_json(text, file, "imufit")
 
 
 def sidecar_path(path: Path) -> Path:
@@ -118,10 +116,7 @@ def read_sidecar(path: Path) -> dict[str, Any]:
     sidecar = sidecar_path(path)
     if not sidecar.is_file():
         return {}
-    try:
-        return tomllib.loads(sidecar.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"not valid TOML ({error})", file=sidecar, remedy="Correct it or move it away.") from None
+    return table_from_toml(sidecar, "Correct it or move it away.")
 
 
 def read_metadata(path: Path, embedded: Mapping[str, Any]) -> Metadata:
@@ -157,15 +152,29 @@ def _without_none(value: Any) -> Any:
 
 def _number(value: Any) -> float | None:
     """Return a finite number, or None when it is something else."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    return float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def _shown(value: Any) -> str:
+    """Return the value as it is to stand in a message."""
+    # Python writes no integer of more than 4300 digits.
+    return f"an integer of {value.bit_length()} bits" if _is_huge(value) else printable(repr(value), NAME)
+
+
+def _is_huge(value: Any) -> bool:
+    return isinstance(value, int) and value.bit_length() > 64
 
 
 def _frame(value: Any, file: str | Path | None) -> Frame:
     if value not in FRAMES:
         raise InputError(
-            f"metadata frame is {value!r}, which is no frame",
+            f"metadata frame is {_shown(value)}, which is no frame",
             file=file,
             column="frame",
             remedy="Write NED, ENU or NWU.",
@@ -175,9 +184,9 @@ def _frame(value: Any, file: str | Path | None) -> Frame:
 
 def _gravity(value: Any, file: str | Path | None) -> float:
     number = _number(value)
-    if number is None or not 0.0 < number <= 30.0:
+    if number is None or not SMALLEST_GRAVITY <= number <= 30.0:
         raise InputError(
-            f"metadata gravity is {value!r}, which is no gravity in m/s^2",
+            f"metadata gravity is {_shown(value)}, which is no gravity in m/s^2",
             file=file,
             column="gravity",
             remedy=f"Write a number such as {STANDARD_GRAVITY}.",
@@ -188,9 +197,9 @@ def _gravity(value: Any, file: str | Path | None) -> float:
 def _mag_reference(value: Any, file: str | Path | None) -> tuple[float, ...]:
     items = value.tolist() if hasattr(value, "tolist") else value
     numbers = [_number(item) for item in items] if isinstance(items, list | tuple) else []
-    if len(numbers) != 3 or None in numbers:
+    if len(numbers) != 3 or not all(number is not None and abs(number) <= LARGEST["mag_x"] for number in numbers):
         raise InputError(
-            f"metadata mag_reference is {value!r}, not three numbers",
+            f"metadata mag_reference is {_shown(value)}, not three numbers",
             file=file,
             column="mag_reference",
             remedy="Write [x, y, z] in uT, in the reference frame.",
@@ -201,7 +210,7 @@ def _mag_reference(value: Any, file: str | Path | None) -> tuple[float, ...]:
 def _rig_axis(value: Any, file: str | Path | None) -> str:
     if value not in AXES:
         raise InputError(
-            f"metadata rig_axis is {value!r}, which is no body axis",
+            f"metadata rig_axis is {_shown(value)}, which is no body axis",
             file=file,
             column="rig_axis",
             remedy='Write "x", "y" or "z".',
@@ -212,7 +221,7 @@ def _rig_axis(value: Any, file: str | Path | None) -> str:
 def _sensor(value: Any, file: str | Path | None) -> str:
     if not isinstance(value, str):
         raise InputError(
-            f"metadata sensor is {value!r}, not text", file=file, column="sensor", remedy="Put it in quotes."
+            f"metadata sensor is {_shown(value)}, not text", file=file, column="sensor", remedy="Put it in quotes."
         )
     return value
 
@@ -220,14 +229,16 @@ def _sensor(value: Any, file: str | Path | None) -> str:
 def _noise(value: Any, file: str | Path | None) -> dict[str, float]:
     remedy = "Write a table such as {acc = 0.02, gyr = 0.001, mag = 0.5}, in m/s^2, rad/s and uT."
     if not isinstance(value, Mapping):
-        raise InputError(f"metadata noise is {value!r}, not a table", file=file, column="noise", remedy=remedy)
+        raise InputError(f"metadata noise is {_shown(value)}, not a table", file=file, column="noise", remedy=remedy)
     for sensor, deviation in value.items():
         if sensor not in ("acc", "gyr", "mag"):
-            raise InputError(f"metadata noise names the sensor {sensor!r}", file=file, column="noise", remedy=remedy)
-        number = _number(deviation)
-        if number is None or number < 0.0:
             raise InputError(
-                f"metadata noise.{sensor} is {deviation!r}, which is no standard deviation",
+                f"metadata noise names the sensor {_shown(sensor)}", file=file, column="noise", remedy=remedy
+            )
+        number = _number(deviation)
+        if number is None or not 0.0 <= number <= LARGEST[GROUPS[sensor][0]]:
+            raise InputError(
+                f"metadata noise.{sensor} is {_shown(deviation)}, which is no standard deviation",
                 file=file,
                 column="noise",
                 remedy=remedy,

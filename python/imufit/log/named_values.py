@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 
-from imufit.log.check import number_from_text
+from imufit.log.check import is_truth, number_from_text
 
 LONGEST_LINE: Final = 4096
 """Characters of a line; what is longer is no record but noise or a binary dump."""
@@ -49,6 +49,8 @@ class Item:
         Where name and values stand in the line.
     closed : bool
         Whether a bracket ends the values, so that a cut line cannot have shortened the last one.
+    truth : str
+        The first value that is true or false instead of a number, which it is read as; empty without.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Item:
     start: int
     end: int
     closed: bool
+    truth: str = ""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -98,8 +101,11 @@ def named_values(line: str) -> list[Item]:
             name = f"{group}_{name}" if group else name
         else:
             group = ""
-        values = tuple(number_from_text(one[1]) for one in _ONE.finditer(text))
-        items.append(Item(name, found["name"], unit, values, found.start(), found.end(), found["open"] is not None))
+        written = [one[1] for one in _ONE.finditer(text)]
+        values = tuple(number_from_text(one, truth=True) for one in written)
+        truth = next(filter(is_truth, written), "")
+        closed = found["open"] is not None
+        items.append(Item(name, found["name"], unit, values, found.start(), found.end(), closed, truth))
         end = found.end()
     return items
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import lzma
+import struct
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,7 +23,25 @@ from imufit.whole_file import whole_file
 
 _BATCH: Final = 65_536
 _METADATA: Final = "metadata"
-_BROKEN: Final = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, OSError)
+_BROKEN: Final = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    struct.error,
+    EOFError,
+    ValueError,
+    OSError,
+    # what the header of an array says is read as Python: too deep, too large, no literal
+    SyntaxError,
+    MemoryError,
+    RecursionError,
+    OverflowError,
+    TypeError,
+    KeyError,
+)
+"""What the readers of archives and arrays raise about damaged bytes."""
+_UNKNOWN: Final = (NotImplementedError, RuntimeError)
+"""... and about a compression, a version or an encryption that they do not know."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +65,7 @@ class NpzSource:
         self._path = path
         self.notes: tuple[str, ...] = ()
         self.embedded: Mapping[str, Any] = {}
+        self.truths: dict[str, tuple[int | None, str]] = {}
         self._members: dict[str, _Member] = {}
         self.n = 0
         lengths: dict[str, int] = {}
@@ -57,6 +78,8 @@ class NpzSource:
             raise
         except _BROKEN:
             raise self._unreadable() from None
+        except _UNKNOWN as error:
+            raise self._unknown(error) from None
         self.names: tuple[str, ...] = tuple(self._members)
         self.n = lengths.get("t", max(lengths.values(), default=0))
         for name, length in lengths.items():
@@ -68,8 +91,17 @@ class NpzSource:
                     remedy="Write one row a sample.",
                 )
 
+    def _unknown(self, error: Exception) -> InputError:
+        return InputError(
+            f"the archive is encrypted, or of a kind that is not known ({error})",
+            file=self._path,
+            remedy="Write it with numpy.savez or numpy.savez_compressed.",
+        )
+
     def _add(self, entry: str, file: IO[bytes], lengths: dict[str, int]) -> None:
         name = entry.removesuffix(".npy")
+        if name in lengths or (name == _METADATA and self.embedded):
+            raise InputError("the array is there twice", file=self._path, column=name, remedy="Save each array once.")
         shape, fortran, dtype = _header(file)
         if dtype.kind not in "fiubUS":
             kind = "Python objects" if dtype.hasobject else f"values of type {dtype}"
@@ -83,10 +115,9 @@ class NpzSource:
             return
         columns = GROUPS.get(name, ())
         if len(shape) == 1:
-            self._members[name] = _Member(entry, dtype, 1, 0)
+            made = {name: _Member(entry, dtype, 1, 0)}
         elif len(shape) == 2 and shape[1] == len(columns) and not fortran:
-            for i, column in enumerate(columns):
-                self._members[column] = _Member(entry, dtype, shape[1], i)
+            made = {column: _Member(entry, dtype, shape[1], i) for i, column in enumerate(columns)}
         else:
             wanted = f"(n, {len(columns)}) in C order" if columns else "(n,)"
             raise InputError(
@@ -95,7 +126,19 @@ class NpzSource:
                 column=name,
                 remedy=f"Save np.ascontiguousarray({name}).",
             )
+        for column in made:
+            if column in self._members:
+                group = next(key for key, names in GROUPS.items() if column in names)
+                raise InputError(
+                    f"the column stands in the array {group} and in the array {column}",
+                    file=self._path,
+                    column=column,
+                    remedy="Save only one of them: which one holds is not to be guessed.",
+                )
+        self._members |= made
         lengths[name] = int(shape[0])
+        if dtype.kind == "b":
+            self.truths |= dict.fromkeys(made, (None, ""))
 
     def _unreadable(self) -> InputError:
         with self._path.open("rb") as file:
@@ -125,6 +168,8 @@ class NpzSource:
             raise
         except _BROKEN:
             raise self._unreadable() from None
+        except _UNKNOWN as error:
+            raise self._unknown(error) from None
 
     def line_of(self, row: int) -> int | None:
         """Binary files have no lines."""

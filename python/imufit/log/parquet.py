@@ -19,6 +19,8 @@ from imufit.whole_file import whole_file
 _KEY: Final = b"imufit"
 _BATCH: Final = 65_536
 _ROW_GROUP: Final = 131_072
+_BROKEN: Final = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
+"""What the reader raises about damaged bytes; a schema's size may be anything."""
 _DAMAGED: Final = "Copy or record it again; imufit recover saves what a crash left."
 
 
@@ -31,8 +33,14 @@ class ParquetSource:
             with pq.ParquetFile(path) as file:
                 self._schema = file.schema_arrow
                 self.n: int = file.metadata.num_rows
-        except (pa.ArrowException, OSError) as error:
+        except UnicodeDecodeError:
+            raise InputError(
+                "a name in the file's schema is no UTF-8", file=path, remedy="Rename the column and write it again."
+            ) from None
+        except _BROKEN as error:
             raise self._unreadable(error) from None
+        truths = [name for name in self._schema.names if pa.types.is_boolean(_value_type(self._schema, name))]
+        self.truths: dict[str, tuple[int | None, str]] = dict.fromkeys(truths, (None, ""))
         listed = [name for name in self._schema.names if pa.types.is_nested(_value_type(self._schema, name))]
         self.names: tuple[str, ...] = tuple(name for name in self._schema.names if name not in listed)
         self.notes: tuple[str, ...] = tuple(f"{path.name}: column {name} left out: it holds lists" for name in listed)
@@ -61,7 +69,7 @@ class ParquetSource:
                 for batch in file.iter_batches(batch_size=_BATCH, columns=wanted, use_threads=False):
                     yield start, batch.num_rows, {name: _array(batch.column(name)) for name in columns}
                     start += batch.num_rows
-        except (pa.ArrowException, OSError) as error:
+        except _BROKEN as error:
             raise InputError(
                 f"the file is damaged after row {start} ({str(error).splitlines()[0]})",
                 file=self._path,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from imufit.errors import InputError
+from imufit.printable import NAME, printable
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Place:
     @property
     def name(self) -> str:
         """Name of the file for notes."""
-        return "log" if self.file is None else self.file.name
+        return "log" if self.file is None else printable(self.file.name, NAME)
 
     def error(
         self, problem: str, *, row: int | None = None, column: str | None = None, remedy: str | None = None

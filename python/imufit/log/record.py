@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
@@ -42,12 +42,15 @@ class Found:
         Whether a name stands in the line more often than in a record: two lines that ran into one.
     more : tuple of str
         Names with values that are not part of the record.
+    truths : dict of str to str
+        Columns that say true or false, and which.
     """
 
     values: tuple[float, ...]
     missing: tuple[str, ...] = ()
     twice: bool = False
     more: tuple[str, ...] = ()
+    truths: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,8 @@ class Record:
                 # only where the plain numbers are the values, in that order, and nothing else is
                 if begin and begin.start() == items[0].start and values == tuple(map(float, plain)):
                     self._remember(form)
-                return Found((*(value for _, value in numbers), *values))
+                truths = self._truths(dict(enumerate(items)))
+                return Found((*(value for _, value in numbers), *values), truths=truths)
         return self._incomplete(line, items, first=first)
 
     @cached_property
@@ -162,7 +166,15 @@ class Record:
             missing=self._columns_but(matched, begins),
             twice=any(counts[name] > times for name, times in self._written.items()),
             more=tuple(item.name for item in items if id(item) not in used and item.name not in known),
+            truths=self._truths(matched),
         )
+
+    def _truths(self, matched: Mapping[int, Item]) -> dict[str, str]:
+        """Columns of the places whose values are true or false, and which."""
+        said = [""] * len(self.lead_names)
+        for place, shape in enumerate(self.shapes):
+            said += [matched[place].truth if place in matched else ""] * len(shape[3])
+        return {column: text for column, text in zip(self.columns, said, strict=True) if text}
 
     def _columns_but(self, matched: Mapping[int, Item], begins: bool) -> tuple[str, ...]:
         """Columns of the places that are not matched."""

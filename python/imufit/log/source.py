@@ -40,6 +40,11 @@ class Source(Protocol):
         ...
 
     @property
+    def truths(self) -> Mapping[str, tuple[int | None, str]]:
+        """First row with a truth value, and that value, of each column that has one; of text as far as scanned."""
+        ...
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What was noticed on reading."""
         ...

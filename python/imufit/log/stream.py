@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from imufit.log.assemble import fields_of, time_of
+from imufit.log.assemble import check_truth_values, fields_of, time_of
 from imufit.log.foreign import plan_columns
 from imufit.log.log import Chunk, Log, check_chunk_size, concatenate
 from imufit.log.metadata import Metadata, read_metadata
@@ -52,7 +52,10 @@ class LogStream:
     def _scan(self) -> TimeRepair:
         scan, time = TimeScan(self._place), self._plan.time
         for start, rows, block in self._source.scan([time.source] if time.source is not None else []):
+            if time.source in self._source.truths:
+                break
             scan.add(time_of(self._plan, block, start, rows, self._place))
+        check_truth_values(self._plan, self._source.truths, self._place)
         if self._source.n == 0:
             raise self._place.error("the file has a header but no rows", remedy="Record or copy it again.")
         return scan.finish()

@@ -8,13 +8,27 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from imufit.log.columns import LARGEST
 from imufit.log.place import Place
 
+DAY: Final = 86400.0
+"""Length of a day, s."""
 COARSE_AT_LEAST: Final = 10
 COARSE_AT_MOST: Final = 0.02
 _PARTS: Final = 10
 _PARTS_AT_LEAST: Final = 4
 _KEPT_STEPS: Final = 100_000
+
+
+def over_midnight(before: float, after: float) -> bool:
+    """Whether a clock that shows the time of day went past midnight between two of its readings.
+
+    Parameters
+    ----------
+    before, after : float
+        s since midnight; a log goes on after a pause of less than half a day.
+    """
+    return 0.0 <= after < before <= DAY and before - after > 0.5 * DAY
 
 
 @dataclass(frozen=True)
@@ -82,10 +96,10 @@ class TimeScan:
         self._last = float(t[-1])
 
     def _check_finite(self, t: NDArray[np.float64], start: int) -> None:
-        bad = np.flatnonzero(~np.isfinite(t))
+        bad = np.flatnonzero(~(np.abs(t) <= LARGEST["t"]))
         if bad.size:
             raise self._place.error(
-                f"{t[bad[0]]} is not a time",
+                f"{t[bad[0]]:.6g} is not a time",
                 row=start + int(bad[0]),
                 column="t",
                 remedy="Every row needs its time in s: fill it in or delete the row.",
@@ -95,11 +109,15 @@ class TimeScan:
         back = np.flatnonzero(steps < 0.0)
         if back.size:
             i = int(back[0])
+            late, early = float(t[i]), float(t[i + 1])
+            remedy = "Sort the log by t or split it there."
+            if over_midnight(late, early):
+                remedy = "This looks like the time of day at midnight: add 86400 s to t from this row on."
             raise self._place.error(
-                f"t = {float(t[i + 1])!r} is before t = {float(t[i])!r} of row {offset + i}",
+                f"t = {early!r} is before t = {late!r} of row {offset + i}",
                 row=offset + i + 1,
                 column="t",
-                remedy="Sort the log by t or split it there.",
+                remedy=remedy,
             )
 
     def _collect(self, t: NDArray[np.float64], steps: NDArray[np.float64], offset: int) -> None:

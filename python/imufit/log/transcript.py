@@ -16,6 +16,7 @@ from imufit.log.columns import POSES
 from imufit.log.csv_layout import text_of
 from imufit.log.named_values import without_colour
 from imufit.log.record import Found, Record
+from imufit.log.time_order import DAY, over_midnight
 
 _ROWS: Final = 20_000
 _DETAILED: Final = 5
@@ -58,6 +59,7 @@ class TranscriptSource:
         self.names = (*record.columns, *(["pose"] if poses and "pose" not in record.columns else []))
         self.n = 0
         self.notes: tuple[str, ...] = ()
+        self.truths: dict[str, tuple[int | None, str]] = {}
 
     def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
         """Count and judge all lines, and give the named columns; a record without them is left out from now on."""
@@ -104,6 +106,7 @@ class TranscriptSource:
     def _rows(self, tally: _Tally) -> Iterator[tuple[int, tuple[float, ...], str | None]]:
         """Line, values and pose of every record that is kept."""
         pose: str | None = None
+        clock = DayClock(self._record)
         for line, text in lines_of(self._path):
             if not text.strip():
                 continue
@@ -124,8 +127,10 @@ class TranscriptSource:
                 lacks = f"lacks {', '.join(found.missing) or 'its time'}" + ("" if kept else ", so it is left out")
                 tally.damaged.append((line, lacks))
             if kept:
+                for name, said in found.truths.items():
+                    self.truths.setdefault(name, (tally.records, said))
                 tally.records += 1
-                yield line, found.values, pose
+                yield line, clock.unrolled(found.values), pose
 
     def _notes(self, tally: _Tally) -> Iterator[str]:
         records = f"{tally.records} record{'' if tally.records == 1 else 's'} ({self._record.words})"
@@ -151,6 +156,42 @@ class TranscriptSource:
             file.seek(-1, 2)
             if file.read(1) not in b"\r\n":
                 yield "the last line has no line end; if the transcript was cut off, its last value is wrong"
+
+
+class DayClock:
+    """The time of day in front of the records of one pass, counted on past midnight.
+
+    Parameters
+    ----------
+    record : Record
+        The kind of line that holds the data.
+    """
+
+    def __init__(self, record: Record) -> None:
+        self._places = [k for k, name in enumerate(record.lead_names) if name == "clock"]
+        self._last: dict[int, float] = {}
+        self._days: dict[int, float] = {}
+
+    def unrolled(self, values: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the values of the next record, with a day more for each midnight that its clock went past.
+
+        Parameters
+        ----------
+        values : tuple of float
+            One for each column of the record.
+        """
+        if not self._places:
+            return values
+        counted = list(values)
+        for place in self._places:
+            now = values[place]
+            if np.isnan(now):
+                continue
+            if over_midnight(self._last.get(place, now), now):
+                self._days[place] = self._days.get(place, 0.0) + DAY
+            self._last[place] = now
+            counted[place] += self._days.get(place, 0.0)
+        return tuple(counted)
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, str]]:

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 
+LEAST_STEP: Final = 1e-6
+"""Mean time from row to row, s, below which no sensor samples: the fastest accelerometers give 1e5 samples a second."""
 HEAD: Final = 200_000
 """Rows from the start of the log on which units are judged."""
 
@@ -89,7 +91,19 @@ def check_units(
 
 def _check_time(t: Array, gyr: Array | None, place: Place, origin: Mapping[str, str]) -> None:
     """Whole numbers far apart are ticks of a finer clock when nothing could be sampled so slowly."""
-    if t.size < 20 or np.any(t != np.floor(t)):
+    if t.size < 20:
+        return
+    mean = float(t[-1] - t[0]) / (t.size - 1)
+    column = origin.get("t", "t")
+    if mean < LEAST_STEP:
+        raise place.error(
+            f"{t.size} rows lie within {t[-1] - t[0]:.3g} s, more than any sensor samples: t is not in s",
+            column="t",
+            remedy="Say how many s one of its units has, such as --map "
+            + shlex.quote(f"t={column}[*3600]")
+            + " for hours.",
+        )
+    if np.any(t != np.floor(t)):
         return
     dt = float(np.median(np.diff(t)))
     if dt < 2.0:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -10,7 +9,7 @@ from typing import Any, Self
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.model.catalogue import find_effect
-from imufit.model.model_file import ModelFile
+from imufit.model.model_file import ModelFile, is_usable, shown
 from imufit.results import Parameter
 
 
@@ -175,6 +174,8 @@ def _values(effect: _imufit.Effect, given: Mapping[str, float]) -> list[float]:
     for name, value in given.items():
         if name not in names:
             raise InputError(f"{effect.id} has no parameter {name}", remedy=f"It has {', '.join(names)}.")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(f"{effect.id} {name} is {value!r}, not a finite number")
+        if not is_usable(value):
+            raise InputError(
+                f"{effect.id} {name} is {shown(value)}, not a finite number", remedy="Write a number in SI units."
+            )
     return [float(given.get(name, 0.0)) for name in names]

@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from imufit.errors import InputError
+from imufit.log.columns import LARGEST_COVARIATE
 from imufit.model.catalogue import find_effect
+from imufit.printable import NAME, printable
 from imufit.whole_toml import HOW_TO_END, read_toml, write_toml
 
 KIND = "imufit sensor model"
@@ -136,13 +138,23 @@ class ModelFile:
                 )
 
 
+def is_usable(value: Any) -> bool:
+    """Whether something is a number that can be worked with."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_COVARIATE
+
+
+def shown(value: Any) -> str:
+    """Return what a file holds, printable and not too long for a message."""
+    return printable(repr(value), NAME)
+
+
 def _units(effect_id: str) -> dict[str, str]:
     return {name: unit for name, unit, _ in find_effect(effect_id).parameters}
 
 
 def _table(value: Any, name: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise InputError(f"{name} is {value!r}, not a table", remedy=f"Write [{name}] above what belongs to it.")
+        raise InputError(f"{name} is {shown(value)}, not a table", remedy=f"Write [{name}] above what belongs to it.")
     return value
 
 
@@ -153,9 +165,9 @@ def _tables(value: Any, name: str) -> dict[str, dict[str, Any]]:
 def _constants(value: Any) -> dict[str, Any]:
     constants = dict(_table(value, "constants"))
     if "temperature_mean" in constants:
-        _check_number(constants["temperature_mean"], "temperature_mean")
+        _check_mean(constants["temperature_mean"], "the temperature")
     for name, mean in _table(constants.get("covariate_means", {}), "constants.covariate_means").items():
-        _check_number(mean, f"the mean of {name}")
+        _check_mean(mean, name)
     return constants
 
 
@@ -163,10 +175,12 @@ def _standard_errors(value: Any) -> dict[str, dict[str, float]]:
     errors = _tables(value, "standard_errors")
     for key, numbers in errors.items():
         for name, number in numbers.items():
-            _check_number(number, f"the standard error of {key} {name}")
+            # One that nobody could work out is not a number, and stays so.
+            if isinstance(number, bool) or not isinstance(number, int | float):
+                raise InputError(f"the standard error of {key} {name} is {shown(number)}, not a number")
     return errors
 
 
-def _check_number(value: Any, name: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{name} is {value!r}, not a number")
+def _check_mean(value: Any, name: str) -> None:
+    if not is_usable(value):
+        raise InputError(f"constants: the mean of {name} is {shown(value)}, not a finite number")

@@ -124,7 +124,7 @@ def _still_rows(t: Array, ref_q: Array, known: NDArray[np.intp], step: float) ->
     # Second differences of a rotation's elements: sqrt(2) times those of its angle, and those have variance 6.
     bends = np.linalg.norm(np.diff(_matrix(ref_q[known]), 2, axis=0), axis=1) / np.sqrt(2.0)
     noise = float(np.quantile(bends, 0.25)) / (0.319 * np.sqrt(6.0))
-    window = _odd(REST / step)
+    window = _odd(REST / step, t.size)
     spread = maximum_filter1d(elements, window, axis=0) - minimum_filter1d(elements, window, axis=0)
     centre = spread.max(axis=1) <= min(STILL + 6.0 * noise, _MOST_STILL)
     return np.asarray(maximum_filter1d(centre.astype(np.uint8), window).astype(np.bool_) & fresh)
@@ -156,8 +156,8 @@ def _vibrations(t: Array, acc: Array, rests: tuple[Rest, ...], step: float) -> t
         if np.count_nonzero(seen) < 8:
             continue
         force = force[seen]
-        slow = uniform_filter1d(force, _odd(_SLOW / step), axis=0, mode="nearest")
-        window = max(5, _odd(_WINDOW / step))
+        slow = uniform_filter1d(force, _odd(_SLOW / step, len(force)), axis=0, mode="nearest")
+        window = max(5, _odd(_WINDOW / step, len(force)))
         rows = rest.start + np.flatnonzero(seen)
         power[rows] = np.maximum(uniform_filter1d(((force - slow) ** 2).sum(axis=1), window, mode="nearest"), 0.0)
     if not np.isfinite(power).any():
@@ -216,5 +216,6 @@ def _runs(mask: NDArray[np.bool_], offset: int) -> list[Rows]:
     return [(int(a) + offset, int(b) + offset) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _odd(rows: float) -> int:
-    return max(3, 2 * round(rows / 2.0) + 1)
+def _odd(rows: float, n: int) -> int:
+    """Odd number of rows of a window over n rows: beyond twice as many it sees nothing more, but takes its time."""
+    return max(3, 2 * round(min(rows, 2.0 * n) / 2.0) + 1)
