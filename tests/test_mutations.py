@@ -96,9 +96,10 @@ HOG = "x = bytearray(1_200_000_000)\ndel x\n"
 
 
 @pytest.mark.parametrize(("kind", "program"), [("hang", HANG), ("process ended", KILL), ("memory", HOG)])
-def test_worker_survives_and_tells(worker: Worker, tmp_path: Path, kind: str, program: str) -> None:
+def test_worker_survives_and_tells(seeds: Path, tmp_path: Path, kind: str, program: str) -> None:
     """A user's own effect file is the way to let a command hang, end or take memory."""
     (tmp_path / "own.py").write_text(program)
-    answer = worker.judged({"arguments": ["explain", "--effects-from", os.fspath(tmp_path / "own.py")]})
-    assert kind in [found for found, _ in answer["faults"]]
-    assert "faults" not in worker.judged({"arguments": ["explain", "gyr.bias"]})
+    with Worker(seeds, limit=3.0) as worker:
+        answer = worker.judged({"arguments": ["explain", "--effects-from", os.fspath(tmp_path / "own.py")]})
+        assert kind in [found for found, _ in answer["faults"]]
+        assert "faults" not in worker.judged({"arguments": ["explain", "gyr.bias"]})

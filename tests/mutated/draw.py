@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from random import Random
 
+import numpy as np
 import tomli_w
 from imufit.cli.app import imufit
 
@@ -132,7 +133,7 @@ def _log_case(drawing: _Drawing, seeds: SeedFiles, command: str) -> Case:
     files = _log_files(drawing, seeds, log, format_, "log")
     name = next(iter(files))
     arguments = _line(rng, command, name)
-    if b" -> acc" in files[name][:300]:
+    if b" -> acc" in files[name][:300] and command != PYTHON:
         arguments += ["--map", "t=clock"]
     files.update(_needed(seeds, arguments))
     _options(drawing, command, arguments, rng.choice((0, 0, 0, 0, 1)))
@@ -148,7 +149,8 @@ def _log_files(drawing: _Drawing, seeds: SeedFiles, log: str, format_: str, stem
         act = rng.choice(COLUMN_MUTATIONS)
 
         def change(own: Random, act: Callable[..., None] = act) -> None:
-            act(own, columns)
+            if all(np.size(values) for values in columns.values()):
+                act(own, columns)
 
         drawing.step(act.__name__, change)
     metadata = tomllib.loads(seeds.files[f"{log}.toml"].decode())

@@ -62,7 +62,7 @@ def parquet(columns: Columns, metadata: bytes | None, rng: Random) -> bytes:
         if array is None:
             continue
         if encoded == "all" or (encoded == "one" and k == len(columns) // 2):
-            array = array.dictionary_encode()
+            array = array if pa.types.is_nested(array.type) else array.dictionary_encode()
         arrays.append((name.encode("utf-8", "replace").decode(), array))
     table = pa.Table.from_arrays([array for _, array in arrays], names=[name for name, _ in arrays])
     if metadata is not None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import select
 import subprocess
 import sys
@@ -24,10 +25,18 @@ START_S = 120.0
 
 
 class Worker:
-    """One process that judges inputs one after another; use it as a context."""
+    """One process that judges inputs one after another; use it as a context.
 
-    def __init__(self, seeds: Path) -> None:
-        self.seeds = seeds
+    Attributes
+    ----------
+    seeds : Path
+        Folder of the whole files.
+    limit : float
+        Time after which an input is ended, s.
+    """
+
+    def __init__(self, seeds: Path, limit: float = judge.CLOCK_S) -> None:
+        self.seeds, self.limit = seeds, limit
         self.folder = tempfile.TemporaryDirectory(prefix="mutated-")
         self.process: subprocess.Popen[bytes] | None = None
         self.done = 0
@@ -49,18 +58,21 @@ class Worker:
         assert process.stdout
         process.stdin.write(json.dumps(request).encode() + b"\n")
         process.stdin.flush()
-        limit = judge.LIMIT_S + GRACE_S + (START_S if first else 0.0)
-        line = process.stdout.readline() if select.select([process.stdout], [], [], limit)[0] else b""
+        limit = self.limit + GRACE_S + (START_S if first else 0.0)
+        in_time = bool(select.select([process.stdout], [], [], limit)[0])
+        line = process.stdout.readline() if in_time else b""
         if line:
             reply: dict[str, Any] = json.loads(line)
+            if "unmade" in reply:
+                raise RuntimeError(f"{request}: {reply['unmade']}")
             return reply
-        return self._died(process)
+        return self._died(process, in_time)
 
     def _start(self) -> subprocess.Popen[bytes]:
         paths = [ROOT / "python", ROOT / "tests"]
         one = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "RAYON", "MKL", "ARROW")}
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, paths)), "MPLBACKEND": "Agg", **one}
-        arguments = [str(self.seeds), self.folder.name, str(self._stacks)]
+        arguments = [str(self.seeds), self.folder.name, str(self._stacks), str(self.limit)]
         self.process = subprocess.Popen(
             [sys.executable, "-m", "mutated.worker", *arguments],
             stdin=subprocess.PIPE,
@@ -81,15 +93,17 @@ class Worker:
             self.process.communicate()
         self.process, self.done = None, 0
 
-    def _died(self, process: subprocess.Popen[bytes]) -> dict[str, Any]:
-        process.kill()
-        process.communicate()
+    def _died(self, process: subprocess.Popen[bytes], in_time: bool) -> dict[str, Any]:
+        """Say how a process ended that gave no answer; after the limit of the time it still runs and is ended here."""
+        if not in_time:
+            process.kill()
+        process.communicate(timeout=GRACE_S)
         self.process, self.done = None, 0
-        stack = self._stacks.read_text(encoding="utf-8", errors="replace") if self._stacks.exists() else ""
-        places = [line.strip() for line in stack.splitlines() if "File " in line and "/mutated/" not in line]
-        where = " < ".join(places[:4])
-        if "Timeout" in stack or process.returncode == -9:
-            return {"code": None, "faults": [("hang", f"over {judge.LIMIT_S:g} s")], "where": where}
+        stack = self._stacks.read_text(encoding="utf-8", errors="replace")
+        places = re.findall(r'File "(?:.*/python/)?([^"]+)", line (\d+) in (\S+)', stack)
+        where = " < ".join(f"{path}:{line} {name}" for path, line, name in places[:4])
+        if not in_time or "Timeout" in stack:
+            return {"code": None, "faults": [("hang", f"over {self.limit:g} s")], "where": where}
         said = (Path(self.folder.name) / "err").read_bytes()[-600:].decode("utf-8", "replace")
         detail = f"exit status {process.returncode} {stack.splitlines()[:1]} {said}"
         return {"code": process.returncode, "faults": [("process ended", detail)], "where": where}

@@ -14,6 +14,7 @@ import resource
 import shutil
 import sys
 import time
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from imufit.cli.app import main as command
 from mutated import corpus, draw, judge
 from mutated.seed_files import SeedFiles, load
 
-ADDRESS_SPACE = 6 * 10**9
+ADDRESS_SPACE = 4 * 10**9
 """Limit of the address space, bytes: of allocators' reserves and maps too, hence far above the limit of the memory."""
 
 LAID_OPEN = 3 * 2**20
@@ -33,6 +34,7 @@ LAID_OPEN = 3 * 2**20
 def main() -> None:
     """Serve until standard input ends."""
     seeds_folder, work, stacks = map(Path, sys.argv[1:4])
+    limit = float(sys.argv[4])
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     requests = os.fdopen(os.dup(0), encoding="utf-8")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -48,10 +50,14 @@ def main() -> None:
         os.dup2(stream.fileno(), number)
     for line in requests:
         request = json.loads(line)
-        case = _case(seeds, request)
+        try:
+            case = _case(seeds, request)
+        except Exception:
+            print(json.dumps({"unmade": traceback.format_exc()}), file=answers, flush=True)
+            continue
         stack.seek(0)
         stack.truncate()
-        with _guarded(stack):
+        with _guarded(stack, limit):
             outcome = run(case, work / "folder", streams)
         found = judge.faults(case.arguments, outcome)
         reply: dict[str, Any] = {"code": outcome.code, "seconds": outcome.seconds, "peak": outcome.peak}
@@ -61,10 +67,9 @@ def main() -> None:
         if found:
             reply["faults"] = found
             if any(kind in ("exit code 1", "internal error") for kind, _ in found):
-                with _guarded(stack):
+                with _guarded(stack, limit):
                     reply["where"] = _where(case, work / "folder", streams)
-        answers.write(json.dumps(reply) + "\n")
-        answers.flush()
+        print(json.dumps(reply), file=answers, flush=True)
 
 
 def _case(seeds: SeedFiles, request: dict[str, Any]) -> draw.Case:
@@ -84,9 +89,9 @@ def _import_all() -> None:
 
 
 @contextlib.contextmanager
-def _guarded(stack: Any) -> Any:
+def _guarded(stack: Any, limit: float) -> Any:
     """End the process when it takes too long, from a thread that compiled code cannot hold up."""
-    faulthandler.dump_traceback_later(judge.LIMIT_S, exit=True, file=stack)
+    faulthandler.dump_traceback_later(limit, exit=True, file=stack)
     try:
         yield
     finally:
@@ -104,7 +109,7 @@ def run(case: draw.Case, folder: Path, streams: list[Any]) -> judge.Outcome:
         stream.seek(0)
         stream.truncate()
     _forget_peak()
-    start = time.perf_counter()
+    start = time.process_time()
     code, escaped = None, ""
     try:
         code = _called(case.arguments)
@@ -116,7 +121,7 @@ def run(case: draw.Case, folder: Path, streams: list[Any]) -> judge.Outcome:
         sys.stdout.flush()
     with contextlib.suppress(Exception):
         sys.stderr.flush()
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     out, err = (_content(stream) for stream in streams)
     written = {}
     for path in folder.rglob("*"):
