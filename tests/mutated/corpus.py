@@ -168,8 +168,18 @@ KEPT: dict[str, Kept] = {
     "temperature_1e308": Kept(
         "a sum of temperatures overflows: panic", ("diagnose", "log.csv"), columns("walk", temp=1e308)
     ),
+    "temperature_1e300_calibrate": Kept(
+        "a bias by such temperatures is a singular matrix",
+        ("calibrate", "log.csv"),
+        columns("sides", temp=lambda temp: temp + 1e300),
+    ),
     "covariate_1e300": Kept(
         "the square of a covariate overflows", ("compare", "log.csv"), columns("table", vbat=1e300)
+    ),
+    "settings_deep": Kept(
+        "the TOML parser's depth",
+        ("replay", "log.csv", "--settings", "s.toml"),
+        beside_a_log("s.toml", f"a = {'[' * DEEP}{']' * DEEP}"),
     ),
     "reading_1e308": Kept(
         "the median of readings overflows to infinity, which is no JSON",
