@@ -31,11 +31,13 @@ test-python: $(STAMP) ## Python tests
 
 # A frame or a line is a few ten bytes; no sanitizer, since there is no unsafe code for it to watch.
 FUZZ_FLAGS := --sanitizer none --fuzz-dir rust/device/fuzz
-FUZZ_LIMITS := -max_total_time=60 -rss_limit_mb=512 -max_len=4096
+FUZZ_LIMITS := -max_total_time=45 -rss_limit_mb=512 -max_len=4096
 
-fuzz: ## Any bytes for the decoders of the wire protocol, a minute each; installs cargo-fuzz
+fuzz: $(STAMP) ## Any bytes for all decoders and readers, four minutes; installs cargo-fuzz and atheris
 	cargo fuzz --version >/dev/null 2>&1 || cargo install cargo-fuzz --locked --quiet
 	for target in frames lines; do cargo fuzz run $(FUZZ_FLAGS) $$target -- $(FUZZ_LIMITS) || exit 1; done
+	$(BIN)/python -c 'import atheris' 2>/dev/null || $(BIN)/python -m pip install --quiet 'atheris>=3,<4'
+	$(BIN)/python tests/fuzz/readers.py --seconds 90
 
 lint: $(STAMP) ## Formatting, clippy, ruff, mypy, stubs, import layers
 	cargo fmt --all --check
