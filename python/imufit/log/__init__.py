@@ -5,6 +5,7 @@ from imufit.log.contents import Contents, contents
 from imufit.log.log import Chunk, Log, LogSource, concatenate
 from imufit.log.metadata import Metadata
 from imufit.log.segments import gaps
+from imufit.log.some_rows import SomeRows
 from imufit.log.stream import LogStream, open_log, read
 from imufit.log.units import parse_mapping
 
@@ -16,6 +17,7 @@ __all__ = [
     "LogSource",
     "LogStream",
     "Metadata",
+    "SomeRows",
     "concatenate",
     "contents",
     "gaps",

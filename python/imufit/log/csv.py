@@ -6,7 +6,7 @@ import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 import numpy as np
 import pyarrow as pa
@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.check import number_from_text
-from imufit.log.csv_layout import NOT_DATA, is_comment, read_layout, split_line, text_of
-from imufit.log.metadata import Metadata, write_sidecar
+from imufit.log.csv_layout import NOT_DATA, is_comment, lines_in, read_layout, split_line, text_of, too_long
+from imufit.log.metadata import Metadata
+from imufit.log.size import LONGEST_LINE
+from imufit.log.text_cells import cells_of
 
 _BLOCK: Final = 4 << 20
 _EMPTY: Final = ["", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None"]
@@ -79,6 +81,8 @@ class CsvSource:
                 block = rest + block
                 cut = block.rfind(b"\n") + 1
                 rest = block[cut:]
+                if len(rest) > LONGEST_LINE:
+                    raise too_long(self._path)
                 if cut:
                     yield self._clean(block[:cut])
             if rest:
@@ -146,18 +150,20 @@ class CsvSource:
         kind = self._kinds[name]
         if pa.types.is_floating(column.type):
             return np.asarray(column.to_numpy(), dtype=np.float64)
-        cells = column.to_pylist()
         if kind == "word":
-            return np.array([number_from_text(cell) for cell in cells], dtype=np.float64)
-        text = np.empty(len(cells), dtype=object)
-        text[:] = cells
-        return text
+            return np.array([number_from_text(cell) for cell in column.to_pylist()], dtype=np.float64)
+        return cells_of(column)
+
+    @property
+    def text(self) -> frozenset[str]:
+        """Columns that hold text, once `scan` has been through."""
+        return frozenset(name for name, kind in self._kinds.items() if kind == "text")
 
     def _rows(self) -> Iterator[tuple[int, str]]:
         """Line number, from 1, and text of every data row."""
         with self._path.open("rb") as file:
             file.seek(self._layout.data_offset)
-            for line, data in enumerate(file, self._layout.data_line + 1):
+            for line, data in enumerate(lines_in(file, self._path), self._layout.data_line + 1):
                 text = text_of(data)
                 if not is_comment(text):
                     yield line, text.rstrip("\r\n")
@@ -206,8 +212,8 @@ def _all_numbers(column: Any) -> bool:
     return True
 
 
-def write_csv(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metadata) -> None:
-    """Write columns as CSV, and the metadata to the sidecar.
+class CsvRows:
+    """Writes columns as CSV.
 
     Numbers have as many digits as it takes to read the same number back; missing ones are empty cells. Text that reads
     as a number comes back as one.
@@ -216,24 +222,38 @@ def write_csv(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metadata)
     ----------
     path : Path
         File to write.
-    table : mapping
-        Columns: (n,) float64, or (n,) object for text with None where there is none.
     metadata : Metadata
-        Goes to the sidecar.
+        Goes to the sidecar alone.
     """
-    for name, column in table.items():
-        if column.dtype == object and any(cell is not None and ("\n" in cell or "\r" in cell) for cell in column):
-            raise InputError(
-                "CSV cannot hold line breaks in text", file=path, column=name, remedy="Write .parquet or .npz."
-            )
-    write_sidecar(path, metadata)
-    arrays = [
-        pa.array(column, pa.string())
-        if column.dtype == object
-        else pa.array(column, pa.float64(), mask=np.isnan(column))
-        for column in table.values()
-    ]
-    with path.open("w", newline="", encoding="utf-8") as header:
-        csv.writer(header, lineterminator="\n").writerow(table)
-    with path.open("ab") as file:
-        pacsv.write_csv(pa.Table.from_arrays(arrays, list(table)), file, pacsv.WriteOptions(include_header=False))
+
+    def __init__(self, path: Path, metadata: Metadata) -> None:
+        self._path = path
+        self._file: IO[bytes] | None = None
+
+    def add(self, table: Mapping[str, NDArray[Any]]) -> None:
+        """Write rows.
+
+        Parameters
+        ----------
+        table : mapping
+            Columns: (n,) float64, or (n,) object for text with None where there is none; the same every time.
+        """
+        if self._file is None:
+            with self._path.open("w", newline="", encoding="utf-8") as header:
+                csv.writer(header, lineterminator="\n").writerow(table)
+            self._file = self._path.open("ab")
+        arrays = [
+            pa.array(column, pa.string())
+            if column.dtype == object
+            else pa.array(column, pa.float64(), mask=np.isnan(column))
+            for column in table.values()
+        ]
+        rows = pa.Table.from_arrays(arrays, list(table))
+        pacsv.write_csv(rows, self._file, pacsv.WriteOptions(include_header=False))
+
+    def finish(self) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+
+    abandon = finish

@@ -131,18 +131,20 @@ def read_metadata(path: Path, embedded: Mapping[str, Any]) -> Metadata:
     return Metadata.from_mapping({**embedded, **sidecar}, path)
 
 
-def write_sidecar(path: Path, metadata: Metadata) -> None:
-    """Write the sidecar of the log at `path`, over an older sidecar but not over another kind of TOML file."""
-    sidecar = sidecar_path(path)
-    if sidecar.exists():
-        older = read_sidecar(path)
-        if older and not KNOWN & older.keys():
-            raise InputError(
-                "this file is in the way: it is no log metadata, but the log's metadata would be written there",
-                file=sidecar,
-                remedy="Write the log under another name.",
-            )
-    sidecar.write_text(tomli_w.dumps(_without_none(metadata.to_mapping())), encoding="utf-8")
+def check_sidecar(path: Path) -> None:
+    """Refuse to write the sidecar of the log at `path` over another kind of TOML file."""
+    older = read_sidecar(path)
+    if older and not KNOWN & older.keys():
+        raise InputError(
+            "this file is in the way: it is no log metadata, but the log's metadata would be written there",
+            file=sidecar_path(path),
+            remedy="Write the log under another name.",
+        )
+
+
+def sidecar_text(metadata: Metadata) -> str:
+    """Metadata as they stand in a sidecar."""
+    return tomli_w.dumps(_without_none(metadata.to_mapping()))
 
 
 def _without_none(value: Any) -> Any:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
@@ -16,7 +14,7 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.log import Log, LogStream, Metadata
 from imufit.log.assemble import group_fields
-from imufit.log.metadata import read_sidecar, sidecar_path, write_sidecar
+from imufit.log.metadata import read_sidecar, sidecar_path
 from imufit.log.place import Place
 from imufit.record.arrived import Arrived
 from imufit.record.clock import typical_step
@@ -237,34 +235,8 @@ def write_log(log: Log, path: Path) -> Log:
     kept = {name: value for name, value in read_sidecar(path).items() if name not in (KEY, "sensor")}
     merged = Metadata.from_mapping({**log.metadata.to_mapping(), **kept}, sidecar_path(path))
     whole = replace(log, metadata=merged)
-    new = path.with_name(f".{path.stem}.new{path.suffix}")
-    try:
-        whole.write(new)
-        with new.open("rb") as file:
-            os.fsync(file.fileno())
-        if sidecar_path(new).exists():
-            sidecar_path(new).replace(sidecar_path(path))
-        elif sidecar_path(path).exists():
-            write_sidecar(path, merged)
-        new.replace(path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror or error})", file=path) from None
-    finally:
-        for left in (new, sidecar_path(new)):
-            with contextlib.suppress(OSError):
-                left.unlink(missing_ok=True)
-    _sync_directory(path.parent)
+    whole.write(path)
     return whole
-
-
-def _sync_directory(directory: Path) -> None:
-    """Put the names in a directory on the disk, where that is known."""
-    with contextlib.suppress(OSError):  # Windows opens no directories
-        handle = os.open(directory, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 def unreadable(path: Path, n: int) -> str:

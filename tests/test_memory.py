@@ -1,0 +1,153 @@
+"""No file takes more than 1 GB of memory, whatever its own size: rows and columns decide, and text is refused."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import imufit
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.lib import format as npy
+
+LIMIT = 600.0
+"""MB that a command may take here. The bound for any file is 1000; a file of seconds leaves most of that unused."""
+
+RUN = """
+import resource, sys
+from pathlib import Path
+from imufit.cli.app import main
+try:
+    code = main(sys.argv[1:]) or 0
+except SystemExit as end:
+    code = end.code or 0
+# ru_maxrss is handed down from the process that started this one; Linux also counts from the start of the program
+status = Path("/proc/self/status")
+lines = status.read_text().splitlines() if status.exists() else []
+peak = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
+print("peak", code, peak[0] if peak else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def run(*words: object) -> tuple[int, float, str]:
+    """Run a command in a process of its own; return its code, its peak memory (MB) and what it said."""
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, *map(str, words)], check=False, capture_output=True, text=True, timeout=300
+    )
+    *said, last = done.stdout.splitlines()
+    _, code, peak = last.split()
+    return int(code), int(peak) / 1024, "\n".join([*said, done.stderr])
+
+
+def write_long(path: Path, n: int, columns: dict[str, float], group: int = 1 << 20, **text: str) -> None:
+    """Write a Parquet of n rows at 100 Hz that repeats itself, so that its file is small."""
+    names = ["t", *columns, *text]
+    kinds = [pa.float64()] * (len(columns) + 1) + [pa.string()] * len(text)
+    rng = np.random.default_rng(1)
+    cycle = {name: np.round(rng.normal(mean, 0.02, 1000), 3) for name, mean in columns.items()}
+    schema = pa.schema(list(zip(names, kinds, strict=True)))
+    with pq.ParquetWriter(path, schema, compression="zstd") as out:
+        for start in range(0, n, group):
+            rows = min(group, n - start)
+            arrays = [pa.array(np.arange(start, start + rows) * 0.01)]
+            arrays += [pa.array(np.resize(values, rows)) for values in cycle.values()]
+            arrays += [pa.repeat(pa.scalar(word), rows) for word in text.values()]
+            out.write_table(pa.Table.from_arrays(arrays, schema=schema))
+
+
+ACC = {"acc_x": 0.0, "acc_y": 0.0, "acc_z": -9.8}
+
+
+def test_a_long_log_of_a_small_file_is_converted_row_group_by_row_group(tmp_path: Path) -> None:
+    n = 10_000_000
+    write_long(tmp_path / "a.parquet", n, ACC)
+    assert (
+        tmp_path / "a.parquet"
+    ).stat().st_size < 40e6  # which once decided that it is held: 320 MB, and as many more
+    code, peak, said = run("convert", tmp_path / "a.parquet", "-o", tmp_path / "b.parquet")
+    assert (code, peak < LIMIT) == (0, True), (peak, said)
+    assert f"{n} rows" in said
+    assert pq.ParquetFile(tmp_path / "b.parquet").metadata.num_rows == n
+
+
+def test_a_label_of_millions_of_rows_is_one_word_in_memory(tmp_path: Path) -> None:
+    n = 3_000_000
+    write_long(tmp_path / "a.parquet", n, ACC, note="the left hand, seen from above")
+    code, peak, said = run("convert", tmp_path / "a.parquet", "-o", tmp_path / "b.parquet")
+    assert (code, peak < LIMIT) == (0, True), (peak, said)
+    assert "the left hand" in said
+
+
+def test_a_part_of_a_log_is_taken_by_its_rows(tmp_path: Path) -> None:
+    write_long(tmp_path / "a.parquet", 300_000, ACC, group=70_000)
+    code, _, said = run("convert", tmp_path / "a.parquet", "--rows", "65000:200000", "-o", tmp_path / "b.npz")
+    assert code == 0, said
+    part = imufit.read(tmp_path / "b.npz")
+    whole = imufit.read(tmp_path / "a.parquet")
+    np.testing.assert_array_equal(part.t, whole.t[65_000:200_000])
+    np.testing.assert_array_equal(part.acc, whole.acc[65_000:200_000])
+    code, _, said = run("convert", tmp_path / "a.parquet", "--rows", "5:300001", "-o", tmp_path / "c.npz")
+    assert (code, "take them out of 0:300000" in said) == (2, True), said
+    code, _, said = run("convert", tmp_path / "a.parquet", "--rows", "5-9", "-o", tmp_path / "c.npz")
+    assert (code, "write FIRST:STOP" in said) == (2, True), said
+
+
+def zeros(path: Path, **arrays: tuple[str, tuple[int, ...]]) -> None:
+    """Write an archive of arrays of zeros, which are packed to a thousandth."""
+    nothing = bytes(1 << 24)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, (kind, shape) in arrays.items():
+            dtype = np.dtype(kind)
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                npy.write_array_header_1_0(file, {"descr": kind, "fortran_order": False, "shape": shape})
+                left = int(np.prod(shape)) * dtype.itemsize
+                for _ in range(left // len(nothing)):
+                    file.write(nothing)
+                file.write(nothing[: left % len(nothing)])
+
+
+def test_an_archive_of_packed_zeros_is_not_unpacked_at_once(tmp_path: Path) -> None:
+    zeros(tmp_path / "a.npz", t=("<f8", (40_000_000,)), acc=("<f8", (40_000_000, 3)))
+    code, peak, said = run("compare", tmp_path / "a.npz")
+    assert (code, peak < LIMIT) == (2, True), (peak, said)
+    assert "row 1, column t: t = 0.0 repeats" in said
+
+
+def test_text_of_an_archive_is_refused_by_its_header(tmp_path: Path) -> None:
+    zeros(tmp_path / "a.npz", t=("<f8", (1000,)), acc=("<f8", (1000, 3)), note=("<U250000", (1000,)))
+    code, peak, said = run("compare", tmp_path / "a.npz")
+    assert (code, peak < LIMIT) == (2, True), (peak, said)
+    assert "column note: the array holds 1 MB of text a value" in said
+
+
+def test_text_of_a_parquet_file_is_refused_by_its_metadata(tmp_path: Path) -> None:
+    names = ["t", "acc_x", "acc_y", "acc_z"]
+    schema = pa.schema([(name, pa.float64()) for name in names] + [("note", pa.string())])
+    numbers = [pa.array(np.arange(300) * 0.01)] * 4
+    long = pa.array([f"{k}{'x' * 1_000_000}" for k in range(300)])
+    pq.write_table(pa.Table.from_arrays([*numbers, long], schema=schema), tmp_path / "a.parquet", compression="zstd")
+    assert (tmp_path / "a.parquet").stat().st_size < 200_000
+    code, peak, said = run("compare", tmp_path / "a.parquet")
+    assert (code, peak < LIMIT) == (2, True), (peak, said)
+    assert "column note: the column holds 300 MB of text in 300 rows" in said
+
+
+def test_a_line_without_end_is_refused(tmp_path: Path) -> None:
+    with (tmp_path / "a.csv").open("wb") as file:
+        file.write(b"t,acc_x,acc_y,acc_z\n0,1,2,3\n")
+        for _ in range(700):
+            file.write(b"1" * 1_000_000)
+    code, peak, said = run("compare", tmp_path / "a.csv")
+    assert (code, peak < LIMIT) == (2, True), (peak, said)
+    assert "a line is longer than 1.05 MB" in said
+
+
+def test_what_needs_every_row_at_once_says_how_to_take_a_part(tmp_path: Path) -> None:
+    write_long(tmp_path / "a.parquet", 8_000_000, ACC)
+    code, peak, said = run("allan", tmp_path / "a.parquet")
+    assert (code, peak < LIMIT) == (2, True), (peak, said)
+    assert "8000000 rows take 256 MB of memory" in said
+    assert "--rows 0:6553600 -o" in said
