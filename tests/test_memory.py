@@ -11,6 +11,9 @@ import imufit
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from imufit.log.excerpt import MOST_ROWS, Excerpt, judged_rows
+from imufit.log.size import HELD
+from imufit.progress import silent
 from numpy.lib import format as npy
 
 LIMIT = 600.0
@@ -151,3 +154,38 @@ def test_what_needs_every_row_at_once_says_how_to_take_a_part(tmp_path: Path) ->
     assert (code, peak < LIMIT) == (2, True), (peak, said)
     assert "8000000 rows take 256 MB of memory" in said
     assert "--rows 0:6553600 -o" in said
+
+
+def test_a_replay_counts_what_its_filters_make_of_each_row(tmp_path: Path) -> None:
+    write_long(tmp_path / "a.parquet", 3_000_000, ACC | dict.fromkeys(("gyr_x", "gyr_y", "gyr_z"), 0.0))
+    filters = ("--filter", "accel,gyro,complementary,kalman,mahony,mekf")
+    code, peak, said = run("replay", tmp_path / "a.parquet", *filters)
+    assert (code, peak < LIMIT) == (2, True), (peak, said)
+    assert "3000000 rows take 1.97 GB of memory" in said
+
+
+def test_a_long_log_is_judged_by_stretches_from_all_over_it() -> None:
+    n = 1_000_000
+    rng = np.random.default_rng(3)
+    acc = rng.normal([0.0, 0.0, -9.81], 0.02, (n, 3))
+    log = imufit.Log.from_arrays(np.arange(n) * 0.01, acc=acc, reference=np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
+    few = Excerpt(log, 96 * 200)
+    times = np.concatenate([chunk.core.t for chunk in few.chunks(5000)])
+    assert (few.n, times[0], times[-1]) == (19_200, log.t[0], log.t[-1])
+    each, _ = np.histogram(times, np.linspace(log.t[0], log.t[-1], 49))
+    assert set(each) == {400}, "as many rows in each of the 48 blocks"
+    fit = imufit.SensorModel().fit(few)
+    assert fit.to_dict()["n"] == few.n
+    assert fit.on(log, silent) is fit, "it answers for the log"
+    assert "judged by 96 stretches of 200 rows each, evenly spread over its 1000000 rows" in str(fit.diagnose().notes)
+
+
+def test_how_many_rows_are_judged_follows_from_rows_and_columns() -> None:
+    n = MOST_ROWS + 1
+    log = imufit.Log.from_arrays(np.arange(n) * 0.01, acc=np.zeros((n, 3)))
+    assert isinstance(judged_rows(log), Excerpt)
+    assert judged_rows(log.rows(0, MOST_ROWS)).n == MOST_ROWS
+    assert judged_rows(judged_rows(log)).n < n
+    wide = dict.fromkeys([f"c{k}" for k in range(60)], np.zeros(n // 4))
+    many = imufit.Log.from_arrays(np.arange(n // 4) * 0.01, acc=np.zeros((n // 4, 3)), covariates=wide)
+    assert judged_rows(many).n * 64 * 8 <= HELD

@@ -29,8 +29,8 @@ def open_logs(paths: Sequence[Path], mapping: Sequence[str] = ()) -> list[Any]:
     return [open_log(path, mapping) for path in paths]
 
 
-def read_log(path: Path, mapping: Sequence[str] = ()) -> Log:
-    """Read a whole log into memory; `mapping` as for `open_log`.
+def read_log(path: Path, mapping: Sequence[str] = (), more: int = 0) -> Log:
+    """Read a whole log into memory; `mapping` as for `open_log`, `more` the bytes that will be made of each row.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def read_log(path: Path, mapping: Sequence[str] = ()) -> Log:
     """
     from imufit.log import LogStream, parse_mapping  # noqa: PLC0415
 
-    return LogStream(path, mapping=parse_mapping(*mapping) or None).held()
+    return LogStream(path, mapping=parse_mapping(*mapping) or None).held(more)
 
 
 def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], settings: Mapping[str, float]) -> Any:

@@ -2,7 +2,8 @@
 
 from imufit.errors import InputError
 from imufit.log.contents import Contents, contents
-from imufit.log.log import Chunk, Log, LogSource, concatenate
+from imufit.log.excerpt import judged_rows
+from imufit.log.log import Chunk, Log, LogSource, concatenate, whole
 from imufit.log.metadata import Metadata
 from imufit.log.segments import gaps
 from imufit.log.some_rows import SomeRows
@@ -21,7 +22,9 @@ __all__ = [
     "concatenate",
     "contents",
     "gaps",
+    "judged_rows",
     "open_log",
     "parse_mapping",
     "read",
+    "whole",
 ]

@@ -17,6 +17,7 @@ from imufit.log.columns import GROUPS, present
 from imufit.log.frame import fields_from_frame
 from imufit.log.metadata import Metadata
 from imufit.log.parquet import ROW_GROUP
+from imufit.log.size import BLOCK_ROWS
 from imufit.log.writer import write_rows
 
 if TYPE_CHECKING:
@@ -375,6 +376,19 @@ def concatenate(logs: Sequence[Log]) -> Log:
         The parts; each begins after the one before it ends.
     """
     return logs[0] if len(logs) == 1 else gathered(logs, sum(log.n for log in logs))
+
+
+def whole(log: LogSource) -> Log:
+    """Return all rows of a log in memory.
+
+    Parameters
+    ----------
+    log : LogSource
+        The log, not empty; one in memory is returned as it is.
+    """
+    if isinstance(log, Log):
+        return log
+    return replace(gathered((chunk.core for chunk in log.chunks(BLOCK_ROWS)), log.n), notes=log.notes)
 
 
 def gathered(pieces: Iterable[Log], n: int) -> Log:

@@ -11,6 +11,8 @@ TEXT_CELL: Final = 96
 HELD: Final = 200 << 20
 """Bytes up to which a log is held in memory. A filter's or a fit's own arrays are some three times as many, so that no
 command takes more than 1 GB."""
+KEPT: Final = 500 << 20
+"""Bytes up to which a log is held together with what a command makes of each row."""
 BLOCK: Final = 32 << 20
 """Bytes of the rows that are read from a file at once, at most."""
 BLOCK_ROWS: Final = 65_536

@@ -13,7 +13,7 @@ from imufit.log.log import Chunk, Log, concatenate, gathered
 from imufit.log.metadata import Metadata, read_metadata
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.place import Place
-from imufit.log.size import HELD, NUMBER, TEXT_CELL, size_in_words
+from imufit.log.size import HELD, KEPT, NUMBER, TEXT_CELL, size_in_words
 from imufit.log.source import open_source
 from imufit.log.time_order import TimeRepair, TimeScan
 from imufit.log.unit_check import HEAD, check_units
@@ -126,20 +126,26 @@ class LogStream:
             numbers += 4  # the reference attitude that follows from the angle
         return self.n * (NUMBER * numbers + TEXT_CELL * text)
 
-    def held(self) -> Log:
+    def held(self, more: int = 0) -> Log:
         """Whole log in memory, for what needs all of its rows at once.
+
+        Parameters
+        ----------
+        more : int
+            Bytes that are made of each row besides, and kept.
 
         Raises
         ------
         InputError
             It is too large for that; the message says how to take a part of it.
         """
-        if self.size <= HELD:
+        made = self.size + self.n * more
+        if self.size <= HELD and made <= KEPT:
             return self.read()
-        rows = self.n * HELD // self.size
+        rows = min(self.n * HELD // self.size, self.n * KEPT // made)
         part = self._path.with_name(f"{self._path.stem}-part.parquet")
         raise self._place.error(
-            f"{self.n} rows take {size_in_words(self.size)} of memory, and this needs all of them at once",
+            f"{self.n} rows take {size_in_words(made)} of memory, and this needs all of them at once",
             remedy=f"Take a part: imufit convert {self._path} --rows 0:{rows} -o {part}",
         )
 
