@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FORMS: Final = ("binary", "text")
+_BY_ROW: Final = ("arrival", "opening", "start", "stamps", "sequence", "lost", "values")
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,16 @@ class Arrived:
         """Number of rows."""
         return int(self.arrival.size)
 
+    def part(self, begin: int, end: int) -> Self:
+        """Rows ``begin <= row < end``.
+
+        Parameters
+        ----------
+        begin, end : int
+            First row, and the row after the last one, counted from 0.
+        """
+        return type(self)(self.announced, *(getattr(self, name)[begin:end] for name in _BY_ROW))
+
     @classmethod
     def joined(cls, parts: Sequence[Arrived]) -> Self:
         """Join rows of one announcement, in order.
@@ -87,8 +98,7 @@ class Arrived:
         parts : sequence of Arrived
             At least one.
         """
-        names = ("arrival", "opening", "start", "stamps", "sequence", "lost", "values")
-        return cls(parts[0].announced, *(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+        return cls(parts[0].announced, *(np.concatenate([getattr(p, name) for p in parts]) for name in _BY_ROW))
 
 
 def of_frames(batch: Any, arrival: Array, opening: NDArray[np.uint32]) -> Arrived:
