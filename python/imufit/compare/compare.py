@@ -31,7 +31,7 @@ MIN_SHARE = 0.02
 SCATTER = 4.0
 WORST_SEGMENTS = 8
 SPECTRUM_ROWS = 512
-SPECTRUM_CHUNKS = 8
+SPECTRUM_CHUNKS = 32
 
 
 def compare(fit: FittedStack, log: LogSource | None, progress: Progress) -> Comparison:
