@@ -50,7 +50,7 @@ def test_open_log_decides_by_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     path = tmp_path / "a.parquet"
     long_log(100).write(path)
     assert isinstance(open_log(path), Log)
-    monkeypatch.setattr("imufit.log.stream.STREAM_ABOVE", 10)
+    monkeypatch.setattr("imufit.log.stream.HELD", 10)
     source: LogSource = open_log(path)
     assert isinstance(source, LogStream)
     assert repr(source) == "LogStream(a.parquet: 100 rows; t, acc_x, acc_y, acc_z, gyr_x, gyr_y, gyr_z; NED)"

@@ -122,7 +122,11 @@ def test_a_value_may_be_edited_by_hand(model, tmp_path):
         ("complete = true\n", 'complete = true\n[units."gyr.scale"]\nx = "1"\n', r"behind the table \[end\].*Move"),
         ("effects = [", "effect = [", "effects is no list"),
         ('[parameters."gyr.bias"]\nx =', '[parameters]\n"gyr.bias" = 3\n[x]\nx =', "is 3, not a table"),
-        ("temperature_mean = 22.55", 'temperature_mean = "warm"', "the mean of the temperature is 'warm', not a finite number"),
+        (
+            "temperature_mean = 22.55",
+            'temperature_mean = "warm"',
+            "the temperature is 'warm', not a finite",
+        ),
         ("vbat = 11.95", "vbat = true", "the mean of vbat is True, not a finite number"),
         ("x = 1.5e-05", 'x = "small"', r"standard error of gyr\.bias x is 'small'"),
     ],

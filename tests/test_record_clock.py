@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from imufit.record.arrived import Announced, Arrived
-from imufit.record.clock import fit_clock, increasing, lower_hull, spread, spread_arrivals
+from imufit.record.clock import fit_clock, lower_hull, spread, spread_arrivals
 from imufit.record.live_clock import LiveClock
 from imufit.record.ticks import Unwrapper, guessed_unit, time_column
-from imufit.record.timing import timed
+from imufit.record.timing import Runs, clock_of, timed, timed_blocks
 
 FRAMES = Announced("binary", "d", 1e-6, ("acc_x",))
 
@@ -151,8 +151,36 @@ def test_stamps_of_a_coarse_clock_are_spread():
 
 
 def test_runs_that_overlap_go_behind_each_other():
-    t = increasing(np.array([0.0, 0.1, 0.2, 0.15, 0.25]), np.array([0, 0, 0, 1, 1]), np.array([0.0, 5.0]))
+    t = Runs().told(np.array([0.0, 0.1, 0.2, 0.15, 0.25]), np.array([0, 0, 0, 1, 1]), whole=True)
     np.testing.assert_allclose(t, [0.0, 0.1, 0.2, 0.21, 0.31])
+
+
+@pytest.mark.parametrize("tick", [1000, 20_000])
+def test_times_are_the_same_however_the_rows_are_cut(tick):
+    rng = np.random.default_rng(12)
+    own = np.arange(6000) / 500.0
+    host = np.concatenate([own[:3500], 2.0 + own[3500:]])
+    stamps = np.concatenate([own[:3500] * 1e6 // tick * tick, (own[3500:] - 6.0) * 1e6 // tick * tick])
+    start = np.repeat([0, 1], [3500, 2500])
+    rows = frames(stamps, read_late(host, rng), start=start)
+    whole = timed(rows)
+    for size in (1500, 2500, 5999):
+        cut = [rows.part(k, min(k + size, rows.n)) for k in range(0, rows.n, size)]
+        clock = clock_of(cut)
+        assert (clock.fit.rate, clock.fit.offsets.tolist()) == (whole.fit.rate, whole.fit.offsets.tolist())
+        pieces = list(timed_blocks(cut, clock))
+        np.testing.assert_array_equal(np.concatenate([piece.arrival for piece, _, _ in pieces]), rows.arrival)
+        np.testing.assert_array_equal(np.concatenate([run for _, _, run in pieces]), whole.run)
+        np.testing.assert_allclose(np.concatenate([t for _, t, _ in pieces]), whole.t, atol=1e-9)
+
+
+def test_rows_timed_as_they_arrive_are_the_same_however_they_are_cut():
+    arrival = np.repeat(np.cumsum(np.full(300, 0.01)), 7)
+    rows = lines(("acc_x",), np.zeros((arrival.size, 1)), arrival)
+    whole = timed(rows)
+    cut = [rows.part(k, min(k + 400, rows.n)) for k in range(0, rows.n, 400)]
+    pieces = list(timed_blocks(cut, clock_of(cut)))
+    np.testing.assert_allclose(np.concatenate([t for _, t, _ in pieces]), whole.t, atol=1e-9)
 
 
 def test_a_device_without_numbers_of_its_starts_is_seen_to_begin_anew():

@@ -20,20 +20,45 @@ if TYPE_CHECKING:
 _LABELS = 8
 
 
+class RowRange(click.ParamType):  # type: ignore[type-arg]
+    """Two numbers of rows, such as ``1000:2000``: the first, and the one after the last."""
+
+    name = "rows"
+
+    def convert(
+        self, value: str | tuple[int, int], param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """Take the numbers apart."""
+        if isinstance(value, tuple):
+            return value
+        first, colon, stop = value.partition(":")
+        if not (colon and first.isdecimal() and stop.isdecimal() and int(first) < int(stop)):
+            self.fail(f"{value!r} is no range of rows: write FIRST:STOP, such as 0:1000000", param, ctx)
+        return int(first), int(stop)
+
+
 @click.command(short_help="Another maker's file, a text table or a serial transcript becomes a log.")
 @click.argument("file", metavar="FILE", type=EXISTING)
 @map_option
 @click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
+@click.option("--rows", type=RowRange(), metavar="FIRST:STOP", help="Take these rows alone, counted from 0.")
 @json_option
-def convert(file: Path, *, mapping: tuple[str, ...], output: Path, json_file: Path | None) -> None:
+def convert(
+    file: Path, *, mapping: tuple[str, ...], output: Path, rows: tuple[int, int] | None, json_file: Path | None
+) -> None:
     """Make a log of FILE: a table of numbers, a serial transcript with named values, or another log.
 
     Tables are separated by commas, semicolons, tabs or blanks; without a header their columns are c1, c2, ... In a
     transcript the most frequent line of the kind accel=(1, 2, 3) temp=21 is the record, the other lines are ignored.
+
+    FILE may be of any length. What another command cannot hold whole, --rows cuts: --rows 0:1000000 are the first
+    million.
     """
     keep_inputs([file], [output, json_file])
     out = Output(json_file)
-    log = engine.read_log(file, mapping)
+    log = engine.open_log(file, mapping)
+    if rows is not None:
+        log = engine.some_rows(log, rows)
     found = engine.contents(log)
     engine.write_log(log, output)
     rate = "" if found.rate is None else f" over {found.duration:.4g} s, {found.rate:.4g} Hz"

@@ -29,11 +29,17 @@ def open_logs(paths: Sequence[Path], mapping: Sequence[str] = ()) -> list[Any]:
     return [open_log(path, mapping) for path in paths]
 
 
-def read_log(path: Path, mapping: Sequence[str] = ()) -> Log:
-    """Read a whole log into memory; `mapping` as for `open_log`."""
-    from imufit.log import parse_mapping, read  # noqa: PLC0415
+def read_log(path: Path, mapping: Sequence[str] = (), more: int = 0) -> Log:
+    """Read a whole log into memory; `mapping` as for `open_log`, `more` the bytes that will be made of each row.
 
-    return read(path, mapping=parse_mapping(*mapping) or None)
+    Raises
+    ------
+    InputError
+        It is too large for that.
+    """
+    from imufit.log import LogStream, parse_mapping  # noqa: PLC0415
+
+    return LogStream(path, mapping=parse_mapping(*mapping) or None).held(more)
 
 
 def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], settings: Mapping[str, float]) -> Any:
@@ -54,7 +60,14 @@ def calibrate_live(
     return calibrate_live(port, keep, mapping=parse_mapping(*mapping) or None, sensors=chosen, **options)
 
 
-def contents(log: Log) -> Contents:
+def some_rows(log: Any, rows: tuple[int, int]) -> Any:
+    """Return the rows from the first number to before the second of a log."""
+    from imufit.log import SomeRows  # noqa: PLC0415
+
+    return SomeRows(log, [rows])
+
+
+def contents(log: Any) -> Contents:
     """Return what a log holds and what it lacks."""
     from imufit.log import contents  # noqa: PLC0415
 

@@ -27,6 +27,9 @@ from imufit.cli.settings import set_option, settings_from
 if TYPE_CHECKING:
     from imufit.results import Table
 
+_MADE = 100
+"""Bytes that a filter makes of a row: attitude, angles and errors."""
+
 
 @click.command(short_help="Attitude for every row, its error, and the methods' tilt beside each other.")
 @log_argument
@@ -88,7 +91,7 @@ def replay(
     for group, values in settings_from(assignments).items():
         settings[group] = {**settings.get(group, {}), **values}
     out = Output(json_file)
-    rows = engine.read_log(log, mapping)
+    rows = engine.read_log(log, mapping, _MADE * len(names or FILTERS))
     if model_file is not None:
         model = engine.sensor_model(path=model_file)
         rows = model.apply(rows)

@@ -32,6 +32,8 @@ FILTER = "mekf"
 BLOCKS = 24
 BINS = 10
 MIN_ROWS = 240
+MOST_ROWS = 400_000
+"""Rows that the filter runs over at most, from the first: each takes 1 kB of memory until all is judged."""
 CHANCE = 3.0
 """Standard errors by which a share must stand out."""
 LIMITS = 0.5
@@ -73,6 +75,7 @@ def attitude_comparison(
         return None
     if any(readings is None or not np.isfinite(readings).all(axis=1).any() for readings in (log.acc, log.gyr)):
         return None
+    whole, log = log, log.rows(0, MOST_ROWS)
     run = replay(log, [filter_name], progress=progress)
     kept = _kept(run, filter_name)
     if kept.sum() < MIN_ROWS:
@@ -101,6 +104,8 @@ def attitude_comparison(
     bins = tuple(_bins(before, after, {**quantities, "time": log.t[kept] - log.t[0]}))
     rms_before, rms_after = _rms(before), _rms(after)
     limit, sentence = _limit(filter_name, rms_before, rms_after if model.effects else None, dependences)
+    if whole.n > log.n:
+        sentence += f" This is of the first {log.n} rows."
     return AttitudeComparison(
         filter_name, rms_before, rms_after if model.effects else None, tuple(dependences), bins, limit, sentence
     )

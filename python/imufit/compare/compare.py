@@ -31,7 +31,7 @@ MIN_SHARE = 0.02
 SCATTER = 4.0
 WORST_SEGMENTS = 8
 SPECTRUM_ROWS = 512
-SPECTRUM_CHUNKS = 8
+SPECTRUM_CHUNKS = 32
 
 
 def compare(fit: FittedStack, log: LogSource | None, progress: Progress) -> Comparison:
@@ -46,10 +46,10 @@ def compare(fit: FittedStack, log: LogSource | None, progress: Progress) -> Comp
     progress : callable
         Called with (rows done, rows in all, what is being done).
     """
-    if log is not None and not any(log is known for known in fit.logs):
+    if log is not None and not any(log == known for known in fit.logs):
         return compare_model(fit.model, log, progress)
     _refuse_rests(fit.analysis)
-    own = fit.worst if log is None else next(k for k, known in enumerate(fit.logs) if known is log)
+    own = fit.worst if log is None else next(k for k, known in enumerate(fit.logs) if known == log)
     found = comparison(fit.analysis, fit.estimate.step, own)
     return _with_attitude(found, fit.model_of(own), fit.logs[own], progress)
 
@@ -69,7 +69,7 @@ def compare_model(model: EffectStack, log: LogSource, progress: Progress) -> Com
     analysis = Analysis.of(model, (log,), progress, keep_constants=True)
     _refuse_rests(analysis)
     found = comparison(analysis, analysis.estimate_unnamed().step)
-    return _with_attitude(found, model, log, progress)
+    return _with_attitude(found, model, analysis.logs[0].surveyed.log, progress)
 
 
 def _refuse_rests(analysis: Analysis) -> None:

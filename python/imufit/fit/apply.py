@@ -11,13 +11,11 @@ from scipy.spatial.transform import Rotation
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.fit.passes import chunk_arrays, covariate_names
-from imufit.log import Log, LogSource
-from imufit.log.log import concatenate
+from imufit.log import Log, LogSource, whole
 
 if TYPE_CHECKING:
     from imufit.model.effect_stack import EffectStack
 
-READ_ROWS = 65536
 SENSORS = ("acc", "gyr", "mag")
 
 
@@ -31,18 +29,18 @@ def apply(model: EffectStack, log: LogSource) -> Log:
     log : Log or LogStream
         Readings; a reference is not needed.
     """
-    whole = log if isinstance(log, Log) else concatenate([chunk.core for chunk in log.chunks(READ_ROWS)])
-    if not whole.n:
-        return whole
-    (chunk,) = whole.chunks(whole.n)
-    covariates = covariate_names(whole)
+    recorded = whole(log)
+    if not recorded.n:
+        return recorded
+    (chunk,) = recorded.chunks(recorded.n)
+    covariates = covariate_names(recorded)
     means = model.constants.get("covariate_means", {})
     kept = [(effect, values) for effect, values in model.stack() if effect.reference_part is None]
     try:
         readings, lost = _imufit.correct_readings(
             chunk_arrays(chunk, covariates),
             kept,
-            whole.metadata.frame,
+            recorded.metadata.frame,
             covariates,
             [means.get(name) for name in covariates],
             model.constants.get("temperature_mean"),
@@ -51,15 +49,15 @@ def apply(model: EffectStack, log: LogSource) -> Log:
         wrong = "Add it to the log, or take the effect out of the model." if error.row is None else "Check the model."
         remedy = error.remedy or wrong
         raise InputError(error.problem, file=log.path, row=error.row, remedy=remedy) from None
-    notes = [*_left_alone(model, whole), *_lost(dict(zip(SENSORS, lost, strict=True)))]
+    notes = [*_left_alone(model, recorded), *_lost(dict(zip(SENSORS, lost, strict=True)))]
     acc, gyr, mag = (
-        getattr(whole, name) if values is None else values for name, values in zip(SENSORS, readings, strict=True)
+        getattr(recorded, name) if values is None else values for name, values in zip(SENSORS, readings, strict=True)
     )
     for turned in (effect.id for effect, _ in model.stack() if effect.reference_part == "mount"):
         mount = Rotation.from_rotvec([model.parameters[turned][axis] for axis in "xyz"])
         acc, gyr, mag = (None if x is None else np.ascontiguousarray(mount.apply(x)) for x in (acc, gyr, mag))
         notes.append(f"{turned}: readings turned into the axes of the body that the reference describes")
-    return replace(whole, acc=acc, gyr=gyr, mag=mag, notes=(*whole.notes, *notes))
+    return replace(recorded, acc=acc, gyr=gyr, mag=mag, notes=(*recorded.notes, *notes))
 
 
 def _left_alone(model: EffectStack, log: Log) -> list[str]:

@@ -20,7 +20,8 @@ from imufit.log import Chunk, LogSource
 from imufit.log.contents import SENSOR_NAMES
 from imufit.progress import Progress
 
-CHUNK_ROWS = 65536
+CHUNK_ROWS = 16384
+"""Rows of a chunk: a comparison takes some 8 kB of memory for each of them."""
 SURVEY_MARGIN = 4096
 
 MASKS = ("ref_exact", "movement")

@@ -11,7 +11,7 @@ from imufit import _imufit
 from imufit.errors import InputError
 from imufit.fit.passes import CHUNK_ROWS, MIN_ROWS, Passes
 from imufit.fit.rests import FEWEST_RESTS, RestReadings, read_rests
-from imufit.log import Log, LogSource, LogStream
+from imufit.log import LogSource, whole
 from imufit.progress import Progress
 
 NEEDS_REFERENCE = "it needs a reference attitude"
@@ -55,8 +55,7 @@ class RestPasses(Passes):
         InputError
             The log has too few rows, or neither rests nor a magnetic field to judge by.
         """
-        log = self.log.read() if isinstance(self.log, LogStream) else self.log
-        assert isinstance(log, Log)
+        log = whole(self.log)
         if log.n < MIN_ROWS:
             raise InputError(
                 f"{log.n} rows are too few for a fit", file=log.path, remedy=f"Record at least {MIN_ROWS}."

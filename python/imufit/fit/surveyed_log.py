@@ -13,7 +13,7 @@ from imufit.errors import InputError
 from imufit.fit.data_faults import data_faults
 from imufit.fit.passes import MIN_COVERAGE, Passes
 from imufit.fit.rest_passes import passes_of
-from imufit.log import LogSource
+from imufit.log import LogSource, judged_rows
 from imufit.model.catalogue import column_effects, effects, unnamed_effects
 from imufit.model.effect_stack import EffectStack
 from imufit.progress import Progress
@@ -128,6 +128,7 @@ def survey(
     keep_constants : bool
         Temperatures and covariates count from the means that the model was fitted with, not from these logs'.
     """
+    logs = [judged_rows(log) for log in logs]
     passes = [passes_of(log, progress) for log in logs]
     surveys = [each.survey() for each in passes]
     facts = [found for found, _ in surveys]

@@ -2,9 +2,11 @@
 
 from imufit.errors import InputError
 from imufit.log.contents import Contents, contents
-from imufit.log.log import Chunk, Log, LogSource, concatenate
+from imufit.log.excerpt import judged_rows
+from imufit.log.log import Chunk, Log, LogSource, concatenate, whole
 from imufit.log.metadata import Metadata
 from imufit.log.segments import gaps
+from imufit.log.some_rows import SomeRows
 from imufit.log.stream import LogStream, open_log, read
 from imufit.log.units import parse_mapping
 
@@ -16,10 +18,13 @@ __all__ = [
     "LogSource",
     "LogStream",
     "Metadata",
+    "SomeRows",
     "concatenate",
     "contents",
     "gaps",
+    "judged_rows",
     "open_log",
     "parse_mapping",
     "read",
+    "whole",
 ]

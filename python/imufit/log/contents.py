@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from imufit.log.columns import CONTRACT, GROUPS
-from imufit.log.log import Log
+from imufit.log.columns import GROUPS
+from imufit.log.log import LogSource
+from imufit.log.parquet import ROW_GROUP
+
+Array = NDArray[np.float64]
+
+SAMPLED: Final = 500_000
+"""Rows that a median is taken of at most: its error is then a thousandth of the spread, and four digits are shown."""
+LABELS: Final = 1000
+"""Different texts of a column that are told at most."""
 
 _UNITS: Final = {
     "t": "s",
@@ -43,9 +53,10 @@ class ColumnContents:
     samples : int
         Rows that hold a value.
     low, median, high : float or None
-        Smallest, middle and largest value; None for text and for a column without values.
+        Smallest, middle and largest value; None for text and for a column without values. Of a log of more than
+        500,000 rows the middle one of as many, evenly spread over it.
     labels : tuple of str
-        The texts that occur, in the order of their first row.
+        The texts that occur, in the order of their first row, the first 1000 of them.
     """
 
     name: str
@@ -108,28 +119,58 @@ class Contents:
         }
 
 
-def contents(log: Log) -> Contents:
+def contents(log: LogSource) -> Contents:
     """Sum up what a log holds.
 
     Parameters
     ----------
-    log : Log
-        A log in memory.
+    log : LogSource
+        A log in memory or on disk: it is read once, and no more than a chunk of it is held.
     """
-    columns = tuple(_column(name, values) for name, values in log.table().items())
+    every = -(-log.n // SAMPLED)
+    summaries: dict[str, _Summary] = {}
+    steps: list[Array] = []
+    ends: list[float] = []
+    for chunk in log.chunks(ROW_GROUP, 1):
+        t = chunk.log.t[max(chunk.begin - 1, 0) : chunk.end]
+        steps.append(np.diff(t)[::every])
+        ends += [float(t[0]), float(t[-1])]
+        for name, values in chunk.core.table().items():
+            summaries.setdefault(name, _Summary(name, every)).add(values)
+    columns = tuple(summary.column() for summary in summaries.values())
     held = {column.name for column in columns if column.samples}
     missing = tuple(name for name in _WANTED if not held & set(GROUPS.get(name, (name,))))
-    rate = 1.0 / float(np.median(np.diff(log.t))) if log.n > 1 else None
-    return Contents(log.n, log.duration, rate, columns, missing, log.notes)
+    rate = 1.0 / float(np.median(np.concatenate(steps))) if log.n > 1 else None
+    return Contents(log.n, ends[-1] - ends[0] if ends else 0.0, rate, columns, missing, log.notes)
 
 
-def _column(name: str, values: np.ndarray[Any, Any]) -> ColumnContents:
-    if values.dtype == object:
-        texts = [str(cell) for cell in values if cell is not None]
-        return ColumnContents(name, "", len(texts), labels=tuple(dict.fromkeys(texts)))
-    finite = values[~np.isnan(values)]
-    unit = _UNITS[name] if name in CONTRACT else ""
-    if finite.size == 0:
-        return ColumnContents(name, unit, 0)
-    low, high = float(np.min(finite)), float(np.max(finite))
-    return ColumnContents(name, unit, int(finite.size), low, float(np.median(finite)), high)
+class _Summary:
+    """Sums up one column, chunk by chunk."""
+
+    def __init__(self, name: str, every: int) -> None:
+        self._name = name
+        self._every = every
+        self._samples = 0
+        self._low, self._high = np.inf, -np.inf
+        self._kept: list[Array] = []
+        self._labels: dict[str, None] = {}
+
+    def add(self, values: NDArray[Any]) -> None:
+        if values.dtype == object:
+            texts = [str(cell) for cell in values if cell is not None]
+            self._samples += len(texts)
+            self._labels |= dict.fromkeys(texts)
+            self._labels = dict.fromkeys(islice(self._labels, LABELS))
+            return
+        known = values[~np.isnan(values)]
+        if known.size:
+            self._samples += int(known.size)
+            self._low, self._high = min(self._low, float(known.min())), max(self._high, float(known.max()))
+            self._kept.append(known[:: self._every].copy())
+
+    def column(self) -> ColumnContents:
+        unit = _UNITS.get(self._name, "")
+        if not self._kept:
+            return ColumnContents(self._name, unit, self._samples, labels=tuple(self._labels))
+        median = float(np.median(np.concatenate(self._kept)))
+        return ColumnContents(self._name, unit, self._samples, self._low, median, self._high)

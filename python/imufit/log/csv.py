@@ -7,7 +7,7 @@ import io
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 import numpy as np
 import pyarrow as pa
@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.check import is_truth, number_from_text
-from imufit.log.csv_layout import NOT_DATA, is_comment, read_layout, split_line, text_of
-from imufit.log.metadata import Metadata, write_sidecar
-from imufit.whole_file import whole_file
+from imufit.log.csv_layout import NOT_DATA, is_comment, lines_in, read_layout, split_line, text_of, too_long
+from imufit.log.metadata import Metadata
+from imufit.log.size import LONGEST_LINE
+from imufit.log.text_cells import cells_of
 
 _BLOCK: Final = 4 << 20
 _EMPTY: Final = ["", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None"]
@@ -82,6 +83,8 @@ class CsvSource:
                 block = rest + block
                 cut = block.rfind(b"\n") + 1
                 rest = block[cut:]
+                if len(rest) > LONGEST_LINE:
+                    raise too_long(self._path)
                 if cut:
                     yield self._clean(block[:cut])
             if rest:
@@ -155,18 +158,20 @@ class CsvSource:
         kind = self._kinds[name]
         if pa.types.is_floating(column.type):
             return np.asarray(column.to_numpy(), dtype=np.float64)
-        cells = column.to_pylist()
         if kind == "word":
-            return np.array([number_from_text(cell, truth=True) for cell in cells], dtype=np.float64)
-        text = np.empty(len(cells), dtype=object)
-        text[:] = cells
-        return text
+            return np.array([number_from_text(cell, truth=True) for cell in column.to_pylist()], dtype=np.float64)
+        return cells_of(column)
+
+    @property
+    def text(self) -> frozenset[str]:
+        """Columns that hold text, once `scan` has been through."""
+        return frozenset(name for name, kind in self._kinds.items() if kind == "text")
 
     def _rows(self) -> Iterator[tuple[int, str]]:
         """Line number, from 1, and text of every data row."""
         with self._path.open("rb") as file:
             file.seek(self._layout.data_offset)
-            for line, data in enumerate(file, self._layout.data_line + 1):
+            for line, data in enumerate(lines_in(file, self._path), self._layout.data_line + 1):
                 text = text_of(data)
                 if not is_comment(text):
                     yield line, text.rstrip("\r\n")
@@ -215,36 +220,49 @@ def _all_numbers(cells: Iterable[str | None]) -> bool:
     return True
 
 
-def write_csv(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metadata) -> None:
-    """Write columns as CSV, and the metadata to the sidecar.
+class CsvRows:
+    """Writes columns as CSV.
 
     Numbers have as many digits as it takes to read the same number back; missing ones are empty cells. Text that reads
     as a number comes back as one.
 
     Parameters
     ----------
+    file : file
+        Open for writing bytes.
     path : Path
-        File to write.
-    table : mapping
-        Columns: (n,) float64, or (n,) object for text with None where there is none.
+        Its place.
     metadata : Metadata
-        Goes to the sidecar.
+        Goes to the sidecar alone.
     """
-    for name, column in table.items():
-        if column.dtype == object and any(cell is not None and ("\n" in cell or "\r" in cell) for cell in column):
-            raise InputError(
-                "CSV cannot hold line breaks in text", file=path, column=name, remedy="Write .parquet or .npz."
-            )
-    arrays = [
-        pa.array(column, pa.string())
-        if column.dtype == object
-        else pa.array(column, pa.float64(), mask=np.isnan(column))
-        for column in table.values()
-    ]
-    header = io.StringIO()
-    csv.writer(header, lineterminator="\n").writerow(table)
-    with whole_file(path) as file:
-        file.write(header.getvalue().encode())
-        pacsv.write_csv(pa.Table.from_arrays(arrays, list(table)), file, pacsv.WriteOptions(include_header=False))
-        file.flush()
-        write_sidecar(path, metadata)  # only when all rows found room
+
+    def __init__(self, file: IO[bytes], path: Path, metadata: Metadata) -> None:
+        self._file = file
+        self._begun = False
+
+    def add(self, table: Mapping[str, NDArray[Any]]) -> None:
+        """Write rows.
+
+        Parameters
+        ----------
+        table : mapping
+            Columns: (n,) float64, or (n,) object for text with None where there is none; the same every time.
+        """
+        if not self._begun:
+            header = io.StringIO()
+            csv.writer(header, lineterminator="\n").writerow(table)
+            self._file.write(header.getvalue().encode())
+            self._begun = True
+        arrays = [
+            pa.array(column, pa.string())
+            if column.dtype == object
+            else pa.array(column, pa.float64(), mask=np.isnan(column))
+            for column in table.values()
+        ]
+        rows = pa.Table.from_arrays(arrays, list(table))
+        pacsv.write_csv(rows, self._file, pacsv.WriteOptions(include_header=False))
+
+    def finish(self) -> None:
+        """Nothing stands behind the rows."""
+
+    abandon = finish

@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from imufit.errors import InputError
 from imufit.log.check import number_from_text
+from imufit.log.size import LONGEST_LINE, size_in_words
 
 _SAMPLE: Final = 1 << 16
 _LINES: Final = 60
@@ -53,6 +55,29 @@ def text_of(data: bytes) -> str:
         return data.decode("utf-8")
     except UnicodeDecodeError:
         return data.decode("cp1252", errors="replace")
+
+
+def lines_in(file: IO[bytes], path: Path) -> Iterator[bytes]:
+    """Give the lines of a file from where it stands.
+
+    Raises
+    ------
+    InputError
+        A line is longer than any line of a log: it would have to be held whole.
+    """
+    while data := file.readline(LONGEST_LINE + 1):
+        if len(data) > LONGEST_LINE:
+            raise too_long(path)
+        yield data
+
+
+def too_long(path: Path) -> InputError:
+    """Return the error for a line that no log has."""
+    return InputError(
+        f"a line is longer than {size_in_words(LONGEST_LINE)}: this is no table of rows",
+        file=path,
+        remedy="Export it with a line for each sample.",
+    )
 
 
 def split_line(line: str, separator: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 from imufit.errors import InputError
 from imufit.log.arrays import contiguous, fields_from_arrays, quaternions_from_rotation, rotation_from_quaternions
 from imufit.log.columns import GROUPS, present
-from imufit.log.csv import write_csv
 from imufit.log.frame import fields_from_frame
 from imufit.log.metadata import Metadata
-from imufit.log.npz import write_npz
-from imufit.log.parquet import write_parquet
+from imufit.log.parquet import ROW_GROUP
+from imufit.log.size import BLOCK_ROWS
+from imufit.log.writer import write_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -185,26 +185,15 @@ class Log:
         """Write the log; the suffix decides on Parquet, NPZ or CSV.
 
         Reading it again gives the same log to the last bit, metadata included. CSV and NPZ have a sidecar
-        ``NAME.toml`` for the metadata.
+        ``NAME.toml`` for the metadata. An older log of that name is replaced once the new one is on the disk.
 
         Parameters
         ----------
         path : str or Path
             Ending in ``.parquet``, ``.npz`` or ``.csv``.
         """
-        path = Path(path)
-        suffix = path.suffix.lower()
-        if suffix not in (".parquet", ".npz", ".csv"):
-            raise InputError(
-                f"logs are not written as {suffix or 'a file without suffix'}",
-                file=path,
-                remedy="Write .parquet, .npz or .csv.",
-            )
-        writer = {".parquet": write_parquet, ".npz": write_npz, ".csv": write_csv}[suffix]
-        try:
-            writer(path, self.table(), self.metadata)
-        except OSError as error:
-            raise InputError(f"{path} cannot be written ({error.strerror or error})", file=path) from None
+        blocks = [self] if self.n == 0 else (chunk.core for chunk in self.chunks(ROW_GROUP))
+        write_rows(Path(path), self.metadata, (block.table() for block in blocks))
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:
         """Cut the log into chunks of `rows` rows with up to `margin` rows more on either side.
@@ -386,16 +375,57 @@ def concatenate(logs: Sequence[Log]) -> Log:
     logs : sequence of Log
         The parts; each begins after the one before it ends.
     """
-    first = logs[0]
-    if len(logs) == 1:
-        return first
-    joined: dict[str, Any] = {}
-    for item in fields(Log):
-        value = getattr(first, item.name)
-        if isinstance(value, np.ndarray):
-            joined[item.name] = np.concatenate([getattr(log, item.name) for log in logs])
-        elif item.name in ("covariates", "labels"):
-            joined[item.name] = {
-                name: np.concatenate([getattr(log, item.name)[name] for log in logs]) for name in value
-            }
-    return replace(first, **joined)
+    return logs[0] if len(logs) == 1 else gathered(logs, sum(log.n for log in logs))
+
+
+def whole(log: LogSource) -> Log:
+    """Return all rows of a log in memory.
+
+    Parameters
+    ----------
+    log : LogSource
+        The log, not empty; one in memory is returned as it is.
+    """
+    if isinstance(log, Log):
+        return log
+    return replace(gathered((chunk.core for chunk in log.chunks(BLOCK_ROWS)), log.n), notes=log.notes)
+
+
+def gathered(pieces: Iterable[Log], n: int) -> Log:
+    """Join parts of one log as they come: no more than one of them is held beside the whole.
+
+    Parameters
+    ----------
+    pieces : iterable of Log
+        As for `concatenate`, at least one.
+    n : int
+        Rows of all of them.
+    """
+    first, filled = None, 0
+    whole: dict[str, Any] = {}
+    for piece in pieces:
+        if first is None:
+            first = piece.rows(0, 0)
+            whole = {name: _room(values, n) for name, values in _arrays(piece).items()}
+        for name, values in _arrays(piece).items():
+            if isinstance(values, dict):
+                for column, cells in values.items():
+                    whole[name][column][filled : filled + piece.n] = cells
+            else:
+                whole[name][filled : filled + piece.n] = values
+        filled += piece.n
+    if first is None:
+        raise ValueError("a log is joined of at least one part")
+    return replace(first, **whole)
+
+
+def _arrays(log: Log) -> dict[str, Any]:
+    """Fields of a log that have a value for each row, and dicts of them."""
+    held = {item.name: getattr(log, item.name) for item in fields(Log)}
+    return {name: v for name, v in held.items() if isinstance(v, np.ndarray) or name in ("covariates", "labels")}
+
+
+def _room(values: Any, n: int) -> Any:
+    if isinstance(values, dict):
+        return {name: _room(cells, n) for name, cells in values.items()}
+    return np.empty((n, *values.shape[1:]), values.dtype)

@@ -15,7 +15,6 @@ from imufit.errors import InputError
 from imufit.log.columns import GROUPS, LARGEST
 from imufit.log.documents import table_from_json, table_from_toml
 from imufit.printable import NAME, printable
-from imufit.whole_file import write_text
 
 Frame = Literal["NED", "ENU", "NWU"]
 FRAMES: Final = ("NED", "ENU", "NWU")
@@ -127,18 +126,20 @@ def read_metadata(path: Path, embedded: Mapping[str, Any]) -> Metadata:
     return Metadata.from_mapping({**embedded, **sidecar}, path)
 
 
-def write_sidecar(path: Path, metadata: Metadata) -> None:
-    """Write the sidecar of the log at `path`, over an older sidecar but not over another kind of TOML file."""
-    sidecar = sidecar_path(path)
-    if sidecar.exists():
-        older = read_sidecar(path)
-        if older and not KNOWN & older.keys():
-            raise InputError(
-                "this file is in the way: it is no log metadata, but the log's metadata would be written there",
-                file=sidecar,
-                remedy="Write the log under another name.",
-            )
-    write_text(sidecar, tomli_w.dumps(_without_none(metadata.to_mapping())))
+def check_sidecar(path: Path) -> None:
+    """Refuse to write the sidecar of the log at `path` over another kind of TOML file."""
+    older = read_sidecar(path)
+    if older and not KNOWN & older.keys():
+        raise InputError(
+            "this file is in the way: it is no log metadata, but the log's metadata would be written there",
+            file=sidecar_path(path),
+            remedy="Write the log under another name.",
+        )
+
+
+def sidecar_text(metadata: Metadata) -> str:
+    """Metadata as they stand in a sidecar."""
+    return tomli_w.dumps(_without_none(metadata.to_mapping()))
 
 
 def _without_none(value: Any) -> Any:

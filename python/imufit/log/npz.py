@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import lzma
+import shutil
 import struct
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,15 +15,16 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 import numpy as np
+import pyarrow as pa
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.columns import GROUPS
-from imufit.log.metadata import Metadata, mapping_from_json, write_sidecar
-from imufit.whole_file import whole_file
+from imufit.log.metadata import Metadata, mapping_from_json
+from imufit.log.size import BLOCK, LONGEST_TEXT, NUMBER, TEXT_CELL, rows_at_once, size_in_words
+from imufit.log.text_cells import cells_of
 
-_BATCH: Final = 65_536
 _METADATA: Final = "metadata"
 _BROKEN: Final = (
     zipfile.BadZipFile,
@@ -108,6 +111,14 @@ class NpzSource:
             raise InputError(
                 f"the array holds {kind}", file=self._path, column=name, remedy="Save it as numbers or text."
             )
+        most = BLOCK if shape == () else LONGEST_TEXT
+        if dtype.itemsize > most:
+            raise InputError(
+                f"the array holds {size_in_words(dtype.itemsize)} of text a value: too much to be labels",
+                file=self._path,
+                column=name,
+                remedy="Save the log without this array.",
+            )
         if shape == ():
             if name == _METADATA:
                 text = str(np.frombuffer(file.read(dtype.itemsize), dtype)[0])
@@ -159,8 +170,9 @@ class NpzSource:
                 files = {entry: stack.enter_context(archive.open(entry)) for entry in members}
                 for file in files.values():
                     _header(file)
-                for start in range(0, self.n, _BATCH):
-                    rows = min(_BATCH, self.n - start)
+                at_once = self._rows_at_once(columns)
+                for start in range(0, self.n, at_once):
+                    rows = min(at_once, self.n - start)
                     pieces = {entry: _read(files[entry], member, rows) for entry, member in members.items()}
                     columns_of = {name: self._members[name] for name in columns}
                     yield start, rows, {name: _array(pieces[m.name][:, m.column]) for name, m in columns_of.items()}
@@ -170,6 +182,17 @@ class NpzSource:
             raise self._unreadable() from None
         except _UNKNOWN as error:
             raise self._unknown(error) from None
+
+    def _rows_at_once(self, columns: Sequence[str]) -> int:
+        members = [self._members[name] for name in columns]
+        stored = sum(member.width * member.dtype.itemsize for member in {m.name: m for m in members}.values())
+        made = sum(TEXT_CELL if member.dtype.kind in "US" else NUMBER for member in members)
+        return rows_at_once(stored + made)
+
+    @property
+    def text(self) -> frozenset[str]:
+        """Columns that hold text."""
+        return frozenset(name for name, member in self._members.items() if member.dtype.kind in "US")
 
     def line_of(self, row: int) -> int | None:
         """Binary files have no lines."""
@@ -192,36 +215,72 @@ def _read(file: IO[bytes], member: _Member, rows: int) -> NDArray[Any]:
 
 def _array(column: NDArray[Any]) -> NDArray[Any]:
     if column.dtype.kind in "US":
-        return column.astype(str).astype(object)
+        return cells_of(pa.array(column.astype(str).tolist(), pa.string()))
     return column.astype(np.float64)
 
 
-def write_npz(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metadata) -> None:
-    """Write columns as NPZ, and the metadata into it and to the sidecar.
+class NpzRows:
+    """Writes columns as NPZ: an archive takes one column after the other, so that rows wait in files beside it.
 
     Parameters
     ----------
+    file : file
+        Open for writing bytes.
     path : Path
-        File to write.
-    table : mapping
-        Columns: (n,) float64, or (n,) object for text with None where there is none.
+        Its place, beside which the columns wait for the last row.
     metadata : Metadata
-        Goes to the 0-d array ``metadata`` as JSON and to the sidecar.
+        Goes to the 0-d array ``metadata`` as JSON.
     """
-    if _METADATA in table:
-        raise InputError(
-            "an NPZ log cannot hold a column of that name", file=path, column=_METADATA, remedy="Rename it."
-        )
-    arrays = {**table, _METADATA: np.array(metadata.to_json())}
-    with whole_file(path) as whole:
-        with zipfile.ZipFile(whole, "w", zipfile.ZIP_STORED) as archive:
-            for name, column in arrays.items():
-                array = np.array(["" if cell is None else cell for cell in column], str) if _is_text(column) else column
-                with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
-                    npy.write_array(file, np.asarray(array, order="C"), allow_pickle=False)
-        whole.flush()
-        write_sidecar(path, metadata)  # only when all columns found room
 
+    def __init__(self, file: IO[bytes], path: Path, metadata: Metadata) -> None:
+        self._file = file
+        self._metadata = metadata
+        self._waiting = tempfile.TemporaryDirectory(prefix=f".{path.stem}.", dir=path.parent)
+        self._files: dict[str, IO[bytes]] = {}
+        self._longest: dict[str, int] = {}
+        self._n = 0
 
-def _is_text(column: NDArray[Any]) -> bool:
-    return bool(column.dtype == object)
+    def add(self, table: Mapping[str, NDArray[Any]]) -> None:
+        """Keep rows.
+
+        Parameters
+        ----------
+        table : mapping
+            Columns: (n,) float64, or (n,) object for text with None where there is none; the same every time.
+        """
+        if not self._files:
+            for number, name in enumerate(table):
+                self._files[name] = (Path(self._waiting.name) / str(number)).open("w+b")
+        for name, column in table.items():
+            if column.dtype == object:
+                words = np.array(["" if cell is None else cell for cell in column], str)
+                self._longest[name] = max(self._longest.get(name, 1), words.dtype.itemsize // 4)
+                npy.write_array(self._files[name], words, allow_pickle=False)
+            else:
+                self._files[name].write(np.ascontiguousarray(column, np.float64).data)
+        self._n += len(next(iter(table.values())))
+
+    def finish(self) -> None:
+        """Write the archive."""
+        with zipfile.ZipFile(self._file, "w", zipfile.ZIP_STORED) as archive:
+            for name, file in self._files.items():
+                longest = self._longest.get(name)
+                dtype = np.dtype(np.float64 if longest is None else f"U{longest}")
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as out:
+                    shape = {"descr": npy.dtype_to_descr(dtype), "fortran_order": False, "shape": (self._n,)}
+                    npy.write_array_header_1_0(out, shape)
+                    end = file.tell()
+                    file.seek(0)
+                    while longest is not None and file.tell() < end:
+                        out.write(npy.read_array(file, allow_pickle=False).astype(dtype).tobytes())
+                    shutil.copyfileobj(file, out)
+                file.close()
+            with archive.open(f"{_METADATA}.npy", "w", force_zip64=True) as out:
+                npy.write_array(out, np.array(self._metadata.to_json()), allow_pickle=False)
+        self._waiting.cleanup()
+
+    def abandon(self) -> None:
+        """Delete what waits."""
+        for file in self._files.values():
+            file.close()
+        self._waiting.cleanup()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 import numpy as np
 import pyarrow as pa
@@ -13,12 +13,13 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
-from imufit.log.metadata import Metadata, mapping_from_json, sidecar_path, write_sidecar
-from imufit.whole_file import whole_file
+from imufit.log.metadata import Metadata, mapping_from_json
+from imufit.log.size import NUMBER, TEXT_CELL, TEXT_GROUP, rows_at_once, size_in_words
+from imufit.log.text_cells import cells_of
 
 _KEY: Final = b"imufit"
-_BATCH: Final = 65_536
-_ROW_GROUP: Final = 131_072
+ROW_GROUP: Final = 131_072
+"""Rows of a row group that is written: what a reader has to hold at least."""
 _BROKEN: Final = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
 """What the reader raises about damaged bytes; a schema's size may be anything."""
 _DAMAGED: Final = "Copy or record it again; imufit recover saves what a crash left."
@@ -33,6 +34,7 @@ class ParquetSource:
             with pq.ParquetFile(path) as file:
                 self._schema = file.schema_arrow
                 self.n: int = file.metadata.num_rows
+                self._check_text(file.metadata)
         except UnicodeDecodeError:
             raise InputError(
                 "a name in the file's schema is no UTF-8", file=path, remedy="Rename the column and write it again."
@@ -46,6 +48,30 @@ class ParquetSource:
         self.notes: tuple[str, ...] = tuple(f"{path.name}: column {name} left out: it holds lists" for name in listed)
         text = (self._schema.metadata or {}).get(_KEY)
         self.embedded: Mapping[str, Any] = mapping_from_json(text, path) if text else {}
+
+    def _check_text(self, metadata: Any) -> None:
+        """Refuse a column of text that cannot be labels, before anything of it is unpacked."""
+        for group in range(metadata.num_row_groups):
+            for place in range(metadata.num_columns):
+                column = metadata.row_group(group).column(place)
+                if column.physical_type == "BYTE_ARRAY" and column.total_uncompressed_size > TEXT_GROUP:
+                    size = size_in_words(column.total_uncompressed_size)
+                    raise InputError(
+                        f"the column holds {size} of text in {metadata.row_group(group).num_rows} rows: too much to "
+                        "be labels",
+                        file=self._path,
+                        column=column.path_in_schema,
+                        remedy="Write the log without this column.",
+                    )
+
+    @property
+    def text(self) -> frozenset[str]:
+        """Columns that hold text."""
+        return frozenset(
+            name
+            for name in self.names
+            if not (_is_number(kind := _value_type(self._schema, name)) or pa.types.is_boolean(kind))
+        )
 
     def _unreadable(self, error: Exception) -> InputError:
         with self._path.open("rb") as file:
@@ -61,12 +87,18 @@ class ParquetSource:
     def blocks(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
         """Give the named columns block by block."""
         start = 0
+        text = [name for name in columns if name in self.text]
+        rows = rows_at_once(NUMBER * (len(columns) - len(text)) + TEXT_CELL * len(text))
         try:
             with pq.ParquetFile(
-                self._path, pre_buffer=False, buffer_size=1 << 16, page_checksum_verification=True
+                self._path,
+                pre_buffer=False,
+                buffer_size=1 << 16,
+                page_checksum_verification=True,
+                read_dictionary=text,
             ) as file:
                 wanted = list(columns) or None
-                for batch in file.iter_batches(batch_size=_BATCH, columns=wanted, use_threads=False):
+                for batch in file.iter_batches(batch_size=rows, columns=wanted, use_threads=False):
                     yield start, batch.num_rows, {name: _array(batch.column(name)) for name in columns}
                     start += batch.num_rows
         except _BROKEN as error:
@@ -90,13 +122,15 @@ def _value_type(schema: pa.Schema, name: str) -> Any:
 def _array(column: Any) -> NDArray[Any]:
     """Make float64 of anything numeric, objects of everything else."""
     kind = column.type
-    if pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind):
+    if _is_number(kind):
         return _numbers(pc.cast(column, pa.float64(), safe=False))
     if pa.types.is_boolean(kind):
         return _array(pc.cast(column, pa.uint8()))
-    cells = np.empty(len(column), dtype=object)
-    cells[:] = column.to_pylist()
-    return cells
+    return cells_of(column)
+
+
+def _is_number(kind: Any) -> bool:
+    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind))
 
 
 def _numbers(values: Any) -> NDArray[np.float64]:
@@ -111,27 +145,45 @@ def _numbers(values: Any) -> NDArray[np.float64]:
     return np.where(bits[values.offset : values.offset + len(values)], numbers, np.nan)
 
 
-def write_parquet(path: Path, table: Mapping[str, NDArray[Any]], metadata: Metadata) -> None:
-    """Write columns as Parquet.
+class ParquetRows:
+    """Writes columns as Parquet, a row group at a time.
 
     Parameters
     ----------
+    file : file
+        Open for writing bytes.
     path : Path
-        File to write. An existing sidecar beside it is rewritten, since it would overrule the file.
-    table : mapping
-        Columns: (n,) float64, or (n,) object for text with None where there is none.
+        Its place.
     metadata : Metadata
         Goes to the schema as JSON.
     """
-    arrays = [pa.array(column, pa.string() if column.dtype == object else pa.float64()) for column in table.values()]
-    schema = pa.schema(
-        [pa.field(name, array.type) for name, array in zip(table, arrays, strict=True)],
-        metadata={_KEY: metadata.to_json().encode()},
-    )
-    with whole_file(path) as file:
-        pq.write_table(
-            pa.Table.from_arrays(arrays, schema=schema), file, row_group_size=_ROW_GROUP, write_page_checksum=True
-        )
-        if sidecar_path(path).exists():
-            file.flush()
-            write_sidecar(path, metadata)  # only when all rows found room
+
+    def __init__(self, file: IO[bytes], path: Path, metadata: Metadata) -> None:
+        self._file = file
+        self._metadata = {_KEY: metadata.to_json().encode()}
+        self._writer: Any = None
+
+    def add(self, table: Mapping[str, NDArray[Any]]) -> None:
+        """Write rows.
+
+        Parameters
+        ----------
+        table : mapping
+            Columns: (n,) float64, or (n,) object for text with None where there is none; the same every time.
+        """
+        kinds = [pa.string() if column.dtype == object else pa.float64() for column in table.values()]
+        arrays = [pa.array(column, kind) for column, kind in zip(table.values(), kinds, strict=True)]
+        if self._writer is None:
+            schema = pa.schema(list(zip(table, kinds, strict=True)), metadata=self._metadata)
+            self._writer = pq.ParquetWriter(self._file, schema, write_page_checksum=True)
+        rows = pa.Table.from_arrays(arrays, schema=self._writer.schema)
+        self._writer.write_table(rows, row_group_size=ROW_GROUP)
+
+    def finish(self) -> None:
+        """Write the end of the file."""
+        self._writer.close()
+
+    def abandon(self) -> None:
+        """Close what is open."""
+        if self._writer is not None:
+            self._writer.close()

@@ -35,6 +35,11 @@ class Source(Protocol):
         ...
 
     @property
+    def text(self) -> frozenset[str]:
+        """Columns that hold text; for text files known after the first `scan`."""
+        ...
+
+    @property
     def embedded(self) -> Mapping[str, Any]:
         """Metadata inside the file."""
         ...

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 from imufit.log.assemble import check_truth_values, fields_of, time_of
+from imufit.log.cut import cut
 from imufit.log.foreign import plan_columns
-from imufit.log.log import Chunk, Log, check_chunk_size, concatenate
+from imufit.log.log import Chunk, Log, concatenate, gathered
 from imufit.log.metadata import Metadata, read_metadata
+from imufit.log.parquet import ROW_GROUP
 from imufit.log.place import Place
+from imufit.log.size import HELD, KEPT, NUMBER, TEXT_CELL, size_in_words
 from imufit.log.source import open_source
 from imufit.log.time_order import TimeRepair, TimeScan
 from imufit.log.unit_check import HEAD, check_units
-
-STREAM_ABOVE: Final = 256 << 20
-"""File size in bytes above which a log is streamed unless told otherwise."""
+from imufit.log.writer import write_rows
 
 
 class LogStream:
@@ -113,43 +113,57 @@ class LogStream:
         margin : int
             Rows of context on either side, fewer at the ends of the log.
         """
-        check_chunk_size(rows, margin)
-        for chunk in _cut(self.pieces(), rows, margin):
+        for chunk in cut(self.pieces(), rows, margin):
             yield replace(chunk, log=replace(chunk.log, notes=self._notes))
 
     def read(self) -> Log:
-        """Whole log in memory."""
-        return replace(concatenate(list(self.pieces())), notes=self._notes)
+        """Whole log in memory, however large it is."""
+        return replace(gathered(self.pieces(), self.n), notes=self._notes)
+
+    @property
+    def size(self) -> int:
+        """Bytes that the whole log would take in memory, told by rows and columns."""
+        text = sum(column.source in self._source.text for column in self._plan.columns)
+        numbers = len(self._plan.columns) - text
+        if "ref_angle" in self._columns and self._metadata.rig_axis is not None:
+            numbers += 4  # the reference attitude that follows from the angle
+        return self.n * (NUMBER * numbers + TEXT_CELL * text)
+
+    def held(self, more: int = 0) -> Log:
+        """Whole log in memory, for what needs all of its rows at once.
+
+        Parameters
+        ----------
+        more : int
+            Bytes that are made of each row besides, and kept.
+
+        Raises
+        ------
+        InputError
+            It is too large for that; the message says how to take a part of it.
+        """
+        made = self.size + self.n * more
+        if self.size <= HELD and made <= KEPT:
+            return self.read()
+        rows = min(self.n * HELD // self.size, self.n * KEPT // made)
+        part = self._path.with_name(f"{self._path.stem}-part.parquet")
+        raise self._place.error(
+            f"{self.n} rows take {size_in_words(made)} of memory, and this needs all of them at once",
+            remedy=f"Take a part: imufit convert {self._path} --rows 0:{rows} -o {part}",
+        )
+
+    def write(self, path: str | Path) -> None:
+        """Write the log as :meth:`Log.write` does, without holding more of it than a row group.
+
+        Parameters
+        ----------
+        path : str or Path
+            Ending in ``.parquet``, ``.npz`` or ``.csv``.
+        """
+        write_rows(Path(path), self._metadata, (chunk.core.table() for chunk in self.chunks(ROW_GROUP)))
 
     def __repr__(self) -> str:
         return f"LogStream({self._path.name}: {self.n} rows; {', '.join(self._columns)}; {self._metadata.frame})"
-
-
-def _cut(pieces: Iterable[Log], rows: int, margin: int) -> Iterator[Chunk]:
-    """Cut a sequence of pieces into chunks with margins, holding no more rows than that takes."""
-    held: list[Log] = []
-    first = start = total = 0  # row of the first held one, of the next chunk, after the last held one
-    for piece in pieces:
-        held.append(piece)
-        total += piece.n
-        if total < start + rows + margin:
-            continue
-        log = concatenate(held)
-        while total >= start + rows + margin:
-            yield _chunk(log, first, start, start + rows, margin)
-            start += rows
-        keep = max(first, start - margin)
-        held = [log.rows(keep - first, log.n)]
-        first = keep
-    if held:
-        log = concatenate(held)
-        for begin in range(start, total, rows):
-            yield _chunk(log, first, begin, min(begin + rows, total), margin)
-
-
-def _chunk(log: Log, first: int, start: int, stop: int, margin: int) -> Chunk:
-    low, high = max(0, start - margin - first), min(stop + margin - first, log.n)
-    return Chunk(log.rows(low, high), start, start - first - low, stop - first - low)
 
 
 def open_log(path: str | Path, mapping: Mapping[str, str] | None = None, stream: bool | None = None) -> Log | LogStream:
@@ -162,11 +176,12 @@ def open_log(path: str | Path, mapping: Mapping[str, str] | None = None, stream:
     mapping : mapping, optional
         Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
     stream : bool, optional
-        Whether to leave the log on disk; None does so above 256 MB.
+        Whether to leave the log on disk; None does so if it would take more than 200 MB of memory, which its rows and
+        columns tell.
     """
     log = LogStream(path, mapping)
     if stream is None:
-        stream = log.path.stat().st_size > STREAM_ABOVE
+        stream = log.size > HELD
     return log if stream else log.read()
 
 

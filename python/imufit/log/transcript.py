@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.log.columns import POSES
-from imufit.log.csv_layout import text_of
+from imufit.log.csv_layout import lines_in, text_of
 from imufit.log.named_values import without_colour
 from imufit.log.record import Found, Record
 from imufit.log.time_order import DAY, over_midnight
@@ -50,6 +50,7 @@ class TranscriptSource:
     """
 
     embedded: Mapping[str, Any] = {}
+    text: frozenset[str] = frozenset({"pose"})
 
     def __init__(self, path: Path, record: Record) -> None:
         self._path = path
@@ -205,7 +206,7 @@ def lines_of(path: Path) -> Iterator[tuple[int, str]]:
         Text file.
     """
     with path.open("rb") as file:
-        for line, data in enumerate(file, 1):
+        for line, data in enumerate(lines_in(file, path), 1):
             text = without_colour(text_of(data)).rstrip("\r\n")
             yield line, text.rpartition("\r")[2].removeprefix("\ufeff")
 

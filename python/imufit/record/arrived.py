@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FORMS: Final = ("binary", "text")
-_ROWS: Final = ("arrival", "opening", "start", "stamps", "sequence", "lost", "values")
+_BY_ROW: Final = ("arrival", "opening", "start", "stamps", "sequence", "lost", "values")
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,16 @@ class Arrived:
         """Number of rows."""
         return int(self.arrival.size)
 
+    def part(self, begin: int, end: int) -> Self:
+        """Rows ``begin <= row < end``.
+
+        Parameters
+        ----------
+        begin, end : int
+            First row, and the row after the last one, counted from 0.
+        """
+        return type(self)(self.announced, *(getattr(self, name)[begin:end] for name in _BY_ROW))
+
     @classmethod
     def joined(cls, parts: Sequence[Arrived]) -> Self:
         """Join rows of one announcement, in order.
@@ -107,7 +117,7 @@ class Arrived:
         parts : sequence of Arrived
             At least one.
         """
-        return cls(parts[0].announced, *(np.concatenate([getattr(p, name) for p in parts]) for name in _ROWS))
+        return cls(parts[0].announced, *(np.concatenate([getattr(p, name) for p in parts]) for name in _BY_ROW))
 
     def where(self, wanted: NDArray[np.bool_]) -> Arrived:
         """Return some of the rows.
@@ -117,7 +127,7 @@ class Arrived:
         wanted : (n,) array of bool
             Which.
         """
-        return Arrived(self.announced, *(getattr(self, name)[wanted] for name in _ROWS))
+        return Arrived(self.announced, *(getattr(self, name)[wanted] for name in _BY_ROW))
 
 
 def of_frames(batch: Any, arrival: Array, opening: NDArray[np.uint32]) -> Arrived:

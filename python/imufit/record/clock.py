@@ -24,7 +24,9 @@ PROMPT: Final = 0.02
 """Delay up to which rows count as prompt in any case, s."""
 SAME_CLOCK: Final = 0.5
 """Difference of the offsets of two pieces up to which one clock ran on between them, s."""
-_CLOSE: Final = 0.1  # of a step: what lies between the last row of a clock and the first one of the next at least
+CLOSE: Final = 0.1
+"""Of a step: what lies between the last row of a clock and the first one of the next at least."""
+_AT_ONCE: Final = 65_536  # points of which a hull is made at once: lists of them take eight times their memory
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,9 @@ def lower_hull(x: Array, y: Array) -> tuple[Array, Array]:
     x, y : (n,) array
         x ascending.
     """
+    if x.size > _AT_ONCE:
+        hulls = [lower_hull(x[k : k + _AT_ONCE], y[k : k + _AT_ONCE]) for k in range(0, x.size, _AT_ONCE)]
+        x, y = (np.concatenate(corners) for corners in zip(*hulls, strict=True))
     hull: list[tuple[float, float]] = []
     for point in zip(x.tolist(), y.tolist(), strict=True):
         if hull and point[0] == hull[-1][0]:
@@ -217,37 +222,6 @@ def _spans(runs: Sequence[int]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(firsts, ends, strict=True)]
 
 
-def increasing(t: Array, segment: NDArray[np.int64], offsets: Array) -> Array:
-    """Make times increase with the rows: spread stamps that repeat, move runs that overlap behind each other.
-
-    Parameters
-    ----------
-    t : (n,) array
-        Time on the host's clock, s.
-    segment : (n,) int array
-        Piece of each row.
-    offsets : (k,) array
-        Offset of each piece: where it changes, another run begins.
-
-    Returns
-    -------
-    (n,) array
-        Strictly increasing, s.
-    """
-    begins = np.searchsorted(segment, np.arange(offsets.size))
-    new = [int(begins[k]) for k in range(1, offsets.size) if offsets[k] != offsets[k - 1]]
-    pieces = [spread(part) for part in np.split(t, new)]
-    step = typical_step(t)
-    out: list[Array] = []
-    end = -np.inf
-    for part in pieces:
-        if part[0] <= end:
-            part = part + (end + _CLOSE * step - part[0])  # noqa: PLW2901
-        end = float(part[-1])
-        out.append(part)
-    return np.concatenate(out)
-
-
 def typical_step(t: Array) -> float:
     """Median of the steps forward, s; 1 ms where there are none."""
     steps = np.diff(t)
@@ -255,13 +229,15 @@ def typical_step(t: Array) -> float:
     return float(np.median(steps)) if steps.size else 1e-3
 
 
-def spread(t: Array) -> Array:
+def spread(t: Array, step: float | None = None) -> Array:
     """Rows that share a stamp spread evenly up to the next stamp, and stamps that go back held: strictly increasing.
 
     Parameters
     ----------
     t : (n,) array
         Time, s, of a clock that is coarser than the rows.
+    step : float, optional
+        Usual time between two of its stamps, s; without it their own.
     """
     t = np.maximum.accumulate(t)
     firsts = np.flatnonzero(np.diff(t, prepend=-np.inf))
@@ -270,23 +246,26 @@ def spread(t: Array) -> Array:
     stamps = t[firsts]
     counts = np.diff(firsts, append=t.size)
     room = np.diff(stamps, append=np.inf)
-    room = np.minimum(room, typical_step(stamps))
+    room = np.minimum(room, typical_step(stamps) if step is None else step)
     within = np.arange(t.size) - np.repeat(firsts, counts)
     return np.asarray(t + np.repeat(room / counts, counts) * within, dtype=np.float64)
 
 
-def spread_arrivals(arrival: Array) -> Array:
+def spread_arrivals(arrival: Array, before: float = -np.inf, step: float | None = None) -> Array:
     """Rows that were read together spread over the time since the read before: for devices that tell no time.
 
     Parameters
     ----------
     arrival : (n,) array
         When the rows arrived, s, ascending.
+    before : float
+        When the rows before these arrived, s; minus infinity if there are none.
+    step : float, optional
+        Usual time between two reads, s; without it their own.
     """
     lasts = np.append(np.flatnonzero(np.diff(arrival)), arrival.size - 1)
     counts = np.diff(lasts, prepend=-1)
     reads = arrival[lasts]
-    room = np.diff(reads, prepend=-np.inf)
-    room = np.minimum(room, typical_step(reads))
+    room = np.minimum(np.diff(reads, prepend=before), typical_step(reads) if step is None else step)
     left = np.repeat(lasts, counts) - np.arange(arrival.size)
     return np.asarray(arrival - np.repeat(room / counts, counts) * left, dtype=np.float64)

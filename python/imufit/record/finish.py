@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Final
@@ -16,11 +16,12 @@ from imufit.log import Log, LogStream, Metadata
 from imufit.log.assemble import group_fields
 from imufit.log.metadata import read_sidecar, sidecar_path
 from imufit.log.place import Place
+from imufit.log.writer import write_rows
 from imufit.record.arrived import Arrived
 from imufit.record.clock import typical_step
 from imufit.record.columns import Columns
-from imufit.record.part import Part
-from imufit.record.timing import Timing, timed
+from imufit.record.part import BLOCK_ROWS, Part
+from imufit.record.timing import Clock, clock_of, timed_blocks
 from imufit.results import Recording, RecordingClock, RecordingGap
 
 Array = NDArray[np.float64]
@@ -33,22 +34,87 @@ MESSAGES: Final = 200
 
 @dataclass(frozen=True)
 class _Piece:
+    """Some rows with their time, s on the host's clock, the run of the device's clock and the number of the part."""
+
     rows: Arrived
-    timing: Timing
-    columns: dict[str, Array]
+    t: Array
+    run: NDArray[np.int64]
+    part: int
 
 
-def log_of(
-    parts: Sequence[Part], file: Path, ended: str | None = None, cpu_share: float | None = None
-) -> tuple[Log, Recording]:
-    """Make a log of what the parts hold.
+@dataclass(frozen=True)
+class _Timed:
+    """Parts with rows and their clocks, whose rows are read as often as wanted."""
+
+    parts: tuple[Part, ...]
+    clocks: tuple[Clock, ...]
+
+    @classmethod
+    def of(cls, parts: Sequence[Part]) -> _Timed:
+        held = tuple(part for part in parts if part.n)
+        return cls(held, tuple(clock_of(part.blocks()) for part in held))
+
+    def pieces(self) -> Iterator[_Piece]:
+        """Rows in order; a part that would overlap the one before is moved behind it."""
+        end = -np.inf
+        for number, (part, clock) in enumerate(zip(self.parts, self.clocks, strict=True)):
+            late: float | None = None
+            for rows, t, run in timed_blocks(part.blocks(), clock):
+                if late is None:
+                    late = end + 0.1 * typical_step(t) - float(t[0]) if t[0] <= end else 0.0
+                yield _Piece(rows, t + late, run, number)
+                end = float(t[-1]) + late
+
+
+@dataclass
+class _Survey:
+    """What a pass over all rows finds: when they begin and end, runs of the clock, gaps, and steps from row to row."""
+
+    first: float
+    last: float = 0.0
+    n: int = 0
+    runs: int = 0
+    gaps: list[RecordingGap] = field(default_factory=list)
+    steps: list[Array] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, pieces: Iterable[_Piece]) -> _Survey:
+        found: _Survey | None = None
+        before: _Piece | None = None
+        for piece in pieces:
+            found = found or cls(float(piece.t[0]))
+            found._add(before, piece)
+            end = piece.rows.n - 1
+            before = _Piece(piece.rows.part(end, end + 1), piece.t[-1:], piece.run[-1:], piece.part)
+        assert found is not None
+        return found
+
+    def _add(self, before: _Piece | None, piece: _Piece) -> None:
+        self.gaps += _gaps(before, piece, self.first)
+        if self.n < BLOCK_ROWS:
+            self.steps.append(np.diff(piece.t, prepend=piece.t[:1] if before is None else before.t))
+        self.runs += before is None or before.part != piece.part or before.run[-1] != piece.run[0]
+        self.runs += int(piece.run[-1] - piece.run[0])
+        self.n += piece.t.size
+        self.last = float(piece.t[-1])
+
+    @property
+    def rate(self) -> float | None:
+        """Rows per second by the median step of the first rows; None for a single row."""
+        steps = np.concatenate(self.steps)
+        steps = steps[steps > 0.0]
+        return 1.0 / float(np.median(steps)) if steps.size else None
+
+
+def make_log(parts: Sequence[Part], file: Path, ended: str | None = None, cpu_share: float | None = None) -> Recording:
+    """Make a log of what the parts hold; their rows are read and written some at a time.
 
     Parameters
     ----------
     parts : sequence of Part
         In order; at least one has rows.
     file : Path
-        The log to be.
+        The log to be. What stands there is replaced; metadata that a sidecar already holds for it are kept.
     ended : str, optional
         Why the recording ended; without it what the parts tell.
     cpu_share : float, optional
@@ -56,97 +122,105 @@ def log_of(
 
     Returns
     -------
-    tuple
-        The log, and what to say of it.
+    Recording
+        What to say of it.
+
+    Raises
+    ------
+    InputError
+        It cannot be written. There is either all of it or nothing.
     """
-    held = [part for part in parts if part.rows is not None]
-    pieces = _pieces(held)
-    t = np.concatenate([piece.timing.t for piece in pieces])
-    first = float(t[0])
-    t = t - first
-    names = dict.fromkeys(name for piece in pieces for name in piece.columns)
-    numbers = {
-        name: np.concatenate([piece.columns.get(name, np.full(piece.rows.n, np.nan)) for piece in pieces])
-        for name in names
-    }
+    timed = _Timed.of(parts)
+    held = timed.parts
+    columns = [Columns(part.announced, part.about.get("mapping")) for part in held]
+    names = tuple(dict.fromkeys(name for each in columns for name in each.names))
+    seen = _Survey.of(timed.pieces())
     told: dict[str, Any] = {}
     for part in parts:
         for note in part.told:
             told |= note
     about = held[0].about
     counts = told.get("counts", {})
-    began = datetime.fromisoformat(about["utc"]) + timedelta(seconds=first - about["monotonic"])
-    fit = pieces[0].timing.fit
+    began = datetime.fromisoformat(about["utc"]) + timedelta(seconds=seen.first - about["monotonic"])
+    fit = timed.clocks[0].fit
     clock = RecordingClock("arrival")
     if fit is not None:
-        runs = sum(int(piece.timing.run[-1]) + 1 for piece in pieces)
-        clock = RecordingClock("device", float(fit.offsets[0]) - first, fit.drift_ppm, fit.jitter, fit.latest, runs)
+        offset = float(fit.offsets[0]) - seen.first
+        clock = RecordingClock("device", offset, fit.drift_ppm, fit.jitter, fit.latest, seen.runs)
     device = held[0].announced
     why = ended or told.get("ended", "crash")
+    duration = seen.last - seen.first
     recording = Recording(
         file=str(file),
         port=about["port"],
         form=device.form,
         device=device.name,
         began=began.isoformat(timespec="microseconds"),
-        n=int(t.size),
-        duration_s=float(t[-1]),
-        rate_hz=1.0 / typical_step(t) if t.size > 1 else None,
-        columns=tuple(names),
+        n=seen.n,
+        duration_s=duration,
+        rate_hz=seen.rate,
+        columns=names,
         **{name: int(counts.get(name, 0)) for name in ("lost", "damaged", "unknown", "unexplained")},
-        gaps=(*_gaps(pieces, t), *(_gap_at_end(told, t, first) if why != "line lost" else ())),
+        gaps=(*seen.gaps, *(_gap_at_end(told, duration, seen.first) if why != "line lost" else ())),
         clock=clock,
         ended=why,
         cpu_share=cpu_share,
-        notes=tuple(dict.fromkeys([*_dropped(parts), *(n for piece in pieces for n in piece.timing.notes)])),
+        notes=tuple(dict.fromkeys([*_dropped(parts), *(note for each in timed.clocks for note in each.notes)])),
     )
     messages = [
-        {"t": round(arrival - first, 6), "text": text}
+        {"t": round(arrival - seen.first, 6), "text": text}
         for part in parts
         for note in part.told
         for arrival, text in note.get("texts", ())
     ]
-    metadata = _metadata(recording, held, messages[:MESSAGES])
-    fields = group_fields(t, numbers, {}, start=0, metadata=metadata, place=Place())
-    return Log(**fields, metadata=metadata), recording
+    kept = {name: value for name, value in read_sidecar(file).items() if name not in (KEY, "sensor")}
+    own = _metadata(recording, held, messages[:MESSAGES])
+    metadata = Metadata.from_mapping({**own.to_mapping(), **kept}, sidecar_path(file))
+
+    def tables() -> Iterator[dict[str, NDArray[Any]]]:
+        for piece in timed.pieces():
+            known = columns[piece.part].of(piece.rows.values)
+            numbers = {name: known.get(name, np.full(piece.rows.n, np.nan)) for name in names}
+            t = piece.t - seen.first
+            fields = group_fields(t, numbers, {}, start=0, metadata=own, place=Place())
+            yield Log(**fields, metadata=metadata).table()
+
+    write_rows(file, metadata, tables())
+    return recording
 
 
-def _pieces(parts: Sequence[Part]) -> list[_Piece]:
-    """Time and columns of each part; one that would overlap the one before is moved behind it."""
-    pieces: list[_Piece] = []
-    for part in parts:
-        assert part.rows is not None
-        timing = timed(part.rows)
-        if pieces:
-            end = float(pieces[-1].timing.t[-1])
-            if timing.t[0] <= end:
-                late = end + 0.1 * typical_step(timing.t) - float(timing.t[0])
-                timing = replace(timing, t=timing.t + late)
-        columns = Columns(part.announced, part.about.get("mapping")).of(part.rows.values)
-        pieces.append(_Piece(part.rows, timing, columns))
-    return pieces
-
-
-def _gaps(pieces: Sequence[_Piece], t: Array) -> list[RecordingGap]:
-    opening = np.concatenate([piece.rows.opening for piece in pieces])
-    lost = np.concatenate([piece.rows.lost for piece in pieces])
-    part = np.repeat(np.arange(len(pieces)), [piece.rows.n for piece in pieces])
-    start = np.concatenate([piece.rows.start for piece in pieces])
-    run = np.concatenate([piece.timing.run for piece in pieces])
+def _gaps(before: _Piece | None, piece: _Piece, first: float) -> list[RecordingGap]:
+    """Tell of the gaps between rows, and before the first of them."""
+    rows, t, run = piece.rows, piece.t, piece.run
+    part = np.full(rows.n, piece.part)
+    opening, start, lost = rows.opening, rows.start, rows.lost
+    if before is not None:
+        earlier = before.rows
+        opening, start, lost, t, run, part = (
+            np.concatenate(pair)
+            for pair in (
+                (earlier.opening, opening),
+                (earlier.start, start),
+                (earlier.lost, lost),
+                (before.t, t),
+                (before.run, run),
+                ([before.part], part),
+            )
+        )
     anew = np.diff(opening.astype(np.int64)) != 0
     reset = (np.diff(start.astype(np.int64)) != 0) | (np.diff(run) != 0) | (np.diff(part) != 0)
     gaps = []
     for row in np.flatnonzero(anew | reset | (lost[1:] > 0)):
         reason = "unplugged" if anew[row] else "reset" if reset[row] else "lost frames"
-        gaps.append(RecordingGap(float(t[row]), float(t[row + 1]), reason, int(lost[row + 1])))
+        gaps.append(RecordingGap(float(t[row]) - first, float(t[row + 1]) - first, reason, int(lost[row + 1])))
     return gaps
 
 
-def _gap_at_end(told: dict[str, Any], t: Array, first: float) -> list[RecordingGap]:
+def _gap_at_end(told: dict[str, Any], end: float, first: float) -> list[RecordingGap]:
     """Tell of a line that was lost and did not come back."""
     if told.get("lost_since") is None:
         return []
-    return [RecordingGap(float(t[-1]), max(float(told["now"]) - first, float(t[-1])), "unplugged", 0)]
+    return [RecordingGap(end, max(float(told["now"]) - first, end), "unplugged", 0)]
 
 
 def _dropped(parts: Sequence[Part]) -> list[str]:
@@ -210,33 +284,6 @@ def check_target(log: Path, force: bool) -> None:
                 file=sidecar_path(log),
                 remedy="Record under another name.",
             )
-
-
-def write_log(log: Log, path: Path) -> Log:
-    """Write a log so that there is either all of it or nothing, and on the disk.
-
-    Parameters
-    ----------
-    log : Log
-        What to write.
-    path : Path
-        Where; what stands there is replaced. Metadata that a sidecar already holds for it are kept.
-
-    Returns
-    -------
-    Log
-        The log with those metadata.
-
-    Raises
-    ------
-    InputError
-        It cannot be written.
-    """
-    kept = {name: value for name, value in read_sidecar(path).items() if name not in (KEY, "sensor")}
-    merged = Metadata.from_mapping({**log.metadata.to_mapping(), **kept}, sidecar_path(path))
-    whole = replace(log, metadata=merged)
-    whole.write(path)
-    return whole
 
 
 def unreadable(path: Path, n: int) -> str:

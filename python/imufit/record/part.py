@@ -7,9 +7,10 @@ import os
 import time
 import zlib
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,6 +29,8 @@ except ImportError:  # Windows keeps others from a file that is open anyway
 VERSION: Final = 1
 SYNC: Final = 1.0
 """Time after which what is written is on the disk, s: a power cut loses no more."""
+BLOCK_ROWS: Final = 65_536
+"""Rows from which on those of several batches are given at once."""
 STALL: Final = 0.05
 """Time for which the disk may keep the line from being read, s."""
 _KEY: Final = b"imufit_part"
@@ -236,8 +239,8 @@ class Part:
         What the device says.
     about : dict
         What else was written at its beginning.
-    rows : Arrived or None
-        All rows of whole batches; None if there is none.
+    n : int
+        Rows of whole batches.
     told : list of dict
         What each batch told.
     dropped : int
@@ -247,9 +250,28 @@ class Part:
     path: Path
     announced: Announced
     about: dict[str, Any]
-    rows: Arrived | None
+    n: int
     told: list[dict[str, Any]]
     dropped: int
+
+    def blocks(self) -> Iterator[Arrived]:
+        """Give the rows of whole batches in order, some at a time."""
+        with pa.OSFile(str(self.path), "rb") as file:
+            held: list[Arrived] = []
+            for batch in islice(_batches(pa.ipc.open_stream(file), file), len(self.told)):
+                if batch.rows is not None:
+                    held.append(Arrived(self.announced, **batch.rows))
+                if sum(rows.n for rows in held) >= BLOCK_ROWS:
+                    yield Arrived.joined(held)
+                    held = []
+            if held:
+                yield Arrived.joined(held)
+
+    @property
+    def rows(self) -> Arrived | None:
+        """All rows of whole batches at once; None if there is none."""
+        blocks = list(self.blocks())
+        return Arrived.joined(blocks) if blocks else None
 
 
 def read_part(path: Path) -> Part | None:
@@ -277,7 +299,12 @@ def read_part(path: Path) -> Part | None:
             except OSError:
                 raise InputError("this recording is still running", file=path, remedy="Stop it first.") from None
         size = path.stat().st_size
-        data = pa.BufferReader(pa.py_buffer(file.read()))
+        with pa.OSFile(str(path), "rb") as data:
+            return _read(path, data, size)
+
+
+def _read(path: Path, data: Any, size: int) -> Part | None:
+    """Check the beginning of a part, and count what whole batches stand behind it."""
     try:
         stream = pa.ipc.open_stream(data)
     except (pa.ArrowException, OSError):
@@ -308,9 +335,12 @@ def read_part(path: Path) -> Part | None:
         as_written = False
     if not as_written:
         raise InputError("the beginning of this part is damaged", file=path, remedy="Record again.")
-    pieces, told, whole = _batches(stream, data, announced)
-    rows = Arrived.joined(pieces) if pieces else None
-    return Part(path, announced, about, rows, told, size - whole)
+    n, told, whole = 0, [], int(data.tell())
+    for batch in _batches(stream, data):
+        n += batch.n
+        told.append(batch.note)
+        whole = batch.end
+    return Part(path, announced, about, n, told, size - whole)
 
 
 def _is_cut_off(path: Path, size: int) -> bool:
@@ -320,25 +350,31 @@ def _is_cut_off(path: Path, size: int) -> bool:
     return start == b"\xff\xff\xff\xff"[: len(start)] or not any(start) or size == 0
 
 
-def _batches(stream: Any, data: Any, announced: Announced) -> tuple[list[Arrived], list[dict[str, Any]], int]:
-    """Rows of the whole batches, what they tell, and where the last one ends."""
-    pieces: list[Arrived] = []
-    told: list[dict[str, Any]] = []
-    whole = int(data.tell())
+@dataclass(frozen=True)
+class _Batch:
+    """A whole batch: its columns, what it tells, and where it ends."""
+
+    n: int
+    rows: dict[str, Any] | None
+    note: dict[str, Any]
+    end: int
+
+
+def _batches(stream: Any, data: Any) -> Iterator[_Batch]:
+    """Whole batches, up to the first that is not."""
     while True:
         try:
             batch, custom = stream.read_next_batch_with_custom_metadata()
             note = json.loads(custom[_KEY])
             columns = [np.asarray(column.to_numpy(zero_copy_only=False)) for column in batch.columns]
             if note.pop("check") != _check(columns):
-                return pieces, told, whole
+                return
         except (StopIteration, pa.ArrowException, OSError, KeyError, TypeError, ValueError, AttributeError):
-            return pieces, told, whole
-        whole = int(data.tell())
-        told.append(note)
+            return
+        rows: dict[str, Any] | None = None
         if batch.num_rows:
-            raw: dict[str, Any] = dict(zip(_RAW, columns, strict=False))
-            pieces.append(Arrived(announced, **raw, values=np.stack(columns[len(_RAW) :], axis=1)))
+            rows = {**dict(zip(_RAW, columns, strict=False)), "values": np.stack(columns[len(_RAW) :], axis=1)}
+        yield _Batch(batch.num_rows, rows, note, int(data.tell()))
 
 
 def _check(columns: Sequence[NDArray[Any]]) -> int:

@@ -10,7 +10,7 @@ from imufit.errors import InputError
 from imufit.log.metadata import Frame
 from imufit.record.arrived import Arrived
 from imufit.record.beginning import beginning_path
-from imufit.record.finish import check_target, log_of, unreadable, write_log
+from imufit.record.finish import check_target, make_log, unreadable
 from imufit.record.journal import DiskError, Journal
 from imufit.record.live_rows import check_mapping
 from imufit.record.part import part_path, read_part
@@ -189,16 +189,12 @@ def converted(
         They hold no rows, or the log cannot be written. The parts stay.
     """
     parts = [part for part in map(read_part, paths) if part is not None]
-    rows = sum(part.rows.n for part in parts if part.rows is not None)
+    rows = sum(part.n for part in parts)
     if rows == 0:
         raise InputError(
             "no whole batch of rows is in it", file=paths[0], remedy="There is nothing to save: delete it."
         )
-    try:
-        made, recording = log_of(parts, log, ended, cpu_share)
-        write_log(made, log)
-    except MemoryError:
-        raise InputError(f"{rows} rows do not fit into the memory", file=log) from None
+    recording = make_log(parts, log, ended, cpu_share)
     note = unreadable(log, rows)
     if note:
         object.__setattr__(recording, "notes", (*recording.notes, note.rstrip(".")))
