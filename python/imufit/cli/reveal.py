@@ -61,6 +61,9 @@ def truth_rows(truth: Truth) -> tuple[tuple[str, str, str], ...]:
     return tuple(rows)
 
 
+_AS_WRITTEN = "Give the JSON as imufit wrote it."
+
+
 def read_answer(path: Path) -> dict[str, Any]:
     """Read the JSON of `diagnose` or `ladder`.
 
@@ -75,6 +78,15 @@ def read_answer(path: Path) -> dict[str, Any]:
     answer = table_from_json_file(path)
     if "verdict" not in answer:
         raise InputError("this is not the JSON of `imufit diagnose` or `imufit ladder`: it has no verdict", file=path)
+    for key in ("candidates", "steps"):
+        entries = answer.get(key, [])
+        if not (isinstance(entries, list) and all(isinstance(entry, dict) and "effect" in entry for entry in entries)):
+            raise InputError("this is no list of effects", file=path, column=key, remedy=_AS_WRITTEN)
+    for table in (answer, *answer.get("candidates", []), *answer.get("steps", [])):
+        if not isinstance(table.get("parameters") or {}, dict):
+            raise InputError("this is no table of parameters", file=path, column="parameters", remedy=_AS_WRITTEN)
+    if not isinstance(answer.get("ambiguous_with") or [], list):
+        raise InputError("this is no list of effects", file=path, column="ambiguous_with", remedy=_AS_WRITTEN)
     return answer
 
 

@@ -72,7 +72,7 @@ def recover(
     target = wanted if log is None else Path(log)
     check_target(target, force)
     # what a part has rows of needs its bytes no more
-    if first.exists() and not any(part.rows for part in map(read_part, parts) if part is not None):
+    if first.exists() and not any(part.n for part in map(read_part, parts) if part is not None):
         begun = read_beginning(first)
         if begun is not None:
             _explain(begun, wanted, port)

@@ -177,9 +177,10 @@ def _drift(t: Array, error: Array, quiet: Sequence[NDArray[np.intp]], known: Mas
 
 
 def _minutes(t: Array, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Rows of each whole minute; of a log that is shorter than two, all rows."""
-    count = max(1, int((t[rows[-1]] - t[rows[0]]) // 60.0))
-    return np.split(rows, np.searchsorted(t[rows], t[rows[0]] + 60.0 * np.arange(1, count)))
+    """Rows of each whole minute that has some; of a log that is shorter than two, all rows."""
+    since = t[rows] - t[rows[0]]
+    minute = np.minimum(since // 60.0, max(0.0, since[-1] // 60.0 - 1.0))
+    return np.split(rows, np.flatnonzero(np.diff(minute)) + 1)
 
 
 def _slope(t: Array, values: Array, blocks: int = 60) -> float:
