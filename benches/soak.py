@@ -1,0 +1,127 @@
+"""Memory over long work: diagnoses in one process, rows through every filter in chunks, and a long recording.
+
+Each part runs in a process of its own. Printed is its resident memory after the first tenth of the work, at the end,
+and at most. Work that keeps something has more at the end than after its first tenth.
+
+Run: ``python benches/soak.py [--diagnoses N] [--rows N] [--seconds S] [--write]``; ``--seconds`` is the length of a
+recording of 8 kHz from an emulated device, in real time. ``--write`` puts the figures into docs/reliability.md.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from imufit import SensorModel
+from imufit.replay import FILTERS, SMOOTHERS, Stream
+from imufit.results import Table
+from imufit.simulate import simulate
+from marked import markdown, write_between
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "reliability.md"
+BEGIN, END = "<!-- soak -->", "<!-- end of soak -->"
+IMUFIT = [sys.executable, "-c", "import sys; from imufit.cli.app import main; sys.exit(main())"]
+CHUNK = 10_000
+"""Rows that a stream takes at once."""
+
+
+def resident() -> float:
+    """Memory that this process holds now, MB."""
+    fields = Path("/proc/self/status").read_text(encoding="ascii").split("VmRSS:")[1].split()
+    return int(fields[0]) / 1024
+
+
+def diagnoses(count: int) -> list[float]:
+    """Diagnose one simulated log after another; memory after each, MB."""
+    held = []
+    for seed in range(count):
+        SensorModel().fit(simulate("handheld", {"gyr.scale": None}, seed, duration=30.0).to_log()).diagnose()
+        held.append(resident())
+    return held
+
+
+def filtered(rows: int) -> list[float]:
+    """Put rows through every filter in chunks; memory after each chunk, MB."""
+    rng = np.random.default_rng(0)
+    stream = Stream([name for name in FILTERS if name not in SMOOTHERS], ("acc", "gyr", "mag"), frame="ENU")
+    held = []
+    for first in range(0, rows, CHUNK):
+        t = (first + np.arange(CHUNK)) * 1e-3
+        noise = rng.normal(0.0, 0.01, (3, CHUNK, 3))
+        stream.extend(t, acc=noise[0] + [0.0, 0.0, 9.81], gyr=noise[1], mag=noise[2] + [0.0, 20.0, -44.0])
+        held.append(resident())
+    return held
+
+
+def recorded(seconds: float) -> list[float]:
+    """Record an emulated device at 8 kHz; memory of the recorder once a second, MB."""
+    with tempfile.TemporaryDirectory() as folder:
+        device = ["handheld", "--rate", "8000", "--loop", "--duration", str(seconds), "--wait"]
+        emulator = subprocess.Popen([*IMUFIT, "emulate", *device], stdout=subprocess.PIPE, text=True)
+        assert emulator.stdout is not None
+        port = emulator.stdout.readline().strip()
+        log = Path(folder) / "log.parquet"
+        recorder = subprocess.Popen(
+            [*IMUFIT, "record", port, "-o", str(log), "--give-up", "2", "--quiet"], stdout=sys.stderr
+        )
+        held = []
+        while recorder.poll() is None:
+            try:
+                status = Path(f"/proc/{recorder.pid}/status").read_text(encoding="ascii")
+                held.append(int(status.split("VmRSS:")[1].split()[0]) / 1024)
+            except (OSError, IndexError):
+                break
+            time.sleep(1.0)
+        recorder.wait()
+        emulator.wait(timeout=60)
+        assert recorder.returncode == 0, recorder.returncode
+        return held
+
+
+PARTS = {"diagnoses": diagnoses, "filtered": filtered, "recorded": recorded}
+
+
+def apart(part: str, amount: float) -> list[float]:
+    """Do one part of the work in a process of its own."""
+    line = [sys.executable, __file__, "--part", part, "--amount", str(amount)]
+    return json.loads(subprocess.run(line, check=True, stdout=subprocess.PIPE, text=True).stdout)
+
+
+def main() -> None:
+    """Measure, and print or write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--diagnoses", type=int, default=500)
+    parser.add_argument("--rows", type=int, default=10_000_000)
+    parser.add_argument("--seconds", type=float, default=3600.0)
+    parser.add_argument("--write", action="store_true")
+    parser.add_argument("--part", choices=PARTS, help=argparse.SUPPRESS)
+    parser.add_argument("--amount", type=float, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.part:
+        amount = given.amount if given.part == "recorded" else int(given.amount)
+        print(json.dumps(PARTS[given.part](amount)))
+        return
+    rows = []
+    for part, amount, words in (
+        ("diagnoses", given.diagnoses, f"{given.diagnoses} diagnoses in one process"),
+        ("filtered", given.rows, f"{given.rows:,} rows through every filter in chunks of {CHUNK:,}"),
+        ("recorded", given.seconds, f"recording of {given.seconds:g} s at 8 kHz, its log included"),
+    ):
+        held = apart(part, amount)
+        early = held[len(held) // 10]
+        rows.append((words, f"{early:.0f}", f"{held[-1]:.0f}", f"{max(held):.0f}"))
+    table = Table("", ("work", ">after the first tenth, MB", ">at the end, MB", ">at most, MB"), tuple(rows))
+    text = markdown(table)
+    if given.write:
+        write_between(PAGE, BEGIN, END, text)
+    else:
+        print(text)
+
+
+if __name__ == "__main__":
+    main()
