@@ -8,7 +8,7 @@ import numpy as np
 from imufit.cli import engine
 from imufit.cli.app import main
 from imufit.figures.style import new_figure
-from imufit.log import Log
+from imufit.log import Log, contents
 from imufit.results import Table
 from imufit.simulate import Grade, ParameterGrade
 from loop_results import BIAS, addition, card, comparison, diagnosis, ladder
@@ -97,9 +97,11 @@ def install(monkeypatch):
     mark = Grade("right", ("gyr.g_sensitivity",), ("gyr.g_sensitivity",), (found,))
     simulation = SimpleNamespace(t=np.arange(200) / 100.0, truth=Truth())
     model = SimpleNamespace(fit=lambda log, progress: Fit(), compare=Fit().compare)
+    two_rows = Log.from_arrays([0.0, 0.5], acc=[[0.0, 0.0, 9.8], [0.0, 0.0, 9.9]])
     for name, result in (
         ("open_log", "opened"),
-        ("read_log", Log.from_arrays([0.0, 0.5], acc=[[0.0, 0.0, 9.8], [0.0, 0.0, 9.9]])),
+        ("read_log", two_rows),
+        ("contents", contents(two_rows)),
         ("sensor_model", model),
         ("ladder", ladder_result),
         ("explain", card()),

@@ -141,14 +141,12 @@ def test_the_new_files_name_cannot_be_foreseen_and_takes_no_place(tmp_path, monk
     assert all(name.startswith(".model.toml.") for name in made)
 
 
-def test_a_link_at_the_old_predictable_name_of_a_recording_is_not_followed(tmp_path):
-    from imufit.record.finish import write_log
-
+def test_a_link_at_the_old_predictable_name_of_a_log_is_not_followed(tmp_path):
     victim = tmp_path / "victim"
     victim.write_bytes(OLD)
     for suffix in (".parquet", ".csv"):
         (tmp_path / f".a.new{suffix}").symlink_to(victim)
-        write_log(log(), tmp_path / f"a{suffix}")
+        log().write(tmp_path / f"a{suffix}")
         assert imufit.read(tmp_path / f"a{suffix}").n == 300
         assert not (tmp_path / f"a{suffix}").is_symlink()
     assert victim.read_bytes() == OLD

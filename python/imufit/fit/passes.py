@@ -181,8 +181,9 @@ class Passes:
             for sensor, axes in readings.flat(MIN_ROWS).items()
             if sensor in facts.sensors and not any(facts.steps[list(SENSOR_NAMES).index(sensor)])
         }
-        if flat and set(flat) == set(facts.sensors):
-            raise self._motionless([axis for axes in flat.values() for axis in axes])
+        if set(flat) == set(facts.sensors):
+            # Where that holds for all of them the log is a computed one: nothing is dead.
+            return False
         for sensor, axes in flat.items():
             self.empty.append(f"Every reading of {' and '.join(axes)} is the same: {sensor} is left out.")
             self._left_out.append((sensor, 0, self.log.n))

@@ -35,6 +35,8 @@ class ParquetSource:
                 self._schema = file.schema_arrow
                 self.n: int = file.metadata.num_rows
                 self._check_text(file.metadata)
+        except InputError:
+            raise
         except UnicodeDecodeError:
             raise InputError(
                 "a name in the file's schema is no UTF-8", file=path, remedy="Rename the column and write it again."
