@@ -128,11 +128,11 @@ impl Filter for Complementary {
 }
 
 impl Follows<f64> for Complementary {
-    fn limit(&self, _time: f64) -> f64 {
+    fn limit(&self, _time: f64, _sound: &Self) -> f64 {
         LOST
     }
 
-    fn heading_limit(&self) -> Option<f64> {
+    fn heading_limit(&self, _sound: &Self) -> Option<f64> {
         None
     }
 

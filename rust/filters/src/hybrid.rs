@@ -216,12 +216,12 @@ impl<T: Real> Filter<T> for Driven<T> {
 }
 
 impl<T: Real> Follows<T> for Seeded<T> {
-    fn limit(&self, time: f64) -> T {
-        self.mahony.limit(time)
+    fn limit(&self, time: f64, sound: &Self) -> T {
+        self.mahony.limit(time, &sound.mahony)
     }
 
-    fn heading_limit(&self) -> Option<T> {
-        self.mahony.heading_limit()
+    fn heading_limit(&self, sound: &Self) -> Option<T> {
+        self.mahony.heading_limit(&sound.mahony)
     }
 
     fn find(&mut self, attitude: Quaternion<T>, sound: &Self, lost: T::SimdBool) {
@@ -230,12 +230,12 @@ impl<T: Real> Follows<T> for Seeded<T> {
 }
 
 impl<T: Real> Follows<T> for Driven<T> {
-    fn limit(&self, time: f64) -> T {
-        self.mahony.limit(time)
+    fn limit(&self, time: f64, sound: &Self) -> T {
+        self.mahony.limit(time, &sound.mahony)
     }
 
-    fn heading_limit(&self) -> Option<T> {
-        self.mahony.heading_limit()
+    fn heading_limit(&self, sound: &Self) -> Option<T> {
+        self.mahony.heading_limit(&sound.mahony)
     }
 
     fn find(&mut self, attitude: Quaternion<T>, sound: &Self, lost: T::SimdBool) {

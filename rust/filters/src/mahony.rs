@@ -248,11 +248,11 @@ impl<T: Real> Filter<T> for Mahony<T> {
 }
 
 impl<T: Real> Follows<T> for Mahony<T> {
-    fn limit(&self, _time: f64) -> T {
+    fn limit(&self, _time: f64, _sound: &Self) -> T {
         T::splat(LOST)
     }
 
-    fn heading_limit(&self) -> Option<T> {
+    fn heading_limit(&self, _sound: &Self) -> Option<T> {
         Some(T::splat(LOST_HEADING))
     }
 

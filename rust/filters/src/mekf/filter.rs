@@ -215,17 +215,17 @@ impl<T: Real> Mekf<T> {
 }
 
 impl<T: Real> Follows<T> for Mekf<T> {
-    fn limit(&self, time: f64) -> T {
+    fn limit(&self, time: f64, sound: &Self) -> T {
         let v = self.values;
-        let tilt = self.covariance.variance(0).simd_max(self.covariance.variance(1));
+        let tilt = sound.covariance.variance(0).simd_max(sound.covariance.variance(1));
         let moved = v.speed * T::splat(SQRT_2 / (self.environment.gravity() * time));
         (T::splat(SURE) * (tilt + moved * moved).simd_sqrt()).simd_clamp(T::splat(LEAST_LOST), T::splat(PI))
     }
 
-    fn heading_limit(&self) -> Option<T> {
+    fn heading_limit(&self, sound: &Self) -> Option<T> {
         let v = self.values;
         let field = v.mag_noise * v.mag_noise + v.mag_departure * v.mag_departure * self.field.departure;
-        let sd = (self.covariance.variance(2) + field).simd_sqrt();
+        let sd = (sound.covariance.variance(2) + field).simd_sqrt();
         Some((T::splat(SURE) * sd).simd_clamp(T::splat(LEAST_LOST_HEADING), T::splat(PI)))
     }
 
