@@ -55,7 +55,7 @@ def stream() -> Stream:
 
 
 def bias_of(state: np.ndarray) -> np.ndarray:
-    return state[16:19]  # after twelve numbers of the rules and the attitude
+    return state[21:24]  # after seventeen numbers of the rules and the attitude
 
 
 def skew(x: np.ndarray) -> np.ndarray:

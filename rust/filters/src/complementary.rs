@@ -16,6 +16,7 @@ use imufit_attitude::Quaternion;
 
 use crate::filter::{Filter, Parameter, Usage, split_state};
 use crate::intake::{Intake, all_rows};
+use crate::lost::{Follows, LOST};
 use crate::{Columns, Environment, Sample, Skipped};
 
 /// Weight and the step it belongs to, or a time constant.
@@ -123,6 +124,20 @@ impl Filter for Complementary {
             self.q = q;
         }
         found.is_some()
+    }
+}
+
+impl Follows<f64> for Complementary {
+    fn limit(&self, _time: f64, _sound: &Self) -> f64 {
+        LOST
+    }
+
+    fn heading_limit(&self, _sound: &Self) -> Option<f64> {
+        None
+    }
+
+    fn find(&mut self, attitude: Quaternion, _sound: &Self, lost: bool) {
+        self.q = attitude.select(lost, self.q);
     }
 }
 

@@ -9,6 +9,9 @@ use imufit_attitude::Real;
 /// Time constant of the departure, s.
 const DEPARTURE_TIME: f64 = 0.5;
 
+/// Largest departure, rad^2: a heading that may be any has a variance of pi^2 / 3, and more would only last longer.
+const LARGEST: f64 = 10.0;
+
 /// Mean of the undisturbed field and the departure from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Field<T> {
@@ -52,7 +55,8 @@ impl<T: Real> Field<T> {
         self.horizontal = horizontal.select(first, self.horizontal);
         self.vertical = vertical.select(first, self.vertical);
         let (h, v) = (horizontal - self.horizontal, vertical - self.vertical);
-        let square = (h * h + v * v) / (self.horizontal * self.horizontal).simd_max(least);
+        let square =
+            ((h * h + v * v) / (self.horizontal * self.horizontal).simd_max(least)).simd_min(T::splat(LARGEST));
         self.departure += (square - self.departure) * T::splat(-(-dt / DEPARTURE_TIME).exp_m1());
         let departure = self.departure.simd_max(square);
         self.time = (self.time + T::splat(dt)).simd_min(memory);

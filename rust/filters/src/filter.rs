@@ -4,6 +4,7 @@ use imufit_attitude::{Quaternion, Real};
 use nalgebra::{Matrix3, SimdBool};
 
 use crate::intake::Intake;
+use crate::lost::Watched;
 use crate::{Columns, Environment, FilterError, Sample, Sensor, Skipped};
 use crate::{accel, complementary, gyro, hybrid, kalman, mahony, mekf, quest, triad};
 
@@ -108,14 +109,19 @@ pub const FILTERS: [Description; 9] = [
         summary: "The integrated rate pulled a little towards the accelerometer's inclination at each step.",
         needs: &[Sensor::Gyr, Sensor::Acc],
         parameters: complementary::PARAMETERS,
-        make: |environment, values| Box::new(complementary::Complementary::new(environment, values)),
+        make: |environment, values| {
+            Box::new(Watched::new(
+                environment,
+                complementary::Complementary::new(environment, values),
+            ))
+        },
     },
     Description {
         name: "kalman",
         summary: "A Kalman filter of attitude and gyro bias with the accelerometer's inclination as its measurement.",
         needs: &[Sensor::Gyr, Sensor::Acc],
         parameters: kalman::PARAMETERS,
-        make: |environment, values| Box::new(kalman::Kalman::new(environment, values)),
+        make: |environment, values| Box::new(Watched::new(environment, kalman::Kalman::new(environment, values))),
     },
     Description {
         name: "triad",
@@ -129,7 +135,7 @@ pub const FILTERS: [Description; 9] = [
         summary: "Mahony's nonlinear complementary filter with gyro bias, with or without a magnetometer.",
         needs: &[Sensor::Gyr, Sensor::Acc],
         parameters: mahony::PARAMETERS,
-        make: |environment, values| Box::new(mahony::Mahony::new(environment, values)),
+        make: |environment, values| Box::new(Watched::new(environment, mahony::Mahony::new(environment, values))),
     },
     Description {
         name: "quest",
@@ -150,7 +156,7 @@ pub const FILTERS: [Description; 9] = [
         summary: "A multiplicative extended Kalman filter that knows disturbances, with or without a magnetometer.",
         needs: &[Sensor::Gyr, Sensor::Acc],
         parameters: mekf::PARAMETERS,
-        make: |environment, values| Box::new(mekf::Mekf::new(environment, values)),
+        make: |environment, values| Box::new(Watched::new(environment, mekf::Mekf::new(environment, values))),
     },
 ];
 

@@ -31,6 +31,7 @@ use nalgebra::{SimdBool, Vector3};
 
 use crate::filter::{Filter, Parameter, Usage};
 use crate::intake::{Intake, all_rows};
+use crate::lost::{Follows, Watched};
 use crate::mahony::{self, Mahony, square_of_sine};
 use crate::{Columns, Environment, Sample, Skipped, triad};
 
@@ -52,9 +53,9 @@ pub const PARAMETERS: &[Parameter] = &[
 /// The filter that these settings ask for.
 pub fn make(environment: &Environment, values: &[f64]) -> Box<dyn Filter> {
     if values.get(5).is_none_or(|driven| *driven > 0.0) {
-        Box::new(Driven::new(environment, values))
+        Box::new(Watched::new(environment, Driven::new(environment, values)))
     } else {
-        Box::new(Seeded::new(environment, values))
+        Box::new(Watched::new(environment, Seeded::new(environment, values)))
     }
 }
 
@@ -211,6 +212,34 @@ impl<T: Real> Filter<T> for Driven<T> {
 
     fn set_state(&mut self, state: &[T]) -> bool {
         self.mahony.set_state(state)
+    }
+}
+
+impl<T: Real> Follows<T> for Seeded<T> {
+    fn limit(&self, time: f64, sound: &Self) -> T {
+        self.mahony.limit(time, &sound.mahony)
+    }
+
+    fn heading_limit(&self, sound: &Self) -> Option<T> {
+        self.mahony.heading_limit(&sound.mahony)
+    }
+
+    fn find(&mut self, attitude: Quaternion<T>, sound: &Self, lost: T::SimdBool) {
+        self.mahony.find(attitude, &sound.mahony, lost);
+    }
+}
+
+impl<T: Real> Follows<T> for Driven<T> {
+    fn limit(&self, time: f64, sound: &Self) -> T {
+        self.mahony.limit(time, &sound.mahony)
+    }
+
+    fn heading_limit(&self, sound: &Self) -> Option<T> {
+        self.mahony.heading_limit(&sound.mahony)
+    }
+
+    fn find(&mut self, attitude: Quaternion<T>, sound: &Self, lost: T::SimdBool) {
+        self.mahony.find(attitude, &sound.mahony, lost);
     }
 }
 

@@ -13,11 +13,13 @@
 //! 6. **Lever arm.** Where the accelerometer sits at a known place of a rigid arm (`lever_x`, `lever_y`, `lever_z`), what
 //!    filters and free fall see is the specific force at the joint: the rate and its change since the row before tell what the
 //!    turn adds. A row without a rate takes the last ones.
-//! 7. **Start.** See [`Start`]. Rows before it have no attitude: NaN.
+//! 7. **Single bad rate.** A rate that its neighbours do not allow is bridged and counted ([`crate::bridge`]).
+//! 8. **Start.** See [`Start`]. Rows before it have no attitude: NaN.
 
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::Vector3;
 
+use crate::bridge::Turned;
 use crate::columns::{Columns, Row};
 use crate::filter::{Filter, Usage};
 use crate::lever_arm::LeverArm;
@@ -160,13 +162,14 @@ impl Intake {
             t_gyr,
             t_mag,
             mut omega,
+            mut bridge,
             ..
         } = self.memory;
         let (Some(acc), Some(gyr), Some(mag)) = (columns.acc, columns.gyr, columns.mag) else {
             return 0;
         };
         // A sensor that has read at the last row; NaN, none yet, fails every comparison.
-        if !(started && t_acc >= last && t_gyr >= last && t_mag >= last) || self.lever.is_some() {
+        if !(started && t_acc >= last && t_gyr >= last && t_mag >= last) || self.lever.is_some() || bridge.span > 0.0 {
             return 0;
         }
         let (rules, least_square) = (self.rules, self.least_square);
@@ -182,9 +185,12 @@ impl Intake {
                 && dt <= rules.max_gap
                 && square > least_square
                 && square + (gyr.norm_squared() + mag.norm_squared()) <= f64::MAX;
-            if !usable || clipped(&acc, rules.acc_range) || clipped(&gyr, rules.gyr_range) {
+            let change = (gyr - omega).norm_squared();
+            if !usable || clipped(&acc, rules.acc_range) || clipped(&gyr, rules.gyr_range) || bridge.doubts(change, dt)
+            {
                 break;
             }
+            bridge.learn(change);
             let sample = Sample {
                 omega: Some(Reading {
                     value: AngularRate((omega + gyr) * 0.5),
@@ -209,7 +215,7 @@ impl Intake {
             skipped.no_heading += no_heading;
             let memory = &mut self.memory;
             (memory.last, memory.t_acc, memory.t_gyr, memory.t_mag) = (last, last, last, last);
-            memory.omega = omega;
+            (memory.omega, memory.bridge) = (omega, bridge);
         }
         rows
     }
@@ -269,16 +275,30 @@ impl Intake {
                     .turn(&mut memory.alpha, &memory.omega, &omega, t - memory.t_gyr);
             }
             skipped.gyr_clipped += usize::from(clipped(&omega, self.rules.gyr_range));
-            if t - memory.t_gyr <= max_gap {
-                let value = AngularRate((memory.omega + omega) * 0.5);
-                sample.omega = Some(Reading {
-                    value,
-                    dt: t - memory.t_gyr,
-                });
-            } else if !memory.t_gyr.is_nan() {
-                skipped.gap += 1;
+            let dt = t - memory.t_gyr;
+            let mut believed = true;
+            if dt <= max_gap {
+                let value = match memory.bridge.turn(&memory.omega, &omega, dt) {
+                    Turned::Mean(mean) => mean,
+                    Turned::Bridged(mean) => {
+                        skipped.gyr_bridged += 1;
+                        mean
+                    }
+                    Turned::Held => {
+                        believed = false;
+                        memory.omega
+                    }
+                };
+                let value = AngularRate(value);
+                sample.omega = Some(Reading { value, dt });
+            } else {
+                memory.bridge.span = 0.0;
+                skipped.gap += usize::from(!memory.t_gyr.is_nan());
             }
-            (memory.t_gyr, memory.omega) = (t, omega);
+            memory.t_gyr = t;
+            if believed {
+                memory.omega = omega;
+            }
         }
         if let Some(reading) = acc {
             let f = if self.lever.is_some() {

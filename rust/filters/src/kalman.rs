@@ -21,6 +21,7 @@ use nalgebra::Vector3;
 
 use crate::filter::{Filter, Parameter, Usage, split_state};
 use crate::intake::{Intake, all_rows};
+use crate::lost::{Follows, LOST};
 use crate::steady_state;
 use crate::vibration::Vibration;
 use crate::{Columns, Environment, Sample, Skipped};
@@ -76,6 +77,10 @@ pub const PARAMETERS: &[Parameter] = &[
         meaning: "1: the gain of the settled filter from the first reading on, whatever the initial uncertainties; 0: the gain of the covariance",
     },
 ];
+
+/// Largest innovation that teaches the bias, rad: a bias of 3 deg/s turns the settled vertical by as much. What exceeds it is a
+/// motion or a bad reading.
+const OF_BIAS: f64 = 0.3;
 
 /// The noises that the gains follow from.
 #[derive(Debug, Clone, Copy)]
@@ -201,7 +206,8 @@ impl Filter for Kalman {
             && let Some(([k_a, k_b], after)) = self.gains(f.dt, r)
         {
             let innovation = Quaternion::between(&self.q.rotate(&f.value.0), &self.environment.up()).log();
-            self.bias += self.q.rotate_back(&innovation) * k_b;
+            let of_bias = innovation * (OF_BIAS / innovation.norm().max(OF_BIAS));
+            self.bias += self.q.rotate_back(&of_bias) * k_b;
             self.q = Quaternion::exp(&(innovation * k_a)) * self.q;
             self.covariance = after;
         }
@@ -241,6 +247,22 @@ impl Filter for Kalman {
             self.vibration = Vibration { mean, power };
         }
         found.is_some()
+    }
+}
+
+impl Follows<f64> for Kalman {
+    fn limit(&self, _time: f64, _sound: &Self) -> f64 {
+        LOST
+    }
+
+    fn heading_limit(&self, _sound: &Self) -> Option<f64> {
+        None
+    }
+
+    fn find(&mut self, attitude: Quaternion, sound: &Self, lost: bool) {
+        if lost {
+            (self.q, self.bias, self.covariance) = (attitude, sound.bias, sound.covariance);
+        }
     }
 }
 

@@ -18,6 +18,7 @@
 #![allow(clippy::inline_always)] // a row of a replay is a hundred operations: a call between them is felt
 
 pub mod accel;
+mod bridge;
 pub mod columns;
 pub mod complementary;
 mod field;
@@ -27,6 +28,7 @@ pub mod hybrid;
 pub mod intake;
 pub mod kalman;
 mod lever_arm;
+mod lost;
 pub mod mahony;
 pub mod mekf;
 mod memory;

@@ -36,6 +36,7 @@ use nalgebra::{SimdBool, Vector3};
 
 use crate::filter::{Filter, Parameter, Usage, split_state};
 use crate::intake::{Intake, all_rows};
+use crate::lost::{Follows, LOST, LOST_HEADING};
 use crate::{Columns, Environment, Sample, Skipped};
 
 /// The gains, named as printed, and the limit of the field.
@@ -243,6 +244,21 @@ impl<T: Real> Filter<T> for Mahony<T> {
             (self.q, self.bias) = (q, Vector3::from(bias));
         }
         found.is_some()
+    }
+}
+
+impl<T: Real> Follows<T> for Mahony<T> {
+    fn limit(&self, _time: f64, _sound: &Self) -> T {
+        T::splat(LOST)
+    }
+
+    fn heading_limit(&self, _sound: &Self) -> Option<T> {
+        Some(T::splat(LOST_HEADING))
+    }
+
+    fn find(&mut self, attitude: Quaternion<T>, sound: &Self, lost: T::SimdBool) {
+        self.q = attitude.select(lost, self.q);
+        self.bias = sound.bias.zip_map(&self.bias, |sound, own| sound.select(lost, own));
     }
 }
 

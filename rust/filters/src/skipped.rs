@@ -27,6 +27,8 @@ pub struct Skipped {
     pub acc_clipped: usize,
     /// An angular rate at the end of the gyro's range: used as it is.
     pub gyr_clipped: usize,
+    /// A single angular rate that its neighbours do not allow: bridged.
+    pub gyr_bridged: usize,
     /// Specific force too short to show the vertical.
     pub free_fall: usize,
     /// Field too close to the vertical to show a heading.
@@ -37,7 +39,7 @@ pub struct Skipped {
 
 impl Skipped {
     /// Reason and rows, in a fixed order.
-    pub fn by_reason(&self) -> [(&'static str, usize); 14] {
+    pub fn by_reason(&self) -> [(&'static str, usize); 15] {
         [
             ("time_not_finite", self.time_not_finite),
             ("time_not_increasing", self.time_not_increasing),
@@ -50,6 +52,7 @@ impl Skipped {
             ("mag_not_finite", self.mag_not_finite),
             ("acc_clipped", self.acc_clipped),
             ("gyr_clipped", self.gyr_clipped),
+            ("gyr_bridged", self.gyr_bridged),
             ("free_fall", self.free_fall),
             ("no_heading", self.no_heading),
             ("not_started", self.not_started),
@@ -70,6 +73,7 @@ impl AddAssign for Skipped {
         self.mag_not_finite += other.mag_not_finite;
         self.acc_clipped += other.acc_clipped;
         self.gyr_clipped += other.gyr_clipped;
+        self.gyr_bridged += other.gyr_bridged;
         self.free_fall += other.free_fall;
         self.no_heading += other.no_heading;
         self.not_started += other.not_started;

@@ -18,6 +18,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::filter::{Description, Filter, fill, find};
 use crate::intake::Intake;
+use crate::lost::Watched;
 use crate::mekf::{Mekf, turned_back};
 use crate::memory::Memory;
 use crate::{Columns, Environment, FilterError, Rules, Skipped, Start};
@@ -67,7 +68,7 @@ struct Passed<T> {
 #[derive(Debug, Clone)]
 pub struct Smoother<T = f64> {
     description: &'static Description,
-    filter: Mekf<T>,
+    filter: Watched<Mekf<T>, T>,
     intake: Intake,
     up: Vector3<f64>,
 }
@@ -96,7 +97,7 @@ impl<T: Real> Smoother<T> {
     ) -> Self {
         Self {
             description,
-            filter: Mekf::new(&environment, values),
+            filter: Watched::new(&environment, Mekf::new(&environment, values)),
             intake: Intake::new(environment, rules, start),
             up: environment.up(),
         }
@@ -119,7 +120,11 @@ impl<T: Real> Smoother<T> {
             return Ok(skipped);
         };
         let reversed = Reversed::new(columns);
-        let (mut after, backwards) = self.pass(&turned_back(&first.state(), first.attitude()), &reversed.columns(), 0);
+        let (mut after, backwards) = self.pass(
+            &turned_back(&first.filter().state(), first.attitude()),
+            &reversed.columns(),
+            0,
+        );
         after.reverse();
         look()?;
         let (before, _) = self.pass(&turned_back(&backwards.state(), q), columns, start);
@@ -135,7 +140,7 @@ impl<T: Real> Smoother<T> {
     /// What the rows from `start` on say to a filter that begins in that state, and the filter after them.
     fn pass(&self, state: &[T], columns: &Columns<'_>, start: usize) -> (Vec<Passed<T>>, Mekf<T>) {
         let (mut filter, mut intake) = (self.filter.clone(), self.intake.clone());
-        if filter.set_state(state) {
+        if filter.begin(state) {
             intake.memory = Memory {
                 started: true,
                 ..Memory::EMPTY
@@ -150,7 +155,7 @@ impl<T: Real> Smoother<T> {
             }
         });
         let found = found.collect();
-        (found, filter)
+        (found, filter.filter().clone())
     }
 }
 

@@ -132,6 +132,12 @@ impl<T: Real> Covariance<T> {
         }
     }
 
+    /// Another covariance in the lanes where the condition holds.
+    pub fn take(&mut self, other: &Self, condition: T::SimdBool) {
+        self.0
+            .zip_apply(&other.0, |own, other| *own = other.select(condition, *own));
+    }
+
     /// The error `at` was measured as `value`, variance `r`; adds to the errors `x` found so far in this step. Nothing is
     /// done where `shown` does not hold.
     ///

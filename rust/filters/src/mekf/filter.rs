@@ -1,5 +1,7 @@
 //! State and step: predictions and measurements in the order in which a row brings them.
 
+use std::f64::consts::{PI, SQRT_2};
+
 use imufit_attitude::matrix::matrix_from_quaternion;
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::{Matrix3, SimdBool, Vector3};
@@ -9,6 +11,7 @@ use super::settings::Values;
 use crate::field::Field;
 use crate::filter::{Filter, Usage};
 use crate::intake::{Intake, all_rows};
+use crate::lost::Follows;
 use crate::rest::{Limits, Rest};
 use crate::{Columns, Environment, Sample, Skipped};
 
@@ -18,6 +21,15 @@ const STANDING: f64 = 0.01;
 const FIRST_TILT: f64 = 0.01;
 /// Variance of the turn during a gap, rad^2.
 const GAP: f64 = 1.0;
+/// Largest velocity in parts of `speed`: 7.5 m/s by default. Fast hand motion (BROAD, trial 16) reaches 12; more comes of bad
+/// readings, and nothing is learned from it.
+const FASTEST: f64 = 15.0;
+/// Standard deviations of the mean force's direction beyond which three windows in a row do not happen.
+const SURE: f64 = 4.0;
+/// Least angle that is lost, rad: what a wrong bias of the accelerometer (0.5 m/s^2) makes.
+const LEAST_LOST: f64 = 0.05;
+/// The same for the heading, rad: with 0.15 the field of one recording of BROAD (trial 21) is followed where the gyro is better.
+const LEAST_LOST_HEADING: f64 = 0.25;
 
 /// The filter.
 #[derive(Debug, Clone)]
@@ -83,9 +95,19 @@ impl<T: Real> Mekf<T> {
             self.level(&f);
         }
         let (time, force) = (T::splat(dt), self.q.rotate(&f));
-        self.velocity[0] += force.x * time;
-        self.velocity[1] += force.y * time;
+        let fast = [self.velocity[0] + force.x * time, self.velocity[1] + force.y * time];
+        let longest = v.speed * T::splat(FASTEST);
+        let believed = (fast[0] * fast[0] + fast[1] * fast[1]).simd_le(longest * longest);
+        self.velocity = fast.map(|x| x.select(believed, T::splat(0.0)));
         self.covariance.accelerate(&force, time);
+        if !believed.all() {
+            let mut standing = self.covariance.clone();
+            for at in [SPEED, SPEED + 1] {
+                standing.forget(at, v.speed * v.speed);
+            }
+            standing.take(&self.covariance, believed);
+            self.covariance = standing;
+        }
         for at in [SPEED, SPEED + 1] {
             self.covariance.add(at, v.acc_noise * v.acc_noise * time);
             if blind > 0.01 * dt {
@@ -189,6 +211,40 @@ impl<T: Real> Mekf<T> {
             self.covariance.forget(at, v.speed * v.speed);
         }
         self.rest = Rest::unknown();
+    }
+}
+
+impl<T: Real> Follows<T> for Mekf<T> {
+    fn limit(&self, time: f64, sound: &Self) -> T {
+        let v = self.values;
+        let tilt = sound.covariance.variance(0).simd_max(sound.covariance.variance(1));
+        let moved = v.speed * T::splat(SQRT_2 / (self.environment.gravity() * time));
+        (T::splat(SURE) * (tilt + moved * moved).simd_sqrt()).simd_clamp(T::splat(LEAST_LOST), T::splat(PI))
+    }
+
+    fn heading_limit(&self, sound: &Self) -> Option<T> {
+        let v = self.values;
+        let field = v.mag_noise * v.mag_noise + v.mag_departure * v.mag_departure * self.field.departure;
+        let sd = (sound.covariance.variance(2) + field).simd_sqrt();
+        Some((T::splat(SURE) * sd).simd_clamp(T::splat(LEAST_LOST_HEADING), T::splat(PI)))
+    }
+
+    fn find(&mut self, attitude: Quaternion<T>, sound: &Self, lost: T::SimdBool) {
+        let (zero, v) = (T::splat(0.0), self.values);
+        let pick = |found: T, own: T| found.select(lost, own);
+        self.q = attitude.select(lost, self.q);
+        self.bias = sound.bias.zip_map(&self.bias, pick);
+        self.scale = sound.scale.zip_map(&self.scale, pick);
+        self.velocity = self.velocity.map(|x| pick(zero, x));
+        self.field = sound.field.select(lost, self.field);
+        let mut covariance = sound.covariance.clone();
+        for at in 0..BIAS {
+            covariance.forget(at, v.angle_start * v.angle_start);
+        }
+        for at in [SPEED, SPEED + 1] {
+            covariance.forget(at, v.speed * v.speed);
+        }
+        self.covariance.take(&covariance, lost);
     }
 }
 
