@@ -19,8 +19,8 @@ LARGEST_FILE: Final = 16 << 20
 """Bytes of a document, 16 MB: the largest JSON of a diagnosis has 1 MB."""
 
 LONGEST_LINE: Final = 16_384
-"""Characters of a line of TOML: the parser needs memory with the square of the parts of a dotted key. That is under 100 MB
-here, and was 2.4 GB at 200,000 characters. The longest line that imufit writes is a sentence."""
+"""Characters of a line of TOML: the parser needs memory with the square of the parts of a dotted key. That is under
+100 MB here, and was 2.4 GB at 200,000 characters. The longest line that imufit writes is a sentence."""
 
 
 def table_from_toml(path: Path, remedy: str | None = None) -> dict[str, Any]:
