@@ -152,6 +152,26 @@ def test_a_line_that_is_unplugged_in_a_frame_goes_on_when_it_is_back(plug, tmp_p
     assert (gap.reason, gap.frames, gap.t_start, gap.t_end) == ("unplugged", 2, log.t[99], log.t[100])
 
 
+def test_a_pseudo_terminal_that_is_gone_is_not_looked_for_in_those_of_others(tmp_path):
+    pty, device = Pty(), Sender()
+    recorder = Recorder(pty.port, tmp_path / "a.parquet")
+    pty.send(device.announce() + device.samples(range(10)))
+    recorder.until(lambda: recorder.seen == 10)
+    pty.close()
+    recorder.until(lambda: recorder.lost)
+    others = [Pty()]
+    while others[-1].port != pty.port and len(others) < 50:  # the system gives free names out again
+        others.append(Pty())
+    assert others[-1].port == pty.port
+    time.sleep(0.5)
+    assert recorder.lost
+    assert recorder.openings == 0
+    recorder.result()
+    assert imufit.read(tmp_path / "a.parquet").n == 10
+    for other in others:
+        other.close()
+
+
 def test_a_line_is_open_again_at_once_however_long_it_was_away(plug, tmp_path):
     recorder = Recorder(plug.port, tmp_path / "a.parquet")
     plug.plug()

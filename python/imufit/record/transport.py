@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 from typing import TYPE_CHECKING, Final
 
@@ -117,9 +118,14 @@ class Line:
         self.lost_since = time.monotonic()
         self._next_try = self.lost_since + RETRY
 
+    @property
+    def _is_of_others(self) -> bool:
+        """Whether a lost line's name is given to strangers: that of a pseudo terminal is, a link to one stays its own."""
+        return self.port.startswith("/dev/pts/") and os.path.realpath(self.port) == self.port
+
     def _reopen(self) -> bool:
         """Try to open the line again, if it is time for that."""
-        if time.monotonic() < self._next_try:
+        if time.monotonic() < self._next_try or self._is_of_others:
             return False
         try:
             self._serial = self._opened()
