@@ -120,7 +120,7 @@ class Line:
 
     @property
     def _is_of_others(self) -> bool:
-        """Whether a lost line's name is given to strangers: that of a pseudo terminal is, a link to one stays its own."""
+        """Whether a lost line's name goes to strangers: that of a pseudo terminal does, a link to one stays."""
         return self.port.startswith("/dev/pts/") and os.path.realpath(self.port) == self.port
 
     def _reopen(self) -> bool:

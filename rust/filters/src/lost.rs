@@ -31,11 +31,11 @@ const WINDOWS: f64 = 3.0;
 /// Sine of the least angle between a field and the vertical that has a heading.
 const LEAST_SINE: f64 = 0.035;
 
-/// Limit of filters that state no covariance, rad: 7 degrees. Three windows in a row together are never off by more than
+/// Limit of filters that state no covariance, rad: 6 degrees. Three windows in a row together are never off by more than
 /// 0.08 with the true attitudes of BROAD, and what is left of less is small 20 s later.
-pub(crate) const LOST: f64 = 0.12;
-/// The same for the heading, rad: fields in buildings turn by half of it, and no proportional gain is slow before a right angle.
-pub(crate) const LOST_HEADING: f64 = 1.0;
+pub(crate) const LOST: f64 = 0.1;
+/// The same for the heading, rad: fields in buildings turn by less for so long, and a proportional gain follows them anyway.
+pub(crate) const LOST_HEADING: f64 = 0.7;
 
 /// What a filter is asked when it is watched.
 pub(crate) trait Follows<T: Real>: Filter<T> + Clone {
@@ -67,7 +67,7 @@ struct Window<T> {
     against: T,
     /// Mean forces of these over gravity, summed, reference frame.
     forces: Vector3<T>,
-    /// Their directions of the field times time, each seen by a level attitude, summed, s.
+    /// Their directions of the field times time, summed, reference frame, s.
     norths: Vector3<T>,
 }
 
@@ -229,19 +229,21 @@ impl<T: Real, F: Follows<T>> Watched<F, T> {
         let window = self.window;
         let mean = window.force / T::splat(window.time);
         let tilt = self.tilt(&mean, window.time);
-        let field = tilt.level.rotate(&window.north);
-        let (heading, turned) = self.heading(&field);
-        let against = tilt.beyond | turned;
+        let levelled = self.heading(&tilt.level.rotate(&window.north));
+        let own = self.heading(&window.north);
+        let against = tilt.beyond | (own.1 & levelled.1);
         let count = window.against + one;
-        let (forces, norths) = (window.forces + mean, window.norths + field);
+        let (forces, norths) = (window.forces + mean, window.norths + window.north);
         let together = self.tilt(&(forces / count), window.time);
-        let lost = against
-            & count.simd_ge(T::splat(WINDOWS))
-            & ((together.beyond & together.as_long_as_gravity) | self.heading(&norths).1);
+        let tilted = together.beyond & together.as_long_as_gravity;
+        // An acceleration tilts the mean force, and a steep field turns with it: a heading is off where it is so both ways.
+        let turned = self.heading(&norths).1 & self.heading(&together.level.rotate(&norths)).1;
+        let lost = against & count.simd_ge(T::splat(WINDOWS)) & (tilted | turned);
         if lost.any() {
             let up = self.environment.up().map(T::splat);
-            let turned = Quaternion::exp(&(up * heading));
-            let found = (turned * tilt.level * self.filter.attitude()).renormalised();
+            let heading = levelled.0.select(tilted, own.0);
+            let level = tilt.level.select(tilted, Quaternion::default());
+            let found = (Quaternion::exp(&(up * heading)) * level * self.filter.attitude()).renormalised();
             self.filter.find(found, &self.sound[0], lost);
         }
         if !against.any() {
@@ -403,6 +405,26 @@ mod tests {
             let mekf = seconds_after(turn, mekf_with(&[]));
             assert!(mahony < 18.0 && mekf < 18.0, "{turn:?}: {mahony} s, {mekf} s");
         }
+    }
+
+    /// Whether the attitude ever jumps while the body is accelerated by 3 m/s^2 for ten seconds.
+    fn jumps<F: Follows<f64>>(filter: F) -> bool {
+        let mut watched = settled(filter);
+        let mut before = watched.attitude();
+        (0..2000).any(|k| {
+            let push = if k < 1000 { Vector3::x() * 3.0 } else { Vector3::zeros() };
+            watched.step(&reading(Quaternion::IDENTITY, k, push));
+            let step = (watched.attitude() * before.inverse()).log().norm();
+            before = watched.attitude();
+            step > 0.05
+        })
+    }
+
+    #[test]
+    fn an_acceleration_that_lasts_is_no_lost_attitude() {
+        assert!(!jumps(mekf_with(&[("speed", 30.0)])));
+        // A filter that holds on to the gyro: the mean force is longer than gravity all the time.
+        assert!(!jumps(Mahony::new(&surroundings(), &[1.0, 1.0, 0.0, 0.01])));
     }
 
     #[test]

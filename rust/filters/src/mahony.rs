@@ -25,7 +25,7 @@
 //!
 //! **Recovery.** One reading with NaN or infinity, free fall and a field along the vertical leave no error behind but that of
 //! the gyro. An error of up to 90 degrees, left by a saturated gyro or by a gap, is below a tenth of itself
-//! `8 / (k_p min(k_1, k_2))` s after good readings return.
+//! `8 / (k_p min(k_1, k_2))` s after good readings return, and a larger one is found again at once ([`crate::lost`]).
 //!
 //! The paper's gains `[k_1 k_2 k_I k_P]`, [`AS_IN_FIGURE_3`] (the text prints `[1 - 0.2 20]`) and [`AS_IN_FIGURE_4`], suit
 //! a slow robot arm. The defaults are softer: found on hand-moved recordings with optical reference (BROAD), where they

@@ -26,7 +26,7 @@
 //! **Gaps and missing readings.** After a gap the tilt is set from the first specific force within its spread and found
 //! again within 10 s in motion and 5 s at rest; the heading within 30 s. While the specific force is
 //! missing (free fall, clipping) the velocity becomes uncertain by gravity times that time. Without a magnetometer the
-//! heading is that of the integrated rate.
+//! heading is that of the integrated rate. An attitude that bad readings have left behind is found again ([`crate::lost`]).
 
 mod covariance;
 mod filter;
