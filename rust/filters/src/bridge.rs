@@ -59,8 +59,9 @@ impl Bridge {
         self.usual += (square.min(LARGEST) - self.usual) * (1.0 / CHANGES);
     }
 
-    /// The turn up to a reading, `dt` after the last one; `before` is the last rate that is believed.
-    pub fn turn(&mut self, before: &Vector3<f64>, rate: &Vector3<f64>, dt: f64) -> Turned {
+    /// The turn up to a reading, `dt` after the last one; `before` is the last rate that is believed. With `on` = false none is
+    /// doubted.
+    pub fn turn(&mut self, before: &Vector3<f64>, rate: &Vector3<f64>, dt: f64, on: bool) -> Turned {
         let (square, span, doubted) = ((rate - before).norm_squared(), self.span, self.doubted);
         if span > 0.0 {
             (self.span, self.doubted) = (0.0, Vector3::zeros());
@@ -73,7 +74,7 @@ impl Bridge {
             self.learn((rate - doubted).norm_squared());
             return Turned::Mean((doubted + rate) * 0.5 + jump * (0.5 * span / dt));
         }
-        if self.doubts(square, dt) {
+        if on && self.doubts(square, dt) {
             (self.span, self.doubted) = (dt, *rate);
             return Turned::Held;
         }
@@ -96,7 +97,7 @@ mod tests {
         for rate in &rates[1..] {
             let rate = Vector3::x() * *rate;
             sum += DT
-                * match bridge.turn(&before, &rate, DT) {
+                * match bridge.turn(&before, &rate, DT, true) {
                     Turned::Mean(mean) | Turned::Bridged(mean) => mean.x,
                     Turned::Held => before.x,
                 };

@@ -32,6 +32,9 @@ pub trait Filter<T: Real = f64>: Send + Sync {
         None
     }
 
+    /// Whether it finds a lost attitude again, see [`crate::lost`](crate); a filter that holds on to nothing has none to lose.
+    fn find_itself(&mut self, _on: bool) {}
+
     /// Starts over at `attitude`, everything learned forgotten.
     fn reset(&mut self, attitude: Quaternion);
 

@@ -186,7 +186,10 @@ impl Intake {
                 && square > least_square
                 && square + (gyr.norm_squared() + mag.norm_squared()) <= f64::MAX;
             let change = (gyr - omega).norm_squared();
-            if !usable || clipped(&acc, rules.acc_range) || clipped(&gyr, rules.gyr_range) || bridge.doubts(change, dt)
+            if !usable
+                || clipped(&acc, rules.acc_range)
+                || clipped(&gyr, rules.gyr_range)
+                || (rules.recovery && bridge.doubts(change, dt))
             {
                 break;
             }
@@ -278,7 +281,7 @@ impl Intake {
             let dt = t - memory.t_gyr;
             let mut believed = true;
             if dt <= max_gap {
-                let value = match memory.bridge.turn(&memory.omega, &omega, dt) {
+                let value = match memory.bridge.turn(&memory.omega, &omega, dt, self.rules.recovery) {
                     Turned::Mean(mean) => mean,
                     Turned::Bridged(mean) => {
                         skipped.gyr_bridged += 1;

@@ -78,10 +78,6 @@ pub const PARAMETERS: &[Parameter] = &[
     },
 ];
 
-/// Largest innovation that teaches the bias, rad: a bias of 3 deg/s turns the settled vertical by as much. What exceeds it is a
-/// motion or a bad reading.
-const OF_BIAS: f64 = 0.3;
-
 /// The noises that the gains follow from.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Noise {
@@ -206,8 +202,7 @@ impl Filter for Kalman {
             && let Some(([k_a, k_b], after)) = self.gains(f.dt, r)
         {
             let innovation = Quaternion::between(&self.q.rotate(&f.value.0), &self.environment.up()).log();
-            let of_bias = innovation * (OF_BIAS / innovation.norm().max(OF_BIAS));
-            self.bias += self.q.rotate_back(&of_bias) * k_b;
+            self.bias += self.q.rotate_back(&innovation) * k_b;
             self.q = Quaternion::exp(&(innovation * k_a)) * self.q;
             self.covariance = after;
         }

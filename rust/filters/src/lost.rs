@@ -102,7 +102,7 @@ impl<T: Real> Window<T> {
         let common = [f.x, f.y, f.z, m.x, m.y, m.z, times[0], times[1], times[2]].map(T::splat);
         let mut own = [self.force, self.north, self.forces, self.norths]
             .into_iter()
-            .flat_map(|v| <[T; 3]>::from(v));
+            .flat_map(<[T; 3]>::from);
         std::array::from_fn(|k| match k {
             0..9 => common[k],
             9 => self.against,
@@ -146,6 +146,8 @@ pub struct Watched<F, T = f64> {
     environment: Environment,
     per_gravity: f64,
     window: Window<T>,
+    /// Whether it is watched at all.
+    on: bool,
     /// The filter at the end of the last two windows that did not speak against it, the older one first.
     sound: [F; 2],
 }
@@ -153,6 +155,7 @@ pub struct Watched<F, T = f64> {
 impl<T: Real, F: Follows<T>> Watched<F, T> {
     pub(crate) fn new(environment: &Environment, filter: F) -> Self {
         Self {
+            on: true,
             sound: [filter.clone(), filter.clone()],
             filter,
             environment: *environment,
@@ -260,6 +263,9 @@ impl<T: Real, F: Follows<T>> Filter<T> for Watched<F, T> {
     #[inline(always)]
     fn step(&mut self, sample: &Sample) -> Usage {
         let usage = self.filter.step(sample);
+        if !self.on {
+            return usage;
+        }
         if let Some(m) = sample.m
             && m.dt > 0.0
         {
@@ -288,6 +294,10 @@ impl<T: Real, F: Follows<T>> Filter<T> for Watched<F, T> {
 
     fn attitude_covariance(&self) -> Option<Matrix3<T>> {
         self.filter.attitude_covariance()
+    }
+
+    fn find_itself(&mut self, on: bool) {
+        self.on = on;
     }
 
     fn reset(&mut self, attitude: Quaternion) {

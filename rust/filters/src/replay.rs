@@ -27,9 +27,11 @@ impl Replay {
         rules: Rules,
         start: Start,
     ) -> Result<Self, FilterError> {
+        let mut filter = description.build(&environment, settings)?;
+        filter.find_itself(rules.recovery);
         Ok(Self {
             description,
-            filter: description.build(&environment, settings)?,
+            filter,
             intake: Intake::new(environment, rules, start),
         })
     }

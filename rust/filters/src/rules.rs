@@ -55,6 +55,12 @@ pub const PARAMETERS: &[Parameter] = &[
         unit: "s",
         meaning: "time constant of the angular acceleration that the lever arm needs: larger takes noise out of it and comes later",
     },
+    Parameter {
+        name: "recovery",
+        default: 1.0,
+        unit: "1",
+        meaning: "1: a lost attitude is found again and a single bad rate is bridged; 0: the equations of the filter alone",
+    },
 ];
 
 /// A reading this close to the end of the range is at it: the last step of a 12 bit converter, so that a range counts
@@ -76,6 +82,8 @@ pub struct Rules {
     pub lever: Vector3<f64>,
     /// Time constant of the angular acceleration, s.
     pub lever_time: f64,
+    /// Whether a lost attitude is found again and a single bad rate is bridged.
+    pub recovery: bool,
 }
 
 impl Default for Rules {
@@ -87,6 +95,7 @@ impl Default for Rules {
             gyr_range: PARAMETERS[3].default,
             lever: Vector3::new(PARAMETERS[4].default, PARAMETERS[5].default, PARAMETERS[6].default),
             lever_time: PARAMETERS[7].default,
+            recovery: PARAMETERS[8].default > 0.0,
         }
     }
 }
@@ -103,6 +112,7 @@ impl Rules {
             gyr_range: value(3),
             lever: Vector3::new(value(4), value(5), value(6)),
             lever_time: value(7),
+            recovery: value(8) > 0.0,
         })
     }
 }

@@ -95,9 +95,11 @@ impl<T: Real> Smoother<T> {
         rules: Rules,
         start: Start,
     ) -> Self {
+        let mut filter = Watched::new(&environment, Mekf::new(&environment, values));
+        filter.find_itself(rules.recovery);
         Self {
             description,
-            filter: Watched::new(&environment, Mekf::new(&environment, values)),
+            filter,
             intake: Intake::new(environment, rules, start),
             up: environment.up(),
         }
