@@ -55,8 +55,12 @@ impl<T: Real> Field<T> {
         self.horizontal = horizontal.select(first, self.horizontal);
         self.vertical = vertical.select(first, self.vertical);
         let (h, v) = (horizontal - self.horizontal, vertical - self.vertical);
-        let square =
-            ((h * h + v * v) / (self.horizontal * self.horizontal).simd_max(least)).simd_min(T::splat(LARGEST));
+        let whole = (h * h + v * v) / (self.horizontal * self.horizontal).simd_max(least);
+        let square = whole.simd_min(T::splat(LARGEST));
+        // Nothing is learned from the part of a departure that no field has.
+        let part = (square / whole.simd_max(T::splat(LARGEST))).simd_sqrt();
+        let part = one.select(whole.simd_le(T::splat(LARGEST)), part);
+        let (h, v) = (h * part, v * part);
         self.departure += (square - self.departure) * T::splat(-(-dt / DEPARTURE_TIME).exp_m1());
         let departure = self.departure.simd_max(square);
         self.time = (self.time + T::splat(dt)).simd_min(memory);
