@@ -164,6 +164,16 @@ def test_a_replay_counts_what_its_filters_make_of_each_row(tmp_path: Path) -> No
     code, peak, said = run("replay", tmp_path / "a.parquet", *filters)
     assert (code, peak < LIMIT) == (2, True), (peak, said)
     assert "3000000 rows take 1.97 GB of memory" in said
+    assert "or allow more with --memory 4" in said
+
+
+def test_a_replay_may_be_allowed_more_memory(tmp_path: Path) -> None:
+    write_long(tmp_path / "a.parquet", 4_000_000, {"gyr_x": 0.0, "gyr_y": 0.0, "gyr_z": 0.01})
+    line = ("replay", tmp_path / "a.parquet", "--filter", "gyro")
+    code, _, said = run(*line)
+    assert code == 2
+    allowed = said.split("--memory ")[1].split(".")[0]
+    assert run(*line, "--memory", allowed)[0] == 0
 
 
 def test_a_long_log_is_judged_by_stretches_from_all_over_it() -> None:

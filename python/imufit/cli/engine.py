@@ -29,8 +29,10 @@ def open_logs(paths: Sequence[Path], mapping: Sequence[str] = ()) -> list[Any]:
     return [open_log(path, mapping) for path in paths]
 
 
-def read_log(path: Path, mapping: Sequence[str] = (), more: int = 0) -> Log:
+def read_log(path: Path, mapping: Sequence[str] = (), more: int = 0, gigabytes: float = 1.0, option: str = "") -> Log:
     """Read a whole log into memory; `mapping` as for `open_log`, `more` the bytes that will be made of each row.
+
+    All of it may take so many `gigabytes`; `option` allows more.
 
     Raises
     ------
@@ -39,7 +41,7 @@ def read_log(path: Path, mapping: Sequence[str] = (), more: int = 0) -> Log:
     """
     from imufit.log import LogStream, parse_mapping  # noqa: PLC0415
 
-    return LogStream(path, mapping=parse_mapping(*mapping) or None).held(more)
+    return LogStream(path, mapping=parse_mapping(*mapping) or None).held(more, gigabytes, option)
 
 
 def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], settings: Mapping[str, float]) -> Any:

@@ -62,6 +62,14 @@ _MADE = 100
     help="Band in which a tilt counts as settled.",
 )
 @click.option(
+    "--memory",
+    type=Real(min=1.0, max=1000.0),
+    default=1.0,
+    show_default=True,
+    metavar="GB",
+    help="Memory that a long log and its attitudes may take.",
+)
+@click.option(
     "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="OUT", help="Write the log with the attitudes added."
 )
 @json_option
@@ -75,6 +83,7 @@ def replay(
     assignments: tuple[str, ...],
     settings_file: Path | None,
     band: float,
+    memory: float,
     output: Path | None,
     json_file: Path | None,
     plot_file: Path | None,
@@ -91,7 +100,7 @@ def replay(
     for group, values in settings_from(assignments).items():
         settings[group] = {**settings.get(group, {}), **values}
     out = Output(json_file)
-    rows = engine.read_log(log, mapping, _MADE * len(names or FILTERS))
+    rows = engine.read_log(log, mapping, _MADE * len(names or FILTERS), memory, "--memory")
     if model_file is not None:
         model = engine.sensor_model(path=model_file)
         rows = model.apply(rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -129,13 +130,17 @@ class LogStream:
             numbers += 4  # the reference attitude that follows from the angle
         return self.n * (NUMBER * numbers + TEXT_CELL * text)
 
-    def held(self, more: int = 0) -> Log:
+    def held(self, more: int = 0, gigabytes: float = 1.0, option: str = "") -> Log:
         """Whole log in memory, for what needs all of its rows at once.
 
         Parameters
         ----------
         more : int
             Bytes that are made of each row besides, and kept.
+        gigabytes : float
+            Memory that all of it may take, GB.
+        option : str
+            Option of the command that allows more, for the message.
 
         Raises
         ------
@@ -143,13 +148,16 @@ class LogStream:
             It is too large for that; the message says how to take a part of it.
         """
         made = self.size + self.n * more
-        if self.size <= HELD and made <= KEPT:
+        held, kept = HELD * gigabytes, KEPT * gigabytes
+        if self.size <= held and made <= kept:
             return self.read()
-        rows = min(self.n * HELD // self.size, self.n * KEPT // made)
+        share = min(held / self.size, kept / made)
+        rows = int(self.n * share)
+        more_words = f", or allow more with {option} {math.ceil(gigabytes / share)}" if option else ""
         part = self._path.with_name(f"{self._path.stem}-part.parquet")
         raise self._place.error(
             f"{self.n} rows take {size_in_words(made)} of memory, and this needs all of them at once",
-            remedy=f"Take a part: imufit convert {self._path} --rows 0:{rows} -o {part}",
+            remedy=f"Take a part: imufit convert {self._path} --rows 0:{rows} -o {part}{more_words}",
         )
 
     def write(self, path: str | Path) -> None:
