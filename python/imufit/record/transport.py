@@ -26,6 +26,8 @@ RETRY: Final = 0.1
 it is back is read from its first quarter of a second on."""
 REQUEST: Final = b"\x00"
 """What asks a device to announce itself (docs/wire.md): the end of a frame, which is no command of anything else."""
+BUSY: Final = 3.0
+"""Time that a port may be in use when it is opened first, s: the program before may be about to close it."""
 
 _STUCK: Final = 0.01  # longest wait for a line that takes no byte, s: shorter than the time between two reads
 
@@ -70,10 +72,16 @@ class Line:
         InputError
             It cannot be opened; the remedy names the ports that are there.
         """
-        try:
-            self._serial = self._opened()
-        except _FAILURES as error:
-            raise _refusal(self.port, error) from None
+        until = time.monotonic() + BUSY
+        while True:
+            try:
+                self._serial = self._opened()
+            except _FAILURES as error:
+                if not _is_busy(error) or time.monotonic() > until:
+                    raise _refusal(self.port, error) from None
+                time.sleep(RETRY)
+            else:
+                return
 
     def read(self) -> bytes:
         """Return what has come since the last call, at most `BLOCK` bytes; nothing while the line is lost."""
@@ -138,6 +146,11 @@ class Line:
         return True
 
 
+def _is_busy(error: Exception) -> bool:
+    """Whether somebody else has the port open."""
+    return getattr(error, "errno", None) in (11, 16) or "exclusively lock" in str(error)  # EAGAIN, EBUSY
+
+
 def _refusal(port: str, error: Exception) -> InputError:
     """Say why a port cannot be opened and which ones there are."""
     from serial.tools import list_ports  # noqa: PLC0415
@@ -161,7 +174,7 @@ def _refusal(port: str, error: Exception) -> InputError:
             f"the port {port} may not be opened by this user",
             remedy="Join its group (sudo usermod -aG dialout $USER) and log in again.",
         )
-    if number in (11, 16) or "exclusively lock" in str(error):  # EAGAIN, EBUSY
+    if _is_busy(error):
         return InputError(f"the port {port} is in use", remedy="Close the serial monitor or whatever reads it.")
     return InputError(f"the port {port} cannot be opened ({_plain(error)})", remedy=listing)
 
