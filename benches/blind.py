@@ -18,7 +18,7 @@ from pathlib import Path
 
 from imufit.grade import SETS, BlindGrade, PowerCurve, grade, power_curve
 from imufit.results import Table
-from marked import write_between
+from marked import markdown, write_between
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PAGE, PICTURE = DOCS / "blind.md", DOCS / "pictures" / "blind_power.png"
@@ -83,12 +83,6 @@ def power_table(curve: PowerCurve) -> Table:
         rows.append((f"{white['size']:g}", f"{white['named']['of']}", *cells))
     names = [f">{noise}: {what}" for noise in ("white", "realistic") for what in ("named", "alone", "wrong")]
     return Table("", (">size", ">logs", *names), tuple(rows))
-
-
-def markdown(table: Table) -> str:
-    rule = "|".join("---:" if right else "---" for right in table.right)
-    lines = [" | ".join(table.names), rule, *(" | ".join(row) for row in table.rows)]
-    return "\n".join(f"| {line} |" if line != rule else f"|{line}|" for line in lines)
 
 
 def seeds(result: BlindGrade) -> str:

@@ -25,7 +25,7 @@ from typing import Any
 from imufit.grade.blind_grade import share
 from imufit.grade.protocol import side_by_side
 from imufit.results import Table
-from marked import write_between
+from marked import markdown, write_between
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -167,12 +167,6 @@ def row_table(rows: list[Judged]) -> Table:
 def cell(text: str) -> str:
     """Return text that a cell of a Markdown table can hold."""
     return " ".join(text.replace("|", "\\|").split())
-
-
-def markdown(table: Table) -> str:
-    rule = "|".join("---:" if right else "---" for right in table.right)
-    lines = [" | ".join(table.names), rule, *(" | ".join(row) for row in table.rows)]
-    return "\n".join(f"| {line} |" if line != rule else f"|{line}|" for line in lines)
 
 
 def size(which: str, logs: list[Judged]) -> str:

@@ -27,7 +27,7 @@ from confirmed import CHANCE, Climbed, Climber, Found, Part, Sensor, halves
 from halves_of_poses import Calibrated, calibrated
 from imufit.figures import quantity
 from imufit.results import Parameter, Table
-from marked import write_between
+from marked import markdown, write_between
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER, PAGE = ROOT / ".." / "shared" / "data", ROOT / "docs" / "recordings.md"
@@ -279,12 +279,6 @@ def counted(rows: dict[str, list[list[str]]]) -> str:
         f"the first answer of some part, {first['yes']} are confirmed and {first['no']} are not. The ladders end as "
         f"{', '.join(f'`{end}` ({n})' for end, n in ends.most_common())}."
     )
-
-
-def markdown(table: Table) -> str:
-    rule = "|".join("---:" if right else "---" for right in table.right)
-    lines = [" | ".join(table.names), rule, *(" | ".join(row) for row in table.rows)]
-    return "\n".join(f"| {line} |" if line != rule else f"|{line}|" for line in lines)
 
 
 def section(rows: dict[str, list[list[str]]]) -> str:

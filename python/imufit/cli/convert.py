@@ -51,8 +51,7 @@ def convert(
     Tables are separated by commas, semicolons, tabs or blanks; without a header their columns are c1, c2, ... In a
     transcript the most frequent line of the kind accel=(1, 2, 3) temp=21 is the record, the other lines are ignored.
 
-    FILE may be of any length. What another command cannot hold whole, --rows cuts: --rows 0:1000000 are the first
-    million.
+    FILE may be of any length. --rows 0:1000000 takes the first million rows, for commands that cannot hold all.
     """
     keep_inputs([file], [output, json_file])
     out = Output(json_file)

@@ -58,6 +58,13 @@ impl<T: Real> Covariance<T> {
         self.0[(at, at)] = variance;
     }
 
+    /// Makes the velocity unknown but for its variance.
+    pub fn forget_velocity(&mut self, variance: T) {
+        for at in [SPEED, SPEED + 1] {
+            self.forget(at, variance);
+        }
+    }
+
     /// That of the attitude.
     pub fn attitude(&self) -> Matrix3<T> {
         self.0.fixed_view::<3, 3>(0, 0).into_owned()

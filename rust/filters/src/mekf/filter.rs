@@ -102,9 +102,7 @@ impl<T: Real> Mekf<T> {
         self.covariance.accelerate(&force, time);
         if !believed.all() {
             let mut standing = self.covariance.clone();
-            for at in [SPEED, SPEED + 1] {
-                standing.forget(at, v.speed * v.speed);
-            }
+            standing.forget_velocity(v.speed * v.speed);
             standing.take(&self.covariance, believed);
             self.covariance = standing;
         }
@@ -207,9 +205,7 @@ impl<T: Real> Mekf<T> {
             self.since_force = -1.0;
         }
         self.velocity = [T::splat(0.0); 2];
-        for at in [SPEED, SPEED + 1] {
-            self.covariance.forget(at, v.speed * v.speed);
-        }
+        self.covariance.forget_velocity(v.speed * v.speed);
         self.rest = Rest::unknown();
     }
 }
@@ -241,9 +237,7 @@ impl<T: Real> Follows<T> for Mekf<T> {
         for at in 0..BIAS {
             covariance.forget(at, v.angle_start * v.angle_start);
         }
-        for at in [SPEED, SPEED + 1] {
-            covariance.forget(at, v.speed * v.speed);
-        }
+        covariance.forget_velocity(v.speed * v.speed);
         self.covariance.take(&covariance, lost);
     }
 }
