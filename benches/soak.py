@@ -1,10 +1,11 @@
-"""Memory over long work: diagnoses in one process, rows through every filter in chunks, and a long recording.
+"""Memory over long work: diagnoses in one process, rows through every filter in chunks, a long recording, a monitor.
 
 Each part runs in a process of its own. Printed is its resident memory after the first tenth of the work, at the end,
 and at most. Work that keeps something has more at the end than after its first tenth.
 
 Run: ``python benches/soak.py [--diagnoses N] [--rows N] [--seconds S] [--write]``; ``--seconds`` is the length of a
-recording of 8 kHz from an emulated device, in real time. ``--write`` puts the figures into docs/reliability.md.
+recording of 8 kHz from an emulated device and of a monitor, in real time. ``--write`` puts the figures into
+docs/reliability.md.
 """
 
 import argparse
@@ -13,9 +14,12 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 from imufit import SensorModel
 from imufit.replay import FILTERS, SMOOTHERS, Stream
 from imufit.results import Table
@@ -58,32 +62,48 @@ def filtered(rows: int) -> list[float]:
     return held
 
 
+def watched(device: list[str], work: Callable[[str], list[str]]) -> list[float]:
+    """Emulate a device and put a command to its port; memory of that command once a second, MB."""
+    emulator = subprocess.Popen([*IMUFIT, "emulate", *device, "--wait"], stdout=subprocess.PIPE, text=True)
+    assert emulator.stdout is not None
+    command = subprocess.Popen([*IMUFIT, *work(emulator.stdout.readline().strip())], stdout=subprocess.DEVNULL)
+    held = []
+    while command.poll() is None:
+        try:
+            status = Path(f"/proc/{command.pid}/status").read_text(encoding="ascii")
+            held.append(int(status.split("VmRSS:")[1].split()[0]) / 1024)
+        except (OSError, IndexError):
+            break
+        time.sleep(1.0)
+    emulator.terminate()
+    emulator.wait(timeout=60)
+    assert command.wait() == 0, command.returncode
+    return held
+
+
 def recorded(seconds: float) -> list[float]:
     """Record an emulated device at 8 kHz; memory of the recorder once a second, MB."""
+    device = ["handheld", "--rate", "8000", "--loop", "--duration", str(seconds)]
     with tempfile.TemporaryDirectory() as folder:
-        device = ["handheld", "--rate", "8000", "--loop", "--duration", str(seconds), "--wait"]
-        emulator = subprocess.Popen([*IMUFIT, "emulate", *device], stdout=subprocess.PIPE, text=True)
-        assert emulator.stdout is not None
-        port = emulator.stdout.readline().strip()
         log = Path(folder) / "log.parquet"
-        recorder = subprocess.Popen(
-            [*IMUFIT, "record", port, "-o", str(log), "--give-up", "2", "--quiet"], stdout=sys.stderr
-        )
-        held = []
-        while recorder.poll() is None:
-            try:
-                status = Path(f"/proc/{recorder.pid}/status").read_text(encoding="ascii")
-                held.append(int(status.split("VmRSS:")[1].split()[0]) / 1024)
-            except (OSError, IndexError):
-                break
-            time.sleep(1.0)
-        recorder.wait()
-        emulator.wait(timeout=60)
-        assert recorder.returncode == 0, recorder.returncode
+        held = watched(device, lambda port: ["record", port, "-o", str(log), "--give-up", "2", "--quiet"])
+        with pq.ParquetFile(log) as file:
+            print(f"{file.metadata.num_rows:,} of {round(8000 * seconds):,} rows recorded", file=sys.stderr)
         return held
 
 
-PARTS = {"diagnoses": diagnoses, "filtered": filtered, "recorded": recorded}
+def monitored(seconds: float) -> list[float]:
+    """Show the attitude of an emulated device; memory of the monitor once a second, MB."""
+    show = ["--plain", "--duration", str(seconds)]
+    return watched(["handheld", "--loop"], lambda port: ["monitor", port, *show])
+
+
+PARTS: dict[str, Callable[[float], list[float]]] = {
+    "recorded": recorded,
+    "monitored": monitored,
+    "diagnoses": lambda amount: diagnoses(int(amount)),
+    "filtered": lambda amount: filtered(int(amount)),
+}
 
 
 def apart(part: str, amount: float) -> list[float]:
@@ -103,18 +123,21 @@ def main() -> None:
     parser.add_argument("--amount", type=float, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.part:
-        amount = given.amount if given.part == "recorded" else int(given.amount)
-        print(json.dumps(PARTS[given.part](amount)))
+        print(json.dumps(PARTS[given.part](given.amount)))
         return
-    rows = []
-    for part, amount, words in (
+    works = (
+        ("recorded", given.seconds, f"recording of {given.seconds:g} s at 8 kHz, its log included"),
+        ("monitored", given.seconds, f"monitor of {given.seconds:g} s, four filters"),
         ("diagnoses", given.diagnoses, f"{given.diagnoses} diagnoses in one process"),
         ("filtered", given.rows, f"{given.rows:,} rows through every filter in chunks of {CHUNK:,}"),
-        ("recorded", given.seconds, f"recording of {given.seconds:g} s at 8 kHz, its log included"),
-    ):
-        held = apart(part, amount)
-        early = held[len(held) // 10]
-        rows.append((words, f"{early:.0f}", f"{held[-1]:.0f}", f"{max(held):.0f}"))
+    )
+    rows = []
+    # What goes on in real time leaves most of a core.
+    with ThreadPoolExecutor(3) as pool:
+        for held, (_, _, words) in zip(pool.map(lambda work: apart(*work[:2]), works), works, strict=True):
+            early = held[len(held) // 10]
+            rows.append((words, f"{early:.0f}", f"{held[-1]:.0f}", f"{max(held):.0f}"))
+            print(rows[-1], file=sys.stderr, flush=True)
     table = Table("", ("work", ">after the first tenth, MB", ">at the end, MB", ">at most, MB"), tuple(rows))
     text = markdown(table)
     if given.write:

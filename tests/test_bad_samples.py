@@ -18,7 +18,7 @@ FILTERS = ("complementary", "kalman", "mahony", "hybrid", "mekf", "smoother", "t
 WITHOUT_HEADING = ("complementary", "kalman")
 SIZES = {"gyr": (5.0, 35.0, 1000.0, 1e100), "acc": (30.0, 157.0, 1e5, 1e100), "mag": (100.0, 1e5, 1e100)}
 """rad/s, m/s^2 and uT: from what hands do over the end of a range to bytes that are none."""
-LEFT = {"one": 2.0, "two": 10.0, "const": 10.0, "noise": 10.0, "zero": 10.0}
+LEFT = {"one": 2.0, "two": 2.0, "const": 2.0, "noise": 5.0, "zero": 2.0}
 """Most that is left, deg, by what was bad: one sample, two, or those of a second (all the same, noise, zeros)."""
 AT = 16.7
 """Where the bad samples begin, s."""

@@ -96,7 +96,7 @@ def test_fahrenheit() -> None:
     np.testing.assert_allclose(conversion("temp", "degF").apply(np.array([32.0, 212.0])), [0.0, 100.0], atol=1e-12)
 
 
-@pytest.mark.parametrize("unit", ["degX+3", "m/s^-2", "+2", "degC+", "degC+x", "340 LSB/degC+36.53+1"])
+@pytest.mark.parametrize("unit", ["degX+3", "m/s^-2", "+2", "degC+", "degC+x", "*0+ +00", "340 LSB/degC+36.53+1"])
 def test_offset_that_cannot_be_read(unit: str) -> None:
     with pytest.raises(InputError) as caught:
         conversion("temp", unit)

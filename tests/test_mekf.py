@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from filter_state import bias_of
 from imufit import Log, _imufit
 from imufit.replay import SETTINGS, SMOOTHERS, Replay, Stream, replay
 from scipy.spatial.transform import Rotation
@@ -52,10 +53,6 @@ def both(log: Log, ranges: dict[str, float] | None = None) -> Replay:
 
 def stream() -> Stream:
     return Stream(["mekf"], ("acc", "gyr", "mag"), frame="ENU", mag_reference=FIELD.tolist())
-
-
-def bias_of(state: np.ndarray) -> np.ndarray:
-    return state[21:24]  # after seventeen numbers of the rules and the attitude
 
 
 def skew(x: np.ndarray) -> np.ndarray:

@@ -103,9 +103,10 @@ _QUANTITIES: Final = {
     **dict.fromkeys(GROUPS["ref_p"], "length"),
     "ref_angle": "angle",
 }
-_NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_UNSIGNED: Final = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER: Final = rf"[-+]?{_UNSIGNED}"
 # the sign of an exponent, as in *1e-3, begins no offset
-_WITH_OFFSET: Final = re.compile(rf"(.*?[^\s^*/(+\-]\s*)(?<![\d.][eE])(?=[+-])({_NUMBER}|[+-]\s+{_NUMBER})")
+_WITH_OFFSET: Final = re.compile(rf"(.*?[^\s^*/(+\-]\s*)(?<![\d.][eE])([+-]\s*{_UNSIGNED})")
 
 
 def lookup(text: str) -> tuple[str, float, float] | None:

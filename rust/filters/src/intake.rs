@@ -16,6 +16,8 @@
 //! 7. **Single bad rate.** A rate that its neighbours do not allow is bridged and counted ([`crate::bridge`]).
 //! 8. **Start.** See [`Start`]. Rows before it have no attitude: NaN.
 
+use std::f64::consts::PI;
+
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::Vector3;
 
@@ -30,6 +32,9 @@ use crate::{AngularRate, Environment, FluxDensity, Reading, Rules, Sample, Skipp
 
 /// Below this angle (rad) between field and vertical the start takes no heading from the field.
 const START_MIN_ANGLE: f64 = 0.035;
+
+/// Length of a specific force over gravity from which on it holds more acceleration than gravity, whose direction may be any.
+const SHOCK: f64 = 2.0;
 
 /// Reads a value if the machine can square it; counts it otherwise.
 #[inline(always)]
@@ -51,6 +56,8 @@ pub struct Intake {
     start: Start,
     /// Square of the least specific force that shows the vertical, (m/s^2)^2.
     least_square: f64,
+    /// Square of the one that is a shock, (m/s^2)^2.
+    shock_square: f64,
     lever: LeverArm,
     pub(crate) memory: Memory,
 }
@@ -118,6 +125,7 @@ impl Intake {
             rules,
             start,
             least_square: (rules.free_fall * environment.gravity()).powi(2),
+            shock_square: (SHOCK * environment.gravity()).powi(2),
             lever: LeverArm {
                 arm: rules.lever,
                 time: rules.lever_time,
@@ -194,6 +202,7 @@ impl Intake {
                 break;
             }
             bridge.learn(change);
+            bridge.follow(&gyr, dt);
             let sample = Sample {
                 omega: Some(Reading {
                     value: AngularRate((omega + gyr) * 0.5),
@@ -207,6 +216,8 @@ impl Intake {
                     value: FluxDensity(mag),
                     dt,
                 }),
+                unsure_turn: 0.0,
+                unsure_tilt: self.unsure_tilt(square),
             };
             no_heading += usize::from(running.step(&sample) == Usage::NoHeading);
             *out = running.attitude().to_array();
@@ -252,6 +263,15 @@ impl Intake {
         }
     }
 
+    /// What a specific force of that square, (m/s^2)^2, misses the vertical by, rad: what is beyond [`SHOCK`].
+    #[inline(always)]
+    fn unsure_tilt(&self, square: f64) -> f64 {
+        if !self.rules.recovery || square <= self.shock_square {
+            return 0.0;
+        }
+        (square.sqrt() / self.environment.gravity() - SHOCK).min(PI)
+    }
+
     /// What is usable of a row, with the time that it stands for.
     fn sample(&mut self, row: &Row, skipped: &mut Skipped) -> Sample {
         let Skipped {
@@ -282,7 +302,10 @@ impl Intake {
             let mut believed = true;
             if dt <= max_gap {
                 let value = match memory.bridge.turn(&memory.omega, &omega, dt, self.rules.recovery) {
-                    Turned::Mean(mean) => mean,
+                    Turned::Mean(mean, unsure) => {
+                        sample.unsure_turn = unsure;
+                        mean
+                    }
                     Turned::Bridged(mean) => {
                         skipped.gyr_bridged += 1;
                         mean
@@ -329,6 +352,9 @@ impl Intake {
                 dt: since(memory.t_mag),
             });
             memory.t_mag = t;
+        }
+        if let Some(f) = &sample.f {
+            sample.unsure_tilt = self.unsure_tilt(f.value.0.norm_squared());
         }
         sample
     }

@@ -190,6 +190,7 @@ impl Filter for Kalman {
             let rate = omega.value.0 - self.bias;
             self.q = self.q.turned(&rate, omega.dt);
             self.predict(omega.dt);
+            self.covariance[0] += sample.unsure_turn * sample.unsure_turn;
             if self.adaptive > 0.0 {
                 self.vibration.turn(&rate, omega.dt);
             }
@@ -197,7 +198,7 @@ impl Filter for Kalman {
         let Some(f) = sample.f else {
             return Usage::Full;
         };
-        let r = self.angle_variance(&f.value.0, f.dt);
+        let r = self.angle_variance(&f.value.0, f.dt) + sample.unsure_tilt * sample.unsure_tilt;
         if f.dt > 0.0
             && let Some(([k_a, k_b], after)) = self.gains(f.dt, r)
         {
@@ -290,6 +291,8 @@ mod tests {
             p = (nalgebra::Matrix2::identity() - gain * h) * p;
             let f = Quaternion::exp(&(Vector3::y() * z)).rotate_back(&(Vector3::z() * 9.81));
             filter.step(&Sample {
+                unsure_turn: 0.0,
+                unsure_tilt: 0.0,
                 omega: Some(Reading {
                     value: AngularRate(Vector3::y() * rate),
                     dt,

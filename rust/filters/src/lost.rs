@@ -14,6 +14,8 @@
 //! 4. The attitude is turned by the least rotation that brings the mean force up, and its heading is that of the field where
 //!    one is measured. What the filter had learned (bias, scale, their certainty) is that of the end of the last window but
 //!    one that did not speak against it: the last one may hold the first bad readings.
+//! 5. One window shows that attitude coarsely. The next [`WINDOWS`] together show it three times as well: the same turn is
+//!    done by their mean, with what the filter had learned before it was lost.
 
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::{Matrix3, SimdBool, Vector3};
@@ -63,7 +65,7 @@ struct Window<T> {
     north: Vector3<T>,
     /// Time of the window, s.
     time: f64,
-    /// Windows in a row that spoke against the attitude.
+    /// Windows in a row that spoke against the attitude; negative: windows to come before a found one is refined.
     against: T,
     /// Mean forces of these over gravity, summed, reference frame.
     forces: Vector3<T>,
@@ -234,28 +236,34 @@ impl<T: Real, F: Follows<T>> Watched<F, T> {
         let tilt = self.tilt(&mean, window.time);
         let levelled = self.heading(&tilt.level.rotate(&window.north));
         let own = self.heading(&window.north);
-        let against = tilt.beyond | (own.1 & levelled.1);
+        let refining = window.against.simd_lt(zero);
+        let against = !refining & (tilt.beyond | (own.1 & levelled.1));
         let count = window.against + one;
         let (forces, norths) = (window.forces + mean, window.norths + window.north);
-        let together = self.tilt(&(forces / count), window.time);
+        let windows = count + T::splat(WINDOWS).select(refining, zero);
+        let together = self.tilt(&(forces / windows), window.time);
         let tilted = together.beyond & together.as_long_as_gravity;
         // An acceleration tilts the mean force, and a steep field turns with it: a heading is off where it is so both ways.
         let turned = self.heading(&norths).1 & self.heading(&together.level.rotate(&norths)).1;
         let lost = against & count.simd_ge(T::splat(WINDOWS)) & (tilted | turned);
-        if lost.any() {
+        let refined = refining & count.simd_ge(zero) & together.as_long_as_gravity;
+        if (lost | refined).any() {
             let up = self.environment.up().map(T::splat);
-            let heading = levelled.0.select(tilted, own.0);
             let level = tilt.level.select(tilted, Quaternion::default());
+            let level = together.level.select(refined, level);
+            let heading = levelled.0.select(tilted, own.0);
+            let heading = self.heading(&together.level.rotate(&norths)).0.select(refined, heading);
             let found = (Quaternion::exp(&(up * heading)) * level * self.filter.attitude()).renormalised();
-            self.filter.find(found, &self.sound[0], lost);
+            self.filter.find(found, &self.sound[0], lost | refined);
         }
-        if !against.any() {
+        if !(against | refining).any() {
             self.sound.swap(0, 1);
             self.sound[1] = self.filter.clone();
         }
-        let goes_on = against & !lost;
+        let goes_on = (against & !lost) | (refining & count.simd_lt(zero));
         let kept = |x: T| x.select(goes_on, zero);
-        self.window = Window::after(kept(count), forces.map(kept), norths.map(kept));
+        let count = T::splat(-WINDOWS).select(lost, kept(count));
+        self.window = Window::after(count, forces.map(kept), norths.map(kept));
     }
 }
 
@@ -360,6 +368,8 @@ mod tests {
         let sway = Vector3::new((7.0 * t).sin(), (5.0 * t).cos(), (6.0 * t).sin());
         let (frame, dt) = (Frame::Enu, DT);
         Sample {
+            unsure_turn: 0.0,
+            unsure_tilt: 0.0,
             omega: Some(Reading {
                 value: AngularRate(Vector3::zeros()),
                 dt,

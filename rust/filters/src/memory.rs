@@ -25,7 +25,7 @@ pub(crate) struct Memory {
 
 impl Memory {
     /// Numbers of a memory that is written down.
-    pub const LENGTH: usize = 17;
+    pub const LENGTH: usize = 24;
 
     pub const EMPTY: Self = Self {
         started: false,
@@ -50,68 +50,50 @@ impl Memory {
     }
 
     pub fn to_array(self) -> [f64; Self::LENGTH] {
-        let Self {
-            started,
-            first,
-            last,
-            t_acc,
-            t_gyr,
-            t_mag,
-            omega,
-            alpha,
-            bridge: Bridge {
-                usual,
-                span,
-                doubted: d,
-            },
-        } = self;
-        let started = if started { 1.0 } else { 0.0 };
-        [
-            started, first, last, t_acc, t_gyr, t_mag, omega.x, omega.y, omega.z, alpha.x, alpha.y, alpha.z, usual,
-            span, d.x, d.y, d.z,
-        ]
+        let Bridge {
+            usual,
+            span,
+            doubted,
+            from,
+            turned,
+            since,
+        } = self.bridge;
+        let started = if self.started { 1.0 } else { 0.0 };
+        let times = [started, self.first, self.last, self.t_acc, self.t_gyr, self.t_mag];
+        let vectors = [self.omega, self.alpha, doubted, from, turned].map(<[f64; 3]>::from);
+        let mut numbers = times
+            .into_iter()
+            .chain([usual, span, since])
+            .chain(vectors.into_iter().flatten());
+        std::array::from_fn(|_| numbers.next().unwrap_or_default())
     }
 
     /// `None` where the numbers are no memory.
     pub fn from_slice(numbers: &[f64]) -> Option<Self> {
-        let &[
-            started,
+        let (&[started, first, last, t_acc, t_gyr, t_mag], own) = numbers.split_first_chunk()?;
+        let (&[usual, span, since], vectors) = own.split_first_chunk()?;
+        let (vectors, rest) = vectors.as_chunks::<3>();
+        let &[omega, alpha, doubted, from, turned] = vectors else {
+            return None;
+        };
+        let sound = rest.is_empty() && own.iter().all(|x| x.is_finite());
+        sound.then(|| Self {
+            started: started > 0.5,
             first,
             last,
             t_acc,
             t_gyr,
             t_mag,
-            x,
-            y,
-            z,
-            a,
-            b,
-            c,
-            usual,
-            span,
-            d,
-            e,
-            f,
-        ] = numbers
-        else {
-            return None;
-        };
-        (x + y + z + a + b + c + usual + span + d + e + f)
-            .is_finite()
-            .then(|| Self {
-                started: started > 0.5,
-                first,
-                last,
-                t_acc,
-                t_gyr,
-                t_mag,
-                omega: Vector3::new(x, y, z),
-                alpha: Vector3::new(a, b, c),
-                bridge: Bridge {
-                    usual,
-                    span,
-                    doubted: Vector3::new(d, e, f),
-                },
-            })
+            omega: omega.into(),
+            alpha: alpha.into(),
+            bridge: Bridge {
+                usual,
+                span,
+                doubted: doubted.into(),
+                from: from.into(),
+                turned: turned.into(),
+                since,
+            },
+        })
     }
 }

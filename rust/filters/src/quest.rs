@@ -235,6 +235,8 @@ mod tests {
 
     fn sample(f: Vector3<f64>, m: Vector3<f64>) -> Sample {
         Sample {
+            unsure_turn: 0.0,
+            unsure_tilt: 0.0,
             omega: None,
             f: Some(Reading {
                 value: SpecificForce(f),

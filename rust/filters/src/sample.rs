@@ -53,6 +53,10 @@ pub struct Reading<T> {
 pub struct Sample {
     /// Mean angular rate over `dt`, from the rates at both ends (trapezoidal rule).
     pub omega: Option<Reading<AngularRate>>,
+    /// The turn by `omega` that no reading confirms, rad: standard deviation about each axis ([`crate::bridge`](crate)).
+    pub unsure_turn: f64,
+    /// The angle by which `f` may miss the vertical although it is no noise, rad: standard deviation.
+    pub unsure_tilt: f64,
     /// Specific force that is fit to show the vertical (no free fall).
     pub f: Option<Reading<SpecificForce>>,
     /// Flux density.
@@ -65,6 +69,8 @@ impl Sample {
     pub fn without_time(self) -> Self {
         Self {
             omega: None,
+            unsure_turn: 0.0,
+            unsure_tilt: 0.0,
             f: self.f.map(|f| Reading { dt: 0.0, ..f }),
             m: self.m.map(|m| Reading { dt: 0.0, ..m }),
         }

@@ -246,6 +246,10 @@ impl<T: Real> Filter<T> for Mekf<T> {
     fn step(&mut self, sample: &Sample) -> Usage {
         if let Some(omega) = sample.omega {
             self.turn(&omega.value.0, omega.dt);
+            for i in 0..3 {
+                self.covariance
+                    .add(i, T::splat(sample.unsure_turn * sample.unsure_turn));
+            }
             if self.since_force >= 0.0 {
                 self.since_force += omega.dt;
             }
