@@ -68,7 +68,7 @@ clean: ## Remove what was built
 $(DEPENDENCIES): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "imufit needs CPython 3.11 or newer: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'maturin>=1.13,<2'
 	touch $@
 
 $(STAMP): $(DEPENDENCIES) $(SOURCES)

@@ -209,7 +209,10 @@ def drop(rng: Random, columns: Columns) -> None:
 def reference(rng: Random, columns: Columns) -> None:
     """Make the reference attitude one that cannot be, or one that tells nothing."""
     names = ["ref_qw", "ref_qx", "ref_qy", "ref_qz"]
-    q = np.stack([_floats(columns, name)[: len(_floats(columns, "t"))] for name in names])
+    found = [_floats(columns, name) for name in names]
+    # An earlier step may have cut one of them.
+    rows = min(len(column) for column in [*found, _floats(columns, "t")])
+    q = np.stack([column[:rows] for column in found])
     which = rng.randrange(6)
     with np.errstate(all="ignore"):
         if which == 0:

@@ -44,10 +44,10 @@ def _dependence(analysis: Analysis, residuals: Sequence[Mapping[str, Any]], item
         return max(float(next(same, 0.0)), _share(analysis.logs[log], residuals[log], item))
 
     concerned = range(len(residuals)) if item.log is None else [item.log]
-    having = [log for log in concerned if any(c["channel"] == item.channel for c in residuals[log]["channels"])]
+    having = [log for log in concerned if any(c["index"] in item.channels for c in residuals[log]["channels"])]
     log = max(having, key=share)
     facts = analysis.logs[log].facts
-    first, last = next(c["stretch"] for c in residuals[log]["channels"] if c["channel"] == item.channel)
+    first, last = next(c["stretch"] for c in residuals[log]["channels"] if c["index"] in item.channels)
     spans = analysis.logs[log].passes.spans(facts)[first:last]
     begin, end = float(spans[:, 0].min()), float(spans[:, 1].max())
     return Unexplained(item.channel, item.covariate, share(log), item.shape, begin, end)

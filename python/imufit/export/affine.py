@@ -140,7 +140,12 @@ def _sensor(model: SensorModel, name: str) -> SensorAffine:
     if abs(np.linalg.det(gain)) <= 1e-9 * np.abs(gain).max() ** 3:
         raise InputError(f"{' and '.join(gains)} cannot be undone: the gain has no inverse", remedy="Check the model.")
     lines = [_line(model, effect.id) for effect in of_sensor]
-    return SensorAffine(name, np.asarray(np.linalg.inv(gain), dtype=np.float64), bias, tuple(lines))
+    found = SensorAffine(name, np.asarray(np.linalg.inv(gain), dtype=np.float64), bias, tuple(lines))
+    with np.errstate(over="ignore", invalid="ignore"):
+        if not all(np.isfinite(part).all() for part in (found.offset, found.scale, found.misalignment)):
+            named = " and ".join(effect.id for effect in of_sensor)
+            raise InputError(f"{named} cannot be written as gain and offset: too large", remedy="Check the model.")
+    return found
 
 
 def _line(model: SensorModel, effect: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import isfinite
 
 from imufit.export.affine import Affine
 
@@ -28,7 +29,10 @@ def json_text(model: Affine) -> str:
     value = {
         "form": "corrected = misalignment diag(scale) raw + bias = matrix raw + bias",
         "sensors": sensors,
-        "standard_errors": model.standard_errors,
+        "standard_errors": {
+            effect: {name: value if isfinite(value) else None for name, value in errors.items()}
+            for effect, errors in model.standard_errors.items()
+        },
         "temperature": list(model.on_temperature),
         "not_exported": list(model.left_out),
     }

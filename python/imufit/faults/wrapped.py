@@ -34,14 +34,16 @@ def wrapped_faults(
     facts : Facts
         Of the log as declared.
     ends : mapping
-        End of the range of each sensor that may have one, m/s^2 and rad/s.
+        End of the range of each sensor that may have one, m/s^2 and rad/s, whether or not it can be judged.
     """
     if not ends:
         return []
     rows = samples(parts, facts)
     found = []
-    for sensor, end in ends.items():
-        ideal, reading = rows.ideal[sensor], rows.readings[sensor]
+    for sensor, reading in rows.readings.items():
+        if sensor not in ends:
+            continue
+        ideal, end = rows.ideal[sensor], ends[sensor]
         beyond = np.abs(ideal) > BEYOND * end
         again = np.abs(ideal - np.sign(ideal) * 2.0 * end - reading) < NEAR * 2.0 * end
         count, wrapped = int(np.count_nonzero(beyond)), int(np.count_nonzero(beyond & again))

@@ -6,6 +6,7 @@ import lzma
 import shutil
 import struct
 import tempfile
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -36,6 +37,7 @@ _BROKEN: Final = (
     OSError,
     # what the header of an array says is read as Python: too deep, too large, no literal
     SyntaxError,
+    tokenize.TokenError,
     MemoryError,
     RecursionError,
     OverflowError,
