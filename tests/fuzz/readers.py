@@ -1,8 +1,8 @@
 """Any bytes for everything in Python that reads a file or a text from outside, guided by the lines that they reach.
 
-Run: ``python tests/fuzz/readers.py [TARGET]... [--seconds S] [--corpus DIR]``; it needs atheris. The time is shared by
-the targets. A target begins with whole files, the kept inputs of `mutated.corpus`, and what earlier runs left in DIR.
-It ends at the first input that raises anything but an InputError, or one whose message breaks a rule of
+Run: ``python tests/fuzz/readers.py [TARGET]... [--seconds S] [--seed N] [--corpus DIR]``; it needs atheris. The time is
+shared by the targets. A target begins with whole files, the kept inputs of `mutated.corpus`, and what earlier runs
+left in DIR. It ends at the first input that raises anything but an InputError, or one whose message breaks a rule of
 `mutated.judge`, and writes it to the current folder as ``TARGET-crash-...``: put it into the kept inputs.
 """
 
@@ -166,7 +166,7 @@ def lay_seeds(folder: Path) -> None:
             (folder / target / f"{k}").write_bytes(data)
 
 
-def fuzz(target: str, seconds: int, folders: list[str]) -> None:
+def fuzz(target: str, seconds: int, seed: int, folders: list[str]) -> None:
     """Run one target in this process, which atheris ends."""
     import atheris
 
@@ -191,13 +191,13 @@ def fuzz(target: str, seconds: int, folders: list[str]) -> None:
             except InputError as error:
                 _judge(error)
 
-        limits = [f"-max_total_time={seconds}", f"-max_len={LONGEST}", f"-rss_limit_mb={MEMORY_MB}"]
+        limits = [f"-max_total_time={seconds}", f"-max_len={LONGEST}", f"-rss_limit_mb={MEMORY_MB}", f"-seed={seed}"]
         limits += [f"-timeout={SECONDS_OF_AN_INPUT}", f"-artifact_prefix={target}-", "-print_final_stats=1"]
         atheris.Setup([sys.argv[0], *limits, *folders], one)
         atheris.Fuzz()
 
 
-def run_all(targets: list[str], seconds: int, corpus: Path | None) -> int:
+def run_all(targets: list[str], seconds: int, seed: int, corpus: Path | None) -> int:
     """Run targets one after another, each in a process of its own; return how many of them failed."""
     failed = []
     with tempfile.TemporaryDirectory() as name:
@@ -208,7 +208,7 @@ def run_all(targets: list[str], seconds: int, corpus: Path | None) -> int:
                 (corpus / target).mkdir(parents=True, exist_ok=True)
                 folders.insert(0, str(corpus / target))
             share = max(1, seconds // len(targets))
-            one = [sys.executable, __file__, target, "--seconds", str(share), "--inside", *folders]
+            one = [sys.executable, __file__, target, "--seconds", str(share), "--seed", str(seed), "--inside", *folders]
             try:
                 done = subprocess.run(
                     one, check=False, timeout=share + START_S, capture_output=True, text=True, errors="replace"
@@ -229,6 +229,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"of {', '.join(TARGETS)}; without it all")
     parser.add_argument("--seconds", type=int, default=120)
+    parser.add_argument("--seed", type=int, default=0, help="of the inputs; 0: another one each time")
     parser.add_argument("--corpus", type=Path)
     parser.add_argument("--inside", nargs="+", help=argparse.SUPPRESS)
     given = parser.parse_args()
@@ -236,9 +237,9 @@ def main() -> int:
         parser.error(f"unknown target {', '.join(sorted(unknown))}")
     if given.inside:
         os.environ["OPENBLAS_NUM_THREADS"] = "1"
-        fuzz(given.targets[0], given.seconds, given.inside)
+        fuzz(given.targets[0], given.seconds, given.seed, given.inside)
         return 0
-    return int(run_all(given.targets or list(TARGETS), given.seconds, given.corpus) > 0)
+    return int(run_all(given.targets or list(TARGETS), given.seconds, given.seed, given.corpus) > 0)
 
 
 if __name__ == "__main__":

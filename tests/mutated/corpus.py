@@ -32,6 +32,8 @@ class Kept:
 EMPTY_LOG = b"t,acc_x,acc_y,acc_z\n0,0,0,9.8\n"
 MODEL = 'kind = "imufit sensor model"\nformat = 1\neffects = ["gyr.bias"]\n'
 PARAMETERS = '[parameters."gyr.bias"]\n'
+END = "[end]\ncomplete = true\n"
+ZEROS = "x = 0.0\ny = 0.0\nz = 0.0\n"
 EXPORT, REVEAL = ("export", "m.toml", "--to", "json"), ("reveal", "tilt.csv", "--answer", "a.json")
 CONVERT, REPLAY = ("convert", "log.csv", "-o", "out.csv"), ("replay", "log.csv")
 DEEP, DIGITS = 100_000, 5_001
@@ -91,6 +93,11 @@ def parquet(metadata: bytes, name: str = "acc_x") -> Callable[[SeedFiles], Files
 KEPT: dict[str, Kept] = {
     "npz_encrypted": Kept("zipfile raises a RuntimeError", ("convert", "log.npz", "-o", "out.csv"), zip_flags(6, 1)),
     "npz_method": Kept("zipfile raises NotImplementedError", ("convert", "log.npz", "-o", "out.csv"), zip_flags(8, 99)),
+    "npz_open_bracket": Kept(
+        "numpy takes the header of an array apart as Python, and the end does not come",
+        ("convert", "log.npz", "-o", "out.csv"),
+        lambda _: {"log.npz": formats.npz({"t": np.arange(9000.0)}).replace(b"(9000,), }", b"(9000,(, }")},
+    ),
     "parquet_deep_metadata": Kept(
         "the JSON parser's depth", ("convert", "log.parquet", "-o", "out.csv"), parquet(b"[" * DEEP)
     ),
@@ -125,6 +132,14 @@ KEPT: dict[str, Kept] = {
         "an escape code in a name reached the terminal",
         EXPORT,
         own("m.toml", f'{MODEL}{PARAMETERS}"\\u001b[31m" = 1\n'),
+    ),
+    "model_infinite_error": Kept(
+        "a standard error that JSON has no word for",
+        EXPORT,
+        own(
+            "m.toml",
+            f'last = "[end]"\n{MODEL}{PARAMETERS}{ZEROS}[standard_errors."gyr.bias"]\nx = -inf\n{END}',
+        ),
     ),
     "answer_deep": Kept("the JSON parser's depth", REVEAL, answer('{"a":' * DEEP)),
     "answer_digits": Kept("Python's limit of digits", REVEAL, answer("1" * DIGITS)),
