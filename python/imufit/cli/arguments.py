@@ -42,7 +42,7 @@ class Real(click.FloatRange):
         """Return the number."""
         number = float(super(click.FloatRange, self).convert(value, param, ctx))
         if not math.isfinite(number):
-            self.fail(f"{value} is no number to count with", param, ctx)
+            self.fail(f"{value} is not a finite number", param, ctx)
         return float(super().convert(number, param, ctx))
 
 

@@ -33,7 +33,7 @@ class RowRange(click.ParamType):  # type: ignore[type-arg]
             return value
         first, colon, stop = value.partition(":")
         if not (colon and first.isdecimal() and stop.isdecimal() and int(first) < int(stop)):
-            self.fail(f"{value!r} is no range of rows: write FIRST:STOP, such as 0:1000000", param, ctx)
+            self.fail(f"{value!r} is not a range of rows: write FIRST:STOP, such as 0:1000000", param, ctx)
         return int(first), int(stop)
 
 
