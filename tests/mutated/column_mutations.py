@@ -18,7 +18,7 @@ def _numeric(rng: Random, columns: Columns) -> str:
 
 
 def _floats(columns: Columns, name: str) -> np.ndarray:
-    values = np.asarray(columns.get(name, np.arange(300.0)))
+    values = np.atleast_1d(columns.get(name, np.arange(300.0)))
     return values.astype(float) if values.dtype.kind in "fiub" else np.arange(float(len(values)))
 
 

@@ -73,9 +73,9 @@ def attitude_comparison(
     """
     if not isinstance(log, Log) or log.ref_q is None:
         return None
-    if any(readings is None or not np.isfinite(readings).all(axis=1).any() for readings in (log.acc, log.gyr)):
-        return None
     whole, log = log, log.rows(0, MOST_ROWS)
+    if not _has_readings(log):
+        return None
     run = replay(log, [filter_name], progress=progress)
     kept = _kept(run, filter_name)
     if kept.sum() < MIN_ROWS:
@@ -83,10 +83,8 @@ def attitude_comparison(
     before = _parts(run, filter_name)
     after = before
     if model.effects:
-        try:
-            undone = corrected(model, log)
-        except InputError:
-            # A nonlinearity may turn back within the readings: then no input belongs to them, and no attitude either.
+        undone = _undone(model, log)
+        if undone is None:
             return None
         run = replay(undone, [filter_name], progress=progress)
         after = _parts(run, filter_name)
@@ -108,6 +106,23 @@ def attitude_comparison(
         sentence += f" This is of the first {log.n} rows."
     return AttitudeComparison(
         filter_name, rms_before, rms_after if model.effects else None, tuple(dependences), bins, limit, sentence
+    )
+
+
+def _undone(model: EffectStack, log: Log) -> Log | None:
+    """Return the corrected log; None where no readings are left or the model cannot be undone."""
+    try:
+        undone = corrected(model, log)
+    except InputError:
+        # A nonlinearity may turn back within the readings: then no input belongs to them, and no attitude either.
+        return None
+    return undone if _has_readings(undone) else None
+
+
+def _has_readings(log: Log) -> bool:
+    """Whether both sensors that the filter needs have a reading at all."""
+    return all(
+        readings is not None and bool(np.isfinite(readings).all(axis=1).any()) for readings in (log.acc, log.gyr)
     )
 
 
