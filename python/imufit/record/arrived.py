@@ -50,6 +50,11 @@ class Announced:
         Columns as it names them.
     ranges, rates : tuple of float
         Per column: value at which it clips, SI units, and rows per second; 0 where that is not known.
+
+    Raises
+    ------
+    ValueError
+        Another form.
     """
 
     form: str
@@ -58,6 +63,10 @@ class Announced:
     columns: tuple[str, ...]
     ranges: tuple[float, ...] = ()
     rates: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.form not in {"binary", "text"}:
+            raise ValueError(f"{self.form!r} is not a form of the wire protocol")
 
 
 @dataclass(frozen=True)

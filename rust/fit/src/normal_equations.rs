@@ -186,12 +186,15 @@ impl NormalEquations {
         })
     }
 
-    /// Condition number of the design matrix, its columns scaled to unit length; infinite if they are dependent.
+    /// Condition number of the design matrix, its columns scaled to unit length; infinite if they are dependent, 1 without any.
     ///
     /// Squaring the matrix squares this number, so that about `2 log10(condition)` of 16 digits are lost, and past
     /// [`TRUSTED_CONDITION`] the prior of [`NormalEquations::solve`] decides along with the data.
     pub fn condition(&self) -> f64 {
         let used: Vec<usize> = (0..self.parameters()).filter(|j| self.gram[(*j, *j)] > 0.0).collect();
+        if used.is_empty() {
+            return 1.0;
+        }
         let size = |j: usize| self.gram[(used[j], used[j])].sqrt();
         let scaled = DMatrix::from_fn(used.len(), used.len(), |i, j| {
             self.gram[(used[i], used[j])] / (size(i) * size(j))
@@ -202,9 +205,7 @@ impl NormalEquations {
             .fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
         // Below rounding an eigenvalue says nothing but that the columns are dependent.
         let rounding = f64::EPSILON * largest * used.len() as f64;
-        if used.is_empty() {
-            1.0
-        } else if smallest > rounding {
+        if smallest > rounding {
             (largest / smallest).sqrt()
         } else {
             f64::INFINITY
