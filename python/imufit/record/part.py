@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
+from datetime import datetime
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -325,6 +326,8 @@ def _read(path: Path, data: Any, size: int) -> Part | None:
                 file=path,
                 remedy="Use the imufit that recorded it.",
             )
+        datetime.fromisoformat(about["utc"])
+        float(about["monotonic"])
         said = about.pop("announced")
         plain: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in said.items()}
         announced = Announced(**plain)
