@@ -178,8 +178,8 @@ def _standard_errors(value: Any) -> dict[str, dict[str, float]]:
             # One that nobody could work out is not a number, and stays so.
             if isinstance(number, bool) or not isinstance(number, int | float):
                 raise InputError(f"the standard error of {key} {name} is {shown(number)}, not a number")
-            if number < 0.0 or number == float("inf"):
-                raise InputError(f"the standard error of {key} {name} is {shown(number)}: it is positive and finite")
+            if number < 0.0:
+                raise InputError(f"the standard error of {key} {name} is {shown(number)}, which is negative")
     return errors
 
 

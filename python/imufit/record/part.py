@@ -326,6 +326,7 @@ def _read(path: Path, data: Any, size: int) -> Part | None:
                 file=path,
                 remedy="Use the imufit that recorded it.",
             )
+        # What the end of a recording computes with; it fails here, where the file is named.
         datetime.fromisoformat(about["utc"])
         float(about["monotonic"])
         said = about.pop("announced")

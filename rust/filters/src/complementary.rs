@@ -161,8 +161,6 @@ mod tests {
             theta = a * (theta + rate * dt) + (1.0 - a) * theta_acc;
             let f = Quaternion::exp(&(Vector3::y() * theta_acc)).rotate_back(&(Vector3::z() * 9.81));
             filter.step(&Sample {
-                unsure_turn: 0.0,
-                unsure_tilt: 0.0,
                 omega: Some(Reading {
                     value: AngularRate(Vector3::y() * rate),
                     dt,
@@ -172,6 +170,7 @@ mod tests {
                     dt,
                 }),
                 m: None,
+                ..Sample::default()
             });
             assert!((filter.attitude().log() - Vector3::y() * theta).norm() < 1e-12);
         }

@@ -252,8 +252,6 @@ mod tests {
 
     fn standing(q: Quaternion, frame: Frame, rate: Vector3<f64>, dt: f64) -> Sample {
         Sample {
-            unsure_turn: 0.0,
-            unsure_tilt: 0.0,
             omega: Some(Reading {
                 value: AngularRate(rate),
                 dt,
@@ -266,6 +264,7 @@ mod tests {
                 value: FluxDensity(q.rotate_back(&frame.default_field())),
                 dt,
             }),
+            ..Sample::default()
         }
     }
 

@@ -291,8 +291,6 @@ mod tests {
             p = (nalgebra::Matrix2::identity() - gain * h) * p;
             let f = Quaternion::exp(&(Vector3::y() * z)).rotate_back(&(Vector3::z() * 9.81));
             filter.step(&Sample {
-                unsure_turn: 0.0,
-                unsure_tilt: 0.0,
                 omega: Some(Reading {
                     value: AngularRate(Vector3::y() * rate),
                     dt,
@@ -302,6 +300,7 @@ mod tests {
                     dt,
                 }),
                 m: None,
+                ..Sample::default()
             });
             assert!((filter.attitude().log() - Vector3::y() * x[0]).norm() < 1e-12);
             assert!((filter.bias - Vector3::y() * x[1]).norm() < 1e-12);

@@ -368,8 +368,6 @@ mod tests {
         let sway = Vector3::new((7.0 * t).sin(), (5.0 * t).cos(), (6.0 * t).sin());
         let (frame, dt) = (Frame::Enu, DT);
         Sample {
-            unsure_turn: 0.0,
-            unsure_tilt: 0.0,
             omega: Some(Reading {
                 value: AngularRate(Vector3::zeros()),
                 dt,
@@ -382,6 +380,7 @@ mod tests {
                 value: FluxDensity(q.rotate_back(&frame.default_field())),
                 dt,
             }),
+            ..Sample::default()
         }
     }
 

@@ -271,8 +271,6 @@ mod tests {
 
     fn standing(q: Quaternion, frame: Frame, bias: Vector3<f64>, dt: f64) -> Sample {
         Sample {
-            unsure_turn: 0.0,
-            unsure_tilt: 0.0,
             omega: Some(Reading {
                 value: AngularRate(bias),
                 dt,
@@ -285,6 +283,7 @@ mod tests {
                 value: FluxDensity(q.rotate_back(&frame.default_field())),
                 dt,
             }),
+            ..Sample::default()
         }
     }
 

@@ -235,8 +235,6 @@ mod tests {
 
     fn sample(f: Vector3<f64>, m: Vector3<f64>) -> Sample {
         Sample {
-            unsure_turn: 0.0,
-            unsure_tilt: 0.0,
             omega: None,
             f: Some(Reading {
                 value: SpecificForce(f),
@@ -246,6 +244,7 @@ mod tests {
                 value: FluxDensity(m),
                 dt: 0.01,
             }),
+            ..Sample::default()
         }
     }
 

@@ -55,7 +55,7 @@ pub struct Sample {
     pub omega: Option<Reading<AngularRate>>,
     /// The turn by `omega` that no reading confirms, rad: standard deviation about each axis ([`crate::bridge`](crate)).
     pub unsure_turn: f64,
-    /// The angle by which `f` may miss the vertical although it is no noise, rad: standard deviation.
+    /// Standard deviation of the angle between `f` and the vertical, rad: what an acceleration adds to the noise.
     pub unsure_tilt: f64,
     /// Specific force that is fit to show the vertical (no free fall).
     pub f: Option<Reading<SpecificForce>>,
