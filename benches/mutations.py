@@ -176,7 +176,7 @@ def new_run(given: argparse.Namespace) -> dict[str, Any]:
         seeds = seed_files.load(folder)
         with Worker(folder) as worker:
             for answer in answers:
-                if "faults" not in answer:
+                if "faults" not in answer or answer["faults"][0][0] == "not made":
                     continue
                 case, answer["left_out"] = smallest(worker, seeds, answer) if given.keep else (None, [])
                 case = case or draw.case(seeds, seed, answer["index"])

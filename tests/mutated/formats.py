@@ -62,7 +62,8 @@ def parquet(columns: Columns, metadata: bytes | None, rng: Random) -> bytes:
         if array is None:
             continue
         if encoded == "all" or (encoded == "one" and k == len(columns) // 2):
-            array = array if pa.types.is_nested(array.type) else array.dictionary_encode()
+            encodable = not (pa.types.is_nested(array.type) or pa.types.is_null(array.type))
+            array = array.dictionary_encode() if encodable else array
         arrays.append((name.encode("utf-8", "replace").decode(), array))
     table = pa.Table.from_arrays([array for _, array in arrays], names=[name for name, _ in arrays])
     if metadata is not None:

@@ -64,7 +64,7 @@ class Worker:
         if line:
             reply: dict[str, Any] = json.loads(line)
             if "unmade" in reply:
-                raise RuntimeError(f"{request}: {reply['unmade']}")
+                return {"code": None, "faults": [("not made", reply["unmade"])]}
             return reply
         return self._died(process, in_time)
 
