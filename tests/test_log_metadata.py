@@ -50,7 +50,8 @@ def test_other_toml_file_is_not_overwritten(tmp_path: Path) -> None:
         ("sensor", 5, "metadata sensor is 5, not text."),
         ("noise", 0.1, "metadata noise is 0.1, not a table."),
         ("noise", {"temp": 0.1}, "metadata noise names the sensor 'temp'."),
-        ("noise", {"acc": -1}, "metadata noise.acc is -1, which is no standard deviation."),
+        ("noise", {"acc": -1}, "metadata noise.acc is -1; no sensor has such a standard deviation."),
+        ("noise", {"gyr": 1e-308}, "metadata noise.gyr is 1e-308; no sensor has such a standard deviation."),
     ],
 )
 def test_bad_metadata_names_the_key(tmp_path: Path, key: str, value: object, message: str) -> None:

@@ -72,6 +72,10 @@ def columns(
     return files
 
 
+def tiny(readings: np.ndarray) -> np.ndarray:
+    return readings * 1e-100
+
+
 def zip_flags(offset: int, value: int) -> Callable[[SeedFiles], Files]:
     """Write an NPZ whose first array claims something in its two headers: 6 = flags, 8 = method."""
     whole = formats.npz({"t": np.arange(3.0), "acc_x": np.zeros(3)})
@@ -190,6 +194,19 @@ KEPT: dict[str, Kept] = {
     ),
     "covariate_1e300": Kept(
         "the square of a covariate overflows", ("compare", "log.csv"), columns("table", vbat=1e300)
+    ),
+    "reading_1e_100": Kept(
+        "the square of a variance is less than any number",
+        ("allan", "log.csv"),
+        columns("poses", acc_x=tiny, acc_y=tiny),
+    ),
+    "noise_1e_308": Kept(
+        "the square of an error over the stated noise overflows",
+        ("compare", "log.csv"),
+        lambda seeds: {
+            "log.csv": seeds.files["handheld.csv"],
+            "log.toml": seeds.files["handheld.toml"].split(b"[noise]")[0] + b"[noise]\nacc = 1e-308\n",
+        },
     ),
     "settings_deep": Kept(
         "the TOML parser's depth",

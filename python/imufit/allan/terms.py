@@ -157,7 +157,9 @@ def fit(tau: Array, variance: Array, freedom: Callable[[str, int], float]) -> Fi
 
 def _fit(tau: Array, variance: Array, rows: NDArray[np.intp], freedom: Callable[[str, int], float]) -> Fitted:
     """Fit the terms to some of the points."""
-    design, measured = basis(tau[rows]), variance[rows]
+    # In units of the largest, so that no square of a variance leaves the range of the numbers.
+    level = variance[rows].max()
+    design, measured = basis(tau[rows]), variance[rows] / level
     if rows[0] > 0:
         # Behind a filter quantisation cannot be seen, and would only take up what is left of the filter's bend.
         design[:, 0] = 0.0
@@ -180,7 +182,8 @@ def _fit(tau: Array, variance: Array, rows: NDArray[np.intp], freedom: Callable[
     probability = float(gammaincc(0.5 * left, 0.5 * misfit))
     # Where the terms do not describe the curve its misfit says how sure they are.
     inflation = np.sqrt(max(1.0, misfit / left))
-    errors = inflation * _errors(whitening @ design, squares)
+    errors = level * inflation * _errors(whitening @ design, squares)
+    squares = level * squares
     terms = {name: _term(squares[k], errors[k]) for k, name in enumerate(TERMS)}
     if rows[0] > 0:
         terms["quantisation"] = Term(None, None, float("nan"))

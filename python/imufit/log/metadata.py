@@ -23,6 +23,10 @@ STANDARD_GRAVITY: Final = 9.80665
 SMALLEST_GRAVITY: Final = 1e-3
 """m/s^2; the moons of Mars have 3e-3. What is smaller is a slip, and a division by it tells nothing."""
 
+SMALLEST_NOISE: Final = 1e-18
+"""Smallest standard deviation that can be stated, m/s^2, rad/s or uT: a thousandth of that of the free-falling test masses
+of LISA Pathfinder (2e-15 m/s^2). The fourth power of the largest reading over it has room in a float64."""
+
 
 @dataclass(frozen=True)
 class Metadata:
@@ -237,9 +241,10 @@ def _noise(value: Any, file: str | Path | None) -> dict[str, float]:
                 f"metadata noise names the sensor {_shown(sensor)}", file=file, column="noise", remedy=remedy
             )
         number = _number(deviation)
-        if number is None or not 0.0 <= number <= LARGEST[GROUPS[sensor][0]]:
+        possible = number is not None and SMALLEST_NOISE <= number <= LARGEST[GROUPS[sensor][0]]
+        if not possible and number != 0.0:
             raise InputError(
-                f"metadata noise.{sensor} is {_shown(deviation)}, which is no standard deviation",
+                f"metadata noise.{sensor} is {_shown(deviation)}; no sensor has such a standard deviation",
                 file=file,
                 column="noise",
                 remedy=remedy,

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use imufit_model::sensor::{AXES, CHANNELS};
+use imufit_model::sensor::{AXES, CHANNELS, Sensor};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -122,16 +122,17 @@ pub fn varying(search: &Search, stack: &Stack, members: &[usize], unnamed: &Unna
     }
 }
 
-/// The likeliest courses of every sensor beside a stack, each with its log Bayes factor of at least `least`.
-pub fn courses(stack: &Stack, least: f64) -> Vec<(Unnamed, f64)> {
+/// The likeliest courses of some sensors beside a stack, each with its log Bayes factor of at least `least`.
+pub fn courses(stack: &Stack, least: f64, sensors: &[Sensor]) -> Vec<(Unnamed, f64)> {
     let problem = stack.criterion.problem;
-    let mut sensors: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+    let mut own: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (c, sums) in problem.sums.iter().enumerate() {
-        if sums.of_blocks() && !problem.parts[sums.log].white.layout.facts.rests {
-            sensors.entry((sums.log, sums.channel / 3)).or_default().push(c);
+        let wanted = sensors.iter().any(|s| s.index() == sums.channel / 3);
+        if wanted && sums.of_blocks() && !problem.parts[sums.log].white.layout.facts.rests {
+            own.entry((sums.log, sums.channel / 3)).or_default().push(c);
         }
     }
-    let found: Vec<Vec<courses::Found>> = sensors
+    let found: Vec<Vec<courses::Found>> = own
         .into_par_iter()
         .map(|(_, channels)| courses::likeliest(stack, &channels, least))
         .collect();

@@ -295,28 +295,33 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// The effects that are there beside one another, in the order in which they were found.
-    pub fn find(&self) -> Option<Vec<usize>> {
+    /// The effects that are there beside one another, in the order in which they were found, and their stack.
+    pub fn find(&self) -> Option<(Vec<usize>, Stack<'a>)> {
         let mut members: Vec<usize> = Vec::new();
         let mut dropped: Vec<usize> = Vec::new();
+        let mut stack = self.stack(&members)?;
         while members.len() < MOST {
-            let stack = self.stack(&members)?;
             let without: Vec<usize> = members.iter().chain(&dropped).copied().collect();
             let weighed = self.weigh_all(&stack, &without);
             let Some(next) = weighed.iter().find(|w| self.there(w)) else {
                 break;
             };
             members.push(next.slot);
-            let needless = self.needless(&members)?;
-            members.retain(|m| !needless.contains(m));
-            dropped.extend(needless);
+            stack = self.stack(&members)?;
+            let needless = self.needless(&stack, &members)?;
+            if !needless.is_empty() {
+                members.retain(|m| !needless.contains(m));
+                stack = self.stack(&members)?;
+                dropped.extend(needless);
+            }
         }
         for _ in 0..ROUNDS {
             if !self.exchange(&mut members)? {
                 break;
             }
+            stack = self.stack(&members)?;
         }
-        Some(members)
+        Some((members, stack))
     }
 
     /// Log of the marginal likelihood of the model and some members, with the prior density of these at their present values (Laplace's
@@ -368,10 +373,9 @@ impl<'a> Search<'a> {
         (0..members.len()).filter_map(beside).map(|w| w.ln_bayes).sum()
     }
 
-    /// Members that the others make needless, but not the last one.
-    fn needless(&self, members: &[usize]) -> Option<Vec<usize>> {
+    /// Members that the others make needless, but not the last one; `stack` is that of all members.
+    fn needless(&self, stack: &Stack, members: &[usize]) -> Option<Vec<usize>> {
         let mut found = Vec::new();
-        let stack = self.stack(members)?;
         for member in &members[..members.len().saturating_sub(1)] {
             let parameters = indices(&self.criterion.problem.slots, &[*member]);
             let known = self.criterion.problem.known_values(&parameters).is_some();

@@ -463,7 +463,8 @@ impl<'a> Stack<'a> {
         self.integrated(asked, |equations| asked.prior.fit(equations))
     }
 
-    /// Logarithm of the mean of something that is known for each strength of the noise.
+    /// Logarithm of the mean of something that is known for each strength of the noise. It is worked out where the noise is likeliest and where
+    /// it is weakest; between these it hardly exceeds both, so that a strength which would not count even then is left out.
     fn integrated(&self, asked: &Asked, of: impl Fn(&Beside) -> f64) -> f64 {
         let sensors = self.sensors(asked);
         let mut at_best = 0.0;
@@ -471,24 +472,32 @@ impl<'a> Stack<'a> {
         for sensor in &sensors {
             let (others, cross) = self.others(asked, Some(*sensor));
             let points = &self.points[*sensor];
-            let factors: Vec<(f64, f64)> = points
-                .iter()
-                .map(|point| {
-                    let equations = self.beside(asked, *sensor, point, &others, &cross);
-                    (point.ln_z, of(&equations))
-                })
+            let value = |point: &Point| of(&self.beside(asked, *sensor, point, &others, &cross));
+            let ends = self.ends(*sensor);
+            let known: Vec<(usize, f64)> = ends.iter().map(|k| (*k, value(&points[*k]))).collect();
+            let most = known.iter().map(|(_, f)| *f).fold(f64::NEG_INFINITY, f64::max);
+            let sum = |(k, f): &(usize, f64)| points[*k].ln_z + f;
+            let counts = known.iter().map(sum).fold(f64::NEG_INFINITY, f64::max) - NEGLIGIBLE;
+            let between = (0..points.len()).filter(|k| !ends.contains(k) && points[*k].ln_z + most >= counts);
+            let with: Vec<f64> = (between.map(|k| points[k].ln_z + value(&points[k])))
+                .chain(known.iter().map(sum))
                 .collect();
-            let with: Vec<f64> = factors.iter().map(|(z, f)| z + f).collect();
-            let without: Vec<f64> = factors.iter().map(|(z, _)| *z).collect();
+            let without: Vec<f64> = points.iter().map(|point| point.ln_z).collect();
             let integrated = log_sum_exp(&with) - log_sum_exp(&without);
-            at_best = points
-                .iter()
-                .zip(&factors)
-                .find(|(p, _)| p.strength == self.best[*sensor])
-                .map_or(integrated, |(_, (_, f))| *f);
+            at_best = (known.iter())
+                .find(|(k, _)| points[*k].strength == self.best[*sensor])
+                .map_or(integrated, |(_, f)| *f);
             more += integrated - at_best;
         }
         at_best + more
+    }
+
+    /// Places of the points of the likeliest and of the weakest noise of a sensor.
+    fn ends(&self, sensor: usize) -> Vec<usize> {
+        let points = &self.points[sensor];
+        let best = points.iter().position(|p| p.strength == self.best[sensor]);
+        let weakest = (0..points.len()).min_by_key(|k| points[*k].strength);
+        best.into_iter().chain(weakest.filter(|k| best != Some(*k))).collect()
     }
 
     /// For each parameter of a question the size from which on its expected log Bayes factor, the noise being as it is here, reaches
@@ -550,15 +559,9 @@ impl<'a> Stack<'a> {
 
     /// Equations of columns beside the stack at the likeliest noise, and at the weakest of a sensor that counts.
     pub fn views(&self, asked: &Asked, sensor: usize) -> Vec<Beside> {
-        let points = &self.points[sensor];
         let (others, cross) = self.others(asked, Some(sensor));
-        let weakest = points.iter().min_by_key(|p| p.strength).map(|p| p.strength);
-        let wanted = [Some(self.best[sensor]), weakest.filter(|k| *k != self.best[sensor])];
-        points
-            .iter()
-            .filter(|p| wanted.contains(&Some(p.strength)))
-            .map(|p| self.beside(asked, sensor, p, &others, &cross))
-            .collect()
+        let view = |k: usize| self.beside(asked, sensor, &self.points[sensor][k], &others, &cross);
+        self.ends(sensor).into_iter().map(view).collect()
     }
 
     /// Log Bayes factor of some of the stack's own columns beside the others, at the likeliest noise (Savage-Dickey density ratio,

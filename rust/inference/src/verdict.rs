@@ -174,12 +174,12 @@ impl Inquiry<'_> {
         self.unnamed.par_iter().map(of).collect()
     }
 
-    /// Courses in time beside a stack.
-    fn courses(&self, stack: &Stack, least: f64) -> Vec<(Unnamed, f64)> {
+    /// Courses in time of some sensors beside a stack.
+    fn courses(&self, stack: &Stack, least: f64, sensors: &[Sensor]) -> Vec<(Unnamed, f64)> {
         if self.unnamed.is_empty() {
             Vec::new()
         } else {
-            dictionary::courses(stack, least)
+            dictionary::courses(stack, least, sensors)
         }
     }
 }
@@ -231,7 +231,7 @@ pub fn decide(
         })
         .filter(|(_, ln)| *ln >= threshold)
         .collect();
-    for (course, ln) in inquiry.courses(&stack, threshold) {
+    for (course, ln) in inquiry.courses(&stack, threshold, &Sensor::ALL) {
         unexplained.push((inquiry.unnamed.len(), ln));
         inquiry.unnamed.push(course);
     }
@@ -363,12 +363,14 @@ fn outdone(weighed: &[Weighed]) -> bool {
 /// Effects that are there, and the log Bayes factors of unnamed causes beside them.
 fn named(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>)> {
     let search = &inquiry.search;
-    let mut members = search.find()?;
-    let stack = search.stack(&members)?;
+    let (mut members, mut stack) = search.find()?;
+    let found = members.len();
     members.retain(|m| !search.of_unseen_motion(&stack, *m));
+    if members.len() < found {
+        stack = search.stack(&members)?;
+    }
     // What varies from block to block is no property of the sensor.
     loop {
-        let stack = search.stack(&members)?;
         let least = members
             .par_iter()
             .map(|m| (*m, search.varying(&stack, &members, *m).common))
@@ -377,15 +379,16 @@ fn named(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>)> {
             Some((member, ln)) if ln < search.threshold => members.retain(|m| *m != member),
             _ => break,
         }
+        stack = search.stack(&members)?;
     }
     // A named effect must be there beside the likeliest unnamed cause too, not only in its place.
     loop {
-        let stack = search.stack(&members)?;
         let left = inquiry.beside(&stack);
         match stands_in(inquiry, &members, &stack, &left) {
             Some(unneeded) => members.retain(|m| *m != unneeded),
             None => return Some((members, left)),
         }
+        stack = search.stack(&members)?;
     }
 }
 
@@ -427,7 +430,7 @@ fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) 
         });
         fixed
             || inquiry
-                .courses(&without, least)
+                .courses(&without, least, sensors)
                 .iter()
                 .any(|(course, instead)| replaced(*instead, stack.ln_bayes(&course.asked) - course.asked.trials))
     })
