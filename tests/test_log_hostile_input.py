@@ -190,3 +190,10 @@ def test_time_in_which_no_sensor_could_sample_is_refused(tmp_path: Path) -> None
     assert "more than any sensor samples: t is not in s" in message(path)
     pd.DataFrame({**COLUMNS, "t": np.arange(N) * 1e-5}).to_csv(path, index=False)
     assert read(path).n == N
+
+
+def test_readings_that_no_instrument_resolves_are_zero_and_the_rest_is_as_it_was() -> None:
+    rows = np.array([[9.8, 1e-29, -1e-31], [1e-308, np.nan, -9.8]])
+    log = Log.from_arrays([0.0, 0.5], acc=rows, covariates={"vbat": [1e-308, 3.7]})
+    np.testing.assert_array_equal(log.acc, [[9.8, 1e-29, 0.0], [0.0, np.nan, -9.8]])
+    np.testing.assert_array_equal(log.covariates["vbat"], [1e-308, 3.7])

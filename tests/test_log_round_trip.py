@@ -12,14 +12,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from imufit.log import Log, LogSource, Metadata, concatenate, gaps, open_log, read
-from imufit.log.columns import LARGEST, LARGEST_COVARIATE
+from imufit.log.columns import LARGEST, LARGEST_COVARIATE, SMALLEST
+from imufit.log.metadata import SMALLEST_NOISE
 from scipy.spatial.transform import Rotation
 
 
 def readings(column: str) -> st.SearchStrategy[float]:
     """Any number that the column may hold."""
     largest = LARGEST.get(column, LARGEST_COVARIATE)
-    return st.one_of(st.floats(-largest, largest), st.just(float("nan")))
+    numbers = st.floats(-largest, largest)
+    if column[:3] in ("acc", "gyr", "mag"):
+        numbers = numbers.map(lambda value: 0.0 if abs(value) < SMALLEST else value)
+    return st.one_of(numbers, st.just(float("nan")))
 
 
 words = st.text(st.characters(codec="utf-8", exclude_characters="\0\r\n"), max_size=6).map(lambda s: s and f"w {s}")
@@ -75,7 +79,7 @@ def logs(draw: st.DrawFn, least: int = 1) -> Log:
             optional={
                 "mag_reference": st.lists(st.floats(-1e8, 1e8), min_size=3, max_size=3),
                 "sensor": st.text(st.characters(codec="utf-8", exclude_categories=["Cc"]), max_size=8),
-                "noise": st.dictionaries(st.sampled_from(["acc", "gyr"]), st.floats(0.0, 1e3)),
+                "noise": st.dictionaries(st.sampled_from(["acc", "gyr"]), st.floats(SMALLEST_NOISE, 1e3)),
                 "licence": st.text("abc \"'\\", max_size=5),
                 "depth": st.integers(-1000, 1000),
             },

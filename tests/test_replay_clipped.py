@@ -1,7 +1,5 @@
 """Where a sensor's range ends: found where readings are cut off, and nowhere else."""
 
-from dataclasses import replace as with_fields
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -151,9 +149,7 @@ class TestMetadata:
         assert replay(log, ["kalman"]).skipped == {"acc_clipped": 1}
         assert replay(log, ["kalman"], {"replay": {"acc_range": 50.0}}).skipped == {}
 
-    @pytest.mark.parametrize("wrong", ["16 g", -1.0, 0, True, float("nan"), [2]])
+    @pytest.mark.parametrize("wrong", ["16 g", -1.0, 0, True, float("nan"), [2], 1e200])
     def test_what_is_no_range_is_refused_by_name(self, wrong: object) -> None:
-        log = Log.from_arrays(np.arange(3) * 0.01, acc=np.ones((3, 3)))
-        log = with_fields(log, metadata=with_fields(log.metadata, extra={"acc_range": wrong}))
-        with pytest.raises(InputError, match=r"metadata acc_range is .* no end of a range"):
-            replay(log, ["accel"])
+        with pytest.raises(InputError, match=r"metadata acc_range is .*, which is not the end of a range"):
+            Log.from_arrays(np.arange(3) * 0.01, acc=np.ones((3, 3)), acc_range=wrong)

@@ -200,6 +200,11 @@ KEPT: dict[str, Kept] = {
         ("allan", "log.csv"),
         columns("poses", acc_x=tiny, acc_y=tiny),
     ),
+    "field_1e_308": Kept(
+        "the square of a field is zero",
+        ("compare", "log.csv"),
+        columns("poses", mag_x=1e-308, mag_y=1e-308, mag_z=1e-308),
+    ),
     "noise_1e_308": Kept(
         "the square of an error over the stated noise overflows",
         ("compare", "log.csv"),

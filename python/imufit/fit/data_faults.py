@@ -29,8 +29,8 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
     """
     if isinstance(passes, RestPasses):
         return tuple(passes.row_faults)
-    told = passes.log.metadata.extra
-    clipped = ClippedRows(ends, [sensor for sensor in ends if f"{sensor}_range" in told])
+    told = passes.log.metadata.ranges
+    clipped = ClippedRows(ends, [sensor for sensor in ends if sensor in told])
 
     def counted() -> Iterator[dict[str, Any]]:
         for chunk in passes.chunks(facts.margin, "looking for faults of the data"):

@@ -206,11 +206,9 @@ class Passes:
                 column = getattr(chunk.log, sensor)
                 if column is not None:
                     end.add(column)
-        told = {sensor: self.log.metadata.extra.get(f"{sensor}_range") for sensor in ends}
         found: dict[str, float] = {}
         for sensor, end in ends.items():
-            known = told[sensor]
-            value = known if isinstance(known, int | float) and known > 0.0 else end.end()
+            value = self.log.metadata.ranges.get(sensor) or end.end()
             if value is not None and value > 0.0:
                 found[sensor] = float(value)
         return found, {sensor: end.largest for sensor, end in ends.items() if end.largest > 0.0}

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
 from imufit.log.assemble import group_fields
-from imufit.log.check import check_poses, check_readings, checked_labels, truth_value
+from imufit.log.check import check_poses, checked_labels, checked_readings, truth_value
 from imufit.log.columns import CONTRACT, GROUPS
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
@@ -89,8 +89,7 @@ def fields_from_arrays(
         if name in CONTRACT:
             raise place.error("a covariate cannot have the name of a log column", column=name, remedy="Rename it.")
         numbers[name] = contiguous(values, name, (time.size,))
-    for column, numeric in numbers.items():
-        check_readings(numeric, column, column, 0, place)
+    numbers = {column: checked_readings(values, column, column, 0, place) for column, values in numbers.items()}
     cells = {name: checked_labels(np.array(column, dtype=object)) for name, column in text.items()}
     check_poses(cells.get("pose", np.empty(0, object)), 0, place)
     repair = scan.finish()

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from imufit.log.check import (
     check_poses,
-    check_readings,
     checked_attitude,
     checked_labels,
+    checked_readings,
     numbers_from_text,
     truth_value,
 )
@@ -92,8 +92,9 @@ def fields_of(
             text[column.target] = checked_labels(raw)
         else:
             values = _numbers(column, block, start, rows, place)
-            check_readings(values, column.target, column.source or column.target, start, place)
-            numbers[column.target] = values
+            numbers[column.target] = checked_readings(
+                values, column.target, column.source or column.target, start, place
+            )
     t = repair.apply(time_of(plan, block, start, rows, place), start)
     return group_fields(t, numbers, text, start=start, metadata=metadata, place=place)
 

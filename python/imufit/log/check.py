@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
-from imufit.log.columns import GROUPS, LARGEST, LARGEST_COVARIATE, POSES
+from imufit.log.columns import GROUPS, LARGEST, LARGEST_COVARIATE, POSES, SMALLEST
 from imufit.log.place import Place
 from imufit.printable import NAME, printable
 
@@ -63,6 +63,9 @@ def truth_value(text: str, column: str, row: int | None, place: Place) -> InputE
     )
 
 
+_SENSORS = frozenset((*GROUPS["acc"], *GROUPS["gyr"], *GROUPS["mag"]))
+
+
 def numbers_from_text(cells: NDArray[np.object_], column: str, start: int, place: Place) -> NDArray[np.float64]:
     """Read a text column that has to hold numbers; (n,) float64."""
     values = np.empty(len(cells))
@@ -81,10 +84,13 @@ def numbers_from_text(cells: NDArray[np.object_], column: str, start: int, place
     return values
 
 
-def check_readings(values: NDArray[np.float64], target: str, column: str, start: int, place: Place) -> None:
+def checked_readings(
+    values: NDArray[np.float64], target: str, column: str, start: int, place: Place
+) -> NDArray[np.float64]:
     """Refuse values that nothing can have measured, infinite ones first; NaN is a missing sample.
 
-    Whatever works on a log relies on it: squares of readings and their sums are finite.
+    Whatever works on a log relies on it: squares of readings and their sums are finite, and none is zero unless the
+    reading is.
 
     Parameters
     ----------
@@ -98,11 +104,18 @@ def check_readings(values: NDArray[np.float64], target: str, column: str, start:
         Row of the log at which the block begins.
     place : Place
         To name the file in errors.
+
+    Returns
+    -------
+    (n,) array
+        The values; readings of a sensor nearer to zero than `SMALLEST` are zero.
     """
     largest = LARGEST.get(target, LARGEST_COVARIATE)
-    bad = np.flatnonzero(np.abs(values) > largest)
+    size = np.abs(values)
+    bad = np.flatnonzero(size > largest)
     if not bad.size:
-        return
+        tiny = (size < SMALLEST) & (size > 0.0) if target in _SENSORS else np.False_
+        return np.where(tiny, 0.0, values) if tiny.any() else values
     value = values[bad[0]]
     remedy = "Write NaN (or leave the cell empty) for a missing sample."
     if np.isinf(value):

@@ -57,6 +57,10 @@ LARGEST_COVARIATE: Final = 1e30
 """Largest absolute value of a column of unknown unit. Counters of 64 bits end at 1.8e19, and no quantity in SI units
 comes near; what lies beyond is a filler such as FLT_MAX. Fourth powers of 1e9 rows still have room in a float64."""
 
+SMALLEST: Final = 1e-30
+"""What is nearer to zero counts as zero in a column of a sensor, m/s^2, rad/s or uT. The quietest instrument (the test
+masses of LISA Pathfinder) resolves 1e-15 m/s^2, and fourth powers still have room in a float64."""
+
 POSES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 _SENSOR_WORDS: Final = {

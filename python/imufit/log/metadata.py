@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal, cast
 
@@ -24,8 +25,8 @@ SMALLEST_GRAVITY: Final = 1e-3
 """m/s^2; the moons of Mars have 3e-3. What is smaller is a slip, and a division by it tells nothing."""
 
 SMALLEST_NOISE: Final = 1e-18
-"""Smallest standard deviation that can be stated, m/s^2, rad/s or uT: a thousandth of that of the free-falling test masses
-of LISA Pathfinder (2e-15 m/s^2). The fourth power of the largest reading over it has room in a float64."""
+"""Smallest standard deviation that can be stated, m/s^2, rad/s or uT: a thousandth of that of the free-falling test
+masses of LISA Pathfinder (2e-15 m/s^2). The fourth power of the largest reading over it has room in a float64."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class Metadata:
         Free text.
     noise : dict
         White noise standard deviation for "acc" (m/s^2), "gyr" (rad/s), "mag" (uT).
+    acc_range, gyr_range : float, optional
+        End of the sensor's range, m/s^2 and rad/s.
     extra : dict
         Everything else that stood there; kept when the log is written.
     """
@@ -56,6 +59,8 @@ class Metadata:
     rig_axis: Literal["x", "y", "z"] | None = None
     sensor: str | None = None
     noise: dict[str, float] = field(default_factory=dict)
+    acc_range: float | None = None
+    gyr_range: float | None = None
     extra: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
@@ -97,7 +102,13 @@ class Metadata:
             values["sensor"] = self.sensor
         if self.noise:
             values["noise"] = dict(self.noise)
-        return values
+        return values | {f"{sensor}_range": end for sensor, end in self.ranges.items()}
+
+    @property
+    def ranges(self) -> dict[str, float]:
+        """End of the range of each sensor of which it is known, "acc" in m/s^2, "gyr" in rad/s."""
+        ends = {"acc": self.acc_range, "gyr": self.gyr_range}
+        return {sensor: end for sensor, end in ends.items() if end is not None}
 
     def to_json(self) -> str:
         """Text for the Parquet schema."""
@@ -252,12 +263,26 @@ def _noise(value: Any, file: str | Path | None) -> dict[str, float]:
     return {str(sensor): float(deviation) for sensor, deviation in value.items()}
 
 
-_CHECKS: Final = {
+def _range(sensor: str, unit: str, value: Any, file: str | Path | None) -> float:
+    number = _number(value)
+    if number is None or not 0.0 < number <= LARGEST[GROUPS[sensor][0]]:
+        raise InputError(
+            f"metadata {sensor}_range is {_shown(value)}, which is not the end of a range",
+            file=file,
+            column=f"{sensor}_range",
+            remedy=f"Write a positive number in {unit}, or leave it out.",
+        )
+    return number
+
+
+_CHECKS: Final[dict[str, Callable[[Any, str | Path | None], Any]]] = {
     "frame": _frame,
     "gravity": _gravity,
     "mag_reference": _mag_reference,
     "rig_axis": _rig_axis,
     "sensor": _sensor,
     "noise": _noise,
+    "acc_range": partial(_range, "acc", "m/s^2"),
+    "gyr_range": partial(_range, "gyr", "rad/s"),
 }
 KNOWN: Final = frozenset(item.name for item in fields(Metadata)) - {"extra"}

@@ -32,7 +32,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.errors import InputError
 from imufit.log import Log
 
 Array = NDArray[np.float64]
@@ -56,18 +55,12 @@ def ranges(log: Log) -> dict[str, float]:
     ----------
     log : Log
         The log.
-
-    Raises
-    ------
-    InputError
-        The metadata name a range that is no positive number.
     """
     least = {"acc": _LEAST_IN_GRAVITY * log.metadata.gravity, "gyr": _LEAST_RATE}
     found = {}
     for sensor, smallest in least.items():
-        known = log.metadata.extra.get(f"{sensor}_range")
         column = getattr(log, sensor)
-        end = _checked(f"{sensor}_range", known, log) if known is not None else None
+        end = log.metadata.ranges.get(sensor)
         if end is None and column is not None:
             end = end_of_range(column, smallest)
         if end is not None:
@@ -162,14 +155,3 @@ def _are_peaks(values: Array, runs: NDArray[np.intp], end: float, step: float) -
     below = min((1.0 - 1e-3) * end, end - 1.5 * step)
     peaks = (runs[:, 1] - runs[:, 0] < ROWS) & (np.maximum(before, after) < below)
     return bool(2 * np.count_nonzero(peaks) > len(runs))
-
-
-def _checked(name: str, value: object, log: Log) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not (math.isfinite(value) and value > 0.0):
-        raise InputError(
-            f"metadata {name} is {value!r}, which is no end of a range",
-            file=log.path,
-            column=name,
-            remedy="Write a positive number in m/s^2 (acc) or rad/s (gyr), or leave it out.",
-        )
-    return float(value)
