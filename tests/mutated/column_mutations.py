@@ -87,7 +87,7 @@ def jitter(rng: Random, columns: Columns) -> None:
     else:
         kept = np.array([rng.random() < 0.8 for _ in range(n)])
         for name in columns:
-            if len(columns[name]) == n:
+            if np.shape(columns[name])[:1] == (n,):
                 columns[name] = np.asarray(columns[name])[kept]
         return
     columns["t"] = t
@@ -125,7 +125,7 @@ def sparse(rng: Random, columns: Columns) -> None:
     every, first = rng.choice((2, 5, 50, 1000)), rng.randrange(2)
     for name in _group(rng, columns):
         values = _floats(columns, name)
-        kept = np.full(len(values), np.nan)
+        kept = np.full(values.shape, np.nan)
         kept[first::every] = values[first::every]
         columns[name] = kept
 
@@ -239,7 +239,7 @@ def labels(rng: Random, columns: Columns) -> None:
 def length(rng: Random, columns: Columns) -> None:
     n = rng.choice((0, 1, 2, 3, 5, 50, 199, 200, 201))
     for name in columns:
-        columns[name] = columns[name][:n]
+        columns[name] = np.atleast_1d(columns[name])[:n]
 
 
 def of_type(rng: Random, columns: Columns) -> None:

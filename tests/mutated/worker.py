@@ -24,7 +24,7 @@ from imufit.cli.app import main as command
 from mutated import corpus, draw, judge
 from mutated.seed_files import SeedFiles, load
 
-ADDRESS_SPACE = 4 * 10**9
+ADDRESS_SPACE = 8 * 10**9
 """Limit of the address space, bytes: of allocators' reserves and maps too, hence far above the limit of the memory."""
 
 LAID_OPEN = 3 * 2**20
