@@ -112,7 +112,9 @@ def _decided(fit: FittedStack, excluded: Sequence[str]) -> Verdict:
     if result.best is None:
         seen += fast_changes(analysis, fit.estimate.step)
     if fits or seen:
-        result = analysis.problem.diagnose(*asked, fitted=fits, refuted=refuted, column_noise=noise, seen=seen)
+        result = analysis.problem.diagnose(
+            *asked, fitted=fits, refuted=refuted, column_noise=noise, seen=seen, again=result
+        )
     return result
 
 

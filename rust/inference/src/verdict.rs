@@ -111,6 +111,28 @@ pub struct Known {
     pub column_noise: Vec<(usize, f64)>,
     /// Lines of the spectrum and random telegraph noise of a residual.
     pub seen: Vec<Finding>,
+    /// What an earlier answer to the same question, with the same candidates refuted, has named.
+    pub named: Option<Named>,
+}
+
+/// Effects that are there beside one another, and what is left beside them: all of an answer that passes over the rows do not change.
+#[derive(Clone, Debug)]
+pub struct Named {
+    /// Slots of the effects.
+    members: Vec<usize>,
+    /// Log Bayes factors of the unnamed causes beside the model alone, and beside these effects.
+    before: Vec<f64>,
+    left: Vec<f64>,
+    /// True if what explains most cannot be so large.
+    too_large: bool,
+}
+
+impl Named {
+    /// True if these can be an answer to an inquiry.
+    fn is_of(&self, inquiry: &Inquiry) -> bool {
+        let offered = |m: &usize| inquiry.search.candidates.contains(m);
+        self.left.len() == inquiry.unnamed.len() && self.members.iter().all(offered)
+    }
 }
 
 /// Answer to "which effect is missing?"
@@ -118,6 +140,8 @@ pub struct Known {
 pub struct Verdict {
     /// The answer.
     pub kind: Kind,
+    /// What the evidence alone names, to be handed on when the same is asked with more knowledge.
+    pub named: Named,
     /// Slot of the effect that stands out.
     pub best: Option<usize>,
     /// Slots of effects that explain the data as well.
@@ -210,14 +234,17 @@ pub fn decide(
     };
     let alone = inquiry.search.stack(&[])?;
     let weighed = inquiry.search.weigh_all(&alone, &[]);
-    let before = inquiry.beside(&alone);
-    // What explains most, and cannot be so large, has a cause that nobody knows: a lesser effect in its place would be a wrong name.
-    let too_large = outdone(&weighed);
-    let (mut members, left) = if too_large {
-        (Vec::new(), before.clone())
-    } else {
-        named(&inquiry)?
+    let earlier = known.named.as_ref().filter(|named| named.is_of(&inquiry));
+    let named = match earlier {
+        Some(named) => named.clone(),
+        None => named(&inquiry, &alone, &weighed)?,
     };
+    let Named {
+        mut members,
+        before,
+        left,
+        too_large,
+    } = named.clone();
     let search = &inquiry.search;
     let stack = search.stack(&members)?;
     let mut unexplained: Vec<(usize, f64)> = (0..left.len())
@@ -307,6 +334,7 @@ pub fn decide(
     let findings = strongest(findings);
     Some(Verdict {
         kind,
+        named,
         best,
         rivals,
         candidates,
@@ -360,8 +388,26 @@ fn outdone(weighed: &[Weighed]) -> bool {
     most.is_some_and(|w| w.plausible == Plausible::TooLarge)
 }
 
-/// Effects that are there, and the log Bayes factors of unnamed causes beside them.
-fn named(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>)> {
+/// What the evidence names; `alone` is the stack of the model, beside which `weighed` are all candidates.
+fn named(inquiry: &Inquiry, alone: &Stack, weighed: &[Weighed]) -> Option<Named> {
+    let before = inquiry.beside(alone);
+    // What explains most, and cannot be so large, has a cause that nobody knows: a lesser effect in its place would be a wrong name.
+    let too_large = outdone(weighed);
+    let (members, left) = if too_large {
+        (Vec::new(), before.clone())
+    } else {
+        beside_unnamed(inquiry)?
+    };
+    Some(Named {
+        members,
+        before,
+        left,
+        too_large,
+    })
+}
+
+/// Effects that are there beside one another and beside unnamed causes, and the log Bayes factors of these.
+fn beside_unnamed(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>)> {
     let search = &inquiry.search;
     let (mut members, mut stack) = search.find()?;
     let found = members.len();

@@ -151,8 +151,9 @@ impl PyProblem {
 
     /// Which effect is missing from the model of slots `model`, among the slots `candidates`; what none of them explains is
     /// asked of the slots `probes`. `fitted` holds log Bayes factors of candidates from fits of their own, by slot; `refuted` those of which a fit keeps nothing; `column_noise` the share of
-    /// noise in the column that a candidate reads; `seen` what rows show besides: (log or None, channel index, log Bayes factor, shape).
-    #[pyo3(signature = (model, candidates, probes=Vec::new(), fitted=Vec::new(), refuted=Vec::new(), column_noise=Vec::new(), seen=Vec::new()))]
+    /// noise in the column that a candidate reads; `seen` what rows show besides: (log or None, channel index, log Bayes factor, shape). `again` is an
+    /// answer to the same question with the same candidates refuted: the effects that it names are taken over.
+    #[pyo3(signature = (model, candidates, probes=Vec::new(), fitted=Vec::new(), refuted=Vec::new(), column_noise=Vec::new(), seen=Vec::new(), again=None))]
     #[allow(clippy::too_many_arguments)] // one name for each thing that is known
     fn diagnose(
         &self,
@@ -164,6 +165,7 @@ impl PyProblem {
         refuted: Vec<usize>,
         column_noise: Vec<(usize, f64)>,
         seen: Vec<Seen>,
+        again: Option<&PyVerdict>,
     ) -> PyResult<PyVerdict> {
         let pairs = fitted.iter().chain(&column_noise).map(|(slot, _)| slot);
         self.known(model.iter().chain(&candidates).chain(&probes).chain(pairs))?;
@@ -187,6 +189,7 @@ impl PyProblem {
             refuted,
             column_noise,
             seen: seen.collect(),
+            named: again.map(PyVerdict::named),
         };
         let found = compute(py, || verdict::decide(&self.0, &model, &candidates, &probes, &known))?;
         let found = found.ok_or_else(|| value_error("the normal equations cannot be solved"))?;

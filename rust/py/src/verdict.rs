@@ -1,7 +1,7 @@
 //! The answer to "which effect is missing?" as Python sees it.
 
 use imufit_inference::problem::Problem;
-use imufit_inference::verdict::{Kind, Status, Verdict};
+use imufit_inference::verdict::{Kind, Named, Status, Verdict};
 use imufit_model::rest_channels;
 use pyo3::prelude::*;
 
@@ -142,25 +142,34 @@ pub struct PyDisagreement {
 }
 
 /// Answer to "which effect is missing?"
-#[pyclass(name = "Verdict", module = "imufit._imufit", frozen, get_all)]
+#[pyclass(name = "Verdict", module = "imufit._imufit", frozen)]
 #[derive(Clone, Debug)]
 pub struct PyVerdict {
     /// The answer.
+    #[pyo3(get)]
     kind: PyKind,
     /// Slot of the effect that stands out.
+    #[pyo3(get)]
     best: Option<usize>,
     /// Slots of effects that explain the data as well.
+    #[pyo3(get)]
     rivals: Vec<usize>,
     /// Every candidate: those that are there first, then by evidence.
+    #[pyo3(get)]
     candidates: Vec<PyCandidate>,
     /// How much effects look like the best one: slot, slot, correlation.
+    #[pyo3(get)]
     correlations: Vec<(usize, usize, f64)>,
     /// Dependences that no named effect explains, most evidence first.
+    #[pyo3(get)]
     findings: Vec<PyFinding>,
     /// Logs that disagree about an effect.
+    #[pyo3(get)]
     disagreements: Vec<PyDisagreement>,
     /// True if they differ so much that there is no answer for all of them.
+    #[pyo3(get)]
     spoilt: bool,
+    named: Named,
 }
 
 impl PyVerdict {
@@ -221,7 +230,13 @@ impl PyVerdict {
             findings: findings.collect(),
             disagreements: disagreements.collect(),
             spoilt: found.spoilt,
+            named: found.named,
         }
+    }
+
+    /// What the evidence alone names.
+    pub fn named(&self) -> Named {
+        self.named.clone()
     }
 }
 
