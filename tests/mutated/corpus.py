@@ -152,6 +152,21 @@ KEPT: dict[str, Kept] = {
         REVEAL,
         answer(json.dumps({"verdict": "missing", "best": "gyr.bias", "ambiguous_with": [], "candidates": "x"})),
     ),
+    "answer_parameter_text": Kept(
+        "a standard error that is text",
+        REVEAL,
+        answer(
+            json.dumps(
+                {
+                    "verdict": "missing",
+                    "best": "gyr.bias",
+                    "candidates": [
+                        {"effect": "gyr.bias", "parameters": {"x": {"value": 0.1, "standard_error": "NED"}}}
+                    ],
+                }
+            )
+        ),
+    ),
     "nul_in_output": Kept("a path with NUL", ("convert", "log.csv", "-o", "nul\0.csv"), own("log.csv", EMPTY_LOG)),
     "nul_in_json": Kept(
         "a path with NUL", ("convert", "log.csv", "-o", "out.csv", "--json", "nul\0.json"), own("log.csv", EMPTY_LOG)

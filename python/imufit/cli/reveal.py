@@ -82,9 +82,17 @@ def read_answer(path: Path) -> dict[str, Any]:
         entries = answer.get(key, [])
         if not (isinstance(entries, list) and all(isinstance(entry, dict) and "effect" in entry for entry in entries)):
             raise InputError("this is no list of effects", file=path, column=key, remedy=_AS_WRITTEN)
-    for table in (answer, *answer.get("candidates", []), *answer.get("steps", [])):
-        if not isinstance(table.get("parameters") or {}, dict):
-            raise InputError("this is no table of parameters", file=path, column="parameters", remedy=_AS_WRITTEN)
+    entries = [*answer.get("candidates", []), *answer.get("steps", [])]
+    by_effect = answer.get("parameters") or {}
+    tables = [by_effect, *(by_effect.values() if isinstance(by_effect, dict) else ())]
+    tables += [entry.get("parameters") or {} for entry in entries]
+    if not all(isinstance(table, dict) for table in tables):
+        raise InputError("this is not a table of parameters", file=path, column="parameters", remedy=_AS_WRITTEN)
+    for table in tables[1:]:
+        for name, value in table.items():
+            parts = [value.get("value"), value.get("standard_error")] if isinstance(value, dict) else [value]
+            if not all(part is None or isinstance(part, int | float) for part in parts):
+                raise InputError("the parameter is not a number", file=path, column=name, remedy=_AS_WRITTEN)
     if not isinstance(answer.get("ambiguous_with") or [], list):
         raise InputError("this is no list of effects", file=path, column="ambiguous_with", remedy=_AS_WRITTEN)
     return answer

@@ -71,6 +71,26 @@ fn quaternion_from_rotation_vector<'py>(py: Python<'py>, vector: &Bound<'py, PyA
     })
 }
 
+/// Attitudes (n, 4) after each of n turns (n, 3), rad, that follow one another, each about the axes of the body as it then stands; NaN is no
+/// turn.
+#[pyfunction]
+fn chained_turns<'py>(py: Python<'py>, vector: &Bound<'py, PyAny>) -> Table<'py> {
+    let vector = Rows::<3>::new("vector", vector)?;
+    let values = vector.values()?;
+    let fill = move |out: &mut [f64]| -> Result<(), Infallible> {
+        let mut q = Quaternion::IDENTITY;
+        for (turn, out) in values.chunks_exact(3).zip(out.chunks_exact_mut(4)) {
+            let turn = Vector3::from_column_slice(turn);
+            if turn.norm_squared().is_finite() {
+                q = (q * Quaternion::exp(&turn)).renormalised();
+            }
+            out.copy_from_slice(&q.to_array());
+        }
+        Ok(())
+    };
+    Ok(filled_rows::<4, _, _>(py, vector.len(), fill, |never| match never {})?.0)
+}
+
 /// Rotation vectors (n, 3), rad, of quaternions (n, 4).
 #[pyfunction]
 fn rotation_vector_from_quaternion<'py>(py: Python<'py>, q: &Bound<'py, PyAny>) -> Table<'py> {
@@ -224,6 +244,7 @@ fn attitude_rmse<'py>(
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(quaternion_product, m)?)?;
     m.add_function(wrap_pyfunction!(quaternion_from_rotation_vector, m)?)?;
+    m.add_function(wrap_pyfunction!(chained_turns, m)?)?;
     m.add_function(wrap_pyfunction!(rotation_vector_from_quaternion, m)?)?;
     m.add_function(wrap_pyfunction!(euler_from_quaternion, m)?)?;
     m.add_function(wrap_pyfunction!(quaternion_from_euler, m)?)?;

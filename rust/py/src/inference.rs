@@ -197,7 +197,7 @@ impl PyProblem {
     }
 
     /// Log of the marginal likelihood of all logs under the `members`, their parameters near their present values, beside the slots `along`
-    /// that are always fitted; each of the `possible` slots may be there or not.
+    /// that are always fitted; each of the `possible` slots may be there or not. Minus infinity where the equations cannot be solved.
     fn ln_evidence(
         &self,
         py: Python<'_>,
@@ -210,7 +210,7 @@ impl PyProblem {
             let criterion = Criterion::new(&self.0);
             Search::new(&criterion, &along, &possible).ln_evidence(&members)
         })?;
-        found.ok_or_else(|| value_error("the normal equations cannot be solved"))
+        Ok(found.unwrap_or(f64::NEG_INFINITY))
     }
 
     /// What zeros do beside the slots given at the likeliest strength: (log, channel index, standard deviation of a walk's step over a
