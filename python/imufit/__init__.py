@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from imufit import figures as figures
     from imufit import fit as fit
     from imufit import grade as grade
+    from imufit import joining as joining
     from imufit import log as log
     from imufit import model as model
     from imufit import monitor as monitor
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from imufit import tune as tune
     from imufit._imufit import __version__
     from imufit.errors import InputError
+    from imufit.joining.join import join as join
     from imufit.log import Log, LogStream, open_log, read
     from imufit.loop import Fit, SensorModel, ladder
     from imufit.model.catalogue import catalogue, explain, load_effects
@@ -51,6 +53,7 @@ else:
         "figures",
         "fit",
         "grade",
+        "joining",
         "log",
         "model",
         "monitor",
@@ -64,6 +67,7 @@ else:
     _HOMES = {
         "_imufit": ("__version__",),
         "errors": ("InputError",),
+        "joining": ("join",),
         "log": ("Log", "LogStream", "open_log", "read"),
         "loop": ("Fit", "SensorModel", "ladder"),
         "model": ("Window", "catalogue", "effect", "explain", "load_effects"),
@@ -103,6 +107,7 @@ __all__ = [
     "catalogue",
     "effect",
     "explain",
+    "join",
     "ladder",
     "load_effects",
     "open_log",

@@ -23,6 +23,7 @@ from imufit.cli.explain import explain
 from imufit.cli.export import export
 from imufit.cli.fit import fit
 from imufit.cli.grade import grade
+from imufit.cli.join import join
 from imufit.cli.ladder import ladder
 from imufit.cli.monitor import monitor
 from imufit.cli.names import unknown
@@ -95,6 +96,7 @@ for _command in (
     tune,
     allan,
     convert,
+    join,
     record,
     monitor,
     recover,

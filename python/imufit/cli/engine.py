@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from imufit.emulate import Emulator
     from imufit.grade import BlindGrade
+    from imufit.joining import Joined
     from imufit.log import Contents, Log
+    from imufit.log.metadata import Frame
     from imufit.results import EffectCard, Ladder, Recording
     from imufit.simulate import Grade, Simulation, Truth
 
@@ -29,8 +31,17 @@ def open_logs(paths: Sequence[Path], mapping: Sequence[str] = ()) -> list[Any]:
     return [open_log(path, mapping) for path in paths]
 
 
-def read_log(path: Path, mapping: Sequence[str] = (), more: int = 0, gigabytes: float = 1.0, option: str = "") -> Log:
+def read_log(
+    path: Path,
+    mapping: Sequence[str] = (),
+    more: int = 0,
+    gigabytes: float = 1.0,
+    option: str = "",
+    bare: bool = False,
+) -> Log:
     """Read a whole log into memory; `mapping` as for `open_log`, `more` the bytes that will be made of each row.
+
+    A `bare` one needs neither a sensor nor a reference.
 
     All of it may take so many `gigabytes`; `option` allows more.
 
@@ -41,7 +52,7 @@ def read_log(path: Path, mapping: Sequence[str] = (), more: int = 0, gigabytes: 
     """
     from imufit.log import LogStream, parse_mapping  # noqa: PLC0415
 
-    return LogStream(path, mapping=parse_mapping(*mapping) or None).held(more, gigabytes, option)
+    return LogStream(path, mapping=parse_mapping(*mapping) or None, bare=bare).held(more, gigabytes, option)
 
 
 def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], settings: Mapping[str, float]) -> Any:
@@ -60,6 +71,31 @@ def calibrate_live(
 
     chosen = sensors or ("acc", "gyr", "mag")
     return calibrate_live(port, keep, mapping=parse_mapping(*mapping) or None, sensors=chosen, **options)
+
+
+def reference_log(
+    path: Path,
+    mapping: Sequence[str],
+    attitude: tuple[str, tuple[str, ...]] | None,
+    inverse: bool,
+    frame: Frame | None,
+) -> Log:
+    """Read a reference; its attitude stands in the columns of its kind, or in those of a log."""
+    from dataclasses import replace  # noqa: PLC0415
+
+    from imufit.joining import with_attitude  # noqa: PLC0415
+
+    log = read_log(path, mapping, bare=attitude is not None)
+    if attitude is not None:
+        log = with_attitude(log, *attitude, inverse=inverse)
+    return log if frame is None else replace(log, metadata=replace(log.metadata, frame=frame))
+
+
+def join(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joined:
+    """Lay a reference beside a sensor's log."""
+    from imufit.joining import join  # noqa: PLC0415
+
+    return join(log, reference, lag, skew)
 
 
 def some_rows(log: Any, rows: tuple[int, int]) -> Any:

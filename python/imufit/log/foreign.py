@@ -68,7 +68,7 @@ class Plan:
         return next(column for column in self.columns if column.target == "t")
 
 
-def plan_columns(names: Sequence[str], mapping: Mapping[str, str] | None, place: Place) -> Plan:
+def plan_columns(names: Sequence[str], mapping: Mapping[str, str] | None, place: Place, bare: bool = False) -> Plan:
     """Decide which columns of the file become which columns of the log.
 
     Parameters
@@ -79,6 +79,8 @@ def plan_columns(names: Sequence[str], mapping: Mapping[str, str] | None, place:
         Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
     place : Place
         To name the file in errors.
+    bare : bool
+        True if the file needs neither a sensor nor a reference: what it has becomes covariates.
 
     Raises
     ------
@@ -106,7 +108,7 @@ def plan_columns(names: Sequence[str], mapping: Mapping[str, str] | None, place:
         if name in changed[:index] or name in names or name in targets:
             raise place.error(f"column {name} is there twice", column=name, remedy="Give these columns other names.")
     columns = [*mapped, *kept]
-    _check_complete([column.target for column in columns], [shown[n] for n in names if n not in used], place)
+    _check_complete([column.target for column in columns], [shown[n] for n in names if n not in used], place, bare)
     notes = tuple(f"{place.name}: column {name} left out: the mapping gives that name to another" for name in lost)
     notes += tuple(
         f"{place.name}: column {name} has another name in the file, which is too long or cannot be printed"
@@ -160,7 +162,7 @@ def _signed(name: str) -> list[tuple[float, str]]:
     return [(1.0, name)]
 
 
-def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place) -> None:
+def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place, bare: bool) -> None:
     """Refuse a log with a missing or misspelt column, and name the nearest."""
     free = [name for name in unused if name not in CONTRACT]
     missing: dict[str, str] = {}
@@ -178,7 +180,7 @@ def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place)
     if missing:
         raise _missing(missing, targets, place)
     complete = [group for group in (*SENSORS, "ref_q") if all(column in targets for column in GROUPS[group])]
-    if not complete and "ref_angle" not in targets:
+    if not complete and "ref_angle" not in targets and not bare:
         raise place.error(
             "there is no sensor: neither acc_x acc_y acc_z nor gyr_* nor mag_* nor a reference ref_q*",
             remedy="Name the columns with --map acc_x=COLUMN[UNIT] and so on." + _listing(free),

@@ -33,13 +33,15 @@ class LogStream:
         Log file.
     mapping : mapping, optional
         Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
+    bare : bool
+        True if the file needs neither a sensor nor a reference: what it has becomes covariates.
     """
 
-    def __init__(self, path: str | Path, mapping: Mapping[str, str] | None = None) -> None:
+    def __init__(self, path: str | Path, mapping: Mapping[str, str] | None = None, bare: bool = False) -> None:
         self._path = Path(path)
         self._source = open_source(self._path)
         self._place = Place(self._path, self._source.line_of)
-        self._plan = plan_columns(self._source.names, mapping, self._place)
+        self._plan = plan_columns(self._source.names, mapping, self._place, bare)
         self._metadata = read_metadata(self._path, self._source.embedded)
         self._repair = self._scan()
         head = self._head()

@@ -1,0 +1,104 @@
+"""``imufit join``: a sensor's log and somebody else's reference become one log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import (
+    EXISTING,
+    LOG_ENDINGS,
+    OutputFile,
+    json_option,
+    keep_inputs,
+    map_option,
+    plot_option,
+)
+from imufit.cli.output import Output
+
+if TYPE_CHECKING:
+    from imufit.log.metadata import Frame
+
+
+class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
+    """A kind of attitude and its columns, such as ``euler-ZYX:yaw[deg],pitch[deg],roll[deg]``."""
+
+    name = "attitude"
+
+    def convert(
+        self,
+        value: str | tuple[str, tuple[str, ...]],
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> tuple[str, tuple[str, ...]]:
+        """Take kind and columns apart."""
+        if isinstance(value, tuple):
+            return value
+        kind, colon, columns = value.partition(":")
+        names = tuple(name.strip() for name in columns.split(","))
+        if not colon or not all(names):
+            self.fail(f"{value!r} names no columns: write KIND:COLUMN,COLUMN,...", param, ctx)
+        return kind, names
+
+
+@click.command(short_help="A sensor's log and somebody else's reference, on two clocks, become one log.")
+@click.argument("sensor", metavar="SENSOR", type=EXISTING)
+@click.argument("reference", metavar="REFERENCE", type=EXISTING)
+@map_option
+@click.option(
+    "--reference-map",
+    "reference_mapping",
+    multiple=True,
+    metavar="COL=NAME[unit]",
+    help="The same for the columns of REFERENCE, e.g. ref_qw=w. Repeatable.",
+)
+@click.option(
+    "--attitude",
+    type=AttitudeColumns(),
+    metavar="KIND:COLUMNS",
+    help="Columns that hold the attitude: quaternion:W,X,Y,Z, matrix:XX,XY,...,ZZ (row by row), "
+    "euler-ZYX:YAW[deg],PITCH[deg],ROLL[deg] (capitals: about the turned axes), angle-x:ANGLE[deg].",
+)
+@click.option("--inverse", is_flag=True, help="The attitude turns vectors of the reference frame into the body.")
+@click.option("--frame", type=click.Choice(("NED", "ENU", "NWU")), help="Frame of the reference attitude.")
+@click.option("--lag", type=float, metavar="S", help="Time by which the reference's stamps are late, if it is known.")
+@click.option("--skew", type=float, metavar="PPM", help="How much the reference's clock is fast, if it is known.")
+@click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
+@json_option
+@plot_option
+def join(
+    sensor: Path,
+    reference: Path,
+    *,
+    mapping: tuple[str, ...],
+    reference_mapping: tuple[str, ...],
+    attitude: tuple[str, tuple[str, ...]] | None,
+    inverse: bool,
+    frame: Frame | None,
+    lag: float | None,
+    skew: float | None,
+    output: Path,
+    json_file: Path | None,
+    plot_file: Path | None,
+) -> None:
+    """Lay the attitude of REFERENCE beside the readings of SENSOR, whose clock is another.
+
+    The lag is found by the angular rates of both, whatever the axes of the sensor on the body are; then lag, skew and
+    mount are refined on the attitude. LOG has all rows of SENSOR and, in rows of their own, all samples of REFERENCE.
+    """
+    keep_inputs([sensor, reference], [output, json_file, plot_file])
+    out = Output(json_file)
+    log = engine.read_log(sensor, mapping)
+    other = engine.reference_log(reference, reference_mapping, attitude, inverse, frame)
+    found = engine.join(log, other, lag, None if skew is None else 1e-6 * skew)
+    engine.write_log(found.log, output)
+    out.say(found.sentence, bold=True)
+    out.tables(found.tables())
+    out.say(*found.remarks)
+    out.wrote(output)
+    out.json({"log": str(output), **found.to_dict()})
+    if plot_file is not None:
+        out.plot(plot_file, found.plot())

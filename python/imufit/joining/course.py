@@ -1,0 +1,124 @@
+"""The attitude that a gyroscope alone gives, at any time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit import _imufit
+
+Array = NDArray[np.float64]
+
+GAP_STEPS: Final = 3.5
+"""A step this many times the usual one is a gap: one or two samples that were lost are not."""
+
+
+def gap_after(t: Array, least: float = 0.0) -> NDArray[np.bool_]:
+    """Say after which samples a gap follows.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Ascending times, s.
+    least : float
+        Shorter steps are no gaps, s.
+
+    Returns
+    -------
+    (n - 1,) array of bool
+    """
+    steps = np.diff(t)
+    return steps > max(GAP_STEPS * float(np.median(steps)), least) if steps.size else np.zeros(0, np.bool_)
+
+
+@dataclass(frozen=True)
+class Course:
+    """Angular rates of a gyroscope, integrated.
+
+    Attributes
+    ----------
+    t : (n,) array
+        Times, s.
+    rate : (n - 1, 3) array
+        Mean angular rate between two samples, rad/s, sensor axes.
+    attitude : (n, 4) array
+        Attitude at each sample, sensor to its axes at the first one; scalar first. Over a gap it stands still.
+    angle : (n, 3) array
+        Integral of the rates, axis by axis, rad.
+    gap : (n - 1,) array of bool
+        Where samples are missing.
+    """
+
+    t: Array
+    rate: Array
+    attitude: Array
+    angle: Array
+    gap: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, t: Array, gyr: Array) -> Course:
+        """Integrate rates.
+
+        Parameters
+        ----------
+        t : (n,) array
+            Ascending times, s.
+        gyr : (n, 3) array
+            Angular rates, rad/s; rows with NaN are left out.
+        """
+        there = np.isfinite(gyr).all(axis=1)
+        t, gyr = t[there], gyr[there]
+        gap = gap_after(t)
+        rate = 0.5 * (gyr[1:] + gyr[:-1])
+        turns = np.where(gap[:, None], 0.0, rate * np.diff(t)[:, None])
+        start = np.zeros((1, 3))
+        attitude = _imufit.chained_turns(np.concatenate((start, turns)))
+        return cls(t, rate, attitude, np.concatenate((start, np.cumsum(turns, axis=0))), gap)
+
+    def _place(self, t: Array) -> tuple[NDArray[np.intp], Array]:
+        place = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
+        return place, t - self.t[place]
+
+    def at(self, t: Array) -> Array:
+        """Attitude at some times within the course, (k, 4)."""
+        place, since = self._place(t)
+        since = np.where(self.gap[place], 0.0, since)
+        turn = _imufit.quaternion_from_rotation_vector(self.rate[place] * since[:, None])
+        return _imufit.quaternion_product(self.attitude[place], turn)
+
+    def angle_at(self, t: Array) -> Array:
+        """Integral of the rates up to some times within the course, (k, 3), rad."""
+        return np.stack([np.interp(t, self.t, self.angle[:, k]) for k in range(3)], axis=1)
+
+    def rate_at(self, t: Array) -> Array:
+        """Mean angular rate of the step in which each of some times lies, (k, 3), rad/s."""
+        return self.rate[self._place(t)[0]]
+
+    def seen(self, begin: Array, end: Array) -> NDArray[np.bool_]:
+        """Say which stretches lie within the course and touch no gap."""
+        count = np.concatenate(([0], np.cumsum(self.gap)))
+        first, _ = self._place(begin)
+        last, _ = self._place(end)
+        inside = (begin >= self.t[0]) & (end <= self.t[-1])
+        return np.asarray(inside & (count[last + 1] == count[first]))
+
+
+def reference_course(t: Array, q: Array) -> Course:
+    """Course of a reference: its turns from one sample to the next, as a gyroscope on the body would read them.
+
+    Parameters
+    ----------
+    t : (m,) array
+        Ascending times, s.
+    q : (m, 4) array
+        Attitudes, body to reference frame, scalar first, none of them NaN.
+    """
+    inverse = q * np.array([1.0, -1.0, -1.0, -1.0])
+    turns = _imufit.rotation_vector_from_quaternion(_imufit.quaternion_product(inverse[:-1], q[1:]))
+    gap = gap_after(t)
+    turns = np.where(gap[:, None], 0.0, turns)
+    angle = np.concatenate((np.zeros((1, 3)), np.cumsum(turns, axis=0)))
+    return Course(t, turns / np.diff(t)[:, None], q, angle, gap)

@@ -1,0 +1,254 @@
+"""Two recordings of one motion, on two clocks, become one log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit import _imufit
+from imufit.errors import InputError
+from imufit.joining.course import Course, gap_after, reference_course
+from imufit.joining.joined import Joined, RateTrace
+from imufit.joining.mount import SMALL, nearest_square_turn, turned
+from imufit.joining.refine import Aligned, refine
+from imufit.joining.search import Correlation, bin_width, binned, turn_between
+from imufit.log import Log
+
+Array = NDArray[np.float64]
+
+RIVAL: Final = 0.3
+"""A second lag with this share of the first one's log likelihood is looked at to a fraction of a sample as well."""
+WORSE: Final = 1.5
+"""It makes the lag ambiguous unless it leaves this many times as much of the rates (square): of a motion that repeats
+itself both leave the noise, of steps that resemble one another the wrong one leaves three times as much and more."""
+SAME: Final = 0.5
+"""Two maxima of the likelihood that lead to the same lag, to this many bins, are one."""
+LEAST_CORRELATION: Final = 0.3
+"""Below this correlation of the rates the two recordings are not called one motion."""
+TOUCHING: Final = 1e-6
+"""Samples of the reference this near to a row of the sensor stand in that row, s."""
+
+
+def join(log: Log, reference: Log, lag: float | None = None, skew: float | None = None) -> Joined:
+    """Put the reference of one recording beside the sensor of another.
+
+    The lag between the clocks is found by correlating the angular rates over all of both recordings, in whatever way
+    the sensor is mounted; then lag, skew and mount are refined on the attitude. The joined log has every row of the
+    sensor, with the reference filled in between its samples (``ref_exact`` 0), and a row for every sample of the
+    reference (``ref_exact`` 1). Gaps of the reference stay open.
+
+    Parameters
+    ----------
+    log : Log
+        With a gyroscope.
+    reference : Log
+        With a reference attitude `ref_q` of a body on which the sensor is fixed, on any clock.
+    lag : float, optional
+        Time by which the reference's stamps are late at its first sample, s, where it is known: the reference's clock
+        less the sensor's. Found if None.
+    skew : float, optional
+        Rate of the reference's clock over the sensor's, less one, where it is known.
+
+    Returns
+    -------
+    Joined
+
+    Raises
+    ------
+    InputError
+        A recording lacks what is needed, the rates have nothing in common, or several lags explain them equally well.
+    """
+    sensor, body, rows = _courses(log, reference)
+    rates = Correlation(sensor, body)
+    if lag is None:
+        aligned, traces, rival = _likeliest(sensor, body, rates, skew, (log, reference))
+    else:
+        refined = refine(sensor, body, lag, rates.at(lag).mount, skew, known=True)
+        if refined is None:
+            raise _apart(reference)
+        rival = 0.0
+        aligned, traces = _compared(sensor, body, refined)
+    square, left = nearest_square_turn(aligned.mount)
+    mount = square if left < SMALL else aligned.mount
+    return Joined(
+        log=_joined(log, reference, rows, aligned, mount),
+        lag=aligned.lag,
+        lag_error=aligned.lag_error,
+        skew=aligned.skew,
+        skew_error=aligned.skew_error,
+        mount=mount,
+        left=left,
+        correlation=traces.correlation,
+        overlap=traces.overlap,
+        attitude_error=aligned.attitude_error,
+        rival=rival,
+        traces=traces,
+    )
+
+
+def _courses(log: Log, reference: Log) -> tuple[Course, Course, NDArray[np.intp]]:
+    if log.gyr is None or not np.isfinite(log.gyr).all(axis=1).sum() > 1:
+        raise InputError(
+            "the log has no gyroscope, and only its rates show when the reference turned",
+            file=log.path or "log",
+            column="gyr_x",
+            remedy="Record the gyroscope too, or name its columns with --map.",
+        )
+    if reference.ref_q is None or not reference.has_reference.sum() > 1:
+        raise InputError(
+            "the file has no reference attitude",
+            file=reference.path or "reference",
+            column="ref_qw",
+            remedy="Name its columns, e.g. --reference-map ref_qw=w.",
+        )
+    rows = np.flatnonzero(reference.has_reference)
+    rows = rows[np.concatenate(([True], np.diff(reference.t[rows]) > 0.0))]
+    return Course.of(log.t, log.gyr), reference_course(reference.t[rows], reference.ref_q[rows]), rows
+
+
+def _likeliest(
+    sensor: Course, body: Course, rates: Correlation, skew: float | None, logs: tuple[Log, Log]
+) -> tuple[Aligned, RateTrace, float]:
+    """Return the likeliest alignment, and by how much of what the next one leaves of the rates it leaves (squares)."""
+    peaks = rates.peaks()
+    near = [peak for peak in peaks if peak.gain >= RIVAL * peaks[0].gain]
+    found: list[tuple[Aligned, RateTrace]] = []
+    for peak in near:
+        aligned = refine(sensor, body, peak.lag, peak.mount, skew)
+        if aligned is None or any(abs(aligned.lag - other.lag) <= SAME * rates.step for other, _ in found):
+            continue
+        found.append(_compared(sensor, body, aligned))
+    if not found:
+        raise _apart(logs[1])
+    found.sort(key=lambda each: -each[1].gain)
+    best, traces = found[0]
+    if traces.correlation < LEAST_CORRELATION:
+        raise _unrelated(traces.correlation, *logs)
+    rival = max((traces.left / each.left for _, each in found[1:]), default=0.0)
+    if rival * WORSE > 1.0:
+        second, others = min(found[1:], key=lambda each: each[1].left)
+        raise InputError(
+            f"the lag is ambiguous: {best.lag:.3f} s and {second.lag:.3f} s make the rates agree equally well "
+            f"(correlation {traces.correlation:.3f} and {others.correlation:.3f})",
+            file=logs[0].path or "log",
+            remedy="Move the sensor once as at no other time, or give the lag with --lag.",
+        )
+    return best, traces, rival
+
+
+def _apart(reference: Log) -> InputError:
+    return InputError(
+        "the recordings have no few seconds of motion in common that no gap interrupts",
+        file=reference.path or "reference",
+        remedy="Record sensor and reference at the same time, and turn the sensor.",
+    )
+
+
+def _unrelated(correlation: float, log: Log, reference: Log) -> InputError:
+    return InputError(
+        f"the rates of the sensor and of {reference.path or 'the reference'} are not those of one motion: "
+        f"their correlation is {correlation:.2f}",
+        file=log.path or "log",
+        remedy="Are they of the same recording, and is the attitude that of the body in the reference frame?",
+    )
+
+
+def _compared(sensor: Course, body: Course, aligned: Aligned) -> tuple[Aligned, RateTrace]:
+    """Return the alignment with the mount that makes the mean rates agree best, and these rates."""
+    step = bin_width(sensor, body)
+    own, other = binned(sensor, body, step)
+    edges = other.start + step * np.arange(len(other.values) + 1, dtype=np.float64)
+    on_sensor = aligned.on_sensor_clock(edges, float(body.t[0]))
+    known = other.known & sensor.seen(on_sensor[:-1], on_sensor[1:])
+    inside = np.clip(on_sensor, sensor.t[0], sensor.t[-1])
+    measured = np.diff(sensor.angle_at(inside), axis=0) / np.diff(on_sensor)[:, None]
+    correlation, mount = 0.0, aligned.mount
+    if known.sum() > 2:
+        measured, expected = (each - each.mean(axis=0) for each in (measured[known], other.values[known]))
+        mount = turn_between(measured.T @ expected)
+        size = np.sqrt(np.sum(measured**2) * np.sum(expected**2))
+        correlation = float(np.sum(measured * (expected @ mount.T)) / size) if size > 0.0 else 0.0
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    own_middle = own.start + step * (np.arange(len(own.values), dtype=np.float64) + 0.5)
+    traces = RateTrace(
+        sensor_t=own_middle,
+        sensor=np.where(own.known, np.linalg.norm(own.values, axis=1), np.nan),
+        reference_t=middle,
+        reference=np.where(other.known, np.linalg.norm(other.values, axis=1), np.nan),
+        aligned_t=aligned.on_sensor_clock(middle, float(body.t[0])),
+        correlation=correlation,
+        overlap=float(known.sum() * step),
+    )
+    return replace(aligned, mount=mount), traces
+
+
+def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, mount: Array) -> Log:
+    """Lay the rows of both in the order of the sensor's clock."""
+    assert reference.ref_q is not None
+    t_ref = aligned.on_sensor_clock(reference.t[rows], float(reference.t[rows[0]]))
+    q_ref = turned(reference.ref_q[rows], mount)
+    within = (t_ref >= log.t[0]) & (t_ref <= log.t[-1])
+    at, between = _filled(log.t, t_ref, q_ref)
+    nearest = np.clip(np.searchsorted(log.t, t_ref), 1, log.n - 1)
+    nearest -= np.abs(t_ref - log.t[nearest - 1]) < np.abs(t_ref - log.t[nearest])
+    touching = np.abs(t_ref - log.t[nearest]) <= TOUCHING
+    exact = np.zeros(log.n)
+    exact[nearest[touching]] = 1.0
+    at[nearest[touching]] = q_ref[touching]
+    own = np.flatnonzero(within & ~touching)
+    t = np.concatenate((log.t, t_ref[own]))
+    order = np.argsort(t, kind="stable")
+
+    def laid(values: Array | None, more: Array | None = None) -> Array | None:
+        if values is None:
+            return None
+        added = np.full((len(own), *values.shape[1:]), np.nan) if more is None else more
+        return np.asarray(np.concatenate((values, added))[order])
+
+    position = None
+    if reference.ref_p is not None:
+        p_ref = reference.ref_p[rows]
+        filled = np.stack([np.interp(log.t, t_ref, p_ref[:, k]) for k in range(3)], axis=1)
+        filled[~between] = np.nan
+        filled[nearest[touching]] = p_ref[touching]
+        position = laid(filled, p_ref[own])
+    labels = {
+        name: np.concatenate((cells, np.full(len(own), "", dtype=object)))[order] for name, cells in log.labels.items()
+    }
+    covariates = {name: laid(values) for name, values in log.covariates.items()}
+    metadata = replace(
+        log.metadata,
+        frame=reference.metadata.frame,
+        extra={**log.metadata.extra, "lag": aligned.lag, "skew": aligned.skew, "mount": mount.tolist()},
+    )
+    return Log(
+        t=np.asarray(t[order]),
+        acc=laid(log.acc),
+        gyr=laid(log.gyr),
+        mag=laid(log.mag),
+        temp=laid(log.temp),
+        ref_q=laid(at, q_ref[own]),
+        ref_p=position,
+        pose=None if log.pose is None else np.concatenate((log.pose, np.full(len(own), "", dtype=object)))[order],
+        covariates={name: values for name, values in covariates.items() if values is not None}
+        | {"ref_exact": np.asarray(laid(exact, np.ones(len(own))))},
+        labels=labels,
+        metadata=metadata,
+        notes=log.notes,
+    )
+
+
+def _filled(t: Array, t_ref: Array, q_ref: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the reference at some times, (n, 4), by slerp; NaN outside and in gaps."""
+    place = np.clip(np.searchsorted(t_ref, t, side="right") - 1, 0, len(t_ref) - 2)
+    between = (t >= t_ref[0]) & (t <= t_ref[-1]) & ~gap_after(t_ref)[place]
+    conjugate = np.array([1.0, -1.0, -1.0, -1.0])
+    turns = _imufit.rotation_vector_from_quaternion(_imufit.quaternion_product(q_ref[:-1] * conjugate, q_ref[1:]))
+    part = (t - t_ref[place]) / np.diff(t_ref)[place]
+    turn = _imufit.quaternion_from_rotation_vector(np.where(between, part, 0.0)[:, None] * turns[place])
+    filled = _imufit.quaternion_product(q_ref[place], turn)
+    filled[~between] = np.nan
+    return filled, between

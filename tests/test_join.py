@@ -1,0 +1,158 @@
+"""Two recordings of one motion on two clocks: simulated by `join_pairs`, which shares no code with imufit, and real."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import imufit
+import numpy as np
+import pytest
+from imufit.errors import InputError
+from imufit.joining import with_attitude
+from imufit.log import Log
+from join_pairs import Pair, pair, repetitive, unrelated
+from recording import recording
+from scipy.spatial.transform import Rotation
+
+FRESH = (3001, 3002, 3003, 3006, 3008, 3010)
+"""Seeds of pairs; `benches/join.py` takes hundreds of others."""
+
+
+def sensor_of(one: Pair) -> Log:
+    return Log(t=one.t, acc=one.acc, gyr=one.gyr)
+
+
+def reference_of(one: Pair) -> Log:
+    log = Log(t=one.ref_t, ref_q=one.ref_q, ref_p=one.ref_p)
+    return replace(log, metadata=replace(log.metadata, frame="ENU"))
+
+
+def tolerance(one: Pair) -> float:
+    """Two milliseconds and a tenth of the reference's interval, s."""
+    return 0.002 + 0.1 * float(np.median(np.diff(one.ref_t)))
+
+
+def test_the_lag_of_a_pair_is_found_in_the_middle_of_what_both_saw_or_it_is_refused() -> None:
+    refused = 0
+    for seed in FRESH:
+        one = pair(seed)
+        try:
+            joined = imufit.join(sensor_of(one), reference_of(one))
+        except InputError:
+            refused += 1
+            continue
+        late = one.ref_t[0] - one.lag
+        middle = 0.5 * (max(one.t[0], late) + min(one.t[-1], one.ref_t[-1] - one.lag)) - late
+        found, truth = joined.lag + joined.skew * middle, one.lag + one.skew * middle
+        assert found == pytest.approx(truth, abs=tolerance(one) + 3.0 * joined.lag_error), seed
+    assert refused <= 1
+
+
+@pytest.mark.parametrize("seed", [3101, 3102])
+def test_a_motion_that_repeats_itself_is_called_ambiguous(seed: int) -> None:
+    one = repetitive(seed)
+    with pytest.raises(InputError, match="the lag is ambiguous"):
+        imufit.join(sensor_of(one), reference_of(one))
+    known = imufit.join(sensor_of(one), reference_of(one), lag=one.lag)
+    assert known.lag == pytest.approx(one.lag, abs=1e-9)
+    assert known.correlation > 0.9
+
+
+@pytest.mark.parametrize("seed", [3201, 3202, 3203])
+def test_recordings_of_different_motions_are_not_joined(seed: int) -> None:
+    one = unrelated(seed)
+    with pytest.raises(InputError, match=r"ambiguous|not those of one motion|in common"):
+        imufit.join(sensor_of(one), reference_of(one))
+
+
+@pytest.mark.parametrize("name", ["05_undisturbed_slow_rotation_with_breaks_B", "16_undisturbed_fast_translation_B"])
+def test_a_lag_put_into_a_recording_is_found(name: str) -> None:
+    log = imufit.read(recording(f"broad/{name}.parquet"))
+    assert log.ref_q is not None
+    assert log.gyr is not None
+    turn = Rotation.from_euler("z", 90, degrees=True)
+    there = np.isfinite(log.ref_q).all(axis=1)
+    ref_q = (Rotation.from_quat(log.ref_q[there][:, [1, 2, 3, 0]]) * turn).as_quat()[:, [3, 0, 1, 2]]
+    sensor = Log(t=log.t, gyr=log.gyr, acc=log.acc)
+    plain = imufit.join(sensor, Log(t=log.t[there], ref_q=log.ref_q[there]))
+    late = imufit.join(sensor, Log(t=log.t[there] + 71.25, ref_q=ref_q))
+    assert late.lag - plain.lag == pytest.approx(71.25, abs=0.002)
+    # The marker axes are turned by 90 degrees about z: the x of the sensor lies on minus their y.
+    np.testing.assert_allclose(late.mount, plain.mount @ turn.as_matrix(), atol=1e-12)
+    assert late.correlation > 0.99
+
+
+def test_the_joined_log_has_all_rows_of_both_and_gaps_stay_open() -> None:
+    one = pair(3001)
+    joined = imufit.join(sensor_of(one), reference_of(one)).log
+    exact = joined.covariates["ref_exact"] == 1.0
+    assert joined.gyr is not None
+    assert joined.ref_q is not None
+    assert np.isfinite(joined.gyr[:, 0]).sum() == np.isfinite(one.gyr[:, 0]).sum()
+    assert np.isfinite(joined.ref_q[exact]).all()
+    assert (np.diff(joined.t) > 0.0).all()
+    assert joined.metadata.frame == "ENU"
+    t = joined.t[exact]
+    gap = int(np.argmax(np.diff(t)))
+    if t[gap + 1] - t[gap] > 5.0 * float(np.median(np.diff(t))):
+        within = (joined.t > t[gap]) & (joined.t < t[gap + 1])
+        assert np.isnan(joined.ref_q[within]).all()
+
+
+def test_attitudes_are_read_as_others_write_them() -> None:
+    rng = np.random.default_rng(5)
+    turns = Rotation.random(20, random_state=rng)
+    q = turns.as_quat()[:, [3, 0, 1, 2]]
+    yaw, pitch, roll = turns.as_euler("ZYX", degrees=True).T
+    matrix = {f"m{k}": turns.as_matrix().reshape(-1, 9)[:, k] for k in range(9)}
+    back = turns.inv().as_quat()
+    columns = {"yaw": yaw, "pitch": pitch, "roll": roll, **matrix, **{f"q{k}": back[:, k] for k in range(4)}}
+    log = Log(t=np.arange(20.0), covariates=columns)
+    for made in (
+        with_attitude(log, "euler-ZYX", ("yaw[deg]", "pitch[deg]", "roll[deg]")),
+        with_attitude(log, "matrix", tuple(matrix)),
+        with_attitude(log, "quaternion", ("q3", "q0", "q1", "q2"), inverse=True),
+    ):
+        assert made.ref_q is not None
+        same = np.abs(np.sum(made.ref_q * q, axis=1))
+        np.testing.assert_allclose(same, 1.0, atol=1e-9)
+    tilted = with_attitude(log, "angle-x", ("roll[deg]",))
+    assert tilted.ref_q is not None
+    np.testing.assert_allclose(tilted.ref_q[:, 1], np.sin(np.deg2rad(roll) / 2.0), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "columns", "said"),
+    [
+        ("euler", ("a", "b", "c"), "not a kind of attitude"),
+        ("euler-ZYX", ("a", "b"), "has 3 columns, 2 were named"),
+        ("euler-ZYX", ("a", "b", "yaw"), "there is no such column"),
+        ("quaternion", ("a", "b", "c", "a"), "does not have unit length in 3 of 3 rows"),
+        ("matrix", ("a",) * 9, "not a rotation"),
+    ],
+)
+def test_what_is_not_an_attitude_is_refused(kind: str, columns: tuple[str, ...], said: str) -> None:
+    log = Log(t=np.arange(3.0), covariates={name: np.full(3, 2.0) for name in "abc"})
+    with pytest.raises(InputError, match=said):
+        with_attitude(log, kind, columns)
+
+
+def test_the_command_joins_euler_angles_of_another_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from imufit.cli.app import main
+
+    one = pair(3002)
+    sensor_of(one).write(tmp_path / "sensor.csv")
+    there = np.isfinite(one.ref_q).all(axis=1)
+    angles = Rotation.from_quat(one.ref_q[there][:, [1, 2, 3, 0]]).as_euler("ZYX", degrees=True)
+    rows = np.column_stack((one.ref_t[there], angles))
+    np.savetxt(tmp_path / "mocap.csv", rows, delimiter=",", header="t,yaw,pitch,roll", comments="")
+    arguments = [str(tmp_path / "sensor.csv"), str(tmp_path / "mocap.csv"), "-o", str(tmp_path / "log.parquet")]
+    more = ["--attitude", "euler-ZYX:yaw[deg],pitch[deg],roll[deg]", "--frame", "ENU", "--json", "-"]
+    assert main(["join", *arguments, *more]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["lag"] == pytest.approx(one.lag, abs=0.01)
+    assert imufit.read(tmp_path / "log.parquet").n == answer["rows"]
+    assert main(["join", *arguments[::-1][2:], *arguments[2:]]) == 2
+    assert "there is no sensor" in capsys.readouterr().err
