@@ -14,7 +14,7 @@ from imufit.joining.course import Course, gap_after, reference_course
 from imufit.joining.joined import Joined, RateTrace
 from imufit.joining.mount import SMALL, nearest_square_turn, turned
 from imufit.joining.refine import Aligned, refine
-from imufit.joining.search import Correlation, bin_width, binned, turn_between
+from imufit.joining.search import LEAST_OVERLAP, Correlation, bin_width, binned, turn_between
 from imufit.log import Log
 
 Array = NDArray[np.float64]
@@ -62,6 +62,8 @@ def join(log: Log, reference: Log, lag: float | None = None, skew: float | None 
         A recording lacks what is needed, the rates have nothing in common, or several lags explain them equally well.
     """
     sensor, body, rows = _courses(log, reference)
+    if min(float(course.t[-1] - course.t[0]) for course in (sensor, body)) < LEAST_OVERLAP:
+        raise _apart(reference)
     rates = Correlation(sensor, body)
     if lag is None:
         aligned, traces, rival = _likeliest(sensor, body, rates, skew, (log, reference))
