@@ -51,7 +51,7 @@ def joined_rates(trace: TraceLike, sentence: str) -> Figure:
     trace : TraceLike
         Rates of both.
     sentence : str
-        What was found.
+        Title of the figure.
 
     Returns
     -------

@@ -9,29 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
+from imufit.log.segments import gap_after
 
 Array = NDArray[np.float64]
 
-GAP_STEPS: Final = 3.5
-"""A step this many times the usual one is a gap: one or two samples that were lost are not."""
-
-
-def gap_after(t: Array, least: float = 0.0) -> NDArray[np.bool_]:
-    """Say after which samples a gap follows.
-
-    Parameters
-    ----------
-    t : (n,) array
-        Ascending times, s.
-    least : float
-        Shorter steps are no gaps, s.
-
-    Returns
-    -------
-    (n - 1,) array of bool
-    """
-    steps = np.diff(t)
-    return steps > max(GAP_STEPS * float(np.median(steps)), least) if steps.size else np.zeros(0, np.bool_)
+CONJUGATE: Final = np.array([1.0, -1.0, -1.0, -1.0])
+"""Factor of a quaternion's components that makes it the inverse turn."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +76,6 @@ class Course:
         """Integral of the rates up to some times within the course, (k, 3), rad."""
         return np.stack([np.interp(t, self.t, self.angle[:, k]) for k in range(3)], axis=1)
 
-    def rate_at(self, t: Array) -> Array:
-        """Mean angular rate of the step in which each of some times lies, (k, 3), rad/s."""
-        return self.rate[self._place(t)[0]]
-
     def seen(self, begin: Array, end: Array) -> NDArray[np.bool_]:
         """Say which stretches lie within the course and touch no gap."""
         count = np.concatenate(([0], np.cumsum(self.gap)))
@@ -116,8 +95,7 @@ def reference_course(t: Array, q: Array) -> Course:
     q : (m, 4) array
         Attitudes, body to reference frame, scalar first, none of them NaN.
     """
-    inverse = q * np.array([1.0, -1.0, -1.0, -1.0])
-    turns = _imufit.rotation_vector_from_quaternion(_imufit.quaternion_product(inverse[:-1], q[1:]))
+    turns = _imufit.rotation_vector_from_quaternion(_imufit.quaternion_product(q[:-1] * CONJUGATE, q[1:]))
     gap = gap_after(t)
     turns = np.where(gap[:, None], 0.0, turns)
     angle = np.concatenate((np.zeros((1, 3)), np.cumsum(turns, axis=0)))

@@ -8,13 +8,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit import _imufit
 from imufit.errors import InputError
-from imufit.joining.course import Course, gap_after, reference_course
+from imufit.joining.course import Course, reference_course
 from imufit.joining.joined import Joined, RateTrace
 from imufit.joining.mount import SMALL, nearest_square_turn, turned
 from imufit.joining.refine import Aligned, refine
-from imufit.joining.search import LEAST_OVERLAP, Correlation, bin_width, binned, turn_between
+from imufit.joining.search import LEAST_OVERLAP, Correlation, turn_between
 from imufit.log import Log
 
 Array = NDArray[np.float64]
@@ -72,7 +71,7 @@ def join(log: Log, reference: Log, lag: float | None = None, skew: float | None 
         if refined is None:
             raise _apart(reference)
         rival = 0.0
-        aligned, traces = _compared(sensor, body, refined)
+        aligned, traces = _compared(sensor, body, rates, refined)
     square, left = nearest_square_turn(aligned.mount)
     mount = square if left < SMALL else aligned.mount
     return Joined(
@@ -122,7 +121,7 @@ def _likeliest(
         aligned = refine(sensor, body, peak.lag, peak.mount, skew)
         if aligned is None or any(abs(aligned.lag - other.lag) <= SAME * rates.step for other, _ in found):
             continue
-        found.append(_compared(sensor, body, aligned))
+        found.append(_compared(sensor, body, rates, aligned))
     if not found:
         raise _apart(logs[1])
     found.sort(key=lambda each: -each[1].gain)
@@ -158,10 +157,9 @@ def _unrelated(correlation: float, log: Log, reference: Log) -> InputError:
     )
 
 
-def _compared(sensor: Course, body: Course, aligned: Aligned) -> tuple[Aligned, RateTrace]:
+def _compared(sensor: Course, body: Course, rates: Correlation, aligned: Aligned) -> tuple[Aligned, RateTrace]:
     """Return the alignment with the mount that makes the mean rates agree best, and these rates."""
-    step = bin_width(sensor, body)
-    own, other = binned(sensor, body, step)
+    own, other, step = rates.own, rates.other, rates.step
     edges = other.start + step * np.arange(len(other.values) + 1, dtype=np.float64)
     on_sensor = aligned.on_sensor_clock(edges, float(body.t[0]))
     known = other.known & sensor.seen(on_sensor[:-1], on_sensor[1:])
@@ -193,7 +191,9 @@ def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, 
     t_ref = aligned.on_sensor_clock(reference.t[rows], float(reference.t[rows[0]]))
     q_ref = turned(reference.ref_q[rows], mount)
     within = (t_ref >= log.t[0]) & (t_ref <= log.t[-1])
-    at, between = _filled(log.t, t_ref, q_ref)
+    course = reference_course(t_ref, q_ref)
+    between = course.seen(log.t, log.t)
+    at = np.where(between[:, None], course.at(log.t), np.nan)
     nearest = np.clip(np.searchsorted(log.t, t_ref), 1, log.n - 1)
     nearest -= np.abs(t_ref - log.t[nearest - 1]) < np.abs(t_ref - log.t[nearest])
     touching = np.abs(t_ref - log.t[nearest]) <= TOUCHING
@@ -241,16 +241,3 @@ def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, 
         metadata=metadata,
         notes=log.notes,
     )
-
-
-def _filled(t: Array, t_ref: Array, q_ref: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the reference at some times, (n, 4), by slerp; NaN outside and in gaps."""
-    place = np.clip(np.searchsorted(t_ref, t, side="right") - 1, 0, len(t_ref) - 2)
-    between = (t >= t_ref[0]) & (t <= t_ref[-1]) & ~gap_after(t_ref)[place]
-    conjugate = np.array([1.0, -1.0, -1.0, -1.0])
-    turns = _imufit.rotation_vector_from_quaternion(_imufit.quaternion_product(q_ref[:-1] * conjugate, q_ref[1:]))
-    part = (t - t_ref[place]) / np.diff(t_ref)[place]
-    turn = _imufit.quaternion_from_rotation_vector(np.where(between, part, 0.0)[:, None] * turns[place])
-    filled = _imufit.quaternion_product(q_ref[place], turn)
-    filled[~between] = np.nan
-    return filled, between

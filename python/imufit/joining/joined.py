@@ -77,7 +77,7 @@ class Joined:
     overlap : float
         Length of the common stretch, s.
     attitude_error : float
-        What the gyroscope leaves of the reference's turns within a few seconds, RMS over axes, rad.
+        RMS over axes of the attitude error within a block, rad.
     rival : float
         Share of the rates (square) that is left at this lag over that at the next likeliest one; 0 without one.
     traces : RateTrace

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.joining.course import CONJUGATE
 from imufit.log import Log
 
 Array = NDArray[np.float64]
@@ -50,14 +51,14 @@ def with_attitude(log: Log, kind: str, columns: Sequence[str], inverse: bool = F
     Raises
     ------
     InputError
-        The kind or a column is not there, or the numbers are no attitude.
+        The kind is unknown, a column is missing, or the numbers are not an attitude.
     """
     values = np.stack([_column(log, name, kind) for name in columns], axis=1)
     q = np.full((log.n, 4), np.nan)
     there = np.isfinite(values).all(axis=1)
     q[there] = _attitudes(log, kind, columns, values[there])
     if inverse:
-        q = q * np.array([1.0, -1.0, -1.0, -1.0])
+        q = q * CONJUGATE
     used = {name.removesuffix(_DEGREES).removesuffix(_RADIANS) for name in columns}
     covariates = {name: column for name, column in log.covariates.items() if name not in used}
     return replace(log, ref_q=q, covariates=covariates)

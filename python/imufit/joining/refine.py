@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.joining.course import Course
+from imufit.joining.course import CONJUGATE, Course
 from imufit.joining.search import turn_between
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ class Aligned:
     mount : (3, 3) array
         Turn from the reference body's axes to the sensor's.
     attitude_error : float
-        What remains of the attitude within a block, RMS over axes, rad.
+        RMS over axes of the attitude error within a block, rad.
     blocks : int
         Blocks compared.
     """
@@ -159,20 +159,19 @@ _Guess = tuple[float, float, Array, float]
 
 def _block(
     sensor: Course, reference: Course, rows: NDArray[np.intp], guess: _Guess
-) -> tuple[Array, Array, Array, Array] | None:
-    """Return error (k, 3), columns of the unknowns (k, 3, 11), those of the block (k, 3, 6) and the times (k,)."""
+) -> tuple[Array, Array, Array] | None:
+    """Return error (k, 3), columns of the unknowns (k, 3, 11) and those of the block (k, 3, 6)."""
     lag, skew, mount, middle = guess
     since = reference.t[rows] - middle
     t = reference.t[rows] - lag - skew * since
     if not sensor.seen(t[:1], t[-1:])[0]:
         return None
-    conjugate = np.array([1.0, -1.0, -1.0, -1.0])
     own = sensor.at(t)
-    own = _imufit.quaternion_product(np.broadcast_to(own[0] * conjugate, own.shape).copy(), own)
+    own = _imufit.quaternion_product(np.broadcast_to(own[0] * CONJUGATE, own.shape).copy(), own)
     q = reference.attitude[rows]
-    q = _imufit.quaternion_product(np.broadcast_to(q[0] * conjugate, q.shape).copy(), q)
+    q = _imufit.quaternion_product(np.broadcast_to(q[0] * CONJUGATE, q.shape).copy(), q)
     turned = _imufit.quaternion_from_rotation_vector(_imufit.rotation_vector_from_quaternion(q) @ mount.T)
-    error = _imufit.rotation_vector_from_quaternion(_imufit.quaternion_product(own * conjugate, turned))
+    error = _imufit.rotation_vector_from_quaternion(_imufit.quaternion_product(own * CONJUGATE, turned))
     # Over more than a sample: the noise of the rate at a sample is part of the error that it is to explain.
     rate = (sensor.angle_at(t + SMOOTH) - sensor.angle_at(t - SMOOTH)) / (2.0 * SMOOTH)
     angle = sensor.angle_at(t) - sensor.angle_at(t[:1])
@@ -187,7 +186,7 @@ def _block(
         unit = np.broadcast_to(np.eye(3)[i], (k, 3)).copy()
         at_start[:, :, i] = _imufit.rotate_back(own, unit)
         at_start[:, i, 3 + i] = t - t[0]
-    return error, columns, at_start, t
+    return error, columns, at_start
 
 
 def _without_start(values: Array, at_start: Array) -> Array:
@@ -220,7 +219,7 @@ def _sums(
         found = _block(sensor, reference, chosen, guess) if len(chosen) >= LEAST_SAMPLES else None
         if found is None:
             continue
-        error, columns, at_start, _ = found
+        error, columns, at_start = found
         left = _without_start(np.concatenate((error[:, :, None], columns), axis=2), at_start)
         information += left[:, 1:].T @ left[:, 1:]
         scores.append(left[:, 1:].T @ left[:, 0])
@@ -240,7 +239,7 @@ def _tame(
         found = _block(sensor, reference, rows, guess)
         if found is None:
             continue
-        error, _, at_start, _ = found
+        error, _, at_start = found
         # By medians first: the start of the block may itself be wild.
         middle = error - np.median(error, axis=0)
         left = _without_start(middle[:, :, None], at_start).reshape(-1, 3)

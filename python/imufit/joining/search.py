@@ -69,10 +69,6 @@ class Candidate:
     ----------
     lag : float
         Time by which the reference's stamps are late, s: its clock less the sensor's.
-    correlation : float
-        Of the rates in the common stretch, the reference turned to agree best; 0 to 1.
-    overlap : float
-        Length of the common stretch, s, gaps taken off.
     gain : float
         Log of the likelihood ratio of "the rates are the same" over "they are unrelated", in units of one bin.
     mount : (3, 3) array
@@ -80,8 +76,6 @@ class Candidate:
     """
 
     lag: float
-    correlation: float
-    overlap: float
     gain: float
     mount: Array
 
@@ -108,11 +102,22 @@ class Correlation:
     ----------
     sensor, reference : Course
         Integrated rates, each on its own clock.
+
+    Attributes
+    ----------
+    step : float
+        Width of the bins, s.
+    own, other : Rates
+        Mean rates of sensor and reference.
+    gain : (lags,) array
+        Log of the likelihood ratio at every lag, as in `Candidate`.
+    shared : (lags, 3, 3) array
+        Sums of the products of the rates at every lag.
     """
 
     def __init__(self, sensor: Course, reference: Course) -> None:
         self.step = bin_width(sensor, reference)
-        own, other = binned(sensor, reference, self.step)
+        self.own, self.other = own, other = binned(sensor, reference, self.step)
         n, m = len(own.values), len(other.values)
         self.first = other.start - own.start + (m - 1) * self.step
         size = fft.next_fast_len(n + m, real=True)
@@ -127,19 +132,19 @@ class Correlation:
         # Where there is none, rounding may leave less.
         rounding = 1e-12 * np.array([size.sum() for size in sizes])
         energy = correlated(sizes[0], known[1]) - rounding[0], correlated(known[0], sizes[1]) - rounding[1]
-        self.common = correlated(known[0], known[1])
+        common = correlated(known[0], known[1])
         self.shared = np.empty((n + m - 1, 3, 3))
         for i in range(3):
             for k in range(3):
                 self.shared[:, i, k] = correlated(own.values[:, i], other.values[:, k])
         least = max(LEAST_OVERLAP, LEAST_SHARE * min(known[0].sum(), known[1].sum()) * self.step)
-        usable = (self.common * self.step >= least) & (energy[0] > 0.0) & (energy[1] > 0.0)
+        usable = (common * self.step >= least) & (energy[0] > 0.0) & (energy[1] > 0.0)
         singular = np.linalg.svd(self.shared[usable], compute_uv=False)
         sign = np.sign(np.linalg.det(self.shared[usable]))
         agreed = singular[:, 0] + singular[:, 1] + sign * singular[:, 2]
-        self.values = np.zeros(n + m - 1)
-        self.values[usable] = np.clip(agreed / np.sqrt(energy[0][usable] * energy[1][usable]), 0.0, 1.0 - 1e-9)
-        self.gain = -0.5 * self.common * np.log1p(-(self.values**2))
+        values = np.zeros(n + m - 1)
+        values[usable] = np.clip(agreed / np.sqrt(energy[0][usable] * energy[1][usable]), 0.0, 1.0 - 1e-9)
+        self.gain = -0.5 * common * np.log1p(-(values**2))
 
     def at(self, lag: float) -> Candidate:
         """Return what there is at a lag, s; at the nearest one that the recordings allow."""
@@ -155,8 +160,6 @@ class Correlation:
     def _candidate(self, place: int) -> Candidate:
         return Candidate(
             self.first - place * self.step,
-            float(self.values[place]),
-            float(self.common[place] * self.step),
             float(self.gain[place]),
             turn_between(self.shared[place]),
         )

@@ -3,12 +3,35 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+GAP_STEPS: Final = 3.5
+"""A step of more than this many median steps is a gap: one or two samples that were lost are not."""
 
-def gaps(t: NDArray[np.float64], factor: float = 3.5) -> list[tuple[int, int]]:
+
+def gap_after(t: NDArray[np.float64], factor: float = GAP_STEPS) -> NDArray[np.bool_]:
+    """Say after which samples a gap follows.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Time, s, strictly increasing.
+    factor : float
+        A step of more than this many median steps is a gap.
+
+    Returns
+    -------
+    (n - 1,) array of bool
+        Empty for n < 2.
+    """
+    steps = np.diff(t)
+    return np.asarray(steps > factor * np.median(steps)) if steps.size else np.zeros(0, np.bool_)
+
+
+def gaps(t: NDArray[np.float64], factor: float = GAP_STEPS) -> list[tuple[int, int]]:
     """Split a log at its gaps into contiguous segments.
 
     Parameters
@@ -25,7 +48,6 @@ def gaps(t: NDArray[np.float64], factor: float = 3.5) -> list[tuple[int, int]]:
     """
     if t.size == 0:
         return []
-    steps = np.diff(t)
-    cuts = np.flatnonzero(steps > factor * np.median(steps)) + 1 if steps.size else np.empty(0, np.int64)
+    cuts = np.flatnonzero(gap_after(t, factor)) + 1
     edges = [0, *(int(cut) for cut in cuts), t.size]
     return list(pairwise(edges))
