@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.figures import quantity
-from imufit.log.contents import SENSOR_NAMES
+from imufit.log.columns import SENSOR_NAMES
 from imufit.loop import SensorModel
 from imufit.rests.poses import Pose
 from imufit.results.json_value import json_value

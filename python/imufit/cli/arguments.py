@@ -66,10 +66,12 @@ class NamedFile(click.Path):
     ----------
     exists : bool
         Whether it must be there.
+    folder : bool
+        Whether it may be a folder.
     """
 
-    def __init__(self, exists: bool = False) -> None:
-        super().__init__(exists=exists, dir_okay=False, readable=True, path_type=Path)
+    def __init__(self, exists: bool = False, folder: bool = False) -> None:
+        super().__init__(exists=exists, dir_okay=folder, readable=True, path_type=Path)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path."""
@@ -132,6 +134,8 @@ class OutputDirectory(click.ParamType):  # type: ignore[type-arg]
 
 
 EXISTING = NamedFile(exists=True)
+LOG = NamedFile(exists=True, folder=True)
+"""A log, or a folder of files that make one."""
 
 
 def map_option(command: Command) -> Command:
@@ -148,15 +152,13 @@ def map_option(command: Command) -> Command:
 def log_argument(command: Command) -> Command:
     """Add LOG and --map."""
     command = map_option(command)
-    return click.argument("log", metavar="LOG", type=EXISTING)(command)
+    return click.argument("log", metavar="LOG", type=LOG)(command)
 
 
 def logs_argument(command: Command) -> Command:
     """Add LOG... and --map: one log, or several of one sensor."""
     command = map_option(command)
-    return click.argument("logs", metavar="LOG...", type=EXISTING, nargs=-1, required=True, callback=_each_once)(
-        command
-    )
+    return click.argument("logs", metavar="LOG...", type=LOG, nargs=-1, required=True, callback=_each_once)(command)
 
 
 def _each_once(_ctx: click.Context, _param: click.Parameter, logs: tuple[Path, ...]) -> tuple[Path, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import EXISTING, LOG_ENDINGS, OutputFile, json_option, keep_inputs, map_option
+from imufit.cli.arguments import LOG, LOG_ENDINGS, OutputFile, json_option, keep_inputs, map_option
 from imufit.cli.output import Output
 from imufit.printable import NAME, printable
 
@@ -38,7 +38,7 @@ class RowRange(click.ParamType):  # type: ignore[type-arg]
 
 
 @click.command(short_help="Another maker's file, a text table or a serial transcript becomes a log.")
-@click.argument("file", metavar="FILE", type=EXISTING)
+@click.argument("file", metavar="FILE", type=LOG)
 @map_option
 @click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
 @click.option("--rows", type=RowRange(), metavar="FIRST:STOP", help="Take these rows alone, counted from 0.")

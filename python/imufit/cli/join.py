@@ -9,7 +9,7 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import (
-    EXISTING,
+    LOG,
     LOG_ENDINGS,
     OutputFile,
     json_option,
@@ -45,8 +45,8 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
 
 
 @click.command(short_help="A sensor's log and somebody else's reference, on two clocks, become one log.")
-@click.argument("sensor", metavar="SENSOR", type=EXISTING)
-@click.argument("reference", metavar="REFERENCE", type=EXISTING)
+@click.argument("sensor", metavar="SENSOR", type=LOG)
+@click.argument("reference", metavar="REFERENCE", type=LOG)
 @map_option
 @click.option(
     "--reference-map",

@@ -7,7 +7,7 @@ import numpy as np
 from imufit.fit.log_evidence import LogEvidence
 from imufit.fit.passes import CHANNELS, UNITS
 from imufit.fit.rest_passes import NEEDS_REFERENCE, RestPasses
-from imufit.log.contents import SENSOR_NAMES
+from imufit.log.columns import SENSOR_NAMES
 
 OFF_FLOOR = 1.2
 """Stated noise is doubted where what nothing explains differs from it by this factor."""

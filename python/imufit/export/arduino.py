@@ -6,7 +6,7 @@ import numpy as np
 
 from imufit.export.affine import Affine, SensorAffine
 from imufit.export.c_header import c_matrix, c_vector
-from imufit.log.contents import SENSOR_NAMES
+from imufit.log.columns import SENSOR_NAMES
 
 GRAVITY = 9.80665
 """The g in which makers give accelerations, m/s^2."""

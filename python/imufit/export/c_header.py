@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imufit.export.affine import Affine, Array, SensorAffine
-from imufit.log.contents import SENSOR_NAMES
+from imufit.log.columns import SENSOR_NAMES
 
 
 def c_float(value: float) -> str:

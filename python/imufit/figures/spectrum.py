@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.figures import quantity, style
-from imufit.log.contents import SENSOR_NAMES
+from imufit.log.columns import SENSOR_NAMES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,7 +17,7 @@ from imufit.fit.commanded import CommandedAttitude
 from imufit.fit.range_end import RangeEnd
 from imufit.fit.readings_seen import ReadingsSeen
 from imufit.log import Chunk, LogSource
-from imufit.log.contents import SENSOR_NAMES
+from imufit.log.columns import SENSOR_NAMES
 from imufit.progress import Progress
 
 CHUNK_ROWS = 16384

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from imufit.log.contents import SENSOR_NAMES
+from imufit.log.columns import SENSOR_NAMES
 
 
 class ReadingsSeen:

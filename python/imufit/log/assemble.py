@@ -16,6 +16,7 @@ from imufit.log.check import (
     numbers_from_text,
     truth_value,
 )
+from imufit.log.clock_text import seconds_from_cells
 from imufit.log.columns import GROUPS, NUMERIC
 from imufit.log.foreign import Plan, PlannedColumn
 from imufit.log.metadata import Metadata
@@ -29,7 +30,14 @@ RawBlock = Mapping[str, NDArray[Any]]
 
 def time_of(plan: Plan, block: RawBlock, start: int, rows: int, place: Place) -> NDArray[np.float64]:
     """Time stamps of one block in s, (n,), before any repair."""
-    return _numbers(plan.time, block, start, rows, place)
+    column = plan.time
+    raw = None if column.source is None else block[column.source]
+    if raw is None or raw.dtype != object:
+        return _numbers(column, block, start, rows, place)
+    times = seconds_from_cells(raw)
+    if np.isnan(times).any():
+        return _numbers(column, block, start, rows, place)  # names the row
+    return column.conversion.apply(times)
 
 
 def check_truth_values(plan: Plan, truths: Mapping[str, tuple[int | None, str]], place: Place) -> None:

@@ -17,6 +17,8 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 """Columns that belong together: field of the log, columns of the table."""
 
 SENSORS: Final = ("acc", "gyr", "mag")
+SENSOR_NAMES: Final = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}
+"""What the sensors are called in a sentence."""
 
 CONTRACT: Final[tuple[str, ...]] = (
     "t",

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.log.columns import GROUPS
+from imufit.log.columns import GROUPS, SENSOR_NAMES
 from imufit.log.log import LogSource
 from imufit.log.parquet import ROW_GROUP
 
@@ -30,8 +30,6 @@ _UNITS: Final = {
     **dict.fromkeys(GROUPS["ref_p"], "m"),
     "ref_angle": "rad",
 }
-SENSOR_NAMES: Final = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}
-"""What the sensors are called in a sentence."""
 _WANTED: Final = {
     **SENSOR_NAMES,
     "temp": "temperature",

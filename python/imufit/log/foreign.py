@@ -68,7 +68,9 @@ class Plan:
         return next(column for column in self.columns if column.target == "t")
 
 
-def plan_columns(names: Sequence[str], mapping: Mapping[str, str] | None, place: Place, bare: bool = False) -> Plan:
+def plan_columns(
+    names: Sequence[str], mapping: Mapping[str, str] | None, place: Place, bare: bool = False, rest: bool = True
+) -> Plan:
     """Decide which columns of the file become which columns of the log.
 
     Parameters
@@ -81,6 +83,8 @@ def plan_columns(names: Sequence[str], mapping: Mapping[str, str] | None, place:
         To name the file in errors.
     bare : bool
         True if the file needs neither a sensor nor a reference: what it has becomes covariates.
+    rest : bool
+        Whether columns that are neither mapped nor a log's own become covariates.
 
     Raises
     ------
@@ -107,8 +111,11 @@ def plan_columns(names: Sequence[str], mapping: Mapping[str, str] | None, place:
     for index, name in enumerate(changed):
         if name in changed[:index] or name in names or name in targets:
             raise place.error(f"column {name} is there twice", column=name, remedy="Give these columns other names.")
+    unused = [shown[n] for n in names if n not in used]
+    if not rest:
+        kept = [column for column in kept if column.target in CONTRACT]
     columns = [*mapped, *kept]
-    _check_complete([column.target for column in columns], [shown[n] for n in names if n not in used], place, bare)
+    _check_complete([column.target for column in columns], unused, place, bare)
     notes = tuple(f"{place.name}: column {name} left out: the mapping gives that name to another" for name in lost)
     notes += tuple(
         f"{place.name}: column {name} has another name in the file, which is too long or cannot be printed"

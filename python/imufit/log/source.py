@@ -10,9 +10,12 @@ from typing import Any, Final, Protocol
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
+from imufit.log.folder import recording_of_folder, recording_of_zip
 from imufit.log.npz import NpzSource
 from imufit.log.parquet import ParquetSource
+from imufit.log.tables import TablesSource
 from imufit.log.text import looks_like_text, open_text
+from imufit.log.unpacked import COMPRESSED, is_utf_16, open_unpacked
 
 TEXT_SUFFIXES: Final = (".csv", ".txt", ".tsv", ".dat", ".log")
 SUFFIXES: Final = (".parquet", ".npz", *TEXT_SUFFIXES)
@@ -75,16 +78,20 @@ def open_source(path: Path) -> Source:
     InputError
         The file is missing, empty, a directory or of no known format.
     """
-    if path.is_dir():
-        raise InputError(f"{path} is a directory, not a log", file=path, remedy="Name a file in it.")
     if not path.exists():
         raise InputError(f"there is no file {path}", file=path, remedy="Check the name.")
     suffix = path.suffix.lower()
     try:
+        if path.is_dir():
+            return TablesSource(path, recording_of_folder(path))
         if path.stat().st_size == 0:
             raise InputError("the file is empty (0 bytes)", file=path, remedy="Record or copy it again.")
         if re.fullmatch(r"\.part\d*", suffix):
             raise InputError("this is what a recording wrote while it ran", file=path, remedy=f"imufit recover {path}")
+        if suffix == ".zip":
+            return TablesSource(path, recording_of_zip(path))
+        if suffix in COMPRESSED or is_utf_16(path):
+            return open_unpacked(path)
         if suffix not in SUFFIXES and not looks_like_text(path):
             raise InputError(
                 f"the suffix {suffix or '(none)'} is not a log's, and the file is no text",

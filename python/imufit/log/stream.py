@@ -14,8 +14,10 @@ from imufit.log.log import Chunk, Log, concatenate, gathered
 from imufit.log.metadata import Metadata, read_metadata
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.place import Place
+from imufit.log.recognise import recognise
 from imufit.log.size import HELD, KEPT, NUMBER, TEXT_CELL, size_in_words
 from imufit.log.source import open_source
+from imufit.log.tables import TablesSource
 from imufit.log.time_order import TimeRepair, TimeScan
 from imufit.log.unit_check import HEAD, check_units
 from imufit.log.writer import write_rows
@@ -41,13 +43,17 @@ class LogStream:
         self._path = Path(path)
         self._source = open_source(self._path)
         self._place = Place(self._path, self._source.line_of)
-        self._plan = plan_columns(self._source.names, mapping, self._place, bare)
+        found = recognise(self._source, mapping, self._place)
+        several = isinstance(self._source, TablesSource) and self._source.several
+        self._plan = plan_columns(self._source.names, found.mapping, self._place, bare, rest=not several)
+        if isinstance(self._source, TablesSource):
+            self._source.choose(self._plan.sources)
         self._metadata = read_metadata(self._path, self._source.embedded)
         self._repair = self._scan()
         head = self._head()
         odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin)
         self._columns = head.columns
-        notes = (*self._source.notes, *self._plan.notes, self._repair.note, *odd)
+        notes = (*self._source.notes, *found.notes, *self._plan.notes, self._repair.note, *odd)
         if "ref_angle" in self._columns and "ref_qw" not in self._columns:
             notes = (*notes, f"{self._place.name}: ref_angle makes no reference without the metadata rig_axis")
         self._notes = tuple(note for note in notes if note)

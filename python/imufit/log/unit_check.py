@@ -23,20 +23,20 @@ HEAD: Final = 200_000
 
 Array = NDArray[np.float64]
 
-_ACC_UNITS: Final = (
+ACC_UNITS: Final = (
     (1.0, "g", "g"),
     (1000.0, "milli-g", "mg"),
     *((float(c), f"raw counts of {c} LSB/g", f"{c} LSB/g") for c in (16384, 8192, 4096, 2048)),
 )
 _DEG: Final = np.pi / 180.0
-_GYR_UNITS: Final = (
+GYR_UNITS: Final = (
     (_DEG, "deg/s", "deg/s"),
     (1e-3 * _DEG, "milli-deg/s", "mdps"),
     *((_DEG / c, f"raw counts of {c:g} LSB/(deg/s)", f"{c:g} LSB/(deg/s)") for c in (131.0, 65.5, 32.8, 16.4)),
 )
 _OTHER_UNIT: Final = 0.03
 """Noise pulls the ratio of rates towards zero, but not as far as this in rad/s."""
-_MAG_UNITS: Final = (
+MAG_UNITS: Final = (
     (0.2, 0.7, "gauss", "G"),
     (200.0, 700.0, "milligauss", "mG"),
     (2e4, 7e4, "nT", "nT"),
@@ -140,7 +140,7 @@ def rest_norm(acc: Array, rows: int = 50) -> float:
 def _check_acc(acc: Array, place: Place, origin: Mapping[str, str]) -> list[str]:
     norm = rest_norm(acc)
     overall = float(np.nanmedian(np.linalg.norm(acc, axis=1))) if np.isfinite(norm) else norm
-    for size, words, unit in _ACC_UNITS:
+    for size, words, unit in ACC_UNITS:
         if abs(norm / size - 1.0) < 0.15 and overall < 3.0 * size:
             raise place.error(
                 f"at rest the norm of acc is {norm:.4g}, which looks like {words}, not m/s^2",
@@ -155,13 +155,13 @@ def _check_acc(acc: Array, place: Place, origin: Mapping[str, str]) -> list[str]
 def _check_gyr(
     t: Array, gyr: Array, vectors: list[Array], ref_q: Array | None, *, place: Place, origin: Mapping[str, str]
 ) -> None:
-    ratios = [(_rate_ratio(t, gyr, ref_q), "the reference attitude turns")] if ref_q is not None else []
-    ratios += [(_field_ratio(t, gyr, v), "the field in the other sensors turns") for v in vectors]
+    ratios = [(rate_ratio(t, gyr, ref_q), "the reference attitude turns")] if ref_q is not None else []
+    ratios += [(field_ratio(t, gyr, v), "the field in the other sensors turns") for v in vectors]
     for ratio, who in ratios:
         if ratio > 0.2:
             return
         if ratio < _OTHER_UNIT:
-            _, words, unit = min(_GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
+            _, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
             raise place.error(
                 f"{who} at {ratio:.3g} of the rate in gyr, which looks like {words}, not rad/s",
                 column="gyr_x",
@@ -179,7 +179,7 @@ def _check_gyr(
         )
 
 
-def _rate_ratio(t: Array, gyr: Array, ref_q: Array) -> float:
+def rate_ratio(t: Array, gyr: Array, ref_q: Array) -> float:
     """Rate of the reference over the rate in gyr, over rows that turn; NaN where too few do."""
     step = max(1, int(np.ceil(0.05 / max(float(np.median(np.diff(t))), 1e-6)))) if t.size > 2 else 1
     if t.size < 20 * step:
@@ -194,7 +194,7 @@ def _rate_ratio(t: Array, gyr: Array, ref_q: Array) -> float:
     return float(np.median(reference[moving] / measured[moving]))
 
 
-def _field_ratio(t: Array, gyr: Array, field: Array) -> float:
+def field_ratio(t: Array, gyr: Array, field: Array) -> float:
     """Factor by which gyr explains the turning of a field fixed in space; NaN unless it explains it clearly.
 
     A constant vector u seen from a body that turns at w obeys du/dt = -w x u, up to the gyro's offset.
@@ -235,7 +235,7 @@ def _check_mag(mag: Array, metadata: Metadata, place: Place, origin: Mapping[str
     size = float(np.median(norm[complete]))
     if metadata.mag_reference is not None and 0.2 < size / max(math.hypot(*metadata.mag_reference), 1e-9) < 5.0:
         return []
-    for low, high, words, unit in _MAG_UNITS:
+    for low, high, words, unit in MAG_UNITS:
         if not low <= size <= high:
             continue
         if unit == "mG" and np.linalg.norm(np.mean(mag[complete] / norm[complete, None], axis=0)) > 0.95:

@@ -47,6 +47,9 @@ _UNITS: Final[dict[str, tuple[str, float, float]]] = {
     "ms": ("time", 1e-3, 0.0),
     "us": ("time", 1e-6, 0.0),
     "ns": ("time", 1e-9, 0.0),
+    "min": ("time", 60.0, 0.0),
+    "h": ("time", 3600.0, 0.0),
+    "d": ("time", 86400.0, 0.0),
     "m/s^2": ("specific force", 1.0, 0.0),
     "g": ("specific force", _G, 0.0),
     "mg": ("specific force", 1e-3 * _G, 0.0),
@@ -190,6 +193,8 @@ def unit_in_header(name: str, target: str) -> str:
     found = re.search(r"(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\)[^()]*)?)\))\s*$", name)
     if not found:
         return ""
+    if found[1] is not None and found[1].isdigit():
+        return ""  # an index, as in gyro_rad[0]
     square, text = found[1] is not None, found[1] if found[1] is not None else found[2]
     try:
         conversion(target, text)

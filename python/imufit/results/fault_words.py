@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit.figures import quantity
-from imufit.log.contents import SENSOR_NAMES
+from imufit.log.columns import SENSOR_NAMES
 
 Array = NDArray[np.float64]
 

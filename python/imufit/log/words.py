@@ -1,0 +1,292 @@
+"""Names of foreign columns taken apart into words: sensor, axis, unit, and what else stands there."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from imufit.log.units import lookup
+
+_WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
+_STUCK: Final = re.compile(r"(a|g|m|w|b|acc|accel|gyr|gyro|mag|magn|omega|raw)([xyz])")
+_INDEX: Final = re.compile(r"\[\d+\]$")
+_UNIT: Final = re.compile(r"\s*[(\[]([^()\[\]]*(?:\([^()]*\)[^()\[\]]*)?)[)\]]\s*$")
+
+SENSOR_WORDS: Final = {
+    "acc": frozenset(("acc", "accel", "accelerometer", "acceleration", "accelerations", "a")),
+    "gyr": frozenset(("gyr", "gyro", "gyroscope", "omega", "angularrate", "angularvelocity", "w", "g")),
+    "mag": frozenset(("mag", "magn", "magnet", "magnetometer", "magneticfield", "magnetic", "m", "b")),
+}
+"""Words that name a sensor; single letters only where nothing else does."""
+_PAIRS: Final = {
+    ("angular", "velocity"): "angularvelocity",
+    ("angular", "rate"): "angularrate",
+    ("rotation", "rate"): "angularrate",
+    ("magnetic", "field"): "magneticfield",
+    ("magnetic", "flux"): "magneticfield",
+}
+"""Two words that name a sensor together."""
+COMPUTED: Final = frozenset(
+    (
+        "linear",
+        "user",
+        "gravity",
+        "est",
+        "estimated",
+        "estimate",
+        "rotated",
+        "filtered",
+        "bias",
+        "variance",
+        "cov",
+        "covariance",
+        "std",
+        "integral",
+        "world",
+        "error",
+        "err",
+        "offset",
+        "setpoint",
+        "target",
+        "norm",
+        "abs",
+        "absolute",
+        "dt",
+        "delta",
+        "ned",
+        "enu",
+        "inertial",
+        "earth",
+        "compensated",
+        "free",
+    )
+)
+"""Words of columns that were computed from readings, or describe them: no specific force, rate or field of the body."""
+_NEUTRAL: Final = frozenset(
+    (
+        "sensor",
+        "data",
+        "imu",
+        "cal",
+        "calibrated",
+        "ln",
+        "x",
+        "y",
+        "z",
+        "adc",
+        "smooth",
+        "sample",
+        "shimmer",
+        "value",
+        "values",
+        "reading",
+        "readings",
+        "combined",
+        "mpu",
+        "board",
+        "msg",
+    )
+)
+"""Words that stand beside a sensor's name without saying anything that makes it another sensor."""
+TIME_WORDS: Final = frozenset(
+    (
+        "t",
+        "time",
+        "timestamp",
+        "timestamps",
+        "times",
+        "ts",
+        "millis",
+        "micros",
+        "seconds",
+        "secs",
+        "sec",
+        "elapsed",
+        "timesec",
+        "clock",
+        "sampletimefine",
+    )
+)
+_NO_TIME: Final = frozenset(
+    (
+        "relative",
+        "dt",
+        "integral",
+        "offset",
+        "invalid",
+        "packet",
+        "delta",
+        "update",
+        "start",
+        "end",
+        "sync",
+        "fix",
+        "local",
+    )
+)
+
+_TIME_UNITS: Final[dict[str, tuple[str, ...]]] = {
+    "s": ("s", "sec", "secs", "seconds"),
+    "ms": ("ms", "millis", "msec", "milliseconds"),
+    "us": ("us", "micros", "usec", "microseconds"),
+    "ns": ("ns", "nanos", "nsec", "nanoseconds"),
+}
+_UNIT_WORDS: Final[dict[str, dict[str, tuple[str, ...]]]] = {
+    "acc": {
+        "m/s^2": ("m s 2", "ms 2", "mps 2", "mss", "m s s", "si"),
+        "g": ("g", "gs"),
+        "mg": ("mg", "milli g"),
+    },
+    "gyr": {
+        "rad/s": ("rad s", "rads", "rad", "radps", "rad sec", "rad per s", "rps"),
+        "deg/s": ("dps", "deg s", "degs", "deg", "deg per s", "deg sec", "degrees", "degsec"),
+        "mdps": ("mdps",),
+    },
+    "mag": {
+        "uT": ("ut", "u t", "microtesla", "microteslas", "micro tesla"),
+        "G": ("ga", "gauss"),
+        "mG": ("mgauss", "milligauss", "mg"),
+        "nT": ("nt", "n t", "nanotesla"),
+    },
+    "t": _TIME_UNITS,
+    "temp": {"degC": ("c", "celsius", "degc", "deg c"), "K": ("k", "kelvin"), "degF": ("f", "fahrenheit")},
+}
+_QUANTITY: Final = {
+    "acc": "specific force",
+    "gyr": "angular rate",
+    "mag": "magnetic flux density",
+    "t": "time",
+    "temp": "temperature",
+}
+
+
+@dataclass(frozen=True)
+class Words:
+    """A column's name, taken apart.
+
+    Parameters
+    ----------
+    column : str
+        The name.
+    words : tuple of str
+        Its words in small letters, those of its table in front, without axis and unit in brackets.
+    axis : str
+        "x", "y" or "z"; empty where the name has none.
+    bracket : str
+        What stands in brackets at the end and is not an index; empty without.
+    index : bool
+        Whether the axis is an index counted from 0.
+    """
+
+    column: str
+    words: tuple[str, ...]
+    axis: str
+    bracket: str
+    index: bool = False
+
+    @property
+    def triple(self) -> tuple[str, ...]:
+        """What the three axes of a sensor have in common."""
+        return (*self.words, "#" if self.index else "", self.bracket)
+
+
+def words_of(name: str, axes: dict[str, str] | None = None) -> Words:
+    """Take a name apart.
+
+    Parameters
+    ----------
+    name : str
+        Column of a file, with its table's name and a point in front where the file has several.
+    axes : dict, optional
+        Axes of the columns that bear numbers instead of names (``c2``).
+    """
+    plain, bracket, axis, index = name, "", "", False
+    if found := _INDEX.search(name):
+        number = int(found[0][1:-1])
+        axis, index = ("xyz"[number], True) if number < 3 else ("", True)
+        plain = name[: found.start()]
+    elif found := _UNIT.search(name):
+        plain, bracket = name[: found.start()], found[1]
+    if axes and name in axes:
+        axis, plain = axes[name], plain.rpartition(".")[0]
+    words = [word for raw in _WORD.findall(plain.replace("µ", "u")) for word in _unstuck(raw.lower())]
+    if not axis:
+        places = [k for k, word in enumerate(words) if word in ("x", "y", "z")]
+        if places:
+            axis = words.pop(places[-1])
+    return Words(name, tuple(_joined(words)), axis, bracket, index)
+
+
+def _unstuck(word: str) -> tuple[str, ...]:
+    found = _STUCK.fullmatch(word)
+    return (found[1], found[2]) if found else (word,)
+
+
+def _joined(words: list[str]) -> Iterator[str]:
+    k = 0
+    while k < len(words):
+        pair = (words[k], words[k + 1] if k + 1 < len(words) else "")
+        if pair in _PAIRS:
+            yield _PAIRS[pair]
+            k += 2
+        else:
+            yield words[k]
+            k += 1
+
+
+def sensor_of(words: tuple[str, ...]) -> tuple[str, tuple[str, ...]] | None:
+    """Find the sensor that the words name.
+
+    Returns
+    -------
+    (sensor, rest) or None
+        "acc", "gyr" or "mag", and the words that name neither the sensor nor anything without meaning; None where no
+        sensor is named, or where the column was computed.
+    """
+    if COMPUTED & set(words):
+        return None
+    for letters in (False, True):
+        for k in range(len(words) - 1, -1, -1):
+            for sensor, names in SENSOR_WORDS.items():
+                if words[k] in names and (len(words[k]) == 1) == letters:
+                    return sensor, (*words[:k], *words[k + 1 :])
+    return None
+
+
+def unit_of(group: str, rest: tuple[str, ...], bracket: str) -> tuple[str | None, tuple[str, ...]]:
+    """Find the unit that a name states.
+
+    Parameters
+    ----------
+    group : str
+        "acc", "gyr", "mag", "t" or "temp".
+    rest : tuple of str
+        Words that do not name the sensor.
+    bracket : str
+        What stands in brackets behind the name.
+
+    Returns
+    -------
+    (unit or None, words)
+        The words that are left.
+    """
+    stated = lookup(bracket) if bracket else None
+    unit = bracket if stated is not None and stated[0] == _QUANTITY[group] else None
+    for length in (3, 2, 1):
+        tail = " ".join(rest[-length:])
+        for name, spellings in _UNIT_WORDS[group].items():
+            if len(rest) >= length and tail in spellings:
+                return unit or name, rest[:-length]
+    return unit, rest
+
+
+def strange(rest: tuple[str, ...]) -> int:
+    """Count the words that may make a column another one than the plain sensor."""
+    return sum(word not in _NEUTRAL for word in rest)
+
+
+def names_time(words: tuple[str, ...]) -> bool:
+    """Whether a column is a time stamp by its words."""
+    return bool(set(words) & TIME_WORDS or {"sample", "fine"} <= set(words)) and not set(words) & _NO_TIME
