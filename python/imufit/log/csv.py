@@ -123,6 +123,7 @@ class CsvSource:
                 include_columns=columns or [self.names[0]],
                 null_values=_EMPTY,
                 strings_can_be_null=False,
+                decimal_point=self._layout.decimal,
             ),
         )
         if ragged:

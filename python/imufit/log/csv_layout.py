@@ -13,9 +13,11 @@ from typing import IO, Final
 from imufit.errors import InputError
 from imufit.log.check import number_from_text
 from imufit.log.size import LONGEST_LINE, size_in_words
+from imufit.log.units import lookup
 
 _SAMPLE: Final = 1 << 16
 _LINES: Final = 60
+_COMMA_NUMBER: Final = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
 COMMENT: Final = ("#", "%", "//")
 NOT_DATA: Final = re.compile(rb"\n[ \t]*(?:#|%|//|\r?\n)")
 """Line end before a line that holds no data: a comment or a blank line."""
@@ -39,6 +41,8 @@ class Layout:
         Line, from 0, at that byte.
     notes : tuple of str
         What was skipped.
+    decimal : str
+        Decimal point of its numbers: a comma where the separator is not one.
     """
 
     separator: str
@@ -47,6 +51,7 @@ class Layout:
     data_offset: int
     data_line: int
     notes: tuple[str, ...] = ()
+    decimal: str = "."
 
 
 def text_of(data: bytes) -> str:
@@ -119,10 +124,31 @@ def read_layout(path: Path) -> Layout:
     if not table:
         raise InputError("the file holds no table", file=path, remedy="A header and rows are wanted.")
     separator, width = _separator([lines[i] for i in table])
+    decimal = _decimal([lines[i] for i in table], separator)
+    if decimal == ",":
+        lines = [line.replace(",", ".") for line in lines]
     header, names, notes = _header(lines, table, separator, width, path)
-    offset = 0 if header is None else sum(len(piece) + 1 for piece in pieces[: header + 1])
     first = 0 if header is None else header + 1
-    return Layout(separator, names, header, min(offset, path.stat().st_size), first, notes)
+    units = next((i for i in table if i >= first), None) if header is not None else None
+    if units is not None and (fields := split_line(lines[units], separator)) and _are_units(fields, len(names)):
+        names = tuple(f"{name} ({unit})" if unit else name for name, unit in zip(names, fields, strict=True))
+        first = units + 1
+    offset = sum(len(piece) + 1 for piece in pieces[:first])
+    return Layout(separator, names, header, min(offset, path.stat().st_size), first, notes, decimal)
+
+
+def _decimal(lines: list[str], separator: str) -> str:
+    """Find the decimal point: a comma where numbers have one, none has a point, and the separator is another."""
+    cells = [cell for line in lines[-_LINES:] for cell in split_line(line, separator)] if separator != "," else []
+    commas = sum(_COMMA_NUMBER.fullmatch(cell) is not None for cell in cells)
+    points = sum("." in cell and _numeric(cell) for cell in cells)
+    return "," if commas and not points else "."
+
+
+def _are_units(fields: list[str], width: int) -> bool:
+    """Whether a line below the header holds units instead of readings."""
+    known = sum(lookup(field.replace("(", "").replace(")", "")) is not None for field in fields)
+    return len(fields) == width and not any(_numeric(field) for field in fields) and 2 * known >= width
 
 
 def _separator(lines: list[str]) -> tuple[str, int]:

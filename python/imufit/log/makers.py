@@ -19,8 +19,9 @@ class Maker:
     marks : tuple of str
         Patterns: the file is of this maker if each of them fits one of its columns.
     units : dict
-        Unit of a sensor or of the time ("acc", "gyr", "mag", "t") that the names do not state; several where the maker
-        used several.
+        Unit of a sensor or of the time ("acc", "gyr", "mag", "t") that the names do not state.
+    ticks : tuple of str
+        Units of the time of which the maker used several, for the stamps to show which.
     left_out : str
         Pattern of columns that are not readings of the sensor although their names say so.
     source : str
@@ -30,6 +31,7 @@ class Maker:
     name: str
     marks: tuple[str, ...]
     units: Mapping[str, str] = field(default_factory=dict)
+    ticks: tuple[str, ...] = ()
     left_out: str = r"(?!)"
     source: str = ""
 
@@ -70,6 +72,7 @@ MAKERS: Final = (
         "Xsens",
         (r"(^|\.)SampleTimeFine$", r"(^|\.)Acc_X$"),
         {"acc": "m/s^2"},
+        ticks=("10000 Hz", "us"),
         source="Movella, MT Manager and DOT user manuals",
     ),
     Maker("Shimmer Consensys", (r"(?i)shimmer.*(Accel|Gyro|Mag)_",), source="Shimmer, Consensys user guide"),

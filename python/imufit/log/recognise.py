@@ -11,11 +11,12 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from imufit.errors import InputError
 from imufit.log.clock_text import seconds_from_cells
 from imufit.log.columns import CONTRACT, GROUPS, SENSOR_NAMES, SENSORS
 from imufit.log.makers import Maker, maker_of
 from imufit.log.place import Place
-from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, time_unit
+from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, time_unit, turned
 from imufit.log.unit_check import HEAD
 from imufit.log.units import conversion
 from imufit.log.words import Words, names_time, sensor_of, strange, unit_of, words_of
@@ -24,6 +25,12 @@ Array = NDArray[np.float64]
 
 _LIKELY_GYR: Final = {"m/s^2": "rad/s", "g": "deg/s", "mg": "mdps"}
 """Unit in which a maker who gives the accelerometer in the former usually gives the gyroscope; else counts."""
+COUNTS: Final = "131 LSB/(deg/s)"
+"""Counts of the usual sensor in its smallest range (InvenSense, MPU-6050 product specification)."""
+ROW_RATE: Final = "row[100Hz]"
+"""Time by row number, with the rate that is most usual."""
+_USUAL_FIELD: Final = 50.0
+"""Magnitude of the earth's field in the middle latitudes, uT (World Magnetic Model)."""
 _NUMBERED: Final = re.compile(r"(?:(?P<table>.*)\.)?c(?P<number>\d+)")
 """Name of a column of a table without a header."""
 
@@ -85,7 +92,7 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         same sensor: all of it is asked in one sentence, with one mapping for the whole file.
     """
     names, given = source.names, dict(mapping or {})
-    taken = {text for text in given.values()}
+    taken = set(given.values())
     wanted = [group for group in ("t", *SENSORS) if not _has(group, names, given)]
     maker = maker_of(names)
     parsed = [_parsed(name, names) for name in names if name not in CONTRACT and name not in taken]
@@ -93,23 +100,57 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         parsed = [words for words in parsed if not re.search(maker.left_out, words.column)]
     found = {group: _candidates(group, parsed, maker) for group in wanted}
     found = {group: candidates for group, candidates in found.items() if candidates}
+    if not given and not found and all(_NUMBERED.fullmatch(name) for name in names):
+        raise _without_names(source, place)
     if not any(group in found for group in SENSORS) and not ("t" in found and _has_any(names, given)):
         return Recognised(given)
     chosen = {group: candidates[0] for group, candidates in found.items()}
     several = [group for group, candidates in found.items() if len(candidates) > 1 and _alike(candidates)]
-    units = _units(source, chosen, names, given)
+    readings = _Readings.of(source, chosen, names, given)
+    units = readings.units(maker.ticks if maker is not None else ())
     asked = [group for group in chosen if units[group] is None]
-    complete = {**_mapping(chosen, {g: units[g] or _likely(g, units) for g in chosen}), **given}
-    if given and (asked or several):
+    if given:
         chosen = {group: each for group, each in chosen.items() if group not in (*asked, *several)}
         return Recognised({**_mapping(chosen, units), **given}, _notes(place, maker, chosen, units))
-    if asked or several:
+    complete = _mapping(chosen, {group: units[group] or readings.likely(group, units) for group in chosen})
+    timeless = "t" in wanted and "t" not in found
+    if asked or several or timeless:
+        complete = {**({"t": ROW_RATE} if timeless else {}), **complete}
         raise place.error(
-            _question(asked, several, chosen),
-            column=chosen[(asked or several)[0]].columns[0],
-            remedy=f"If this is right: --map {shlex.quote(','.join(f'{k}={v}' for k, v in complete.items()))}",
+            _question(asked, several, timeless),
+            column="t" if timeless else chosen[(asked or several)[0]].columns[0],
+            remedy=_remedy(complete),
         )
     return Recognised(complete, _notes(place, maker, chosen, units))
+
+
+def _remedy(mapping: Mapping[str, str]) -> str:
+    """Word the one mapping of a file."""
+    text = f"--map {shlex.quote(','.join(f'{target}={source}' for target, source in mapping.items()))}"
+    return f"If this is right, use {text}"
+
+
+def _without_names(source: Readable, place: Place) -> InputError:
+    """Ask about a table without a header, with what its numbers look like."""
+    names = source.names
+    rows = _first_rows(source, names)
+    complete, free = {"t": ROW_RATE}, list(names)
+    first = rows[names[0]]
+    if first.size > 1 and np.all(np.diff(first) > 0.0):
+        complete["t"] = f"{names[0]}[{time_unit(first) or 's'}]"
+        free = free[1:]
+    triples = [tuple(free[k : k + 3]) for k in range(0, len(free) - 2, 3)]
+    fitting = [acc_unit(np.stack([rows[name] for name in triple], axis=1)) for triple in triples]
+    if any(fitting):
+        k = next(k for k, unit in enumerate(fitting) if unit)
+        unit = fitting[k] or ""
+        others = [triple for i, triple in enumerate(triples) if i != k]
+        named = [("acc", triples[k], unit), *(("gyr", triple, _LIKELY_GYR.get(unit, COUNTS)) for triple in others[:1])]
+        for group, triple, each in named:
+            complete |= {target: f"{name}[{each}]" for target, name in zip(GROUPS[group], triple, strict=True)}
+    return place.error(
+        f"the columns {names[0]} to {names[-1]} have no names", column=names[0], remedy=_remedy(complete)
+    )
 
 
 def _has(group: str, names: Sequence[str], given: Mapping[str, str]) -> bool:
@@ -157,33 +198,59 @@ def _alike(candidates: Sequence[_Candidate]) -> bool:
     return (first.strange, first.unit is None) == (second.strange, second.unit is None)
 
 
-def _units(
-    source: Readable, chosen: Mapping[str, _Candidate], names: Sequence[str], given: Mapping[str, str]
-) -> dict[str, str | None]:
-    """Unit of each group: as its names state, else as the first rows show."""
-    units = {group: each.unit for group, each in chosen.items()}
-    if None not in units.values():
+@dataclass(frozen=True)
+class _Readings:
+    """The first rows of what was found, as they stand in the file."""
+
+    chosen: Mapping[str, _Candidate]
+    rows: Mapping[str, Array]
+
+    @classmethod
+    def of(
+        cls, source: Readable, chosen: Mapping[str, _Candidate], names: Sequence[str], given: Mapping[str, str]
+    ) -> _Readings:
+        """Read them, where a unit has to be found in them."""
+        if all(each.unit is not None for each in chosen.values()):
+            return cls(chosen, {})
+        columns = [column for each in chosen.values() for column in each.columns]
+        own = ("t", *GROUPS["acc"], *GROUPS["ref_q"])
+        return cls(chosen, _first_rows(source, [*columns, *(c for c in own if c in names and c not in given)]))
+
+    def _stacked(self, group: str) -> Array | None:
+        wanted = self.chosen[group].columns if group in self.chosen else GROUPS[group]
+        there = all(column in self.rows for column in wanted)
+        return np.stack([self.rows[column] for column in wanted], axis=1) if there else None
+
+    def units(self, ticks: tuple[str, ...]) -> dict[str, str | None]:
+        """Find the unit of each group: as its names state, else as the readings show."""
+        units = {group: each.unit for group, each in self.chosen.items()}
+        if not self.rows:
+            return units
+        raw_t = self.rows.get(self.chosen["t"].columns[0] if "t" in self.chosen else "t")
+        if raw_t is not None and "t" in units and units["t"] is None:
+            units["t"] = time_unit(raw_t, ticks)
+        acc, gyr, mag = (self._stacked(group) for group in SENSORS)
+        if "acc" in units and units["acc"] is None and acc is not None:
+            units["acc"] = acc_unit(acc)
+        t = None if raw_t is None else raw_t * conversion("t", units.get("t") or "s").factor
+        if "gyr" in units and units["gyr"] is None and gyr is not None and t is not None:
+            fields = [(_filled(t, each), each is mag) for each in (acc, mag) if each is not None]
+            units["gyr"] = gyr_unit(t, gyr, fields, self._stacked("ref_q"))
+        if "mag" in units and units["mag"] is None and mag is not None:
+            rate = units.get("gyr", "rad/s")
+            moves = t is not None and gyr is not None and rate is not None
+            units["mag"] = mag_unit(mag, moves and turned(t, gyr * conversion("gyr_x", rate).factor))  # type: ignore
         return units
-    columns = [column for each in chosen.values() for column in each.columns]
-    beside = [column for column in ("t", *GROUPS["acc"], *GROUPS["ref_q"]) if column in names and column not in given]
-    rows = _first_rows(source, [*columns, *beside])
 
-    def stacked(group: str) -> Array | None:
-        wanted = chosen[group].columns if group in chosen else GROUPS[group]
-        return np.stack([rows[column] for column in wanted], axis=1) if all(c in rows for c in wanted) else None
-
-    raw_t = rows.get(chosen["t"].columns[0] if "t" in chosen else "t")
-    if raw_t is not None and "t" in chosen and units["t"] is None:
-        units["t"] = time_unit(raw_t)
-    acc, gyr, mag = (stacked(group) for group in SENSORS)
-    if "acc" in chosen and units["acc"] is None and acc is not None:
-        units["acc"] = acc_unit(acc)
-    if "mag" in chosen and units["mag"] is None and mag is not None:
-        units["mag"] = mag_unit(mag)
-    t = None if raw_t is None else raw_t * conversion("t", (units["t"] if "t" in chosen else None) or "s").factor
-    if "gyr" in chosen and units["gyr"] is None and gyr is not None and t is not None:
-        units["gyr"] = gyr_unit(t, gyr, [each for each in (acc, mag) if each is not None], stacked("ref_q"))
-    return units
+    def likely(self, group: str, units: Mapping[str, str | None]) -> str:
+        """Propose a unit where nothing shows it."""
+        if group == "gyr":
+            return _LIKELY_GYR.get(units.get("acc") or "m/s^2", COUNTS)
+        if group == "mag":
+            size = np.linalg.norm(self._stacked("mag"), axis=1)  # type: ignore[arg-type]
+            size = size[np.isfinite(size) & (size > 0.0)]
+            return f"*{_USUAL_FIELD / float(np.median(size)):.3g}" if size.size else "uT"
+        return {"t": "ms", "acc": "g"}[group]
 
 
 def _first_rows(source: Readable, columns: Sequence[str]) -> dict[str, Array]:
@@ -200,11 +267,12 @@ def _first_rows(source: Readable, columns: Sequence[str]) -> dict[str, Array]:
     return {column: np.concatenate(parts)[:HEAD] for column, parts in pieces.items() if parts}
 
 
-def _likely(group: str, units: Mapping[str, str | None]) -> str:
-    """Unit that is proposed where nothing shows it."""
-    if group == "gyr":
-        return _LIKELY_GYR.get(units.get("acc") or "m/s^2", "131 LSB/(deg/s)")
-    return {"t": "ms", "acc": "g", "mag": "uT"}[group]
+def _filled(t: Array, values: Array) -> Array:
+    """Fill the rows without a sample on a straight line between their neighbours."""
+    known = np.isfinite(values).all(axis=1) & np.isfinite(t)
+    if known.sum() < 2 or known.all():
+        return values
+    return np.stack([np.interp(t, t[known], values[known, k]) for k in range(values.shape[1])], axis=1)
 
 
 def _mapping(chosen: Mapping[str, _Candidate], units: Mapping[str, str | None]) -> dict[str, str]:
@@ -215,15 +283,17 @@ def _mapping(chosen: Mapping[str, _Candidate], units: Mapping[str, str | None]) 
     }
 
 
-def _question(asked: Sequence[str], several: Sequence[str], chosen: Mapping[str, _Candidate]) -> str:
-    parts = []
+def _question(asked: Sequence[str], several: Sequence[str], timeless: bool) -> str:
+    parts = ["column t is missing"] if timeless else []
     if asked:
-        which = " and ".join("the time" if group == "t" else f"the {SENSOR_NAMES[group]}" for group in asked)
-        parts.append(f"the file does not state the unit of {which}, and the readings do not show it")
+        parts.append(f"the file does not state the unit of {_named(asked)}, and the readings do not show it")
     if several:
-        which = " and ".join("the time" if group == "t" else f"the {SENSOR_NAMES[group]}" for group in several)
-        parts.append(f"several columns may be {which}")
+        parts.append(f"several columns may be {_named(several)}")
     return "; ".join(parts)
+
+
+def _named(groups: Sequence[str]) -> str:
+    return " and ".join("the time" if group == "t" else f"the {SENSOR_NAMES[group]}" for group in groups)
 
 
 def _notes(

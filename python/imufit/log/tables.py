@@ -125,7 +125,7 @@ class TablesSource:
         return laid
 
     def line_of(self, row: int) -> int | None:
-        """A merged row has no line."""
+        """Return None: a merged row has no line."""
         return None
 
 
@@ -142,10 +142,10 @@ def _time_of(table: Table, fixed: str | None) -> tuple[str, NDArray[np.float64]]
             found.append((strange(rest), unit is None, name, unit))
     if not found and all(name == f"c{k + 1}" for k, name in enumerate(names)):
         found = [(0, True, "c1", None)]
-    for _, _, name, unit in sorted(found, key=lambda each: each[:2]):
+    for _, _, name, stated in sorted(found, key=lambda each: each[:2]):
         cells = table.columns[name]
         values = seconds_from_cells(cells) if cells.dtype == object else cells
-        unit = "s" if cells.dtype == object else (unit or fixed or time_unit(values))
+        unit = "s" if cells.dtype == object else (stated or fixed or time_unit(values))
         if unit is not None and np.isfinite(values).any() and bool(np.all(np.diff(values[np.isfinite(values)]) >= 0.0)):
             return name, conversion("t", unit).apply(np.asarray(values, np.float64))
     return None

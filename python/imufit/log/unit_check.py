@@ -83,7 +83,7 @@ def check_units(
     if acc is not None:
         notes += _check_acc(acc, place, origin)
     if gyr is not None:
-        _check_gyr(t, gyr, [v for v in (acc, mag) if v is not None], ref_q, place=place, origin=origin)
+        _check_gyr(t, gyr, [(v, v is mag) for v in (acc, mag) if v is not None], ref_q, place=place, origin=origin)
     if mag is not None:
         notes += _check_mag(mag, metadata, place, origin)
     return notes
@@ -153,10 +153,16 @@ def _check_acc(acc: Array, place: Place, origin: Mapping[str, str]) -> list[str]
 
 
 def _check_gyr(
-    t: Array, gyr: Array, vectors: list[Array], ref_q: Array | None, *, place: Place, origin: Mapping[str, str]
+    t: Array,
+    gyr: Array,
+    vectors: list[tuple[Array, bool]],
+    ref_q: Array | None,
+    *,
+    place: Place,
+    origin: Mapping[str, str],
 ) -> None:
     ratios = [(rate_ratio(t, gyr, ref_q), "the reference attitude turns")] if ref_q is not None else []
-    ratios += [(field_ratio(t, gyr, v), "the field in the other sensors turns") for v in vectors]
+    ratios += [(field_ratio(t, gyr, v, iron), "the field in the other sensors turns") for v, iron in vectors]
     for ratio, who in ratios:
         if ratio > 0.2:
             return
@@ -194,10 +200,20 @@ def rate_ratio(t: Array, gyr: Array, ref_q: Array) -> float:
     return float(np.median(reference[moving] / measured[moving]))
 
 
-def field_ratio(t: Array, gyr: Array, field: Array) -> float:
-    """Factor by which gyr explains the turning of a field fixed in space; NaN unless it explains it clearly.
+def field_ratio(t: Array, gyr: Array, field: Array, iron: bool) -> float:
+    """Find the factor by which gyr explains the turning of a field fixed in space; NaN unless it explains it clearly.
 
-    A constant vector u seen from a body that turns at w obeys du/dt = -w x u, up to the gyro's offset.
+    A constant vector u seen from a body that turns at w obeys du/dt = -w x u, up to the gyro's offset. Iron on the
+    body adds b to what is seen, and w x b to that.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Time, s.
+    gyr, field : (n, 3) arrays
+        Readings in any unit; rows with NaN are left out.
+    iron : bool
+        Whether the field may have an offset that is fixed to the body: a magnetometer's has.
     """
     complete = np.isfinite(gyr).all(axis=1) & np.isfinite(field).all(axis=1)
     t, gyr, field = t[complete], gyr[complete], field[complete]
@@ -208,21 +224,25 @@ def field_ratio(t: Array, gyr: Array, field: Array) -> float:
     if blocks < 20:
         return float("nan")
     t, w, u = (a[: blocks * rows].reshape(blocks, rows, -1).mean(axis=1) for a in (t, gyr, field))
-    u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-30)
+    size = np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-30)
+    u /= np.median(size) if iron else size
     dt = t[2:] - t[:-2]
     steady = (dt[:, 0] < 5.0 * np.median(dt)) & (dt[:, 0] > 0.0)
     change = ((u[2:] - u[:-2]) / dt)[steady]
     w, u = w[1:-1][steady], u[1:-1][steady]
-    design = np.stack([-np.cross(w, u), *(-np.cross(np.broadcast_to(e, u.shape), u) for e in np.eye(3))], axis=-1)
-    a, b = design.reshape(-1, 4), change.reshape(-1)
+    axes = [np.broadcast_to(e, u.shape) for e in np.eye(3)]
+    offset = [-np.cross(e, u) for e in axes]
+    carried = [np.cross(w, e) for e in axes] if iron else []
+    design = np.stack([-np.cross(w, u), *offset, *carried], axis=-1)
+    a, b = design.reshape(-1, design.shape[-1]), change.reshape(-1)
     scale = np.linalg.norm(a, axis=0)
     if b.size < 60 or not np.all(scale > 0.0):
         return float("nan")
     solution, *_ = np.linalg.lstsq(a / scale, b, rcond=None)
-    offset, *_ = np.linalg.lstsq((a / scale)[:, 1:], b, rcond=None)
+    still, *_ = np.linalg.lstsq((a / scale)[:, 1:4], b, rcond=None)
     total = max(float(np.sum(b**2)), 1e-30)
     unexplained = float(np.sum((b - a @ (solution / scale)) ** 2)) / total
-    by_offset_alone = float(np.sum((b - (a / scale)[:, 1:] @ offset) ** 2)) / total
+    by_offset_alone = float(np.sum((b - (a / scale)[:, 1:4] @ still) ** 2)) / total
     clear = unexplained < 0.4 and by_offset_alone - unexplained > 0.3 and solution[0] > 0.0
     return float(solution[0] / scale[0]) if clear else float("nan")
 

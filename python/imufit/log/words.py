@@ -105,6 +105,8 @@ TIME_WORDS: Final = frozenset(
         "sec",
         "elapsed",
         "timesec",
+        "date",
+        "datetime",
         "clock",
         "sampletimefine",
     )
@@ -272,8 +274,8 @@ def unit_of(group: str, rest: tuple[str, ...], bracket: str) -> tuple[str | None
     (unit or None, words)
         The words that are left.
     """
-    stated = lookup(bracket) if bracket else None
-    unit = bracket if stated is not None and stated[0] == _QUANTITY[group] else None
+    stated = lookup(bracket.replace("(", "").replace(")", "")) if bracket else None
+    unit = bracket.replace("(", "").replace(")", "") if stated is not None and stated[0] == _QUANTITY[group] else None
     for length in (3, 2, 1):
         tail = " ".join(rest[-length:])
         for name, spellings in _UNIT_WORDS[group].items():
