@@ -69,8 +69,8 @@ def test_unusable_text_leaves_no_log(tmp_path: Path, capsys: pytest.CaptureFixtu
     code, out, err = run(capsys, "convert", tmp_path / "a.log", "-o", tmp_path / "b.csv")
     assert (code, out) == (2, "")
     assert err == (
-        "imufit: a.log: column t is missing. Give time in s, for a fixed rate with --map "
-        "'t=row[100Hz],acc_x=ax,acc_y=ay,acc_z=az'.\n"
+        "imufit: a.log: column t is missing. If this is right, use --map "
+        "'t=row[100Hz],acc_x=ax[m/s^2],acc_y=ay[m/s^2],acc_z=az[m/s^2]'\n"
     )
     assert not (tmp_path / "b.csv").exists()
 

@@ -169,7 +169,9 @@ def test_text_in_time(tmp_path: Path) -> None:
 
 def test_decimal_comma_is_recognised(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
-    path.write_text("t;mag_x;mag_y;mag_z\n0;1;2;3\n1;1,5;2;3\n")
+    path.write_text("t;mag_x;mag_y;mag_z\n0;1;2;3\n1;30,5;2;3\n")
+    assert read(path).mag.tolist() == [[1.0, 2.0, 3.0], [30.5, 2.0, 3.0]]
+    path.write_text("t;mag_x;mag_y;mag_z\n0.5;1;2;3\n1;1,5;2;3\n")
     assert (
         message(path)
         == "a.csv: row 1 (line 3), column mag_x: '1,5' is not a number. Write a decimal point, not a comma."
@@ -200,8 +202,9 @@ def test_second_sensor_is_not_a_slip(tmp_path: Path) -> None:
 
 
 def test_capital_letters_in_time(tmp_path: Path) -> None:
-    df = frame().rename(columns={"t": "Time"})
-    assert message(save(df, tmp_path / "a.csv")) == "a.csv: column t is missing; did you mean Time? Use --map t=Time"
+    log = read(save(frame().rename(columns={"t": "Time"}), tmp_path / "a.csv"))
+    assert log.t.tolist() == frame()["t"].tolist()
+    assert log.notes == ("a.csv: taken t from Time in s",)
 
 
 def test_sensor_that_is_partly_there(tmp_path: Path, suffix: str) -> None:
@@ -305,7 +308,9 @@ def test_unknown_suffix_missing_file_directory(tmp_path: Path) -> None:
     )
     assert message(tmp_path / "b.csv") == f"b.csv: there is no file {tmp_path / 'b.csv'}. Check the name."
     (tmp_path / "c.csv").mkdir()
-    assert message(tmp_path / "c.csv") == f"c.csv: {tmp_path / 'c.csv'} is a directory, not a log. Name a file in it."
+    assert message(tmp_path / "c.csv") == (
+        "c.csv: the folder of text files holds no table. Name a file that holds samples."
+    )
 
 
 def test_arrays_are_checked_too() -> None:

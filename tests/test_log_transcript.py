@@ -208,8 +208,8 @@ def test_without_mapping_the_error_names_one_that_works(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="column t is missing") as caught:
         transcript(tmp_path, *lines, mapping="")
     mapping = (caught.value.remedy or "").split("'")[1]
-    assert mapping == "t=row[100Hz],acc_x=accel_x,acc_y=accel_y,acc_z=accel_z"
-    assert read(tmp_path / "a.log", parse_mapping(mapping.replace("_z", "_z[g]").replace("acc_z[g]", "acc_z"))).n == 20
+    assert mapping == "t=row[100Hz],acc_x=accel_x[g],acc_y=accel_y[g],acc_z=accel_z[g]"
+    assert read(tmp_path / "a.log", parse_mapping(mapping)).n == 20
 
 
 @pytest.mark.parametrize("name", ["a.log", "a.csv", "a.capture", "a"])

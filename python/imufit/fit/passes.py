@@ -14,6 +14,7 @@ from imufit.errors import InputError
 from imufit.faults import row_faults
 from imufit.fit.column_noise import ColumnNoise
 from imufit.fit.commanded import CommandedAttitude
+from imufit.fit.computed_columns import computed_columns
 from imufit.fit.range_end import RangeEnd
 from imufit.fit.readings_seen import ReadingsSeen
 from imufit.log import Chunk, LogSource
@@ -73,9 +74,12 @@ class Passes:
 
     def __init__(self, log: LogSource, progress: Progress) -> None:
         self.log = log
-        self.covariates = covariate_names(log)
+        computed = computed_columns(log)
+        self.covariates = [name for name in covariate_names(log) if name not in computed]
         self.empty: list[str] = []
-        """What is to be said of columns without any value."""
+        """What is to be said of columns that are not used."""
+        if computed:
+            self.empty.append(f"Not used, since they are computed from the readings: {', '.join(computed)}.")
         self.column_noise: dict[str, float] = {}
         """Share of noise in each covariate's variance (``temp`` too), once the log has been surveyed."""
         self._progress = progress

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from imufit.errors import InputError
 from imufit.log.assemble import group_fields
 from imufit.log.check import check_poses, checked_labels, checked_readings, truth_value
-from imufit.log.columns import CONTRACT, GROUPS
-from imufit.log.metadata import Metadata
+from imufit.log.columns import CONTRACT, GROUPS, meant
+from imufit.log.metadata import KNOWN, Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import TimeScan
 
@@ -43,6 +43,27 @@ def contiguous(values: ArrayLike, name: str, shape: tuple[int, ...] | None = Non
             f"the array has shape {array.shape}, but {shape} is wanted: rows are samples", file="log", column=name
         )
     return array
+
+
+def check_keywords(metadata: Mapping[str, Any]) -> None:
+    """Refuse an array among the metadata: a column under a name that a log does not know.
+
+    Parameters
+    ----------
+    metadata : mapping
+        Keywords that do not name a column.
+
+    Raises
+    ------
+    InputError
+        The column is named, with the nearest that there is.
+    """
+    for key, value in metadata.items():
+        if key not in KNOWN and np.ndim(value) > 0 and np.size(value) > 1 and not isinstance(value, Mapping):
+            column = meant(f"{key}_x")
+            group = next((group for group, columns in GROUPS.items() if column in columns), "")
+            remedy = f"Did you mean {group}?" if group else "Columns without a fixed meaning go into covariates={...}."
+            raise InputError("a log has no array of this name", file="log", column=key, remedy=remedy)
 
 
 def fields_from_arrays(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from imufit.log.check import (
     check_poses,
@@ -17,7 +18,7 @@ from imufit.log.check import (
     truth_value,
 )
 from imufit.log.clock_text import seconds_from_cells
-from imufit.log.columns import GROUPS, NUMERIC
+from imufit.log.columns import EULER, GROUPS, NUMERIC
 from imufit.log.foreign import Plan, PlannedColumn
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
@@ -124,6 +125,8 @@ def group_fields(
     for name in ("temp", "ref_angle"):
         if name in numbers:
             fields[name] = numbers.pop(name)
+    if "ref_q" not in fields and all(name in numbers for name in EULER):
+        fields["ref_q"] = attitude_of_angles(*(numbers.pop(name) for name in EULER))
     if "ref_q" in fields:
         fields["ref_q"] = checked_attitude(fields["ref_q"], start, place)
     elif "ref_angle" in fields and metadata.rig_axis is not None:
@@ -131,6 +134,29 @@ def group_fields(
     if "pose" in text:
         fields["pose"] = text.pop("pose")
     return {**fields, "covariates": numbers, "labels": text}
+
+
+def attitude_of_angles(
+    roll: NDArray[np.float64], pitch: NDArray[np.float64], yaw: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Attitude of a body turned by yaw about z, then by pitch about its y, then by roll about its x.
+
+    Parameters
+    ----------
+    roll, pitch, yaw : (n,) arrays
+        rad; NaN is missing.
+
+    Returns
+    -------
+    (n, 4) array
+        Unit quaternions, scalar first, body to reference frame.
+    """
+    angles = np.stack([yaw, pitch, roll], axis=1)
+    known = np.isfinite(angles).all(axis=1)
+    q = np.full((roll.size, 4), np.nan)
+    if known.any():
+        q[known] = Rotation.from_euler("ZYX", angles[known]).as_quat()[:, [3, 0, 1, 2]]
+    return q
 
 
 def attitude_of_rig(angle: NDArray[np.float64], axis: str) -> NDArray[np.float64]:

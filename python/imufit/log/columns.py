@@ -20,6 +20,9 @@ SENSORS: Final = ("acc", "gyr", "mag")
 SENSOR_NAMES: Final = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}
 """What the sensors are called in a sentence."""
 
+EULER: Final = ("ref_roll", "ref_pitch", "ref_yaw")
+"""Reference attitude as angles, rad: a file may have them in place of `ref_q`, a log has not."""
+
 CONTRACT: Final[tuple[str, ...]] = (
     "t",
     *GROUPS["acc"],

@@ -12,7 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
-from imufit.log.arrays import contiguous, fields_from_arrays, quaternions_from_rotation, rotation_from_quaternions
+from imufit.log.arrays import (
+    check_keywords,
+    contiguous,
+    fields_from_arrays,
+    quaternions_from_rotation,
+    rotation_from_quaternions,
+)
 from imufit.log.columns import GROUPS, present
 from imufit.log.frame import fields_from_frame
 from imufit.log.metadata import Metadata
@@ -252,10 +258,16 @@ class Log:
             Further columns of numbers and of text.
         **metadata
             As in `Metadata`: frame, gravity, mag_reference, ...
+
+        Raises
+        ------
+        InputError
+            An array cannot be, or has a name that a log does not know.
         """
         given = {"acc": acc, "gyr": gyr, "mag": mag, "ref_p": ref_p, "temp": temp, "ref_angle": ref_angle}
         ref_q = quaternions_from_rotation(reference) if isinstance(reference, Rotation) else reference
         text = {**(labels or {}), **({} if pose is None else {"pose": pose})}
+        check_keywords(metadata)
         meta = Metadata.from_mapping(metadata, "log")
         return cls(**fields_from_arrays(t, {**given, "ref_q": ref_q}, covariates or {}, text, meta))
 

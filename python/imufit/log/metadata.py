@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import math
 from collections.abc import Callable, Mapping
@@ -23,6 +24,10 @@ AXES: Final = ("x", "y", "z")
 STANDARD_GRAVITY: Final = 9.80665
 SMALLEST_GRAVITY: Final = 1e-3
 """m/s^2; the moons of Mars have 3e-3. What is smaller is a slip, and a division by it tells nothing."""
+
+ALIKE: Final = 0.8
+"""Share of letters in common (difflib) from which a name is a slip for another: one letter of five lost has 0.89, two
+letters exchanged 0.8; `source` and `sensor` have 0.5."""
 
 SMALLEST_NOISE: Final = 1e-18
 """Smallest standard deviation that can be stated, m/s^2, rad/s or uT: a thousandth of that of the free-falling test
@@ -70,7 +75,7 @@ class Metadata:
         Parameters
         ----------
         values : mapping
-            Keys as in the file; None counts as absent, unknown keys go to `extra`.
+            Keys as in the file; None counts as absent, unknown keys go to `extra` unless they look like a known one.
         file : str or Path, optional
             File to name in errors.
 
@@ -85,6 +90,7 @@ class Metadata:
             if key == "extra" and isinstance(value, Mapping):
                 extra.update(value)
             elif key not in KNOWN:
+                _check_unknown(str(key), values, file)
                 extra[key] = value
             elif value is not None:
                 known[key] = _CHECKS[key](value, file)
@@ -185,6 +191,18 @@ def _shown(value: Any) -> str:
 
 def _is_huge(value: Any) -> bool:
     return isinstance(value, int) and value.bit_length() > 64
+
+
+def _check_unknown(key: str, values: Mapping[str, Any], file: str | Path | None) -> None:
+    """Refuse a key that looks like a slip for a known one, which would be ignored without a word."""
+    close = difflib.get_close_matches(key.lower(), KNOWN - values.keys(), n=1, cutoff=ALIKE)
+    if close:
+        raise InputError(
+            f"metadata have no key {printable(key, NAME)}",
+            file=file,
+            column=key,
+            remedy=f"Did you mean {close[0]}? If not, put the key into the table extra.",
+        )
 
 
 def _frame(value: Any, file: str | Path | None) -> Frame:

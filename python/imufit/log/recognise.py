@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.clock_text import seconds_from_cells
-from imufit.log.columns import CONTRACT, GROUPS, SENSOR_NAMES, SENSORS
+from imufit.log.columns import CONTRACT, EULER, GROUPS, SENSOR_NAMES, SENSORS
 from imufit.log.makers import Maker, maker_of
 from imufit.log.place import Place
 from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, time_unit, turned
@@ -29,6 +29,8 @@ COUNTS: Final = "131 LSB/(deg/s)"
 """Counts of the usual sensor in its smallest range (InvenSense, MPU-6050 product specification)."""
 ROW_RATE: Final = "row[100Hz]"
 """Time by row number, with the rate that is most usual."""
+_WHOLE_TURN: Final = 6.4
+"""Largest angle of an attitude, rad: a whole turn, and rounding."""
 _USUAL_FIELD: Final = 50.0
 """Magnitude of the earth's field in the middle latitudes, uT (World Magnetic Model)."""
 _NUMBERED: Final = re.compile(r"(?:(?P<table>.*)\.)?c(?P<number>\d+)")
@@ -91,7 +93,10 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         Sensors are there, but the unit of one is neither stated nor shown by the readings, or two columns may be the
         same sensor: all of it is asked in one sentence, with one mapping for the whole file.
     """
-    names, given = source.names, dict(mapping or {})
+    names = source.names
+    angles = _angles(source, names, mapping or {})
+    given = {**angles, **(mapping or {})}
+    told = (f"{place.name}: reference attitude from {', '.join(angles.values())}",) if angles else ()
     taken = set(given.values())
     wanted = [group for group in ("t", *SENSORS) if not _has(group, names, given)]
     maker = maker_of(names)
@@ -100,19 +105,19 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         parsed = [words for words in parsed if not re.search(maker.left_out, words.column)]
     found = {group: _candidates(group, parsed, maker) for group in wanted}
     found = {group: candidates for group, candidates in found.items() if candidates}
-    if not given and not found and all(_NUMBERED.fullmatch(name) for name in names):
+    if not mapping and not found and all(_NUMBERED.fullmatch(name) for name in names):
         raise _without_names(source, place)
     if not any(group in found for group in SENSORS) and not ("t" in found and _has_any(names, given)):
-        return Recognised(given)
+        return Recognised(given, told)
     chosen = {group: candidates[0] for group, candidates in found.items()}
     several = [group for group, candidates in found.items() if len(candidates) > 1 and _alike(candidates)]
     readings = _Readings.of(source, chosen, names, given)
     units = readings.units(maker.ticks if maker is not None else ())
     asked = [group for group in chosen if units[group] is None]
-    if given:
+    if mapping:
         chosen = {group: each for group, each in chosen.items() if group not in (*asked, *several)}
-        return Recognised({**_mapping(chosen, units), **given}, _notes(place, maker, chosen, units))
-    complete = _mapping(chosen, {group: units[group] or readings.likely(group, units) for group in chosen})
+        return Recognised({**_mapping(chosen, units), **given}, (*told, *_notes(place, maker, chosen, units)))
+    complete = {**given, **_mapping(chosen, {group: units[group] or readings.likely(group, units) for group in chosen})}
     timeless = "t" in wanted and "t" not in found
     if asked or several or timeless:
         complete = {**({"t": ROW_RATE} if timeless else {}), **complete}
@@ -121,7 +126,28 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
             column="t" if timeless else chosen[(asked or several)[0]].columns[0],
             remedy=_remedy(complete),
         )
-    return Recognised(complete, _notes(place, maker, chosen, units))
+    return Recognised(complete, (*told, *_notes(place, maker, chosen, units)))
+
+
+def _angles(source: Readable, names: Sequence[str], given: Mapping[str, str]) -> dict[str, str]:
+    """Find a reference attitude in angles, and whether they are in degrees: what turns by more than a turn is."""
+    if _has("ref_q", names, given) or any(target in given for target in EULER):
+        return {}
+    found: dict[str, tuple[str, str]] = {}
+    for name in names:
+        words = words_of(name)
+        for target in EULER:
+            if {"ref", "reference"} & set(words.words) and target[4:] in words.words:
+                unit = next((unit for unit in ("deg", "rad") if unit in (words.bracket, *words.words)), "")
+                found[target] = name, unit
+    if set(found) != set(EULER):
+        return {}
+    unit = next((unit for _, unit in found.values() if unit), "")
+    if not unit:
+        rows = _first_rows(source, [name for name, _ in found.values()])
+        largest = max(float(np.nanmax(np.abs(values), initial=0.0)) for values in rows.values())
+        unit = "deg" if largest > _WHOLE_TURN else "rad"
+    return {target: f"{name}[{unit}]" for target, (name, _) in found.items()}
 
 
 def _remedy(mapping: Mapping[str, str]) -> str:
