@@ -16,7 +16,8 @@ from imufit.log.clock_text import seconds_from_cells
 from imufit.log.columns import CONTRACT, EULER, GROUPS, SENSOR_NAMES, SENSORS
 from imufit.log.makers import Maker, maker_of
 from imufit.log.place import Place
-from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, time_unit, turned
+from imufit.log.time_unit import time_unit
+from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, turned
 from imufit.log.unit_check import HEAD
 from imufit.log.units import conversion
 from imufit.log.words import Words, names_time, sensor_of, strange, unit_of, words_of

@@ -51,7 +51,7 @@ class LogStream:
         self._metadata = read_metadata(self._path, self._source.embedded)
         self._repair = self._scan()
         head = self._head()
-        odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin)
+        odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin, "t" in found.mapping)
         self._columns = head.columns
         notes = (*self._source.notes, *found.notes, *self._plan.notes, self._repair.note, *odd)
         if "ref_angle" in self._columns and "ref_qw" not in self._columns:

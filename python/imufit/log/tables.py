@@ -14,7 +14,7 @@ from imufit.formats import Recording, Table
 from imufit.log.clock_text import seconds_from_cells
 from imufit.log.makers import maker_of
 from imufit.log.size import BLOCK_ROWS, size_in_words
-from imufit.log.unit_by_data import time_unit
+from imufit.log.time_unit import time_unit
 from imufit.log.units import conversion
 from imufit.log.words import names_time, strange, unit_of, words_of
 from imufit.printable import NAME, printable

@@ -13,11 +13,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from imufit.errors import InputError
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
+from imufit.log.time_unit import time_unit
 
 LEAST_STEP: Final = 1e-6
 """Mean time from row to row, s, below which no sensor samples: the fastest accelerometers give 1e5 samples a second."""
+SLOWEST_STEP: Final = 2.0
+"""Median time from row to row, s, from which a clock that was not stated is taken for one of another unit: at 0.5 Hz a
+hand turns a sensor over between two samples. A log of rests may be as slow, and then says so."""
 HEAD: Final = 200_000
 """Rows from the start of the log on which units are judged."""
 
@@ -34,6 +39,10 @@ GYR_UNITS: Final = (
     (1e-3 * _DEG, "milli-deg/s", "mdps"),
     *((_DEG / c, f"raw counts of {c:g} LSB/(deg/s)", f"{c:g} LSB/(deg/s)") for c in (131.0, 65.5, 32.8, 16.4)),
 )
+_LIKE_CLOCK: Final = 0.3
+"""Logarithm of a ratio of rates over 1/1000 up to which the clock is in ms: noise takes some 10 % of it."""
+_COARSE_STEP: Final = 0.1
+"""Rows so far apart, s, may be 0.1 ms and more apart; at 10 kHz and faster nothing is logged with a clock in ms."""
 _OTHER_UNIT: Final = 0.03
 """Noise pulls the ratio of rates towards zero, but not as far as this in rad/s."""
 MAG_UNITS: Final = (
@@ -50,6 +59,7 @@ def check_units(
     metadata: Metadata,
     place: Place,
     origin: Mapping[str, str] | None = None,
+    clock_stated: bool = False,
 ) -> list[str]:
     """Refuse a log whose readings are unmistakably in another unit.
 
@@ -65,6 +75,8 @@ def check_units(
         To name the file in errors.
     origin : mapping, optional
         Column of the file for each column of the log, to word the remedy.
+    clock_stated : bool
+        Whether the unit of the time was stated: rows may then be as far apart as they are.
 
     Returns
     -------
@@ -79,18 +91,26 @@ def check_units(
     acc, gyr, mag, ref_q = (sensors.get(name) for name in ("acc", "gyr", "mag", "ref_q"))
     notes: list[str] = []
     origin = origin or {}
-    _check_time(t, gyr, place, origin)
+    _check_time(t, place, origin, clock_stated)
     if acc is not None:
         notes += _check_acc(acc, place, origin)
     if gyr is not None:
-        _check_gyr(t, gyr, [(v, v is mag) for v in (acc, mag) if v is not None], ref_q, place=place, origin=origin)
+        _check_gyr(
+            t,
+            gyr,
+            [(v, v is mag) for v in (acc, mag) if v is not None],
+            ref_q,
+            place=place,
+            origin=origin,
+            stated=clock_stated,
+        )
     if mag is not None:
         notes += _check_mag(mag, metadata, place, origin)
     return notes
 
 
-def _check_time(t: Array, gyr: Array | None, place: Place, origin: Mapping[str, str]) -> None:
-    """Whole numbers far apart are ticks of a finer clock when nothing could be sampled so slowly."""
+def _check_time(t: Array, place: Place, origin: Mapping[str, str], stated: bool) -> None:
+    """Refuse rows closer or farther apart than any sensor samples."""
     if t.size < 20:
         return
     mean = float(t[-1] - t[0]) / (t.size - 1)
@@ -103,22 +123,16 @@ def _check_time(t: Array, gyr: Array | None, place: Place, origin: Mapping[str, 
             + shlex.quote(f"t={column}[*3600]")
             + " for hours.",
         )
-    if np.any(t != np.floor(t)):
-        return
     dt = float(np.median(np.diff(t)))
-    if dt < 2.0:
-        return
-    unit = "ms" if dt < 1e3 else "us" if dt < 5e5 else "ns"
-    if unit == "ms":
-        rate = np.linalg.norm(gyr - np.nanmedian(gyr, axis=0), axis=1) if gyr is not None else np.empty(0)
-        rate = rate[np.isfinite(rate)]
-        # radians turned from one sample to the next: a log sampled so coarsely would show nothing
-        if rate.size < 20 or np.quantile(rate, 0.99) * dt < 2.0:
-            return
-    raise place.error(
-        f"the time steps are whole numbers around {dt:g}, which looks like {unit}, not s",
+    if dt >= SLOWEST_STEP and not stated:
+        raise _other_clock(f"the time steps are around {dt:g}", time_unit(t) or "ms", place, column)
+
+
+def _other_clock(seen: str, unit: str, place: Place, column: str) -> InputError:
+    return place.error(
+        f"{seen}, which looks like {unit}, not s",
         column="t",
-        remedy="Use --map " + shlex.quote(f"t={origin.get('t', 't')}[{unit}]"),
+        remedy=f"Use --map {shlex.quote(f't={column}[{unit}]')}, or {shlex.quote(f't={column}[s]')} if it is s.",
     )
 
 
@@ -160,6 +174,7 @@ def _check_gyr(
     *,
     place: Place,
     origin: Mapping[str, str],
+    stated: bool,
 ) -> None:
     ratios = [(rate_ratio(t, gyr, ref_q), "the reference attitude turns")] if ref_q is not None else []
     ratios += [(field_ratio(t, gyr, v, iron), "the field in the other sensors turns") for v, iron in vectors]
@@ -167,6 +182,9 @@ def _check_gyr(
         if ratio > 0.2:
             return
         if ratio < _OTHER_UNIT:
+            if not stated and abs(np.log(ratio / 1e-3)) < _LIKE_CLOCK and float(np.median(np.diff(t))) >= _COARSE_STEP:
+                seen = f"{who} at {ratio:.3g} of the rate in gyr, with rows {float(np.median(np.diff(t))):.3g} s apart"
+                raise _other_clock(seen, "ms", place, origin.get("t", "t"))
             _, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
             raise place.error(
                 f"{who} at {ratio:.3g} of the rate in gyr, which looks like {words}, not rad/s",
