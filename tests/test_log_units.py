@@ -229,10 +229,22 @@ def test_time_in_ticks_is_recognised(tmp_path: Path, unit: str, factor: float) -
     np.testing.assert_allclose(read(tmp_path / "a.parquet", {"t": f"t[{unit}]"}).t, moving().t, atol=1e-9)
 
 
-def test_slow_log_in_whole_seconds_is_accepted() -> None:
+def test_slow_log_states_its_clock() -> None:
     log = moving(still=True)
-    df = log.to_dataframe().assign(t=np.arange(log.n) * 10.0)
-    assert Log.from_dataframe(df).duration == 10.0 * (log.n - 1)
+    for start in (0.0, 0.37):
+        df = log.to_dataframe().assign(t=start + np.arange(log.n) * 10.0)
+        with pytest.raises(InputError, match="the time steps are around 10, which looks like ms, not s"):
+            Log.from_dataframe(df)
+        assert Log.from_dataframe(df, mapping={"t": "t[s]"}).duration == pytest.approx(10.0 * (log.n - 1))
+
+
+def test_clock_in_milliseconds_is_not_taken_for_a_gyroscope_in_another_unit() -> None:
+    df = moving().to_dataframe()
+    df["t"] *= 1e3
+    df = df.assign(**{f"ref_q{axis}": np.nan for axis in "wxyz"})
+    with pytest.raises(InputError, match="looks like ms, not s") as caught:
+        Log.from_dataframe(df)
+    assert "t=t[ms]" in (caught.value.remedy or "")
 
 
 def test_strong_iron_beside_a_magnetometer_is_noted_not_refused() -> None:

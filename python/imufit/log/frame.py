@@ -52,7 +52,9 @@ def fields_from_frame(df: pd.DataFrame, mapping: Mapping[str, str] | None, metad
     sensors: dict[str, NDArray[np.float64] | None] = {
         name: fields[name][:HEAD] for name in ("acc", "gyr", "mag", "ref_q") if name in fields
     }
-    odd = check_units(fields["t"][:HEAD], sensors, metadata, place, plan.origin, "t" in (mapping or {}))
+    odd = check_units(
+        fields["t"][:HEAD], sensors, metadata, place, plan.origin, "t" in (mapping or {}) or metadata != Metadata()
+    )
     notes = tuple(note for note in (*plan.notes, repair.note, *odd) if note)
     return {**fields, "metadata": metadata, "notes": notes}
 

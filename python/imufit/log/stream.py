@@ -11,7 +11,7 @@ from imufit.log.assemble import check_truth_values, fields_of, time_of
 from imufit.log.cut import cut
 from imufit.log.foreign import plan_columns
 from imufit.log.log import Chunk, Log, concatenate, gathered
-from imufit.log.metadata import Metadata, read_metadata
+from imufit.log.metadata import Metadata, read_metadata, sidecar_path
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.place import Place
 from imufit.log.recognise import recognise
@@ -51,7 +51,9 @@ class LogStream:
         self._metadata = read_metadata(self._path, self._source.embedded)
         self._repair = self._scan()
         head = self._head()
-        odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin, "t" in found.mapping)
+        # what says of itself that it is a log keeps to the log's units
+        stated = "t" in found.mapping or bool(self._source.embedded) or sidecar_path(self._path).is_file()
+        odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin, stated)
         self._columns = head.columns
         notes = (*self._source.notes, *found.notes, *self._plan.notes, self._repair.note, *odd)
         if "ref_angle" in self._columns and "ref_qw" not in self._columns:
