@@ -37,7 +37,7 @@ class Maker:
 
     def made(self, names: Sequence[str]) -> bool:
         """Whether a file with these columns is of this maker."""
-        return all(any(re.search(mark, name) for name in names) for mark in self.marks)
+        return all(any(re.search(mark, name, re.IGNORECASE) for name in names) for mark in self.marks)
 
 
 MAKERS: Final = (
@@ -75,7 +75,7 @@ MAKERS: Final = (
         ticks=("10000 Hz", "us"),
         source="Movella, MT Manager and DOT user manuals",
     ),
-    Maker("Shimmer Consensys", (r"(?i)shimmer.*(Accel|Gyro|Mag)_",), source="Shimmer, Consensys user guide"),
+    Maker("Shimmer Consensys", (r"shimmer.*(Accel|Gyro|Mag)_",), source="Shimmer, Consensys user guide"),
     Maker(
         "x-io",
         (r"(^|\.)Gyroscope X \(deg/s\)$", r"(^|\.)Accelerometer X \(g\)$"),
