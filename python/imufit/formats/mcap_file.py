@@ -175,9 +175,7 @@ class _Walk:
             return
         header = value.get("header")
         stamp = (header.pop("stamp", None) if isinstance(header, dict) else None) or value.get("timestamp")
-        self._messages.rows.append(
-            topic, self._messages.rows.flat(value), _seconds(stamp) or message.log_time * 1e-9
-        )
+        self._messages.rows.append(topic, self._messages.rows.flat(value), _seconds(stamp) or message.log_time * 1e-9)
 
     def _undecoded(self, topic: str) -> None:
         self._messages.undecoded[topic] = self._messages.undecoded.get(topic, 0) + 1

@@ -41,7 +41,9 @@ def read(path: Path) -> Recording:
         if _TIME not in data.data or not len(data.data[_TIME]):
             continue
         columns = {
-            name: values.astype(float) for name, values in data.data.items() if not name.rpartition(".")[2] == "_padding0"
+            name: values.astype(float)
+            for name, values in data.data.items()
+            if not name.rpartition(".")[2] == "_padding0"
         }
         columns[_TIME] *= 1e-6
         name = data.name if data.name not in several or data.multi_id == 0 else f"{data.name}.{data.multi_id}"

@@ -164,5 +164,3 @@ def _seconds(stamp: Any) -> float:
 def _long_name(kind: str) -> str:
     package, _, name = kind.partition("/")
     return kind if "/msg/" in kind or not name else f"{package}/msg/{name}"
-
-
