@@ -1,0 +1,114 @@
+"""MATLAB's files (``.mat``): up to version 7.2 read by scipy, 7.3 by h5py."""
+
+from __future__ import annotations
+
+import io
+import zlib
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from imufit.errors import InputError
+from imufit.formats import hdf5
+from imufit.formats.arrays import Named, tables_of
+from imufit.formats.limits import RATIO, UNSUSPECTED, WHOLE, check_expansion, check_size, check_values
+from imufit.formats.recording import Recording
+
+FORM: Final = "MATLAB file"
+_MAGIC: Final = b"MATLAB 5.0 MAT-file"
+_HEADER: Final = 128
+_PACKED: Final = 15
+"""Type of an element whose content is packed by zlib, by MATLAB's description of the format."""
+_DEPTH: Final = 16
+"""Levels of structs within structs; those that a motion capture system writes have 4."""
+_LIST: Final = 64
+"""Members of an array of structs that are read one by one."""
+
+
+def recognises(head: bytes, _path: Path) -> bool:
+    """Return whether a file begins with MATLAB's text, or names its version where the text is another."""
+    return head.startswith((_MAGIC, b"MATLAB 7.3 MAT-file")) or (
+        # the first 116 bytes are free text; behind them stand version 1.0 and the order of bytes
+        len(head) >= _HEADER and head[124:128] in (b"\x00\x01IM", b"\x01\x00MI") and b"\0" not in head[:16]
+    )
+
+
+def read(path: Path) -> Recording:
+    """Read a file of any version."""
+    with path.open("rb") as file:
+        head = file.read(1024)
+    if hdf5.MAGIC in head:
+        return hdf5.read_matlab(path, FORM)
+    import scipy.io  # noqa: PLC0415 - costs a tenth of a second that other commands do not need
+
+    check_size(path, WHOLE)
+    data = path.read_bytes()
+    _check_packed(path, data)
+    declared = scipy.io.whosmat(io.BytesIO(data))
+    check_values(path, sum(int(np.prod([max(int(k), 1) for k in shape], dtype=float)) for _, shape, _ in declared))
+    content = scipy.io.loadmat(io.BytesIO(data), simplify_cells=True, verify_compressed_data_integrity=True)
+    named = Named(".")
+    opaque = False
+    for name, value in content.items():
+        if name.startswith("__"):
+            opaque = opaque or name == "__function_workspace__"
+            continue
+        _add(named, name, value, 0)
+    tables, notes = tables_of(path, named)
+    if not tables and opaque:
+        raise InputError(
+            "the file holds only objects of MATLAB, such as a table or a timetable",
+            file=path,
+            remedy="Save T.Variables or table2struct(T, 'ToScalar', true) instead, or export with writetable(T, FILE).",
+        )
+    return Recording(FORM, tables, notes)
+
+
+def _add(named: Named, name: str, value: Any, depth: int) -> None:
+    if isinstance(value, dict):
+        if depth == _DEPTH:
+            named.left_out.append(name)
+            return
+        for key, member in value.items():
+            _add(named, f"{name}.{key}", member, depth + 1)
+    elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
+        members = list(np.asarray(value, dtype=object).reshape(-1)) if not isinstance(value, list) else value
+        if members and all(isinstance(member, dict) for member in members) and len(members) <= _LIST:
+            for index, member in enumerate(members):
+                _add(named, f"{name}[{index}]", member, depth + 1)
+        elif members and all(isinstance(member, str) for member in members):
+            named.add(name, np.array(members, dtype=object))
+        elif members and depth < _DEPTH and len(members) <= _LIST:
+            for index, member in enumerate(members):
+                _add(named, f"{name}[{index}]", member, depth + 1)
+        elif members:
+            named.left_out.append(name)
+    elif isinstance(value, np.ndarray) and value.dtype.names:
+        named.left_out.append(name)
+    elif isinstance(value, str | np.ndarray | np.generic | bool | int | float):
+        named.add(name, value)
+    else:
+        named.left_out.append(name)
+
+
+def _check_packed(path: Path, data: bytes) -> None:
+    """Refuse elements that unpack to more than readings can, before they are unpacked into memory."""
+    if len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
+        return
+    order = "little" if data[126:128] == b"IM" else "big"
+    at, total, packed = _HEADER, 0, 0
+    most = max(UNSUSPECTED, RATIO * len(data))
+    while at + 8 <= len(data):
+        kind = int.from_bytes(data[at : at + 4], order)  # type: ignore[arg-type]
+        length = int.from_bytes(data[at + 4 : at + 8], order)  # type: ignore[arg-type]
+        if kind == _PACKED:
+            packed += length
+            unpacker = zlib.decompressobj()
+            rest = data[at + 8 : at + 8 + length]
+            while rest:
+                total += len(unpacker.decompress(rest, 1 << 20))
+                rest = unpacker.unconsumed_tail
+                if total > min(most, WHOLE):
+                    check_expansion(path, packed, total)
+        at += 8 + length
