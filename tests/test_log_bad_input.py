@@ -301,9 +301,9 @@ def test_binary_content_in_csv(tmp_path: Path) -> None:
 
 
 def test_unknown_suffix_missing_file_directory(tmp_path: Path) -> None:
-    (tmp_path / "a.xlsx").write_bytes(b"PK\x03\x04\x14\x00\x06\x00")
-    assert message(tmp_path / "a.xlsx") == (
-        "a.xlsx: the suffix .xlsx is not a log's, and the file is no text. Logs are .parquet, .npz, .csv, .txt, .tsv, "
+    (tmp_path / "a.doc").write_bytes(b"\xd0\xcf\x11\xe0\x00\x00\x06\x00")
+    assert message(tmp_path / "a.doc") == (
+        "a.doc: the suffix .doc is not a log's, and the file is no text. Logs are .parquet, .npz, .csv, .txt, .tsv, "
         ".dat, .log: export it as text, of which imufit convert makes a log."
     )
     assert message(tmp_path / "b.csv") == f"b.csv: there is no file {tmp_path / 'b.csv'}. Check the name."

@@ -126,7 +126,7 @@ class _Walk:
         size = len(self._data)
         rest = size - self._end
         last = max((float(np.nanmax(table.columns[table.time])) for table in tables if table.time), default=0.0)
-        if 0 < rest and not (rest <= _FILLED and not self._data[self._end :].strip(b"\0\xff")):
+        if rest > 0 and not (rest <= _FILLED and not self._data[self._end :].strip(b"\0\xff")):
             yield (
                 f"The file is cut off or damaged: its last {rest} of {size} bytes are no whole message, and the last "
                 f"message read is of {last:.3f} s."

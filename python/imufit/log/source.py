@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol
 
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
+from imufit.formats import Recording
+from imufit.formats.find import recording_of
 from imufit.log.folder import recording_of_folder, recording_of_zip
 from imufit.log.npz import NpzSource
 from imufit.log.parquet import ParquetSource
@@ -70,6 +72,10 @@ class Source(Protocol):
         ...
 
 
+_ARRAYS: Final[Mapping[str, Callable[[Path], Source]]] = {".parquet": ParquetSource, ".npz": NpzSource}
+"""Formats of logs that are told by their suffix."""
+
+
 def open_source(path: Path) -> Source:
     """Open a log file: Parquet and NPZ by their suffix, text by its content.
 
@@ -80,16 +86,16 @@ def open_source(path: Path) -> Source:
     """
     if not path.exists():
         raise InputError(f"there is no file {path}", file=path, remedy="Check the name.")
-    suffix = path.suffix.lower()
     try:
-        if path.is_dir():
-            return TablesSource(path, recording_of_folder(path))
-        if path.stat().st_size == 0:
+        suffix = "" if path.is_dir() else path.suffix.lower()
+        if not path.is_dir() and path.stat().st_size == 0:
             raise InputError("the file is empty (0 bytes)", file=path, remedy="Record or copy it again.")
         if re.fullmatch(r"\.part\d*", suffix):
             raise InputError("this is what a recording wrote while it ran", file=path, remedy=f"imufit recover {path}")
-        if suffix == ".zip":
-            return TablesSource(path, recording_of_zip(path))
+        if suffix in _ARRAYS:
+            return _ARRAYS[suffix](path)
+        if (found := _recording(path)) is not None:
+            return TablesSource(path, found)
         if suffix in COMPRESSED or is_utf_16(path):
             return open_unpacked(path)
         if suffix not in SUFFIXES and not looks_like_text(path):
@@ -98,8 +104,14 @@ def open_source(path: Path) -> Source:
                 file=path,
                 remedy=f"Logs are {', '.join(SUFFIXES)}: export it as text, of which imufit convert makes a log.",
             )
-        if suffix == ".parquet":
-            return ParquetSource(path)
-        return NpzSource(path) if suffix == ".npz" else open_text(path)
+        return open_text(path)
     except OSError as error:
         raise InputError(f"the file cannot be read ({error.strerror or error})", file=path) from None
+
+
+def _recording(path: Path) -> Recording | None:
+    """Read what is held in memory as a whole: another program's file, a folder or an archive of text files."""
+    found = recording_of(path)
+    if found is None and path.is_dir():
+        return recording_of_folder(path)
+    return recording_of_zip(path) if found is None and path.suffix.lower() == ".zip" else found

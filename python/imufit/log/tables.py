@@ -53,7 +53,7 @@ class TablesSource:
         self._columns: dict[str, tuple[int, NDArray[Any]]] = {}
         self._times: dict[int, NDArray[np.float64]] = {}
         lost: list[str] = []
-        shown = [f"{table.name}.{name}" for table in tables for name in table.columns]
+        shown = [_whole(table, name) for table in tables for name in table.columns]
         maker = maker_of(shown if self.several else list(tables[0].columns))
         fixed = maker.units.get("t") if maker is not None else None
         for k, table in enumerate(tables):
@@ -65,7 +65,7 @@ class TablesSource:
                 self._times[k] = time[1]
             for name, values in table.columns.items():
                 if k not in self._times or time is None or name != time[0]:
-                    self._columns[f"{table.name}.{name}" if self.several else name] = (k, values)
+                    self._columns[_whole(table, name) if self.several else name] = (k, values)
         if not self._columns:
             raise InputError(
                 f"of {len(tables)} tables of the {recording.form} none has a time",
@@ -75,7 +75,7 @@ class TablesSource:
         self.names = (*(("t",) if self._times else ()), *self._columns)
         self._used = sorted({k for k, _ in self._columns.values()})
         self._merge()
-        self.notes = (f"{path.name}: {recording.form}", *recording.notes)
+        self.notes = (f"{path.name}: {recording.form}", *(note.rstrip(".") for note in recording.notes))
         if lost:
             words = ", ".join(printable(name, NAME) for name in lost[:_SHOWN])
             self.notes += (f"{path.name}: left out without a time: {words}{' ...' if len(lost) > _SHOWN else ''}",)
@@ -127,6 +127,11 @@ class TablesSource:
     def line_of(self, row: int) -> int | None:
         """Return None: a merged row has no line."""
         return None
+
+
+def _whole(table: Table, name: str) -> str:
+    """Name of a column among those of several tables."""
+    return name if name.startswith(f"{table.name}.") else f"{table.name}.{name}"
 
 
 def _time_of(table: Table, fixed: str | None) -> tuple[str, NDArray[np.float64]] | None:
