@@ -9,9 +9,10 @@ from pathlib import Path
 import imufit
 import numpy as np
 import pytest
+from imufit.cli.app import main
 from imufit.errors import InputError
-from imufit.joining import with_attitude
-from imufit.log import Log
+from imufit.joining import join_as_found, with_attitude
+from imufit.log import Log, read
 from join_pairs import Pair, pair, repetitive, unrelated
 from recording import recording
 from scipy.spatial.transform import Rotation
@@ -156,3 +157,33 @@ def test_the_command_joins_euler_angles_of_another_file(tmp_path: Path, capsys: 
     assert imufit.read(tmp_path / "log.parquet").n == answer["rows"]
     assert main(["join", *arguments[::-1][2:], *arguments[2:]]) == 2
     assert "there is no sensor" in capsys.readouterr().err
+
+
+def test_a_phone_and_cameras_in_their_native_files_become_one_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = recording("phone_qualisys/native/Thibaud_Nexus5_NoDist_Texting")
+    out = tmp_path / "joined.parquet"
+    assert main(["join", str(folder), str(folder / "qualisys.mat"), "--frame", "ENU", "-o", str(out)]) == 0
+    assert "attitude read as matrix of" in capsys.readouterr().out
+    found = read(out)
+    assert found.metadata.extra["lag"] == pytest.approx(0.952, abs=0.005)
+    assert found.ref_q is not None
+
+
+@pytest.mark.parametrize("kind", ["scalar last", "inverse", "degrees"])
+def test_columns_of_an_attitude_are_read_as_the_rates_show(kind: str) -> None:
+    one = pair(3001)
+    q = one.ref_q[np.isfinite(one.ref_q).all(axis=1)]
+    t = one.ref_t[np.isfinite(one.ref_q).all(axis=1)]
+    if kind == "degrees":
+        angles = np.degrees(Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_euler("ZYX"))
+        columns = {f"head_{name}": angles[:, k] for k, name in enumerate(("yaw", "pitch", "roll"))}
+    else:
+        numbers = q * [1, -1, -1, -1] if kind == "inverse" else q[:, [1, 2, 3, 0]]
+        columns = {f"body.rotation[{k}]": numbers[:, k] for k in range(4)}
+    log, bare = sensor_of(one), Log(t=t, covariates=columns)
+    found = join_as_found(log, bare, None, None)
+    declared = imufit.join(log, Log(t=t, ref_q=q))
+    assert found.lag == pytest.approx(declared.lag, abs=1e-6)
+    assert ("reference to body" in found.log.notes[-1]) == (kind == "inverse")

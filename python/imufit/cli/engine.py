@@ -85,17 +85,18 @@ def reference_log(
 
     from imufit.joining import with_attitude  # noqa: PLC0415
 
-    log = read_log(path, mapping, bare=attitude is not None)
+    log = read_log(path, mapping, bare=True)
     if attitude is not None:
         log = with_attitude(log, *attitude, inverse=inverse)
     return log if frame is None else replace(log, metadata=replace(log.metadata, frame=frame))
 
 
 def join(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joined:
-    """Lay a reference beside a sensor's log."""
-    from imufit.joining import join  # noqa: PLC0415
+    """Lay a reference beside a sensor's log; one without a declared attitude is read as the sensor's rates show."""
+    from imufit.joining import join, join_as_found  # noqa: PLC0415
 
-    return join(log, reference, lag, skew)
+    way = join if reference.ref_q is not None else join_as_found
+    return way(log, reference, lag, skew)
 
 
 def some_rows(log: Any, rows: tuple[int, int]) -> Any:

@@ -59,7 +59,8 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
     "--attitude",
     type=AttitudeColumns(),
     metavar="KIND:COLUMNS",
-    help="Columns that hold the attitude: quaternion:W,X,Y,Z, matrix:XX,XY,...,ZZ (row by row), "
+    help="Columns that hold the attitude, where names and rates do not show them: quaternion:W,X,Y,Z, "
+    "matrix:XX,XY,...,ZZ (row by row), "
     "euler-ZYX:YAW[deg],PITCH[deg],ROLL[deg] (capitals: about the turned axes), angle-x:ANGLE[deg].",
 )
 @click.option("--inverse", is_flag=True, help="The attitude turns vectors of the reference frame into the body.")
@@ -97,7 +98,7 @@ def join(
     engine.write_log(found.log, output)
     out.say(found.sentence, bold=True)
     out.tables(found.tables())
-    out.say(*found.remarks)
+    out.say(*found.remarks, *(f"{note}." for note in found.log.notes[len(log.notes) :]))
     out.wrote(output)
     out.json({"log": str(output), **found.to_dict()})
     if plot_file is not None:

@@ -1,0 +1,177 @@
+"""A reference whose columns are not declared: every way to read them as an attitude is joined, and the rates decide."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from imufit.errors import InputError
+from imufit.joining.join import WORSE, join
+from imufit.joining.joined import Joined
+from imufit.joining.reference import KINDS, with_attitude
+from imufit.log import Log
+
+_NAMED: Final = re.compile(r"(?P<base>.*?)[._ ]?q?[._ ]?(?P<part>[wxyz])", re.IGNORECASE)
+_NUMBERED: Final = re.compile(r"(?P<base>.*?)(?:\[(?P<index>\d)\]|_?(?P<digit>\d))")
+_ATTITUDE: Final = re.compile(r"q|quat|orient|rot|att|dcm|\br$", re.IGNORECASE)
+_ANGLE: Final = re.compile(r"(?P<base>.*?)(?P<part>roll|pitch|yaw)(?P<unit>.*deg.*)?.*", re.IGNORECASE)
+_WHOLE_TURN: Final = 6.4
+"""Largest angle of an attitude in rad: a whole turn, and rounding."""
+_UPRIGHT: Final = 0.35
+"""Largest angle between the mean specific force and the vertical, rad: 20 degrees; of readings that differ by an exchange
+of axes the wrong ones are 90 degrees off, or lie anywhere."""
+_MOST_WAYS: Final = 24
+"""Ways that are tried at most: six bodies, each in four."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way to read columns as an attitude.
+
+    Parameters
+    ----------
+    kind : str
+        As for `with_attitude`.
+    columns : tuple of str
+        Their names.
+    inverse : bool
+        Whether the attitude turns vectors of the reference frame into the body.
+    """
+
+    kind: str
+    columns: tuple[str, ...]
+    inverse: bool
+
+    @property
+    def summary(self) -> str:
+        """The way in a few words."""
+        between = " ... " if len(self.columns) > 2 else " "
+        turned = ", reference to body" if self.inverse else ", body to reference"
+        return f"{self.kind} of {self.columns[0]}{between}{self.columns[-1]}{turned}"
+
+    @property
+    def words(self) -> str:
+        """The options of the command that say the same."""
+        return f'--attitude "{self.kind}:{",".join(self.columns)}"{" --inverse" if self.inverse else ""}'
+
+
+def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joined:
+    """Join a reference whose attitude stands in columns of any kind, in the way that agrees with the sensor's rates.
+
+    Parameters
+    ----------
+    log : Log
+        With a gyroscope.
+    reference : Log
+        With columns that can be read as an attitude among its covariates.
+    lag, skew : float, optional
+        As for `join`.
+
+    Returns
+    -------
+    Joined
+        Its log has a note on the way that was taken.
+
+    Raises
+    ------
+    InputError
+        No columns look like an attitude, none agrees with the sensor, or two ways agree equally well.
+    """
+    ways = list(_ways(reference))[:_MOST_WAYS]
+    file = reference.path or "reference"
+    if not ways:
+        held = ", ".join(list(reference.covariates)[:12]) or "none"
+        raise InputError(
+            f"no columns look like an attitude; there are {held}",
+            file=file,
+            remedy=f"Name them with --attitude {KINDS}.",
+        )
+    found: list[tuple[Way, Joined]] = []
+    refused: list[InputError] = []
+    for way in ways:
+        try:
+            attitude = with_attitude(reference, way.kind, way.columns, way.inverse)
+            found.append((way, join(log, attitude, lag, skew)))
+        except InputError as error:
+            refused.append(error)
+    if not found:
+        raise refused[0]
+    least = min(joined.traces.left for _, joined in found)
+    alike = [each for each in found if each[1].traces.left <= WORSE * least]
+    upright = [each for each in alike if _off_vertical(each[1].log) < _UPRIGHT] if len(alike) > 1 else alike
+    if len(upright) != 1:
+        raise InputError(
+            "rates and gravity do not show how the columns are to be read as an attitude",
+            file=file,
+            remedy=f"Say which holds: {' or '.join(way.words for way, _ in (upright or alike)[:2])}.",
+        )
+    way, best = upright[0]
+    note = f"{reference.path.name if reference.path else 'reference'}: attitude read as {way.summary}"
+    return replace(best, log=replace(best.log, notes=(*best.log.notes, note)))
+
+
+def _off_vertical(log: Log) -> float:
+    """Angle between the mean specific force in the reference frame and its vertical axis, rad; NaN without any.
+
+    A quaternion with its scalar misplaced is, up to constant turns of body and frame, the inverse of the right one (an
+    orthogonal map of determinant -1): the rates are the same, and only gravity tells them apart.
+    """
+    if log.acc is None or log.ref_q is None:
+        return float("nan")
+    known = np.isfinite(log.acc).all(axis=1) & log.has_reference
+    if not known.any():
+        return float("nan")
+    mean = Rotation.from_quat(log.ref_q[known][:, [1, 2, 3, 0]]).apply(log.acc[known]).mean(axis=0)
+    return float(np.arccos(np.clip(np.abs(mean[2]) / max(float(np.linalg.norm(mean)), 1e-30), 0.0, 1.0)))
+
+
+def _ways(reference: Log) -> Iterator[Way]:
+    names = [name for name, values in reference.covariates.items() if np.isfinite(values).any()]
+    for kind, columns in (*_quaternions(names), *_matrices(names), *_angles(reference, names)):
+        for inverse in (False, True):
+            yield Way(kind, columns, inverse)
+
+
+def _quaternions(names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    named: dict[str, dict[str, str]] = {}
+    for name in names:
+        if found := _NAMED.fullmatch(name):
+            named.setdefault(found["base"], {})[found["part"].lower()] = name
+    for parts in named.values():
+        if set(parts) == set("wxyz"):
+            yield "quaternion", tuple(parts[part] for part in "wxyz")
+    for base, numbered in _by_number(names).items():
+        if _ATTITUDE.search(base) and set(numbered) == {0, 1, 2, 3}:
+            yield "quaternion", tuple(numbered[k] for k in range(4))
+            yield "quaternion", tuple(numbered[k] for k in (3, 0, 1, 2))
+
+
+def _matrices(names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    for base, numbered in _by_number(names).items():
+        if _ATTITUDE.search(base) and set(numbered) == set(range(9)):
+            yield "matrix", tuple(numbered[k] for k in range(9))
+
+
+def _by_number(names: Sequence[str]) -> dict[str, dict[int, str]]:
+    found: dict[str, dict[int, str]] = {}
+    for name in names:
+        if match := _NUMBERED.fullmatch(name):
+            found.setdefault(match["base"], {})[int(match["index"] or match["digit"])] = name
+    return found
+
+
+def _angles(reference: Log, names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    sets: dict[str, dict[str, str]] = {}
+    for name in names:
+        if match := _ANGLE.fullmatch(name):
+            sets.setdefault(match["base"], {})[match["part"].lower()] = name
+    for parts in sets.values():
+        if set(parts) == {"roll", "pitch", "yaw"}:
+            largest = max(float(np.nanmax(np.abs(reference.covariates[name]))) for name in parts.values())
+            unit = "[deg]" if largest > _WHOLE_TURN or any("deg" in name.lower() for name in parts.values()) else ""
+            yield "euler-ZYX", tuple(f"{parts[part]}{unit}" for part in ("yaw", "pitch", "roll"))
