@@ -1,13 +1,14 @@
 """Faults of the data that are no effects of a sensor: wrong units and frames, turned axes, rows that cannot be.
 
 Faults of rows (`imufit.faults.rows`) concern some samples, which are left out of the evidence where they are certain
-to be wrong. Others (`imufit.faults.frames`) concern the whole log: nothing can be said of effects until they are put
+to be wrong. Others (`imufit.faults.frames`, `imufit.faults.late`) concern the whole log: nothing can be said of effects until they are put
 right.
 """
 
 from imufit.faults.clipped import ClippedRows
 from imufit.faults.frames import frame_faults
 from imufit.faults.knock import knock_faults
+from imufit.faults.late import late_faults
 from imufit.faults.rows import LeftOut, row_faults
 
-__all__ = ["ClippedRows", "LeftOut", "frame_faults", "knock_faults", "row_faults"]
+__all__ = ["ClippedRows", "LeftOut", "frame_faults", "knock_faults", "late_faults", "row_faults"]

@@ -30,7 +30,9 @@ Part = Mapping[str, Any]
 MISSED: Final = 0.2
 """Share of a reading's sum of squares that an ideal sensor must leave before anything else is tried."""
 LEFT: Final = 0.1
-"""Share that another way of reading the log may leave at most, and a quarter of what the log as declared leaves."""
+"""Share of a reading's sum of squares that another way of reading the log may leave at most."""
+QUARTER: Final = 0.25
+"""The same, as a share of what the log as declared leaves."""
 TIE: Final = 0.01
 MIN_ROWS: Final = 200
 EXCITED: Final = {"acc": 1.0, "gyr": 0.05, "mag": 3.0}
@@ -170,8 +172,7 @@ def frame_faults(parts: Sequence[Part], facts: _imufit.Facts, metadata: Metadata
     if not parts:
         return []
     rows = samples(parts, facts)
-    views = {sensor: _view(sensor, rows) for sensor in facts.sensors}
-    declared = {s: float(np.sum((v[0] - v[1]) ** 2) / np.sum(v[0] ** 2)) for s, v in views.items() if v is not None}
+    declared = declared_shares(rows, facts.sensors)
     missed = [sensor for sensor, share in declared.items() if share > MISSED]
     if not missed:
         return []
@@ -189,6 +190,25 @@ def frame_faults(parts: Sequence[Part], facts: _imufit.Facts, metadata: Metadata
     best = min(alike, key=lambda r: (KINDS.index(r.change.kind), r.left(r.good)))
     alike.remove(best)
     return _worded(best, [s for s in best.good if s in missed], alike, declared, facts, metadata)
+
+
+def declared_shares(rows: Samples, sensors: Sequence[str]) -> dict[str, float]:
+    """Share of each reading's sum of squares that an ideal sensor misses, the log read as declared.
+
+    Parameters
+    ----------
+    rows : Samples
+        Rows from all over the log.
+    sensors : sequence of str
+        Which sensors; those whose readings say nothing are left out.
+    """
+    views = {sensor: _view(sensor, rows) for sensor in sensors}
+    return {s: float(np.sum((v[0] - v[1]) ** 2) / np.sum(v[0] ** 2)) for s, v in views.items() if v is not None}
+
+
+def explains(share: float, declared: float) -> bool:
+    """Say whether another way of reading a log explains a sensor: by the shares left, there and as declared."""
+    return share <= min(LEFT, QUARTER * declared)
 
 
 def _changes(
@@ -215,7 +235,7 @@ def _explains(sensor: str, match: Match, declared: float) -> bool:
     if declared <= MISSED and match.usual and not match.turned:
         return match.share <= MISSED
     known = match.usual or wrong_unit(sensor, match.ratio) is not None
-    return known and match.share <= min(LEFT, 0.25 * declared)
+    return known and explains(match.share, declared)
 
 
 def _view(sensor: str, rows: Samples) -> tuple[Array, Array] | None:

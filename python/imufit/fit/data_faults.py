@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from imufit import _imufit
-from imufit.faults import ClippedRows, frame_faults
+from imufit.faults import ClippedRows, frame_faults, late_faults
 from imufit.faults.samples import windows
 from imufit.faults.wrapped import wrapped_faults
 from imufit.fit.passes import Passes
@@ -16,7 +16,8 @@ from imufit.results import DataFault
 
 
 def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float]) -> tuple[DataFault, ...]:
-    """Name what is wrong with the data of a log: what its rows showed, clipped readings, wrong units and frames.
+    """Name what is wrong with the data of a log: what its rows showed, clipped readings, wrong units and frames, a
+    late reference.
 
     Parameters
     ----------
@@ -39,6 +40,10 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
 
     parts = windows(counted(), facts)
     faults = frame_faults(parts, facts, passes.log.metadata)
+    if not any(fault.sensor in ("gyr", "ref", None) for fault in faults):
+        # Rates that another way of reading the log explains need no other time.
+        path = passes.log.path
+        faults += late_faults(parts, facts, lambda: passes.chunks(0, "looking for a late reference"), path)
     faults += wrapped_faults(parts, facts, ends)
     return (*faults, *passes.row_faults, *clipped.faults(), *_packets(passes.log, facts))
 

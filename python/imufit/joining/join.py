@@ -10,23 +10,15 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.joining.course import Course, reference_course
-from imufit.joining.joined import Joined, RateTrace
+from imufit.joining.joined import Joined
+from imufit.joining.likeliest import Placed, likeliest, placed
 from imufit.joining.mount import SMALL, nearest_square_turn, turned
 from imufit.joining.refine import Aligned, refine
-from imufit.joining.search import LEAST_OVERLAP, Correlation, turn_between
+from imufit.joining.search import LEAST_OVERLAP, Correlation
 from imufit.log import Log
 
 Array = NDArray[np.float64]
 
-RIVAL: Final = 0.3
-"""A second lag with this share of the first one's log likelihood is looked at to a fraction of a sample as well."""
-WORSE: Final = 1.5
-"""It makes the lag ambiguous unless it leaves this many times as much of the rates (square): of a motion that repeats
-itself both leave the noise, of steps that resemble one another the wrong one leaves three times as much and more."""
-SAME: Final = 0.5
-"""Two maxima of the likelihood that lead to the same lag, to this many bins, are one."""
-LEAST_CORRELATION: Final = 0.3
-"""Below this correlation of the rates the two recordings are not called one motion."""
 TOUCHING: Final = 1e-6
 """Samples of the reference this near to a row of the sensor stand in that row, s."""
 
@@ -65,13 +57,13 @@ def join(log: Log, reference: Log, lag: float | None = None, skew: float | None 
         raise _apart(reference)
     rates = Correlation(sensor, body)
     if lag is None:
-        aligned, traces, rival = _likeliest(sensor, body, rates, skew, (log, reference))
+        best, rival = _only_one(sensor, body, rates, skew, (log, reference))
     else:
         refined = refine(sensor, body, lag, rates.at(lag).mount, skew, known=True)
         if refined is None:
             raise _apart(reference)
-        rival = 0.0
-        aligned, traces = _compared(sensor, body, rates, refined)
+        best, rival = placed(sensor, body, rates, refined), 0.0
+    aligned, traces = best.aligned, best.traces
     square, left = nearest_square_turn(aligned.mount)
     mount = square if left < SMALL else aligned.mount
     return Joined(
@@ -110,34 +102,24 @@ def _courses(log: Log, reference: Log) -> tuple[Course, Course, NDArray[np.intp]
     return Course.of(log.t, log.gyr), reference_course(reference.t[rows], reference.ref_q[rows]), rows
 
 
-def _likeliest(
+def _only_one(
     sensor: Course, body: Course, rates: Correlation, skew: float | None, logs: tuple[Log, Log]
-) -> tuple[Aligned, RateTrace, float]:
-    """Return the likeliest alignment, and by how much of what the next one leaves of the rates it leaves (squares)."""
-    peaks = rates.peaks()
-    near = [peak for peak in peaks if peak.gain >= RIVAL * peaks[0].gain]
-    found: list[tuple[Aligned, RateTrace]] = []
-    for peak in near:
-        aligned = refine(sensor, body, peak.lag, peak.mount, skew)
-        if aligned is None or any(abs(aligned.lag - other.lag) <= SAME * rates.step for other, _ in found):
-            continue
-        found.append(_compared(sensor, body, rates, aligned))
-    if not found:
+) -> tuple[Placed, float]:
+    """Return the likeliest alignment and its rival, as in `Joined`; refuse one that is not the only one."""
+    found = likeliest(sensor, body, rates, skew)
+    if found is None:
         raise _apart(logs[1])
-    found.sort(key=lambda each: -each[1].gain)
-    best, traces = found[0]
-    if traces.correlation < LEAST_CORRELATION:
-        raise _unrelated(traces.correlation, *logs)
-    rival = max((traces.left / each.left for _, each in found[1:]), default=0.0)
-    if rival * WORSE > 1.0:
-        second, others = min(found[1:], key=lambda each: each[1].left)
+    best, second = found.best, found.second
+    if found.unrelated:
+        raise _unrelated(best.traces.correlation, *logs)
+    if second is not None and found.ambiguous:
         raise InputError(
-            f"the lag is ambiguous: {best.lag:.3f} s and {second.lag:.3f} s make the rates agree equally well "
-            f"(correlation {traces.correlation:.3f} and {others.correlation:.3f})",
+            f"the lag is ambiguous: {best.aligned.lag:.3f} s and {second.aligned.lag:.3f} s make the rates agree "
+            f"equally well (correlation {best.traces.correlation:.3f} and {second.traces.correlation:.3f})",
             file=logs[0].path or "log",
             remedy="Move the sensor once as at no other time, or give the lag with --lag.",
         )
-    return best, traces, rival
+    return best, found.rival
 
 
 def _apart(reference: Log) -> InputError:
@@ -155,34 +137,6 @@ def _unrelated(correlation: float, log: Log, reference: Log) -> InputError:
         file=log.path or "log",
         remedy="Are they of the same recording, and is the attitude that of the body in the reference frame?",
     )
-
-
-def _compared(sensor: Course, body: Course, rates: Correlation, aligned: Aligned) -> tuple[Aligned, RateTrace]:
-    """Return the alignment with the mount that makes the mean rates agree best, and these rates."""
-    own, other, step = rates.own, rates.other, rates.step
-    edges = other.start + step * np.arange(len(other.values) + 1, dtype=np.float64)
-    on_sensor = aligned.on_sensor_clock(edges, float(body.t[0]))
-    known = other.known & sensor.seen(on_sensor[:-1], on_sensor[1:])
-    inside = np.clip(on_sensor, sensor.t[0], sensor.t[-1])
-    measured = np.diff(sensor.angle_at(inside), axis=0) / np.diff(on_sensor)[:, None]
-    correlation, mount = 0.0, aligned.mount
-    if known.sum() > 2:
-        measured, expected = (each - each.mean(axis=0) for each in (measured[known], other.values[known]))
-        mount = turn_between(measured.T @ expected)
-        size = np.sqrt(np.sum(measured**2) * np.sum(expected**2))
-        correlation = float(np.sum(measured * (expected @ mount.T)) / size) if size > 0.0 else 0.0
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    own_middle = own.start + step * (np.arange(len(own.values), dtype=np.float64) + 0.5)
-    traces = RateTrace(
-        sensor_t=own_middle,
-        sensor=np.where(own.known, np.linalg.norm(own.values, axis=1), np.nan),
-        reference_t=middle,
-        reference=np.where(other.known, np.linalg.norm(other.values, axis=1), np.nan),
-        aligned_t=aligned.on_sensor_clock(middle, float(body.t[0])),
-        correlation=correlation,
-        overlap=float(known.sum() * step),
-    )
-    return replace(aligned, mount=mount), traces
 
 
 def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, mount: Array) -> Log:

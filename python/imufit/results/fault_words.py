@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -135,6 +137,16 @@ def angle_in_degrees(ratio: float) -> Words:
     """Say that the commanded angle of a rig is in degrees, by the gyroscope's ratio to it."""
     faster = f"The reference turns {1.0 / ratio:.4g} times as fast as the gyroscope"
     return f"{faster}: ref_angle is in degrees.", "Declare the unit: --map 'ref_angle=ref_angle[deg]'."
+
+
+def late(lag: float, correlation: float, declared: float, path: Path | None) -> Words:
+    """Say that the reference's stamps are late by a lag, s, and how well the rates agree then and as declared."""
+    log = "LOG" if path is None else shlex.quote(str(path))
+    return (
+        f"The reference is {abs(lag):.2f} s {'late' if lag > 0.0 else 'early'} against the sensors (correlation of "
+        f"the rates {correlation:.2f}, {declared:.2f} as declared).",
+        f"Shift the reference: imufit join {log} {log} --lag {lag:.4f} -o joined.parquet",
+    )
 
 
 def stuck(sensor: str, axes: str, rows: int, span: tuple[float, float], moved: float) -> Words:

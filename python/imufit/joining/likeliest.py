@@ -1,0 +1,172 @@
+"""The likeliest alignment of a sensor and a reference, and how well their rates agree under it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.joining.course import Course
+from imufit.joining.joined import RateTrace
+from imufit.joining.refine import Aligned, refine
+from imufit.joining.search import Correlation, turn_between
+
+Array = NDArray[np.float64]
+
+RIVAL: Final = 0.3
+"""A second lag with this share of the first one's log likelihood is looked at to a fraction of a sample as well."""
+WORSE: Final = 1.5
+"""It makes the lag ambiguous unless it leaves this many times as much of the rates (square): of a motion that repeats
+itself both leave the noise, of steps that resemble one another the wrong one leaves three times as much and more."""
+SAME: Final = 0.5
+"""Two maxima of the likelihood that lead to the same lag, to this many bins, are one."""
+LEAST_CORRELATION: Final = 0.3
+"""Below this correlation of the rates the two recordings are not called one motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """An alignment and the rates of both under it.
+
+    Attributes
+    ----------
+    aligned : Aligned
+        Lag, skew, and the mount that makes the mean rates agree best.
+    traces : RateTrace
+        The rates and how well they agree.
+    """
+
+    aligned: Aligned
+    traces: RateTrace
+
+
+@dataclass(frozen=True, eq=False)
+class Likeliest:
+    """The likeliest alignment and what speaks against it.
+
+    Attributes
+    ----------
+    best : Placed
+        The likeliest one.
+    second : Placed or None
+        Of the others the one that leaves least of the rates; None if no other comes near.
+    """
+
+    best: Placed
+    second: Placed | None
+
+    @property
+    def rival(self) -> float:
+        """Share of the rates (square) that is left by the best one over that by the second; 0 without one."""
+        return 0.0 if self.second is None else self.best.traces.left / self.second.traces.left
+
+    @property
+    def ambiguous(self) -> bool:
+        """True if two lags make the rates agree equally well."""
+        return self.rival * WORSE > 1.0
+
+    @property
+    def unrelated(self) -> bool:
+        """True if the rates have nothing in common."""
+        return self.best.traces.correlation < LEAST_CORRELATION
+
+
+def likeliest(sensor: Course, body: Course, rates: Correlation, skew: float | None = None) -> Likeliest | None:
+    """Find the likeliest alignment.
+
+    Parameters
+    ----------
+    sensor, body : Course
+        Integrated rates of sensor and reference, each on its own clock.
+    rates : Correlation
+        Of the two.
+    skew : float, optional
+        Rate of the reference's clock over the sensor's, less one, where it is known.
+
+    Returns
+    -------
+    Likeliest or None
+        None where no few seconds are common to both.
+    """
+    peaks = rates.peaks()
+    near = [peak for peak in peaks if peak.gain >= RIVAL * peaks[0].gain]
+    found: list[Placed] = []
+    for peak in near:
+        aligned = refine(sensor, body, peak.lag, peak.mount, skew)
+        if aligned is None or any(abs(aligned.lag - other.aligned.lag) <= SAME * rates.step for other in found):
+            continue
+        found.append(placed(sensor, body, rates, aligned))
+    if not found:
+        return None
+    found.sort(key=lambda each: -each.traces.gain)
+    return Likeliest(found[0], min(found[1:], key=lambda each: each.traces.left, default=None))
+
+
+@dataclass(frozen=True, eq=False)
+class CommonRates:
+    """Mean rates of sensor and reference in the bins that both have, each less its mean.
+
+    Attributes
+    ----------
+    measured : (k, 3) array
+        Of the sensor, rad/s, its axes.
+    expected : (k, 3) array
+        Of the reference, rad/s, axes of its body.
+    change : (k, 3) array
+        Time derivative of the latter, rad/s^2.
+    middle : (m,) array
+        Middle of each of the reference's bins, s, on its clock.
+    overlap : float
+        Length of the common bins, s.
+    """
+
+    measured: Array
+    expected: Array
+    change: Array
+    middle: Array
+    overlap: float
+
+    @classmethod
+    def of(cls, sensor: Course, body: Course, rates: Correlation, aligned: Aligned) -> CommonRates:
+        """Take the means over the same times of both under an alignment."""
+        other, step = rates.other, rates.step
+        edges = other.start + step * np.arange(len(other.values) + 1, dtype=np.float64)
+        on_sensor = aligned.on_sensor_clock(edges, float(body.t[0]))
+        known = other.known & sensor.seen(on_sensor[:-1], on_sensor[1:])
+        inside = np.clip(on_sensor, sensor.t[0], sensor.t[-1])
+        measured = np.diff(sensor.angle_at(inside), axis=0) / np.diff(on_sensor)[:, None]
+        if known.sum() > 2:
+            change = np.gradient(other.values, step, axis=0)[known]
+            measured, expected = (each - each.mean(axis=0) for each in (measured[known], other.values[known]))
+        else:
+            measured = expected = change = np.zeros((0, 3))
+        return cls(measured, expected, change, 0.5 * (edges[1:] + edges[:-1]), float(known.sum() * step))
+
+    def mount(self) -> Array:
+        """Turn from the reference body's axes to the sensor's that makes the rates agree best, (3, 3)."""
+        return turn_between(self.measured.T @ self.expected)
+
+    def correlation(self, mount: Array) -> float:
+        """Correlation of the rates, axis by axis, with a mount; 0 where nothing moves."""
+        size = np.sqrt(np.sum(self.measured**2) * np.sum(self.expected**2))
+        return float(np.sum(self.measured * (self.expected @ mount.T)) / size) if size > 0.0 else 0.0
+
+
+def placed(sensor: Course, body: Course, rates: Correlation, aligned: Aligned) -> Placed:
+    """Return an alignment with the mount that makes the mean rates agree best, and these rates."""
+    own, other, step = rates.own, rates.other, rates.step
+    common = CommonRates.of(sensor, body, rates, aligned)
+    mount = common.mount() if len(common.measured) else aligned.mount
+    own_middle = own.start + step * (np.arange(len(own.values), dtype=np.float64) + 0.5)
+    traces = RateTrace(
+        sensor_t=own_middle,
+        sensor=np.where(own.known, np.linalg.norm(own.values, axis=1), np.nan),
+        reference_t=common.middle,
+        reference=np.where(other.known, np.linalg.norm(other.values, axis=1), np.nan),
+        aligned_t=aligned.on_sensor_clock(common.middle, float(body.t[0])),
+        correlation=common.correlation(mount),
+        overlap=common.overlap,
+    )
+    return Placed(replace(aligned, mount=mount), traces)
