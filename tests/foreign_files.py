@@ -46,7 +46,7 @@ class Sound:
 
 def sound(kind: str, seed: int) -> Sound:
     """Readings of a hand or an arm: `handheld`, `arm`, `rest_first` (10 s at rest, then the hand) or `rest` alone."""
-    log = simulate("arm" if kind == "arm" else "handheld", seed=seed, duration=14, rate=RATE, frame="ENU").log
+    log = simulate("arm" if kind == "arm" else "handheld", seed=seed, duration=14, rate=RATE, frame="ENU")
     assert log.acc is not None
     assert log.gyr is not None
     assert log.mag is not None
