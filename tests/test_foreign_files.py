@@ -1,0 +1,76 @@
+"""Other makers' files are read right with no option, or a question is put that one pasted mapping answers."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_files import KINDS, WRITERS, Foreign, Part, sound, write
+from imufit.errors import InputError
+from imufit.log import Log, parse_mapping, read
+
+SEEDS = {"handheld": 774101, "arm": 774102, "rest_first": 774103, "rest": 774104}
+"""Seed of the log of each kind."""
+
+ORDER_S = 2e-5
+"""Time may be off by this, s: a double of seconds since 1970 or of days since 1899 keeps no more than 1e-6 s."""
+
+
+def judge_sensor(name: str, got: np.ndarray | None, t: np.ndarray, part: Part | None) -> None:
+    """Compare a sensor with what was printed: same samples, same times, same values."""
+    kept = np.zeros(len(t), bool) if got is None else np.isfinite(got).any(axis=1)
+    if part is None:
+        assert not kept.any(), f"{name} was read, but the file holds none: {got[kept][:2]}"
+        return
+    assert kept.any(), f"{name} was not read"
+    assert got is not None
+    wanted = np.isfinite(part.values).any(axis=1)
+    assert kept.sum() == wanted.sum(), f"{name}: {kept.sum()} of {wanted.sum()} samples were read"
+    values = part.values[wanted]
+    size = np.sqrt(np.mean(values**2))
+    np.testing.assert_allclose(got[kept], values, rtol=1e-5, atol=1e-5 * size, err_msg=f"{name} was read wrong")
+    times, printed = t[kept], part.t[wanted]
+    np.testing.assert_allclose(times - times[0], printed - printed[0], atol=ORDER_S, err_msg=f"times of {name}")
+
+
+def judge(log: Log, foreign: Foreign) -> None:
+    """Compare a log with what was printed."""
+    for name in ("acc", "gyr", "mag"):
+        judge_sensor(name, getattr(log, name), log.t, getattr(foreign, name))
+
+
+def judge_question(error: InputError, foreign: Foreign) -> Log:
+    """Paste the one mapping of a question: all that stands in the file must come out of it."""
+    maps = re.findall(r"--map '([^']*)'", error.remedy or "")
+    assert len(maps) == 1, f"one mapping is wanted: {error}"
+    log = read(foreign.path, parse_mapping(maps[0]))
+    for name in ("acc", "gyr", "mag"):
+        part, got = getattr(foreign, name), getattr(log, name)
+        if part is None:
+            continue
+        assert got is not None, f"the mapping leaves out {name}: {error}"
+        kept = np.isfinite(got).any(axis=1)
+        assert kept.sum() == len(part.values)
+        # what was asked for is a unit or a rate: but for a factor the readings must be the printed ones
+        factor = np.sum(got[kept] * part.values) / np.sum(part.values**2)
+        np.testing.assert_allclose(got[kept], factor * part.values, rtol=1e-4, atol=1e-4 * abs(factor) * 50)
+        assert factor > 0, f"{name} comes out with the opposite sign"
+    return log
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", sorted(WRITERS))
+def test_read_right_or_asked(tmp_path: Path, name: str, kind: str) -> None:
+    foreign = write(name, tmp_path / "made", sound(kind, SEEDS[kind]))
+    due = WRITERS[name].due[kind]
+    try:
+        log = read(foreign.path)
+    except InputError as error:
+        assert due != "reads", f"this file tells all, but imufit asks: {error}"
+        if any((foreign.acc, foreign.gyr, foreign.mag)):
+            judge_question(error, foreign)
+        return
+    judge(log, foreign)
+    assert due != "asks", "the file does not tell, but was read without a question"
