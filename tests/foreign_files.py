@@ -556,9 +556,7 @@ def _shimmer(s: Sound, *, raw: bool, wide: bool, separator: str = "\t", sep_line
     sheet = Sheet(s).time(device + "Timestamp_Unix_CAL", 1e3, EPOCH_S, "%.4f")
     units = ["ms"]
     if raw:
-        sheet.others(
-            [device + f"Accel_LN_{a}_RAW" for a in "XYZ"], np.column_stack([2048 + s.acc * 83, *([])]), "%.0f"
-        )
+        sheet.others([device + f"Accel_LN_{a}_RAW" for a in "XYZ"], np.column_stack([2048 + s.acc * 83, *([])]), "%.0f")
         units += ["no_units"] * 3
     sheet.sensor("acc", [device + f"Accel_LN_{a}_CAL" for a in "XYZ"], form="%.9f")
     units += ["m/(s^2)"] * 3
@@ -630,9 +628,7 @@ def betaflight_raw(folder: Path, s: Sound) -> Foreign:
 
 @case()
 def betaflight_units(folder: Path, s: Sound) -> Foreign:
-    sheet = _betaflight(
-        s, "time (us)", "accSmooth[*] (m/s/s)", 1, "gyroADC[*] (deg/s)", "%.2f", "%.6f"
-    )
+    sheet = _betaflight(s, "time (us)", "accSmooth[*] (m/s/s)", 1, "gyroADC[*] (deg/s)", "%.2f", "%.6f")
     return sheet.write(folder / "LOG00007.02.csv", sheet.text(", "))
 
 
@@ -808,14 +804,14 @@ def matlab_mobile_folder(folder: Path, s: Sound) -> Foreign:
     parts = []
     for sensor, name in (("acc", "Acceleration"), ("gyr", "AngularVelocity"), ("mag", "MagneticField")):
         sheet = Sheet(s).other("Timestamp", _clock(s, "%d-%b-%Y %H:%M:%S.%f"))
-        parts.append(sheet.sensor(sensor, "XYZ").write(folder / "run" / f"{name}.csv"))
+        parts.append(sheet.sensor(sensor, list("XYZ")).write(folder / "run" / f"{name}.csv"))
     return together(folder / "run", *parts)
 
 
 @case()
 def matlab_mobile_single(folder: Path, s: Sound) -> Foreign:
     sheet = Sheet(s).other("Timestamp", _clock(s, "%d-%b-%Y %H:%M:%S.%f"))
-    return sheet.sensor("acc", "XYZ").write(folder / "Acceleration.csv")
+    return sheet.sensor("acc", list("XYZ")).write(folder / "Acceleration.csv")
 
 
 @case(moving="either", rest="either")

@@ -11,8 +11,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
-from imufit.joining.join import WORSE, join
+from imufit.joining.join import join
 from imufit.joining.joined import Joined
+from imufit.joining.likeliest import WORSE
 from imufit.joining.reference import KINDS, with_attitude
 from imufit.log import Log
 

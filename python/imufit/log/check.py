@@ -14,7 +14,7 @@ from imufit.printable import NAME, printable
 
 UNIT_TOLERANCE: Final = 1e-3
 _EXACT: Final = 1e-12
-_MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--"})
+_MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "#n/a", "-", "--"})
 _BOOLEAN: Final = {"true": 1.0, "false": 0.0}
 
 

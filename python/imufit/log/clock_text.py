@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from imufit.log.check import number_from_text
 
-_FRACTION: Final = re.compile(r"^(?P<whole>.*:\d{1,2})(?P<fraction>[.,]\d+)?\s*(?P<zone>Z|UTC|[+-]\d\d:?\d\d)?$")
+_FRACTION: Final = re.compile(
+    r"^(?P<whole>.*?\d{1,2}:\d\d:\d\d)(?P<fraction>[.,]\d+)?\s*(?P<zone>Z|UTC|[+-]\d\d:?\d\d)?$"
+)
 _FORMS: Final = (
     "%Y-%m-%dT%H:%M:%S",
     "%Y-%m-%d %H:%M:%S",

@@ -22,7 +22,7 @@ from imufit.log.size import LONGEST_LINE
 from imufit.log.text_cells import cells_of
 
 _BLOCK: Final = 4 << 20
-_EMPTY: Final = ["", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None"]
+_EMPTY: Final = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None"]
 _FAILED: Final = re.compile(r"CSV column #(\d+)")
 
 

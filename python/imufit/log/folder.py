@@ -106,6 +106,8 @@ def _columns(file: Path) -> dict[str, NDArray[Any]]:
     source = open_text(file)
     if isinstance(source, TranscriptSource):
         raise InputError("a transcript without a table")
+    if len(set(source.names)) < len(source.names):
+        raise InputError("two columns have the same name")
     pieces: dict[str, list[NDArray[Any]]] = {name: [] for name in source.names}
     for _, _, _ in source.scan([]):
         pass

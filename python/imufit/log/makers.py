@@ -24,6 +24,10 @@ class Maker:
         Units of the time of which the maker used several, for the stamps to show which.
     left_out : str
         Pattern of columns that are not readings of the sensor although their names say so.
+    force : str
+        Pattern of columns that are specific force although their names say that gravity was taken off.
+    opposite : tuple of str
+        Sensors whose readings have the opposite sign: gravity instead of specific force.
     source : str
         Where the layout is documented.
     """
@@ -33,6 +37,8 @@ class Maker:
     units: Mapping[str, str] = field(default_factory=dict)
     ticks: tuple[str, ...] = ()
     left_out: str = r"(?!)"
+    force: str = r"(?!)"
+    opposite: tuple[str, ...] = ()
     source: str = ""
 
     def made(self, names: Sequence[str]) -> bool:
@@ -48,6 +54,21 @@ MAKERS: Final = (
         # Accelerometer.csv has the acceleration without gravity; time is in ns since 1970
         left_out=r"(^|\.)time$|^(Accelerometer|Gravity|Orientation)\.",
         source="github.com/tszheichoi/awesome-sensor-logger, README",
+    ),
+    Maker(
+        "ROS sensor_msgs/Imu",
+        (r"angular_velocity\.x$", r"linear_acceleration\.x$"),
+        {"acc": "m/s^2", "gyr": "rad/s"},
+        force=r"linear_acceleration\.[xyz]$",
+        source="docs.ros.org, sensor_msgs/Imu",
+    ),
+    Maker(
+        "Apple Core Motion",
+        (r"(accelerometerAcceleration|userAcceleration|motionUserAcceleration)\.?x",),
+        {"gyr": "rad/s"},
+        opposite=("acc",),
+        left_out=r"(?i)loggingTime|loggingSample|magneticField.*(Bias|Accuracy)",
+        source="developer.apple.com, Core Motion: CMAccelerometerData",
     ),
     Maker(
         "phyphox",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -20,7 +20,7 @@ from imufit.log.time_unit import time_unit
 from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, turned
 from imufit.log.unit_check import HEAD
 from imufit.log.units import conversion
-from imufit.log.words import Words, names_time, sensor_of, strange, unit_of, words_of
+from imufit.log.words import COMPUTED, Words, names_time, sensor_of, strange, unit_of, words_of
 
 Array = NDArray[np.float64]
 
@@ -104,8 +104,11 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
     parsed = [_parsed(name, names) for name in names if name not in CONTRACT and name not in taken]
     if maker is not None:
         parsed = [words for words in parsed if not re.search(maker.left_out, words.column)]
-    found = {group: _candidates(group, parsed, maker) for group in wanted}
-    found = {group: candidates for group, candidates in found.items() if candidates}
+    found = _found(wanted, parsed, maker)
+    if not found.keys() & set(SENSORS) and place.file is not None:
+        # a file of one sensor has the sensor's name in its own
+        parsed = [replace(words, words=(*words_of(place.file.stem).words, *words.words)) for words in parsed]
+        found |= {group: each for group, each in _found(wanted, parsed, maker).items() if group != "t"}
     if not mapping and not found and all(_NUMBERED.fullmatch(name) for name in names):
         raise _without_names(source, place)
     if not any(group in found for group in SENSORS) and not ("t" in found and _has_any(names, given)):
@@ -117,8 +120,13 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
     asked = [group for group in chosen if units[group] is None]
     if mapping:
         chosen = {group: each for group, each in chosen.items() if group not in (*asked, *several)}
-        return Recognised({**_mapping(chosen, units), **given}, (*told, *_notes(place, maker, chosen, units)))
-    complete = {**given, **_mapping(chosen, {group: units[group] or readings.likely(group, units) for group in chosen})}
+        return Recognised(
+            {**_mapping(chosen, units, maker), **_temperature(parsed, names, given), **given},
+            (*told, *_notes(place, maker, chosen, units)),
+        )
+    warm = _temperature(parsed, names, given)
+    proposed = {group: units[group] or readings.likely(group, units) for group in chosen}
+    complete = {**given, **warm, **_mapping(chosen, proposed, maker)}
     timeless = "t" in wanted and "t" not in found
     if asked or several or timeless:
         complete = {**({"t": ROW_RATE} if timeless else {}), **complete}
@@ -151,6 +159,19 @@ def _angles(source: Readable, names: Sequence[str], given: Mapping[str, str]) ->
     return {target: f"{name}[{unit}]" for target, (name, _) in found.items()}
 
 
+def _temperature(parsed: Sequence[Words], names: Sequence[str], given: Mapping[str, str]) -> dict[str, str]:
+    """Find the one column that is a temperature in a stated unit."""
+    if _has("temp", names, given):
+        return {}
+    found = []
+    for words in parsed:
+        rest = tuple(word for word in words.words if word not in ("temp", "temperature", "temperatur"))
+        unit = unit_of("temp", rest, words.bracket)[0] if len(rest) < len(words.words) else None
+        if unit is not None:
+            found.append(f"{words.column}[{unit}]")
+    return {"temp": found[0]} if len(found) == 1 else {}
+
+
 def _remedy(mapping: Mapping[str, str]) -> str:
     """Word the one mapping of a file."""
     text = f"--map {shlex.quote(','.join(f'{target}={source}' for target, source in mapping.items()))}"
@@ -178,6 +199,12 @@ def _without_names(source: Readable, place: Place) -> InputError:
     return place.error(
         f"the columns {names[0]} to {names[-1]} have no names", column=names[0], remedy=_remedy(complete)
     )
+
+
+def _found(wanted: Sequence[str], parsed: Sequence[Words], maker: Maker | None) -> dict[str, list[_Candidate]]:
+    """Columns that may be each of the groups, without the groups that have none."""
+    found = {group: _candidates(group, parsed, maker) for group in wanted}
+    return {group: candidates for group, candidates in found.items() if candidates}
 
 
 def _has(group: str, names: Sequence[str], given: Mapping[str, str]) -> bool:
@@ -212,7 +239,10 @@ def _candidates(group: str, parsed: Sequence[Words], maker: Maker | None) -> lis
             if words.axis:
                 triples.setdefault(words.triple, {})[words.axis] = words
         for axes in triples.values():
-            named = sensor_of(axes["x"].words) if set(axes) == set("xyz") else None
+            if set(axes) != set("xyz"):
+                continue
+            force = maker is not None and re.search(maker.force, axes["x"].column) is not None
+            named = sensor_of(tuple(word for word in axes["x"].words if not (force and word in COMPUTED)))
             if named is not None and named[0] == group:
                 unit, rest = unit_of(group, named[1], axes["x"].bracket)
                 made.append(_Candidate(tuple(axes[axis].column for axis in "xyz"), unit or fixed, strange(rest)))
@@ -302,9 +332,10 @@ def _filled(t: Array, values: Array) -> Array:
     return np.stack([np.interp(t, t[known], values[known, k]) for k in range(values.shape[1])], axis=1)
 
 
-def _mapping(chosen: Mapping[str, _Candidate], units: Mapping[str, str | None]) -> dict[str, str]:
+def _mapping(chosen: Mapping[str, _Candidate], units: Mapping[str, str | None], maker: Maker | None) -> dict[str, str]:
+    opposite = maker.opposite if maker is not None else ()
     return {
-        target: f"{column}[{units[group]}]"
+        target: f"{'-' if group in opposite else ''}{column}[{units[group]}]"
         for group, each in chosen.items()
         for target, column in zip(GROUPS.get(group, (group,)), each.columns, strict=True)
     }

@@ -15,6 +15,8 @@ _NEAR: Final = 0.15
 """Relative difference up to which gravity at rest shows the unit; the units lie a factor of 2 apart."""
 _NEAR_RATE: Final = 0.25
 """The same for rates, of which noise pulls a ratio towards zero by some percent; the units lie a factor of 2 apart."""
+_BLOCKS: Final = (0.1, 0.3, 1.0)
+"""Lengths of the blocks over which turning is compared, s: shaking averages out of the longer ones, quick turns too."""
 _EARTH: Final = (20.0, 70.0)
 """Magnitude of the earth's field, uT (World Magnetic Model: 22 to 67)."""
 _LEAST_CHANGE: Final = 0.15
@@ -50,7 +52,7 @@ def gyr_unit(t: Array, gyr: Array, vectors: list[tuple[Array, bool]], ref_q: Arr
         Reference attitude.
     """
     ratios = [rate_ratio(t, gyr, ref_q)] if ref_q is not None else []
-    ratios += [field_ratio(t, gyr, vector, iron) for vector, iron in vectors]
+    ratios += [field_ratio(t, gyr, vector, iron, block) for vector, iron in vectors for block in _BLOCKS]
     known = ((1.0, "", "rad/s"), *GYR_UNITS)
     for ratio in ratios:
         if np.isfinite(ratio) and ratio > 0.0:

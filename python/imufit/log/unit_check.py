@@ -218,7 +218,7 @@ def rate_ratio(t: Array, gyr: Array, ref_q: Array) -> float:
     return float(np.median(reference[moving] / measured[moving]))
 
 
-def field_ratio(t: Array, gyr: Array, field: Array, iron: bool) -> float:
+def field_ratio(t: Array, gyr: Array, field: Array, iron: bool, block: float = 0.1) -> float:
     """Find the factor by which gyr explains the turning of a field fixed in space; NaN unless it explains it clearly.
 
     A constant vector u seen from a body that turns at w obeys du/dt = -w x u, up to the gyro's offset. Iron on the
@@ -232,12 +232,14 @@ def field_ratio(t: Array, gyr: Array, field: Array, iron: bool) -> float:
         Readings in any unit; rows with NaN are left out.
     iron : bool
         Whether the field may have an offset that is fixed to the body: a magnetometer's has.
+    block : float
+        Time over which readings are averaged, s.
     """
     complete = np.isfinite(gyr).all(axis=1) & np.isfinite(field).all(axis=1)
     t, gyr, field = t[complete], gyr[complete], field[complete]
     if t.size < 200:
         return float("nan")
-    rows = max(1, int(np.ceil(0.1 / max(float(np.median(np.diff(t))), 1e-6))))
+    rows = max(1, int(np.ceil(block / max(float(np.median(np.diff(t))), 1e-6))))
     blocks = t.size // rows
     if blocks < 20:
         return float("nan")

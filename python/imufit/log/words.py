@@ -10,14 +10,20 @@ from typing import Final
 from imufit.log.units import lookup
 
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
-_STUCK: Final = re.compile(r"(a|g|m|w|b|acc|accel|gyr|gyro|mag|magn|omega|raw)([xyz])")
+_STUCK: Final = re.compile(r"(a|f|g|m|w|b|h|acc|accel|gyr|gyro|mag|magn|omega|raw)([xyz])")
 _INDEX: Final = re.compile(r"\[\d+\]$")
 _UNIT: Final = re.compile(r"\s*[(\[]([^()\[\]]*(?:\([^()]*\)[^()\[\]]*)?)[)\]]\s*$")
 
 SENSOR_WORDS: Final = {
-    "acc": frozenset(("acc", "accel", "accelerometer", "acceleration", "accelerations", "a")),
-    "gyr": frozenset(("gyr", "gyro", "gyroscope", "omega", "angularrate", "angularvelocity", "w", "g")),
-    "mag": frozenset(("mag", "magn", "magnet", "magnetometer", "magneticfield", "magnetic", "m", "b")),
+    "acc": frozenset(
+        ("acc", "accel", "accelerometer", "acceleration", "accelerations", "beschleunigung", "ac", "a", "f")
+    ),
+    "gyr": frozenset(
+        ("gyr", "gyro", "gyroscope", "gy", "omega", "drehrate", "angularrate", "angularvelocity", "w", "g")
+    ),
+    "mag": frozenset(
+        ("mag", "magn", "magnet", "magnetometer", "magneticfield", "magnetfeld", "magnetic", "m", "b", "h")
+    ),
 }
 """Words that name a sensor; single letters only where nothing else does."""
 _PAIRS: Final = {
@@ -31,6 +37,7 @@ _PAIRS: Final = {
 COMPUTED: Final = frozenset(
     (
         "linear",
+        "lin",
         "user",
         "gravity",
         "est",
@@ -57,7 +64,6 @@ COMPUTED: Final = frozenset(
         "delta",
         "ned",
         "enu",
-        "inertial",
         "earth",
         "compensated",
         "free",
@@ -87,6 +93,7 @@ _NEUTRAL: Final = frozenset(
         "mpu",
         "board",
         "msg",
+        "axis",
     )
 )
 """Words that stand beside a sensor's name without saying anything that makes it another sensor."""
@@ -107,6 +114,7 @@ TIME_WORDS: Final = frozenset(
         "timesec",
         "date",
         "datetime",
+        "zeit",
         "clock",
         "sampletimefine",
     )
@@ -205,12 +213,12 @@ def words_of(name: str, axes: dict[str, str] | None = None) -> Words:
         Axes of the columns that bear numbers instead of names (``c2``).
     """
     plain, bracket, axis, index = name, "", "", False
-    if found := _INDEX.search(name):
+    if (found := _UNIT.search(name)) and not found[1].isdigit():
+        plain, bracket = name[: found.start()], found[1]
+    if found := _INDEX.search(plain):
         number = int(found[0][1:-1])
         axis, index = ("xyz"[number], True) if number < 3 else ("", True)
-        plain = name[: found.start()]
-    elif found := _UNIT.search(name):
-        plain, bracket = name[: found.start()], found[1]
+        plain = plain[: found.start()]
     if axes and name in axes:
         axis, plain = axes[name], plain.rpartition(".")[0]
     words = [word for raw in _WORD.findall(plain.replace("µ", "u")) for word in _unstuck(raw.lower())]
@@ -250,7 +258,8 @@ def sensor_of(words: tuple[str, ...]) -> tuple[str, tuple[str, ...]] | None:
     if COMPUTED & set(words):
         return None
     for letters in (False, True):
-        for k in range(len(words) - 1, -1, -1):
+        # a unit may stand behind the letter of a sensor: ax_g
+        for k in range(len(words)) if letters else range(len(words) - 1, -1, -1):
             for sensor, names in SENSOR_WORDS.items():
                 if words[k] in names and (len(words[k]) == 1) == letters:
                     return sensor, (*words[:k], *words[k + 1 :])
