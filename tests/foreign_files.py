@@ -1,7 +1,7 @@
 """Files as other makers' programs export them, written from a sound log: what a user would have on disk.
 
-Every writer of `WRITERS` takes a folder and a `Sound` and returns a `Foreign`: the path to read and the readings in SI as
-they were printed. The layouts follow the makers' public descriptions; nothing here knows how imufit reads them.
+Every writer of `WRITERS` takes a folder and a `Sound` and returns a `Foreign`: the path to read and the readings in SI
+as they were printed. The layouts follow the makers' public descriptions; nothing here knows how imufit reads them.
 """
 
 from __future__ import annotations
@@ -163,18 +163,22 @@ class Sheet:
 
 Writer = Callable[[Path, Sound], Foreign]
 
-MOVING = ("handheld", "arm", "rest_first")
-"""Kinds of logs in which the body turns, so that the unit of a rate can be found from gravity's turn."""
-
-KINDS = (*MOVING, "rest")
+KINDS = ("handheld", "arm", "rest_first", "rest")
+"""Kinds of logs; see `sound`."""
 
 
 @dataclass(frozen=True)
 class Case:
     """A writer and what is due for each kind of log.
 
-    ``reads``: read right with no option. ``asks``: the file does not tell, so a question with one complete mapping is due.
-    ``either``: read right, or a question.
+    ``reads``
+        Read right with no option.
+    ``asks``
+        The file does not tell: a question with one complete mapping is due.
+    ``either``
+        Read right, or such a question.
+    ``refuses``
+        As ``either``, or a refusal that offers no mapping: the layout is beyond a table.
     """
 
     name: str
@@ -186,11 +190,16 @@ WRITERS: dict[str, Case] = {}
 
 
 def case(moving: str = "reads", rest: str = "reads") -> Callable[[Writer], Writer]:
-    """Enter a writer under its own name."""
+    """Enter a writer under its own name.
+
+    Where a file at rest may ask for the unit of the rates, a hand that never rests may, too: its gravity is hidden
+    under accelerations.
+    """
 
     def enter(writer: Writer) -> Writer:
         name = writer.__name__
-        WRITERS[name] = Case(name, writer, {kind: rest if kind == "rest" else moving for kind in KINDS})
+        hand = "either" if moving == "reads" != rest else moving
+        WRITERS[name] = Case(name, writer, {"handheld": hand, "arm": moving, "rest_first": moving, "rest": rest})
         return writer
 
     return enter
@@ -538,9 +547,9 @@ DOT_PREAMBLE = (
 )
 
 
-@case(rest="either")
+@case()
 def movella_dot(folder: Path, s: Sound) -> Foreign:
-    """The DOT's rates are in deg/s; its clock ticks in us."""
+    """The DOT's rates are in deg/s, its clock ticks in us; the preamble names it."""
     sheet = _dot(s, False)
     return sheet.write(folder / "Xsens DOT_D422CD001234_20240620_100000.csv", sheet.text(before=DOT_PREAMBLE))
 
@@ -701,7 +710,7 @@ def sketch_counts_no_time_unit(folder: Path, s: Sound) -> Foreign:
 def sketch_mpu6050_tmp(folder: Path, s: Sound) -> Foreign:
     """The layout of the classic MPU-6050 sketch, with the raw temperature between, at +-250 deg/s and +-2 g."""
     sheet = Sheet(s).time("t_ms", 1e3, 0, "%d").sensor("acc", [f"Ac{a}" for a in "XYZ"], 16384 / G, "%d")
-    sheet.other("Tmp", ["%d" % (-4100 + k // 50) for k in range(len(s.t))])
+    sheet.other("Tmp", [str(-4100 + k // 50) for k in range(len(s.t))])
     return sheet.sensor("gyr", [f"Gy{a}" for a in "XYZ"], 131 * DEG, "%d").write(folder / "teraterm.log")
 
 
@@ -1234,7 +1243,7 @@ def euroc_ground_truth(folder: Path, s: Sound) -> Foreign:
     return sheet.write(folder / "state_groundtruth_estimate0" / "data.csv")
 
 
-@case(moving="either", rest="either")
+@case(moving="refuses", rest="refuses")
 def kitti_oxts(folder: Path, s: Sound) -> Foreign:
     """One file a sample, thirty numbers without names; the times stand in a file beside."""
     run = folder / "oxts"
@@ -1283,8 +1292,8 @@ def axivity_omgui(folder: Path, s: Sound) -> Foreign:
 @case(moving="either", rest="either")
 def actigraph(folder: Path, s: Sound) -> Foreign:
     before = (
-        "------------ Data File Created By ActiGraph GT3X+ ActiLife v6.13.3 Firmware v2.5.0 date format M/d/yyyy at 100 "
-        "Hz  Filter Normal -----------\nSerial Number: NEO1DXXXXXXXX\nStart Time 08:00:00\nStart Date 6/20/2024\n"
+        "------------ Data File Created By ActiGraph GT3X+ ActiLife v6.13.3 Firmware v2.5.0 date format M/d/yyyy at "
+        "100 Hz  Filter Normal -----------\nSerial Number: NEO1DXXXXXXXX\nStart Time 08:00:00\nStart Date 6/20/2024\n"
         "Epoch Period (hh:mm:ss) 00:00:00\nDownload Time 16:26:16\nDownload Date 6/21/2024\n"
         "Current Memory Address: 0\nCurrent Battery Voltage: 4.03     Mode = 12\n"
         "--------------------------------------------------\n"
@@ -1357,7 +1366,7 @@ def ardupilot_two_imus(folder: Path, s: Sound) -> Foreign:
     return sheet.write(folder / "imu.csv", "\n".join(both) + "\n")
 
 
-@case(rest="either")
+@case(moving="refuses", rest="refuses")
 def micros_that_wrap(folder: Path, s: Sound) -> Foreign:
     """micros() of an Arduino starts again at 0 after 2^32 us: the time goes on, or the file is refused."""
     sheet = _sketch(s, SI, "micros,ax,ay,az,gx,gy,gz", time="us")
@@ -1365,7 +1374,7 @@ def micros_that_wrap(folder: Path, s: Sound) -> Foreign:
     return sheet.write(folder / "log.csv")
 
 
-@case(moving="either", rest="either")
+@case(moving="refuses", rest="refuses")
 def gnss_logger(folder: Path, s: Sound) -> Foreign:
     """Google's GnssLogger: records of several kinds in one file, told by the first cell."""
     lines = [
