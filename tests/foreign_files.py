@@ -1,7 +1,7 @@
 """Files as other makers' programs export them, written from a sound log: what a user would have on disk.
 
-Every writer of `WRITERS` takes a folder and a `Sound` and returns a `Foreign`: the path to read and the readings in SI as
-they were printed. The layouts follow the makers' public descriptions; nothing here knows how imufit reads them.
+Every writer of `WRITERS` takes a folder and a `Sound` and returns a `Foreign`: the path to read and the readings in SI
+as they were printed. The layouts follow the makers' public descriptions; nothing here knows how imufit reads them.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import gzip
 import zipfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -75,12 +75,16 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Foreign:
-    """A file, folder or archive and what stands in it, None where a sensor is not in it."""
+    """A file, folder or archive and what stands in it, None where a sensor is not in it.
+
+    Sensors in `may_lack` may be left out: they stand there as a sum of two columns.
+    """
 
     path: Path
     acc: Part | None = None
     gyr: Part | None = None
     mag: Part | None = None
+    may_lack: tuple[str, ...] = ()
 
 
 @dataclass(eq=False)
@@ -116,8 +120,8 @@ class Sheet:
         """
         values = getattr(self.sound, sensor)[:: self.every]
         printed = np.empty_like(values)
-        if isinstance(names, str):
-            names = [names.replace("*", axis) for axis in order]
+        if "*" in names:
+            names = [str(names).replace("*", axis) for axis in order]
         for name, axis in zip(names, order, strict=True):
             k = "xyz".index(axis)
             cells = [form % value for value in values[:, k] * per_si]
@@ -159,18 +163,22 @@ class Sheet:
 
 Writer = Callable[[Path, Sound], Foreign]
 
-MOVING = ("handheld", "arm", "rest_first")
-"""Kinds of logs in which the body turns, so that the unit of a rate can be found from gravity's turn."""
-
-KINDS = (*MOVING, "rest")
+KINDS = ("handheld", "arm", "rest_first", "rest")
+"""Kinds of logs; see `sound`."""
 
 
 @dataclass(frozen=True)
 class Case:
     """A writer and what is due for each kind of log.
 
-    ``reads``: read right with no option. ``asks``: the file does not tell, so a question with one complete mapping is due.
-    ``either``: read right, or a question.
+    ``reads``
+        Read right with no option.
+    ``asks``
+        The file does not tell: a question with one complete mapping is due.
+    ``either``
+        Read right, or such a question.
+    ``refuses``
+        As ``either``, or a refusal that offers no mapping: the layout is beyond a table.
     """
 
     name: str
@@ -182,11 +190,16 @@ WRITERS: dict[str, Case] = {}
 
 
 def case(moving: str = "reads", rest: str = "reads") -> Callable[[Writer], Writer]:
-    """Enter a writer under its own name."""
+    """Enter a writer under its own name.
+
+    Where a file at rest may ask for the unit of the rates, a hand that never rests may, too: its gravity is hidden
+    under accelerations.
+    """
 
     def enter(writer: Writer) -> Writer:
         name = writer.__name__
-        WRITERS[name] = Case(name, writer, {kind: rest if kind == "rest" else moving for kind in KINDS})
+        hand = "either" if moving == "reads" != rest else moving
+        WRITERS[name] = Case(name, writer, {"handheld": hand, "arm": moving, "rest_first": moving, "rest": rest})
         return writer
 
     return enter
@@ -252,7 +265,6 @@ def phyphox_acc_old(folder: Path, s: Sound) -> Foreign:
 
 @case()
 def phyphox_acc_old_names(folder: Path, s: Sound) -> Foreign:
-    sheet = _phyphox(s, "acc", "Linear Acceleration")
     sheet = Sheet(s).time("Time (s)", form=SCIENTIFIC).sensor("acc", "Accelerometer * (m/s^2)", form=SCIENTIFIC)
     return sheet.write(folder / "Accelerometer.csv", sheet.text(quote=True))
 
@@ -399,7 +411,7 @@ def sensor_logger_without_total(folder: Path, s: Sound) -> Foreign:
     """Accelerometer.csv is without gravity; with Gravity.csv beside, the sum of both is the specific force."""
     parts = _logger_folder(folder / "run", s, total=False)
     sums = Part(s.t, np.round(s.acc - gravity(s), 9) + np.round(gravity(s), 9))
-    return together(folder / "run", *parts, Foreign(folder, acc=sums))
+    return replace(together(folder / "run", *parts, Foreign(folder, acc=sums)), may_lack=("acc",))
 
 
 @case()
@@ -535,9 +547,9 @@ DOT_PREAMBLE = (
 )
 
 
-@case(rest="either")
+@case()
 def movella_dot(folder: Path, s: Sound) -> Foreign:
-    """The DOT's rates are in deg/s; its clock ticks in us."""
+    """The DOT's rates are in deg/s, its clock ticks in us; the preamble names it."""
     sheet = _dot(s, False)
     return sheet.write(folder / "Xsens DOT_D422CD001234_20240620_100000.csv", sheet.text(before=DOT_PREAMBLE))
 
@@ -698,7 +710,7 @@ def sketch_counts_no_time_unit(folder: Path, s: Sound) -> Foreign:
 def sketch_mpu6050_tmp(folder: Path, s: Sound) -> Foreign:
     """The layout of the classic MPU-6050 sketch, with the raw temperature between, at +-250 deg/s and +-2 g."""
     sheet = Sheet(s).time("t_ms", 1e3, 0, "%d").sensor("acc", [f"Ac{a}" for a in "XYZ"], 16384 / G, "%d")
-    sheet.other("Tmp", ["%d" % (-4100 + k // 50) for k in range(len(s.t))])
+    sheet.other("Tmp", [str(-4100 + k // 50) for k in range(len(s.t))])
     return sheet.sensor("gyr", [f"Gy{a}" for a in "XYZ"], 131 * DEG, "%d").write(folder / "teraterm.log")
 
 
@@ -852,7 +864,7 @@ def apple_core_motion_gravity_and_user(folder: Path, s: Sound) -> Foreign:
     total = -G * (np.round(-gravity(s) / G, 6) + np.round((gravity(s) - s.acc) / G, 6))
     assert sheet.seconds is not None
     sheet.parts["acc"] = Part(sheet.seconds, total)
-    return sheet.write(folder / "motion.csv")
+    return replace(sheet.write(folder / "motion.csv"), may_lack=("acc",))
 
 
 @case(moving="either", rest="either")
@@ -869,7 +881,7 @@ def apple_device_motion_dotted(folder: Path, s: Sound) -> Foreign:
     sheet.others([f"userAcceleration.{a}" for a in "xyz"], (gravity(s) - s.acc) / G)
     total = -G * (np.round(-gravity(s) / G, 6) + np.round((gravity(s) - s.acc) / G, 6))
     sheet.parts["acc"] = Part(s.t, total)
-    return sheet.write(folder / "dws_1.csv")
+    return replace(sheet.write(folder / "dws_1.csv"), may_lack=("acc",))
 
 
 # --- data sets -------------------------------------------------------------------------------------------------------
@@ -949,14 +961,7 @@ def metabase_folder(folder: Path, s: Sound) -> Foreign:
         folder / "run",
         _metabase(s, "acc", "g", 1 / G).write(folder / "run" / f"{stem}Accelerometer_100.000Hz_1.5.0.csv"),
         _metabase(s, "gyr", "deg/s", DEG).write(folder / "run" / f"{stem}Gyroscope_100.000Hz_1.5.0.csv"),
-        _metabase(s, "mag", "T", 1e-6).write(folder / "run" / f"{stem}Magnetometer_25.000Hz_1.5.0.csv")
-        if False
-        else Sheet(s)
-        .time("epoc (ms)", 1e3, EPOCH_S, "%d")
-        .other("timestamp (+0000)", _clock(s, "%Y-%m-%dT%H.%M.%S.%f"))
-        .other("elapsed (s)", s.t, "%.6f")
-        .sensor("mag", [f"{a}-axis (uT)" for a in "xyz"], 1, "%.4f")
-        .write(folder / "run" / f"{stem}Magnetometer_25.000Hz_1.5.0.csv"),
+        _metabase(s, "mag", "uT", 1).write(folder / "run" / f"{stem}Magnetometer_25.000Hz_1.5.0.csv"),
     )
 
 
@@ -1152,11 +1157,21 @@ def first_row_time_alone(folder: Path, s: Sound) -> Foreign:
 @case()
 def nan_words(folder: Path, s: Sound) -> Foreign:
     sheet = _plain(s)
-    for row, word in zip((3, 40, 41, 90, 200), ("NaN", "nan", "#N/A", "NULL", "-"), strict=True):
+    return _with_words(sheet, ("NaN", "nan", "NAN", "-nan", "NaN")).write(folder / "a.csv")
+
+
+@case()
+def spreadsheet_words(folder: Path, s: Sound) -> Foreign:
+    """What spreadsheets, R and databases write where nothing was measured."""
+    return _with_words(_plain(s), ("NA", "#N/A", "NULL", "null", "None")).write(folder / "a.csv")
+
+
+def _with_words(sheet: Sheet, words: Sequence[str]) -> Sheet:
+    for row, word in zip((3, 40, 41, 90, 200), words, strict=True):
         for k in (1, 2, 3):
             sheet.columns[k][row] = word
         sheet.parts["acc"].values[row] = np.nan
-    return sheet.write(folder / "a.csv")
+    return sheet
 
 
 @case()
@@ -1204,6 +1219,215 @@ def euler_rates_and_angles(folder: Path, s: Sound) -> Foreign:
     sheet = Sheet(s).time("time_s").others(["lax", "lay", "laz"], s.acc - gravity(s))
     sheet.others(["gx", "gy", "gz"], gravity(s))
     return sheet.sensor("mag", ["mx (uT)", "my (uT)", "mz (uT)"]).write(folder / "a.csv")
+
+
+@case(moving="either", rest="either")
+def acc_without_gravity(folder: Path, s: Sound) -> Foreign:
+    """Named as an accelerometer, but the norm at rest is near 0: no specific force, whatever the header says."""
+    sheet = Sheet(s).time("time_s").others([f"acc_{a} (m/s^2)" for a in "xyz"], s.acc - gravity(s))
+    return sheet.sensor("gyr", [f"gyr_{a} (rad/s)" for a in "xyz"]).write(folder / "a.csv")
+
+
+# --- more makers -----------------------------------------------------------------------------------------------------
+
+
+@case(moving="either", rest="either")
+def euroc_ground_truth(folder: Path, s: Sound) -> Foreign:
+    """Estimated biases in rad/s and m/s^2 stand beside the attitude: none is a reading."""
+    n = len(s.t)
+    sheet = Sheet(s).time("#timestamp", 1e9, EPOCH_S, "%d")
+    sheet.others([f" p_RS_R_{a} [m]" for a in "xyz"], np.cumsum(s.gyr, axis=0) / 200)
+    sheet.others([f" q_RS_{a} []" for a in "wxyz"], s.q).others([f" v_RS_R_{a} [m s^-1]" for a in "xyz"], s.gyr)
+    sheet.others([f" b_w_RS_S_{a} [rad s^-1]" for a in "xyz"], np.full((n, 3), -0.002))
+    sheet.others([f" b_a_RS_S_{a} [m s^-2]" for a in "xyz"], np.full((n, 3), 0.05))
+    return sheet.write(folder / "state_groundtruth_estimate0" / "data.csv")
+
+
+@case(moving="refuses", rest="refuses")
+def kitti_oxts(folder: Path, s: Sound) -> Foreign:
+    """One file a sample, thirty numbers without names; the times stand in a file beside."""
+    run = folder / "oxts"
+    (run / "data").mkdir(parents=True)
+    stamps = _clock(s, "%Y-%m-%d %H:%M:%S.%f000", 0)[:60]
+    (run / "timestamps.txt").write_text("\n".join(stamps) + "\n")
+    for k in range(60):
+        row = [49.01, 8.43, 112.8, *euler_deg(s)[k] / DEG, 0, 0, 0, 0, 0, *s.acc[k], *s.acc[k], *s.gyr[k], *s.gyr[k]]
+        text = " ".join(f"{value:.10g}" for value in row) + " 0.1 0.02 4 8 5 6 0\n"
+        (run / "data" / f"{k:010d}.txt").write_text(text)
+    first = slice(0, 60)
+    return Foreign(run, Part(s.t[first], s.acc[first]), Part(s.t[first], s.gyr[first]))
+
+
+@case(moving="either", rest="either")
+def physics_toolbox(folder: Path, s: Sound) -> Foreign:
+    """Physics Toolbox Sensor Suite: gF is the specific force in g, ax ay az is without gravity."""
+    sheet = Sheet(s).time("time", form="%.6f").sensor("acc", "gF*", 1 / G, "%.6f")
+    sheet.others(["ax", "ay", "az"], s.acc - gravity(s)).sensor("gyr", "w*").other("p", "1013.2")
+    sheet.sensor("mag", "B*", 1, "%.4f").others(["Azimuth", "Pitch", "Roll"], euler_deg(s), "%.3f")
+    return sheet.write(folder / "physics_toolbox.csv")
+
+
+@case()
+def androsensor(folder: Path, s: Sound) -> Foreign:
+    sheet = Sheet(s)
+    ms = [str(round(1e3 * float(t)) + 7) for t in s.t]
+    sheet.sensor("acc", [f"ACCELEROMETER {a} (m/s²)" for a in "XYZ"], form="%.4f")
+    sheet.others([f"GRAVITY {a} (m/s²)" for a in "XYZ"], gravity(s), "%.4f")
+    sheet.others([f"LINEAR ACCELERATION {a} (m/s²)" for a in "XYZ"], s.acc - gravity(s), "%.4f")
+    sheet.sensor("gyr", [f"GYROSCOPE {a} (rad/s)" for a in "XYZ"], form="%.4f")
+    sheet.sensor("mag", [f"MAGNETIC FIELD {a} (μT)" for a in "XYZ"], form="%.4f")
+    sheet.others([f"ORIENTATION {a} (°)" for a in ("Z (azimuth", "X (pitch", "Y (roll")], euler_deg(s), "%.4f")
+    sheet.other("Time since start in ms ", ms).other("YYYY-MO-DD HH-MI-SS_SSS", _clock(s, "%Y-%m-%d %H-%M-%S:%f"))
+    return sheet.write(folder / "Sensor_record_20240620_100000_AndroSensor.csv", sheet.text(";"))
+
+
+@case(moving="either", rest="either")
+def axivity_omgui(folder: Path, s: Sound) -> Foreign:
+    """AX6 export: no header, a date and clock, g and deg/s."""
+    sheet = Sheet(s).other("t", _clock(s, "%Y-%m-%d %H:%M:%S.%f")).sensor("acc", "a*", 1 / G, "%.6f")
+    sheet.sensor("gyr", "g*", DEG, "%.6f")
+    return sheet.write(folder / "CWA-DATA.csv", sheet.text(header=None))
+
+
+@case(moving="either", rest="either")
+def actigraph(folder: Path, s: Sound) -> Foreign:
+    before = (
+        "------------ Data File Created By ActiGraph GT3X+ ActiLife v6.13.3 Firmware v2.5.0 date format M/d/yyyy at "
+        "100 Hz  Filter Normal -----------\nSerial Number: NEO1DXXXXXXXX\nStart Time 08:00:00\nStart Date 6/20/2024\n"
+        "Epoch Period (hh:mm:ss) 00:00:00\nDownload Time 16:26:16\nDownload Date 6/21/2024\n"
+        "Current Memory Address: 0\nCurrent Battery Voltage: 4.03     Mode = 12\n"
+        "--------------------------------------------------\n"
+    )
+    sheet = Sheet(s).sensor("acc", [f"Accelerometer {a}" for a in "XYZ"], 1 / G, "%.3f")
+    return sheet.write(folder / "NEO1D (2024-06-20)RAW.csv", sheet.text(before=before, end="\r\n"))
+
+
+@case(moving="either", rest="either")
+def openlog_artemis(folder: Path, s: Sound) -> Foreign:
+    """Milli-g, deg/s and uT without a word of it; every line ends in a comma."""
+    sheet = Sheet(s).other("rtcDate", _clock(s, "%m/%d/%Y", 0)).other("rtcTime", _clock(s, "%H:%M:%S.%f", 4))
+    sheet.sensor("acc", [f"a{a}" for a in "XYZ"], 1000 / G, "%.2f").sensor("gyr", [f"g{a}" for a in "XYZ"], DEG, "%.2f")
+    sheet.sensor("mag", [f"m{a}" for a in "XYZ"], 1, "%.2f").other("imu_degC", "24.31").other("output_Hz", "99.998")
+    return sheet.write(folder / "dataLog00001.TXT", sheet.text(end=",\r\n"))
+
+
+@case()
+def polar_acc(folder: Path, s: Sound) -> Foreign:
+    sheet = Sheet(s).other("Phone timestamp", _clock(s, "%Y-%m-%dT%H:%M:%S.%f"))
+    sheet.time("sensor timestamp [ns]", 1e9, EPOCH_S - 946_684_800, "%d")
+    sheet.sensor("acc", [f"{a} [mg]" for a in "XYZ"], 1000 / G, "%.1f")
+    return sheet.write(folder / "Polar_Sense_ACC.txt", sheet.text(";"))
+
+
+@case()
+def polar_folder(folder: Path, s: Sound) -> Foreign:
+    parts = []
+    for sensor, unit, per_si, name in (
+        ("acc", "mg", 1000 / G, "ACC"),
+        ("gyr", "dps", DEG, "GYRO"),
+        ("mag", "G", 0.01, "MAGN"),
+    ):
+        sheet = Sheet(s).other("Phone timestamp", _clock(s, "%Y-%m-%dT%H:%M:%S.%f"))
+        sheet.time("sensor timestamp [ns]", 1e9, EPOCH_S - 946_684_800, "%d")
+        sheet.sensor(sensor, [f"{a} [{unit}]" for a in "XYZ"], per_si, "%.5f")
+        parts.append(sheet.write(folder / "run" / f"Polar_Sense_0A1B2C3D_20240620_100000_{name}.txt", sheet.text(";")))
+    return together(folder / "run", *parts)
+
+
+@case(rest="either")
+def ardupilot_imu(folder: Path, s: Sound) -> Foreign:
+    """`mavlogdump.py --types IMU --format csv` of a vehicle with one sensor: rad/s and m/s^2 without a word of it."""
+    sheet = Sheet(s).time("timestamp", start=EPOCH_S, form="%.6f").time("TimeUS", 1e6, 112.5, "%d").other("I", "0")
+    sheet.sensor("gyr", [f"Gyr{a}" for a in "XYZ"], form="%.7g").sensor("acc", [f"Acc{a}" for a in "XYZ"], form="%.7g")
+    for name, cell in (
+        ("EG", "0"),
+        ("EA", "0"),
+        ("T", "41.2"),
+        ("GH", "1"),
+        ("AH", "1"),
+        ("GHz", "1000"),
+        ("AHz", "1000"),
+    ):
+        sheet.other(name, cell)
+    return sheet.write(folder / "imu.csv")
+
+
+@case(moving="either", rest="either")
+def ardupilot_two_imus(folder: Path, s: Sound) -> Foreign:
+    """Rows of two sensors take turns, told by the column I: they must not become one."""
+    sheet = Sheet(s).time("TimeUS", 1e6, 112.5, "%d").other("I", "0")
+    sheet.sensor("gyr", [f"Gyr{a}" for a in "XYZ"], form="%.7g").sensor("acc", [f"Acc{a}" for a in "XYZ"], form="%.7g")
+    lines = sheet.text().splitlines()
+    both = [lines[0]]
+    for k, line in enumerate(lines[1:]):
+        time = int(sheet.columns[0][k])
+        other = [f"{value:.7g}" for value in (*(-s.gyr[k, [1, 0, 2]]), *(s.acc[k, [2, 1, 0]] + 0.4))]
+        both += [line, ",".join([str(time + 40), "1", *other])]
+    return sheet.write(folder / "imu.csv", "\n".join(both) + "\n")
+
+
+@case(moving="refuses", rest="refuses")
+def micros_that_wrap(folder: Path, s: Sound) -> Foreign:
+    """micros() of an Arduino starts again at 0 after 2^32 us: the time goes on, or the file is refused."""
+    sheet = _sketch(s, SI, "micros,ax,ay,az,gx,gy,gz", time="us")
+    sheet.columns[0] = [str((int(cell) + 2**32 - 5_000_000) % 2**32) for cell in sheet.columns[0]]
+    return sheet.write(folder / "log.csv")
+
+
+@case(moving="refuses", rest="refuses")
+def gnss_logger(folder: Path, s: Sound) -> Foreign:
+    """Google's GnssLogger: records of several kinds in one file, told by the first cell."""
+    lines = [
+        "# ",
+        "# Header Description:",
+        "# ",
+        "# Version: v3.0.5.6 Platform: 14 Manufacturer: Google Model: Pixel 6",
+    ]
+    for kind, unit in (("Accel", "Mps2"), ("Gyro", "RadPerSec"), ("Mag", "MicroT")):
+        axes = ",".join(f"Uncal{kind}{a}{unit}" for a in "XYZ")
+        lines += ["# ", f"# Uncal{kind},utcTimeMillis,elapsedRealtimeNanos,{axes},Bias{unit}X,Bias{unit}Y,Bias{unit}Z"]
+    for k, t in enumerate(s.t):
+        stamp = f"{EPOCH_S * 1000 + round(t * 1000)},{8_123_250_000_000 + round(t * 1e9)}"
+        for kind, row in (("Accel", s.acc[k]), ("Gyro", s.gyr[k]), ("Mag", s.mag[k])):
+            lines.append(f"Uncal{kind},{stamp}," + ",".join(f"{value:.7f}" for value in row) + ",0.0,0.0,0.0,3")
+    path = folder / "gnss_log_2024_06_20_10_00_00.txt"
+    path.write_text("\n".join(lines) + "\n")
+    rounded = {name: Part(s.t, np.round(getattr(s, name), 7)) for name in ("acc", "gyr", "mag")}
+    return Foreign(path, **rounded)
+
+
+# --- spellings of units ----------------------------------------------------------------------------------------------
+
+SPELLINGS = (
+    ("Time (sec)", 1, "m/s/s", 1, "deg/sec", DEG, "microtesla", 1),
+    ("time [msec]", 1e3, "m/s**2", 1, "rad/sec", 1, "Gauss", 0.01),
+    ("t_us", 1e6, "m s^-2", 1, "degrees/s", DEG, "nT", 1e3),
+    ("timestamp_ns", 1e9, "m·s⁻²", 1, "rad·s⁻¹", 1, "μT", 1),
+    ("Time(ms)", 1e3, "milli-g", 1000 / G, "mdps", 1000 * DEG, "mGauss", 10),
+    ("elapsed [µs]", 1e6, "G", 1 / G, "DPS", DEG, "UT", 1),
+    ("Time, ms", 1e3, "mg", 1000 / G, "°/sec", DEG, "mG", 10),
+    ("seconds", 1, "ms-2", 1, "rads-1", 1, "µT", 1),
+)
+"""Spellings of time, acc, gyr and mag with how many of it make one of SI: as they are met in headers."""
+
+
+def _spelled(k: int, style: str) -> Writer:
+    time, time_per, acc, acc_per, gyr, gyr_per, mag, mag_per = SPELLINGS[k]
+
+    def spelled(folder: Path, s: Sound) -> Foreign:
+        sheet = Sheet(s).time(time, time_per, 1.5, "%.6f" if time_per == 1 else "%d")
+        sheet.sensor("acc", [style.format("Acc", a, acc) for a in "xyz"], acc_per, "%.7f")
+        sheet.sensor("gyr", [style.format("Gyr", a, gyr) for a in "xyz"], gyr_per, "%.7f")
+        sheet.sensor("mag", [style.format("Mag", a, mag) for a in "xyz"], mag_per, "%.6f")
+        return sheet.write(folder / "a.txt", sheet.text("\t"))
+
+    spelled.__name__ = f"spelled_{k}_{'brackets' if '[' in style else 'parentheses'}"
+    return spelled
+
+
+for _k in range(len(SPELLINGS)):
+    for _style in ("{0}_{1} [{2}]", "{0} {1} ({2})"):
+        case()(_spelled(_k, _style))
 
 
 def write(name: str, folder: Path, s: Sound) -> Foreign:
