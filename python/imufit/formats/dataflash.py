@@ -88,7 +88,7 @@ class _Walk:
                 continue
             if at + form.len > size:
                 break
-            if form.name == "FMT" or form.name == _UNITS:
+            if form.name in ("FMT", _UNITS):
                 self._describe(form, data[at + 3 : at + form.len])
             offsets = self.offsets.get(form.type)
             if offsets is None:
@@ -126,7 +126,7 @@ class _Walk:
         size = len(self._data)
         rest = size - self._end
         last = max((float(np.nanmax(table.columns[table.time])) for table in tables if table.time), default=0.0)
-        if 0 < rest and not (rest <= _FILLED and not self._data[self._end :].strip(b"\0\xff")):
+        if rest > 0 and not (rest <= _FILLED and not self._data[self._end :].strip(b"\0\xff")):
             yield (
                 f"The file is cut off or damaged: its last {rest} of {size} bytes are no whole message, and the last "
                 f"message read is of {last:.3f} s."
@@ -162,7 +162,7 @@ def _tables(form: Any, data: NDArray[np.uint8], offsets: NDArray[np.int64], code
 
 def _by_instance(form: Any, columns: dict[str, NDArray[Any]], time: str | None) -> Iterator[Table]:
     """Split a table by the number of the sensor, as the rows of several sensors alternate."""
-    name = form.instance_field or next((name for name in _INSTANCES if name in columns), None)
+    name: str = form.instance_field or next((name for name in _INSTANCES if name in columns), "")
     numbers = np.unique(columns[name]) if name in columns and columns[name].dtype == float else np.zeros(0)
     if not 0 < len(numbers) <= _MOST_INSTANCES:
         yield Table(form.name, columns, time)

@@ -15,6 +15,8 @@ from imufit.formats.recording import Recording, Table
 FORM: Final = "PX4 ULog"
 _MAGIC: Final = b"ULog\x01\x12\x35"
 _TIME: Final = "timestamp"
+_TIMES: Final = (_TIME, "timestamp_sample")
+"""Columns that have times of the recorder's clock, us, in every message of PX4."""
 _HEADER: Final = 16
 """Bytes before the first message, by the definition of the format."""
 _KINDS: Final = frozenset(b"FDIMPQARSOLCB")
@@ -43,9 +45,11 @@ def read(path: Path) -> Recording:
         columns = {
             name: values.astype(float)
             for name, values in data.data.items()
-            if not name.rpartition(".")[2] == "_padding0"
+            if not name.rpartition(".")[2].startswith("_padding")
         }
-        columns[_TIME] *= 1e-6
+        for time in _TIMES:
+            if time in columns:
+                columns[time] *= 1e-6
         name = data.name if data.name not in several or data.multi_id == 0 else f"{data.name}.{data.multi_id}"
         tables.append(Table(name, columns, _TIME))
     return Recording(FORM, tuple(tables), _notes(path, log, tables), _metadata(log))
