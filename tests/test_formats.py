@@ -18,11 +18,10 @@ import foreign_files
 import numpy as np
 import pytest
 from foreign_files import ACC, GYR, MAKERS, QUATERNION, N, T
-from recording import recording
-
 from imufit.errors import InputError
 from imufit.formats.find import FORMATS, SUFFIXES, recording_of
 from imufit.formats.recording import Recording, Table
+from recording import recording
 
 SECONDS = 10.0
 """Time in which every file must be read or refused, s."""
@@ -143,6 +142,41 @@ def test_the_whole_messages_of_a_ulog_that_is_cut_off_are_read(tmp_path: Path) -
     assert 0.45 < sensors.n / 17070 < 0.55
     assert "whole messages" in found.notes[0]
     assert f"{max(table.columns['timestamp'].max() for table in found.tables):.3f} s" in found.notes[0]
+
+
+def test_a_ulog_with_appended_data_and_damage_between_is_read_on(tmp_path: Path) -> None:
+    data = recording("px4_ulog/sample.ulg").read_bytes()
+    flags = struct.pack("<HB8s8s", 40, ord("B"), bytes(8), b"\x01" + bytes(7))
+    cut, path = len(data) // 2, tmp_path / "appended.ulg"
+    first = data[:16] + flags + bytes(24) + data[16:cut]
+    whole = read(recording("px4_ulog/sample.ulg"))
+    place = struct.pack("<QQQ", len(first), 0, 0)
+    info = b"int32_t twice"
+    appended = struct.pack("<HBB", len(info) + 5, ord("I"), len(info)) + info + bytes(4)
+    path.write_bytes(first[: 16 + len(flags)] + place + first[16 + len(flags) + 24 :] + appended)
+    half = table_of(read(path), "sensor_combined")
+    assert 0.4 < half.n / 17070 < 0.6
+    np.testing.assert_array_equal(
+        half.columns["timestamp"], table_of(whole, "sensor_combined").columns["timestamp"][: half.n]
+    )
+    # a few sectors of the middle are gone: messages go on behind
+    path.write_bytes(data[:cut] + data[cut + 5000 :])
+    found = read(path)
+    assert 0.98 * 17070 < table_of(found, "sensor_combined").n < 17070
+    assert "damaged" in found.notes[0]
+
+
+def hostile_ends() -> list[bytes]:
+    """Ends behind the definitions of a ULog at which a reader that goes back could go on for ever."""
+    return [b"\xff" * 500_000, bytes(500_000), b"\xff\xffD" + bytes(100), b"\x00\x00D" * 1000, b"\x10\x27Z" + bytes(9)]
+
+
+@pytest.mark.parametrize("place", [1000, 1_000_000])
+def test_no_end_of_a_ulog_holds_its_reader_up(tmp_path: Path, place: int) -> None:
+    data = recording("px4_ulog/sample.ulg").read_bytes()[:place]
+    for end in hostile_ends():
+        (tmp_path / "a.ulg").write_bytes(data + end)
+        check_damaged(tmp_path / "a.ulg")
 
 
 @pytest.mark.parametrize("compressed", [True, False])
@@ -336,12 +370,13 @@ def mutated(data: bytes, draw: random.Random) -> bytes:
 
 def check_damaged(path: Path) -> None:
     start = time.monotonic()
+    found, problem = None, ""
     try:
         found = recording_of(path)
     except InputError as error:
-        assert "\n" not in str(error)
-    else:
-        assert found is None or found.tables
+        problem = str(error)
+    assert "\n" not in problem
+    assert found is None or found.tables
     assert time.monotonic() - start < SECONDS
 
 
