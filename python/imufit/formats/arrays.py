@@ -90,7 +90,8 @@ def tables_of(path: Path, named: Named) -> tuple[tuple[Table, ...], tuple[str, .
     Returns
     -------
     tables : tuple of Table
-        With a column `t` where a rate is given and no array of times.
+        Named after the group of their clock, which their columns then leave out of their path; with a column `t`
+        where a rate is given and no array of times.
     notes : tuple of str
         What was left out.
     """
@@ -110,7 +111,11 @@ def tables_of(path: Path, named: Named) -> tuple[tuple[Table, ...], tuple[str, .
     for name, column in columns.items():
         grouped.setdefault((_nearest(named, name, len(column), clocks, rates), len(column)), {})[name] = column
     tables = []
-    for (group, n), members in grouped.items():
+    for (group, n), found in grouped.items():
+        if all(column.dtype == object for column in found.values()):
+            named.left_out += found
+            continue
+        members = {name[len(group) + 1 :] if group else name: column for name, column in found.items()}
         time = None
         if group is not None and (group, n) not in clocks:
             time = time_name(members)

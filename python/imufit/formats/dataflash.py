@@ -88,7 +88,7 @@ class _Walk:
                 continue
             if at + form.len > size:
                 break
-            if form.name == "FMT" or form.name == _UNITS:
+            if form.name in ("FMT", _UNITS):
                 self._describe(form, data[at + 3 : at + form.len])
             offsets = self.offsets.get(form.type)
             if offsets is None:
@@ -162,7 +162,7 @@ def _tables(form: Any, data: NDArray[np.uint8], offsets: NDArray[np.int64], code
 
 def _by_instance(form: Any, columns: dict[str, NDArray[Any]], time: str | None) -> Iterator[Table]:
     """Split a table by the number of the sensor, as the rows of several sensors alternate."""
-    name = form.instance_field or next((name for name in _INSTANCES if name in columns), None)
+    name: str = form.instance_field or next((name for name in _INSTANCES if name in columns), "")
     numbers = np.unique(columns[name]) if name in columns and columns[name].dtype == float else np.zeros(0)
     if not 0 < len(numbers) <= _MOST_INSTANCES:
         yield Table(form.name, columns, time)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import math
 import zipfile
 from pathlib import Path
 from typing import Any, Final
@@ -47,15 +46,14 @@ def read(path: Path) -> Recording:
         check_expansion(path, size, sum(member.file_size for member in members), _UNPACKED)
         shared = sum(member.file_size for member in members if not member.filename.startswith("xl/worksheets/"))
         check_expansion(path, size, shared, PARSED)
-    book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
     tables: list[Table] = []
     notes: list[str] = []
-    try:
+    with path.open("rb") as file:  # of a path the library asks for its own suffixes
+        book = openpyxl.load_workbook(file, read_only=True, data_only=True, keep_links=False)
         for sheet in book.worksheets:
             made, said = _sheet(path, sheet)
             tables += made
             notes += said
-    finally:
         book.close()
     if len(tables) == 1:
         tables = [Table("", tables[0].columns, tables[0].time)]
@@ -67,7 +65,7 @@ def _sheet(path: Path, sheet: Any) -> tuple[list[Table], list[str]]:
     above: list[tuple[Any, ...]] = []
     names: list[str] | None = None
     dates: set[str] = set()
-    texts = 0
+    texts: dict[str, int] = {}
     rows = Rows(path)
     for count, cells in enumerate(sheet.iter_rows(values_only=True)):
         if count > _HEIGHT:
@@ -83,32 +81,25 @@ def _sheet(path: Path, sheet: Any) -> tuple[list[Table], list[str]]:
                 above.append(cells)
                 continue
             names = _names(above, len(cells))
-        values: dict[str, float | str | None] = {}
-        for index, cell in enumerate(cells[:_WIDTH]):
-            if index >= len(names):
-                names.append(f"c{index + 1}")
-            value, date = _value(cell)
-            values[names[index]] = value
+        names += [f"c{index + 1}" for index in range(len(names), min(len(cells), _WIDTH))]
+        values = {}
+        for name, cell in zip(names, cells, strict=False):
+            values[name], date = _value(cell)
             if date:
-                dates.add(names[index])
-            elif isinstance(value, str):
-                texts += 1
+                dates.add(name)
+            elif isinstance(values[name], str):
+                texts[name] = texts.get(name, 0) + 1
         rows.append(sheet.title, values)
-    tables = list(rows.tables())
+    tables = rows.tables()
     if not tables:
         return [], []
     table = tables[0]
+    lost = sum(count for name, count in texts.items() if table.columns[name].dtype == float)
     time = next(iter(dates)) if len(dates) == 1 else None
     if time is not None and (time not in table.columns or table.columns[time].dtype == object):
         time = None
-    columns = {name: column for name, column in table.columns.items()}
-    lost = texts and [name for name, column in columns.items() if column.dtype == float and _is_empty(column)]
-    notes = [f"Columns without a number: {', '.join(lost[:5])}."] if lost else []
-    return [Table(table.name, columns, time)], notes
-
-
-def _is_empty(column: Any) -> bool:
-    return all(math.isnan(value) for value in column[:1000])
+    notes = [f"{lost} texts in columns of numbers of the sheet {sheet.title} are taken as missing."] if lost else []
+    return [Table(table.name, table.columns, time)], notes
 
 
 def _is_data(cells: tuple[Any, ...]) -> bool:
@@ -119,7 +110,7 @@ def _is_data(cells: tuple[Any, ...]) -> bool:
 
 
 def _names(above: list[tuple[Any, ...]], width: int) -> list[str]:
-    """Return names for the columns: those of the last row of texts above, with the units where a row of them follows."""
+    """Return names for the columns: the last row of texts above, with the units where a row of them follows."""
     wide = [row for row in above[-2:] if sum(cell not in (None, "") for cell in row) >= min(2, width)]
     header = wide[0] if len(wide) == 2 and _are_units(wide[0], wide[1]) else wide[-1] if wide else ()
     units = wide[1] if wide and header is not wide[-1] else ()

@@ -119,7 +119,8 @@ def recording_of(path: Path) -> Recording | None:
         found = form.read(path)
     if not found.tables:
         raise InputError(
-            f"the {form.name} holds no table of numbers" + "".join(f". {note.rstrip('.')}" for note in found.notes),
+            f"the file ({form.name}) holds no table of numbers"
+            + "".join(f". {note.rstrip('.')}" for note in found.notes),
             file=path,
             remedy="Export the readings as CSV, with a row a sample.",
         )

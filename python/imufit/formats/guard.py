@@ -87,9 +87,9 @@ def guarded(path: Path, form: str) -> Iterator[None]:
     except PermissionError:
         raise InputError("the file may not be read", file=path) from None
     except Exception as error:  # a library on damaged bytes raises whatever its code happens to run into
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = " ".join(str(error).replace(str(path), path.name).split()) or type(error).__name__
         raise InputError(
-            f"the file is cut off or damaged, or not a {form}: its reader says: {reason[:200]}",
+            f"the file is cut off or damaged, or not of the format {form}: its reader says: {reason[:200]}",
             file=path,
             remedy="Copy the file again from where it was recorded, or export it as CSV.",
         ) from None

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from imufit.errors import InputError
 from imufit.formats.arrays import Named, tables_of
 from imufit.formats.guard import library
 from imufit.formats.limits import STREAMED, VALUES, check_size, check_values
@@ -43,6 +44,9 @@ def _read(path: Path, form: str, separator: str, matlab: bool) -> Recording:
     with h5py.File(path, "r") as file:
         walk.group(file, "", 0)
     tables, notes = tables_of(path, named)
+    if walk.damaged:
+        shown = ", ".join(walk.damaged[:5])
+        notes = (*notes, f"{len(walk.damaged)} datasets are damaged and were left out: {shown}.")
     return Recording(form, tables, notes)
 
 
@@ -54,6 +58,7 @@ class _Walk:
         self._matlab = matlab
         self._values = 0
         self._objects = 0
+        self.damaged: list[str] = []
 
     def group(self, group: Any, prefix: str, depth: int) -> None:
         self._attributes(group, prefix)
@@ -68,7 +73,12 @@ class _Walk:
                 continue
             member = group[key]
             if isinstance(member, self._h5py.Dataset):
-                self._dataset(member, name)
+                try:
+                    self._dataset(member, name)
+                except InputError:
+                    raise
+                except Exception:  # a filter that fails on damaged bytes raises what it happens to run into
+                    self.damaged.append(name)
             elif depth < _DEPTH and not str(key).startswith("#"):
                 self.group(member, name, depth + 1)
 

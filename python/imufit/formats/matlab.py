@@ -45,9 +45,10 @@ def read(path: Path) -> Recording:
     check_size(path, WHOLE)
     data = path.read_bytes()
     _check_packed(path, data)
-    declared = scipy.io.whosmat(io.BytesIO(data))
+    source: Any = io.BytesIO(data)  # scipy reads open files as well, which its types do not say
+    declared = scipy.io.whosmat(source)
     check_values(path, sum(int(np.prod([max(int(k), 1) for k in shape], dtype=float)) for _, shape, _ in declared))
-    content = scipy.io.loadmat(io.BytesIO(data), simplify_cells=True, verify_compressed_data_integrity=True)
+    content = scipy.io.loadmat(source, simplify_cells=True, verify_compressed_data_integrity=True)
     named = Named(".")
     opaque = False
     for name, value in content.items():
@@ -66,26 +67,20 @@ def read(path: Path) -> Recording:
 
 
 def _add(named: Named, name: str, value: Any, depth: int) -> None:
-    if isinstance(value, dict):
-        if depth == _DEPTH:
-            named.left_out.append(name)
-            return
+    if depth > _DEPTH:
+        named.left_out.append(name)
+    elif isinstance(value, dict):
         for key, member in value.items():
             _add(named, f"{name}.{key}", member, depth + 1)
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
-        members = list(np.asarray(value, dtype=object).reshape(-1)) if not isinstance(value, list) else value
-        if members and all(isinstance(member, dict) for member in members) and len(members) <= _LIST:
-            for index, member in enumerate(members):
-                _add(named, f"{name}[{index}]", member, depth + 1)
-        elif members and all(isinstance(member, str) for member in members):
+        members = value if isinstance(value, list) else list(value.reshape(-1))
+        if members and all(isinstance(member, str) for member in members):
             named.add(name, np.array(members, dtype=object))
-        elif members and depth < _DEPTH and len(members) <= _LIST:
+        elif len(members) <= _LIST:
             for index, member in enumerate(members):
                 _add(named, f"{name}[{index}]", member, depth + 1)
-        elif members:
+        else:
             named.left_out.append(name)
-    elif isinstance(value, np.ndarray) and value.dtype.names:
-        named.left_out.append(name)
     elif isinstance(value, str | np.ndarray | np.generic | bool | int | float):
         named.add(name, value)
     else:

@@ -97,8 +97,8 @@ class _Walk:
             file.seek(at)
             self._rest(file.read(_CHUNK_BYTES))
             self.notes.append(
-                f"{self._path.name} is cut off or damaged: {100 * at / self._size:.2f} % of its bytes are whole records "
-                "from its beginning; what could be read of the next one was."
+                f"{self._path.name} is cut off or damaged: {100 * at / self._size:.2f} % of its bytes, from its "
+                "beginning, are whole records; what could be read of the next one was."
             )
         if damaged:
             self.notes.append(f"{damaged} chunks of {self._path.name} are damaged and were left out.")

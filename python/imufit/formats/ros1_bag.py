@@ -54,8 +54,8 @@ def read(path: Path) -> Recording:
     notes = messages.notes()
     if end < size:
         notes.append(
-            f"The file is cut off: {100 * end / size:.2f} % of its bytes are whole records; what could be read of the "
-            "last one was."
+            f"The file is cut off or damaged: {100 * end / size:.2f} % of its bytes, from its beginning, are whole "
+            "records; what could be read of the next one was."
         )
     if walk.damaged:
         notes.append(f"{walk.damaged} chunks of the file are damaged and were left out.")
@@ -107,7 +107,11 @@ def _split(data: Any, at: int, size: int, header: Any) -> Iterator[tuple[Any, by
         body = at + 4 + length
         if length > _HEADER or body + 4 > size:
             return
-        about = header.read(io.BytesIO(data[at:body]))
+        try:
+            about = header.read(io.BytesIO(data[at:body]))
+            about.get_uint8("op")
+        except Exception:  # fields that do not fit the header, names that are no text: nothing tells where the next is
+            return
         (length,) = struct.unpack_from("<L", data, body)
         end = body + 4 + length
         yield about, data[body + 4 : min(end, size)], end, end <= size

@@ -61,7 +61,7 @@ def _read_database(path: Path, storage: Any, messages: Messages) -> list[str]:
     reader.open()
     count = 0
     total = reader.metadata.message_count
-    notes = []
+    notes: list[str] = []
     try:
         for connection, time_ns, raw in _until_damaged(reader, notes):
             count += 1

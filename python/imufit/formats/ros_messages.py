@@ -13,6 +13,8 @@ LARGEST_MESSAGE: Final = 65_536
 """Bytes of a message; longer ones are images, scans and maps, not rows of numbers (an `Imu` has about 330)."""
 _DEFINITION: Final = 500_000
 """Characters of a definition; a message with 50 others inside has about 30 000."""
+_TYPES: Final = 300
+"""Definitions of a file; a robot of many parts records some 100, and each takes about 10 ms to prepare."""
 _DEPTH: Final = 12
 """Levels of messages within messages; the deepest of the standard packages have 6."""
 _STAMPS: Final = frozenset({"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"})
@@ -93,10 +95,10 @@ class Messages:
 
     def _store(self, kind: str, definition: str, language: str) -> Any:
         key = (kind, definition)
-        if key not in self._stores:
+        if key not in self._stores and len(self._stores) < _TYPES:
             self._stores[key] = None  # a definition that cannot be read is tried once
             self._stores[key] = self._made(kind, definition, language)
-        if self._stores[key] is None:
+        if self._stores.get(key) is None:
             raise ValueError("the definition cannot be read")
         return self._stores[key]
 
@@ -113,6 +115,8 @@ class Messages:
             # several files of IDL in one text stand behind lines such as "IDL: sensor_msgs/msg/Imu"
             for part in definition.split("=" * 80 + "\n"):
                 types.update(typesys.get_types_from_idl(part.partition("\n")[2] if part.startswith("IDL: ") else part))
+        if _may_loop(types):
+            return None
         store = typesys.get_typestore(typesys.Stores.EMPTY)
         store.register(types)
         return store
@@ -150,6 +154,22 @@ class Messages:
             for index, member in enumerate(members):
                 self._field(member, f"{name}[{index}]", values, depth + 1)
         return values
+
+
+def _may_loop(types: dict[str, Any]) -> bool:
+    """Return whether a definition has lists whose members take no bytes: the message then bounds no list's length."""
+    empty: set[str] = set()
+    for _ in range(_DEPTH):
+        empty |= {
+            name
+            for name, (_, fields) in types.items()
+            if all(kind.name == "NAME" and of in empty for _, (kind, of) in fields)
+        }
+    return any(
+        kind.name in ("ARRAY", "SEQUENCE") and of[0][0].name == "NAME" and of[0][1] in empty
+        for _, fields in types.values()
+        for _, (kind, of) in fields
+    )
 
 
 def _messages(value: Any) -> bool:

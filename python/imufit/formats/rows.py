@@ -170,6 +170,7 @@ class _Growing:
                 column.extend(array("d", [math.nan]) * missing)
 
     def table(self, name: str) -> Table:
+        """Return the table, its rows in the order of time where they have one."""
         columns: dict[str, Any] = {}
         time = None
         if self.timed:
@@ -183,6 +184,10 @@ class _Growing:
                 columns[key] = text
             else:
                 columns[key] = np.frombuffer(column, dtype=float)
+        if time is not None and np.any(np.diff(columns[time]) < 0):
+            # several writers to one topic, and messages on their way, arrive in another order than they were sent
+            order = np.argsort(columns[time], kind="stable")
+            columns = {key: column[order] for key, column in columns.items()}
         return Table(name, columns, time)
 
 
