@@ -14,10 +14,10 @@ import zipfile
 import zlib
 from pathlib import Path
 
-import foreign_files
+import format_files
 import numpy as np
 import pytest
-from foreign_files import ACC, GYR, MAKERS, QUATERNION, N, T
+from format_files import ACC, GYR, MAKERS, QUATERNION, N, T
 from imufit.errors import InputError
 from imufit.formats.find import FORMATS, SUFFIXES, recording_of
 from imufit.formats.recording import Recording, Table
@@ -70,18 +70,18 @@ def check_ros(found: Recording, offset: float = 0.0) -> None:
 
 @pytest.mark.parametrize("compression", [None, "bz2", "lz4"])
 def test_a_bag_of_ros_1_is_a_table_a_topic(tmp_path: Path, compression: str | None) -> None:
-    found = read(foreign_files.ros1_bag(tmp_path / "a.bag", compression))
+    found = read(format_files.ros1_bag(tmp_path / "a.bag", compression))
     assert found.notes == ()
     check_ros(found)
 
 
 def test_the_time_of_the_bag_stands_in_where_messages_have_none(tmp_path: Path) -> None:
-    check_ros(read(foreign_files.ros1_bag(tmp_path / "a.bag", stamp=False)), 0.5)
+    check_ros(read(format_files.ros1_bag(tmp_path / "a.bag", stamp=False)), 0.5)
 
 
 @pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
 def test_the_folder_of_a_bag_of_ros_2_is_read(tmp_path: Path, storage: str) -> None:
-    found = read(foreign_files.ros2_bag(tmp_path / "bag", storage))
+    found = read(format_files.ros2_bag(tmp_path / "bag", storage))
     check_ros(found)
     # transforms are a table for every frame that they place
     body = table_of(found, "/tf/body")
@@ -89,7 +89,7 @@ def test_the_folder_of_a_bag_of_ros_2_is_read(tmp_path: Path, storage: str) -> N
 
 
 def test_a_database_of_ros_2_is_read_without_its_folder(tmp_path: Path) -> None:
-    check_ros(read(foreign_files.ros2_database(tmp_path / "a.db3")))
+    check_ros(read(format_files.ros2_database(tmp_path / "a.db3")))
 
 
 def test_a_folder_that_is_no_bag_is_of_no_format(tmp_path: Path) -> None:
@@ -99,20 +99,20 @@ def test_a_folder_that_is_no_bag_is_of_no_format(tmp_path: Path) -> None:
 @pytest.mark.parametrize("compression", ["NONE", "LZ4", "ZSTD"])
 @pytest.mark.parametrize("encoding", ["cdr", "ros1"])
 def test_an_mcap_of_ros_is_a_table_a_topic(tmp_path: Path, encoding: str, compression: str) -> None:
-    found = read(foreign_files.mcap(tmp_path / "a.mcap", encoding, compression))
+    found = read(format_files.mcap(tmp_path / "a.mcap", encoding, compression))
     assert found.notes == ()
     check_ros(found)
 
 
 def test_an_mcap_of_json_is_a_table_a_topic(tmp_path: Path) -> None:
-    imu = table_of(read(foreign_files.mcap(tmp_path / "a.mcap", "json")), "/imu/data")
+    imu = table_of(read(format_files.mcap(tmp_path / "a.mcap", "json")), "/imu/data")
     np.testing.assert_allclose(imu.columns["t"], T, atol=1e-6)
     np.testing.assert_allclose(stacked(imu, *xyz("linear_acceleration")), ACC)
 
 
 @pytest.mark.parametrize("units", [True, False])
 def test_messages_of_two_sensors_in_a_dataflash_log_are_two_tables(tmp_path: Path, units: bool) -> None:
-    found = read(foreign_files.dataflash(tmp_path / "a.bin", units))
+    found = read(format_files.dataflash(tmp_path / "a.bin", units))
     assert found.notes == ()
     for sensor in range(2):
         imu = table_of(found, f"IMU.{sensor}")
@@ -181,7 +181,7 @@ def test_no_end_of_a_ulog_holds_its_reader_up(tmp_path: Path, place: int) -> Non
 
 @pytest.mark.parametrize("compressed", [True, False])
 def test_structs_of_matlab_are_tables_by_their_clocks(tmp_path: Path, compressed: bool) -> None:
-    found = read(foreign_files.matlab(tmp_path / "a.mat", compressed=compressed))
+    found = read(format_files.matlab(tmp_path / "a.mat", compressed=compressed))
     imu, mocap = table_of(found, "imu"), table_of(found, "mocap")
     np.testing.assert_array_equal(imu.columns["t"], T)
     np.testing.assert_array_equal(stacked(imu, *three("acc")), ACC)
@@ -215,7 +215,7 @@ def test_other_versions_of_matlab_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("attribute", [True, False])
 def test_the_layout_of_broad_is_one_table(tmp_path: Path, attribute: bool) -> None:
-    (table,) = read(foreign_files.hdf5(tmp_path / "a.h5", attribute)).tables
+    (table,) = read(format_files.hdf5(tmp_path / "a.h5", attribute)).tables
     np.testing.assert_allclose(table.columns["t"], np.arange(N) / 100)
     np.testing.assert_array_equal(stacked(table, *three("imu_acc")), ACC)
     np.testing.assert_array_equal(stacked(table, *(f"opt_quat[{index}]" for index in range(4))), QUATERNION)
@@ -233,14 +233,14 @@ def test_a_short_recording_of_hdf5_keeps_its_axes(tmp_path: Path) -> None:
 
 
 def test_a_sheet_is_read_below_its_title_with_its_units(tmp_path: Path) -> None:
-    (table,) = read(foreign_files.excel(tmp_path / "a.xlsx")).tables
+    (table,) = read(format_files.excel(tmp_path / "a.xlsx")).tables
     np.testing.assert_allclose(table.columns["Time (s)"], T)
     np.testing.assert_allclose(stacked(table, *(f"Acc{axis} (m/s^2)" for axis in "XYZ")), ACC)
     assert list(table.columns["Note"][:2]) == ["start", None]
 
 
 def test_dates_of_a_sheet_are_the_time(tmp_path: Path) -> None:
-    (table,) = read(foreign_files.excel_dates(tmp_path / "a.xlsx")).tables
+    (table,) = read(format_files.excel_dates(tmp_path / "a.xlsx")).tables
     assert table.time == "when"
     start = 1714979289.0  # 2024-05-06 07:08:09 UTC
     np.testing.assert_allclose(table.columns["when"], start + 0.01 * np.arange(N), atol=1e-3)
@@ -248,7 +248,7 @@ def test_dates_of_a_sheet_are_the_time(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("compression", ["uncompressed", "lz4", "zstd"])
 def test_feather_is_read(tmp_path: Path, compression: str) -> None:
-    (table,) = read(foreign_files.feather(tmp_path / "a.feather", compression)).tables
+    (table,) = read(format_files.feather(tmp_path / "a.feather", compression)).tables
     np.testing.assert_array_equal(table.columns["t"], T)
     assert list(table.columns["pose"][:2]) == ["+x", None]
 
@@ -269,21 +269,21 @@ def test_feather_keeps_dates_and_metadata(tmp_path: Path) -> None:
 
 
 def test_arrays_of_numpy_are_read(tmp_path: Path) -> None:
-    (matrix,) = read(foreign_files.numpy_matrix(tmp_path / "a.npy")).tables
+    (matrix,) = read(format_files.numpy_matrix(tmp_path / "a.npy")).tables
     np.testing.assert_array_equal(stacked(matrix, "c1", "c2", "c3", "c4"), np.column_stack([T, ACC]))
-    (table,) = read(foreign_files.numpy_structured(tmp_path / "b.npy")).tables
+    (table,) = read(format_files.numpy_structured(tmp_path / "b.npy")).tables
     np.testing.assert_array_equal(table.columns["t"], T)
     np.testing.assert_allclose(stacked(table, *three("acc")), ACC, rtol=1e-6)
 
 
 def test_json_is_read_in_each_of_its_shapes(tmp_path: Path) -> None:
-    (rows,) = read(foreign_files.json_objects(tmp_path / "a.json")).tables
+    (rows,) = read(format_files.json_objects(tmp_path / "a.json")).tables
     np.testing.assert_array_equal(rows.columns["acc.y"], ACC[:, 1])
     np.testing.assert_array_equal(rows.columns["ok"], 1.0)
-    (arrays,) = read(foreign_files.json_arrays(tmp_path / "b.json")).tables
+    (arrays,) = read(format_files.json_arrays(tmp_path / "b.json")).tables
     np.testing.assert_allclose(arrays.columns["t"], np.arange(N) / 100)
     np.testing.assert_array_equal(stacked(arrays, *three("imu.gyr")), GYR)
-    (lines,) = read(foreign_files.json_lines(tmp_path / "c.jsonl")).tables
+    (lines,) = read(format_files.json_lines(tmp_path / "c.jsonl")).tables
     np.testing.assert_array_equal(lines.columns["acc_x"], ACC[:, 0])
 
 
@@ -312,7 +312,7 @@ def test_a_pickle_is_refused_and_not_run(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", [name for name in MAKERS if not name.endswith(("v4.mat", ".json", ".jsonl"))])
 def test_the_content_tells_the_format_whatever_the_suffix(tmp_path: Path, name: str) -> None:
-    (tmp_path / "named.dat").write_bytes(foreign_files.bytes_of(name, tmp_path))
+    (tmp_path / "named.dat").write_bytes(format_files.bytes_of(name, tmp_path))
     read(tmp_path / "named.dat")
 
 
@@ -387,7 +387,7 @@ def test_damaged_files_are_refused_or_read_in_part(
     if name == "sample.ulg":
         data = recording("px4_ulog/sample.ulg").read_bytes()[:300_000]
     else:
-        data = foreign_files.bytes_of(name, tmp_path)
+        data = format_files.bytes_of(name, tmp_path)
     capfd.readouterr()
     path = tmp_path / f"damaged{Path(name).suffix}"
     for end in [*range(0, min(len(data), 300), 23), *np.linspace(300, len(data), 25).astype(int)]:
@@ -403,11 +403,11 @@ def test_damaged_files_are_refused_or_read_in_part(
 @pytest.mark.parametrize(
     ("name", "maker"),
     [
-        ("a.bag", lambda path: foreign_files.ros1_bag(path, None)),
-        ("a.mcap", lambda path: foreign_files.mcap(path, compression="NONE")),
-        ("b.mcap", lambda path: foreign_files.mcap(path, compression="ZSTD")),
-        ("a.bin", foreign_files.dataflash),
-        ("a.jsonl", foreign_files.json_lines),
+        ("a.bag", lambda path: format_files.ros1_bag(path, None)),
+        ("a.mcap", lambda path: format_files.mcap(path, compression="NONE")),
+        ("b.mcap", lambda path: format_files.mcap(path, compression="ZSTD")),
+        ("a.bin", format_files.dataflash),
+        ("a.jsonl", format_files.json_lines),
     ],
 )
 def test_the_whole_part_of_a_file_that_is_cut_off_is_read_with_a_note(tmp_path: Path, name: str, maker) -> None:
@@ -442,7 +442,7 @@ def hostile_hdf5(path: Path) -> None:
 
 
 def hostile_excel(path: Path) -> None:
-    foreign_files.excel(path)
+    format_files.excel(path)
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -496,7 +496,7 @@ def hostile_message(path: Path) -> None:
 
 
 def hostile_database(path: Path) -> None:
-    foreign_files.ros2_database(path)
+    format_files.ros2_database(path)
     with sqlite3.connect(path) as database:
         database.execute("ALTER TABLE messages ADD COLUMN big BLOB GENERATED ALWAYS AS (zeroblob(900000000)) VIRTUAL")
 
@@ -506,7 +506,7 @@ def hostile_json(path: Path) -> None:
 
 
 def hostile_dataflash(path: Path) -> None:
-    path.write_bytes(foreign_files.dataflash(path).read_bytes() + b"\xa3\x95\x07" * 1_000_000)
+    path.write_bytes(format_files.dataflash(path).read_bytes() + b"\xa3\x95\x07" * 1_000_000)
 
 
 HOSTILE = {

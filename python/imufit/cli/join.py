@@ -18,6 +18,7 @@ from imufit.cli.arguments import (
     plot_option,
 )
 from imufit.cli.output import Output
+from imufit.whole_file import identity
 
 if TYPE_CHECKING:
     from imufit.log.metadata import Frame
@@ -53,7 +54,8 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
     "reference_mapping",
     multiple=True,
     metavar="COL=NAME[unit]",
-    help="The same for the columns of REFERENCE, e.g. ref_qw=w. Repeatable.",
+    help="The same for the columns of REFERENCE, e.g. ref_qw=w. Repeatable. "
+    "If REFERENCE is SENSOR itself, --map holds.",
 )
 @click.option(
     "--attitude",
@@ -93,6 +95,9 @@ def join(
     keep_inputs([sensor, reference], [output, json_file, plot_file])
     out = Output(json_file)
     log = engine.read_log(sensor, mapping)
+    if not reference_mapping and identity(reference) == identity(sensor):
+        # One log whose reference is late: its columns are the same, whoever asks for them.
+        reference_mapping = mapping
     other = engine.reference_log(reference, reference_mapping, attitude, inverse, frame)
     found = engine.join(log, other, lag, None if skew is None else 1e-6 * skew)
     engine.write_log(found.log, output)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from imufit import _imufit
 from imufit.faults.frames import MISSED, declared_shares, explains
 from imufit.faults.samples import samples
 from imufit.joining.course import Course, reference_course
-from imufit.joining.likeliest import CommonRates, Likeliest, likeliest
+from imufit.joining.likeliest import CommonRates, likeliest
 from imufit.joining.refine import Aligned
 from imufit.joining.search import LEAST_OVERLAP, Correlation
 from imufit.results import fault_words
@@ -26,8 +26,11 @@ from imufit.results.data_fault import DataFault
 Array = NDArray[np.float64]
 Part = Mapping[str, Any]
 
-AS_DECLARED = Aligned(0.0, 0.0, 0.0, 0.0, np.eye(3), 0.0, 0)
+AS_DECLARED: Final = Aligned(0.0, 0.0, 0.0, 0.0, np.eye(3), 0.0, 0)
 """Reference and sensor on one clock, with parallel axes."""
+BLOCKS: Final = 60
+"""Blocks of the attitude that the lag is refined by, of 1.5 s each: of a log of 25 minutes they give it to a
+millisecond or two in seconds, where all of its blocks take minutes."""
 
 
 def late_faults(
@@ -65,9 +68,12 @@ def late_faults(
         return []
     sensor, body = courses
     rates = Correlation(sensor, body)
-    found = likeliest(sensor, body, rates)
     declared = CommonRates.of(sensor, body, rates, AS_DECLARED)
-    if found is None or found.ambiguous or not _longer_than_an_effect(found, declared):
+    left = _left_by_an_effect(declared)
+    if left <= MISSED:
+        return []
+    found = likeliest(sensor, body, rates, most=BLOCKS)
+    if found is None or found.ambiguous or not explains(found.best.traces.left, left):
         return []
     words = fault_words.late(
         found.best.aligned.lag, found.best.traces.correlation, declared.correlation(np.eye(3)), path
@@ -75,22 +81,20 @@ def late_faults(
     return [DataFault("late", "ref", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
 
 
-def _longer_than_an_effect(found: Likeliest, declared: CommonRates) -> bool:
-    """Say whether the lag explains the rates, and neither the declared clock nor `ref.delay` does.
+def _left_by_an_effect(declared: CommonRates) -> float:
+    """Return the share of the rates (square) that the declared clock leaves if `ref.delay` comes to help.
 
-    `ref.delay` starts from the derivative of the ideal readings. Where this column leaves less than a fifth of the rates, the
-    effect finds the lag.
+    The effect starts from the derivative of the ideal readings. Where this column leaves less than a fifth of the
+    rates, the effect finds the lag.
     """
     if not len(declared.measured):
         # At the declared times the two have no motion in common.
-        left = 1.0
-    else:
-        mount = declared.mount()
-        columns = np.stack([(each @ mount.T).ravel() for each in (declared.expected, declared.change)], axis=1)
-        measured = declared.measured.ravel()
-        solved = np.linalg.lstsq(columns, measured)[0]
-        left = float(np.sum((measured - columns @ solved) ** 2) / max(float(measured @ measured), 1e-300))
-    return left > MISSED and explains(found.best.traces.left, left)
+        return 1.0
+    mount = declared.mount()
+    columns = np.stack([(each @ mount.T).ravel() for each in (declared.expected, declared.change)], axis=1)
+    measured = declared.measured.ravel()
+    solved = np.linalg.lstsq(columns, measured)[0]
+    return float(np.sum((measured - columns @ solved) ** 2) / max(float(measured @ measured), 1e-300))
 
 
 def _courses(chunks: Iterable[Part]) -> tuple[Course, Course] | None:

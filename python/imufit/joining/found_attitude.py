@@ -24,8 +24,8 @@ _ANGLE: Final = re.compile(r"(?P<base>.*?)(?P<part>roll|pitch|yaw)(?P<unit>.*deg
 _WHOLE_TURN: Final = 6.4
 """Largest angle of an attitude in rad: a whole turn, and rounding."""
 _UPRIGHT: Final = 0.35
-"""Largest angle between the mean specific force and the vertical, rad: 20 degrees; of readings that differ by an exchange
-of axes the wrong ones are 90 degrees off, or lie anywhere."""
+"""Largest angle between the mean specific force and the vertical, rad: 20 degrees; of readings that differ by an
+exchange of axes the wrong ones are 90 degrees off, or lie anywhere."""
 _MOST_WAYS: Final = 24
 """Ways that are tried at most: six bodies, each in four."""
 

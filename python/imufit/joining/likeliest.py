@@ -73,7 +73,9 @@ class Likeliest:
         return self.best.traces.correlation < LEAST_CORRELATION
 
 
-def likeliest(sensor: Course, body: Course, rates: Correlation, skew: float | None = None) -> Likeliest | None:
+def likeliest(
+    sensor: Course, body: Course, rates: Correlation, skew: float | None = None, most: int | None = None
+) -> Likeliest | None:
     """Find the likeliest alignment.
 
     Parameters
@@ -84,6 +86,8 @@ def likeliest(sensor: Course, body: Course, rates: Correlation, skew: float | No
         Of the two.
     skew : float, optional
         Rate of the reference's clock over the sensor's, less one, where it is known.
+    most : int, optional
+        Blocks of the attitude to refine by, as in `refine`.
 
     Returns
     -------
@@ -94,7 +98,7 @@ def likeliest(sensor: Course, body: Course, rates: Correlation, skew: float | No
     near = [peak for peak in peaks if peak.gain >= RIVAL * peaks[0].gain]
     found: list[Placed] = []
     for peak in near:
-        aligned = refine(sensor, body, peak.lag, peak.mount, skew)
+        aligned = refine(sensor, body, peak.lag, peak.mount, skew, most=most)
         if aligned is None or any(abs(aligned.lag - other.aligned.lag) <= SAME * rates.step for other in found):
             continue
         found.append(placed(sensor, body, rates, aligned))

@@ -88,7 +88,13 @@ class _Blocks:
 
 
 def refine(
-    sensor: Course, reference: Course, lag: float, mount: Array, skew: float | None = None, known: bool = False
+    sensor: Course,
+    reference: Course,
+    lag: float,
+    mount: Array,
+    skew: float | None = None,
+    known: bool = False,
+    most: int | None = None,
 ) -> Aligned | None:
     """Refine lag, skew and mount from what is nearly right.
 
@@ -104,6 +110,8 @@ def refine(
         The skew, where it is known.
     known : bool
         True if the lag, that of the first sample, is known as well.
+    most : int, optional
+        Blocks to look at, evenly over the recording; all of them if None.
 
     Returns
     -------
@@ -111,6 +119,8 @@ def refine(
         None where no block of the reference lies within the sensor's recording.
     """
     blocks = _Blocks(reference).rows
+    if most is not None and len(blocks) > most:
+        blocks = [blocks[k] for k in np.linspace(0, len(blocks) - 1, most).astype(int)]
     start = float(reference.t[0])
     middle = start if known else float(0.5 * (reference.t[0] + reference.t[-1]))
     # The lag is that of the middle: there the skew hardly moves it.
