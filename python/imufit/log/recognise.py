@@ -271,7 +271,10 @@ class _Readings:
             return cls(chosen, {})
         columns = [column for each in chosen.values() for column in each.columns]
         own = ("t", *GROUPS["acc"], *GROUPS["ref_q"])
-        return cls(chosen, _first_rows(source, [*columns, *(c for c in own if c in names and c not in given)]))
+        rows = _first_rows(source, [*columns, *(c for c in own if c in names and c not in given)])
+        time = rows.get(chosen["t"].columns[0] if "t" in chosen else "t")
+        known = None if time is None else np.isfinite(time)
+        return cls(chosen, rows if known is None else {name: values[known] for name, values in rows.items()})
 
     def _stacked(self, group: str) -> Array | None:
         wanted = self.chosen[group].columns if group in self.chosen else GROUPS[group]

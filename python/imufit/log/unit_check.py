@@ -43,6 +43,10 @@ _LIKE_CLOCK: Final = 0.3
 """Logarithm of a ratio of rates over 1/1000 up to which the clock is in ms: noise takes some 10 % of it."""
 _COARSE_STEP: Final = 0.1
 """Rows so far apart, s, may be 0.1 ms and more apart; at 10 kHz and faster nothing is logged with a clock in ms."""
+_NO_GRAVITY: Final = 0.1
+"""Norm at rest over gravity below which gravity was taken off: an accelerometer of any make is wrong by less."""
+_FEW_GRAVITY: Final = 0.5
+"""The same for the median of the whole log, which a fall leaves at one."""
 _OTHER_UNIT: Final = 0.03
 """Noise pulls the ratio of rates towards zero, but not as far as this in rad/s."""
 MAG_UNITS: Final = (
@@ -93,7 +97,7 @@ def check_units(
     origin = origin or {}
     _check_time(t, place, origin, clock_stated)
     if acc is not None:
-        notes += _check_acc(acc, place, origin)
+        notes += _check_acc(acc, metadata.gravity, place, origin)
     if gyr is not None:
         _check_gyr(
             t,
@@ -151,7 +155,7 @@ def rest_norm(acc: Array, rows: int = 50) -> float:
     return float(np.median(size[quiet]))
 
 
-def _check_acc(acc: Array, place: Place, origin: Mapping[str, str]) -> list[str]:
+def _check_acc(acc: Array, gravity: float, place: Place, origin: Mapping[str, str]) -> list[str]:
     norm = rest_norm(acc)
     overall = float(np.nanmedian(np.linalg.norm(acc, axis=1))) if np.isfinite(norm) else norm
     for size, words, unit in ACC_UNITS:
@@ -161,6 +165,13 @@ def _check_acc(acc: Array, place: Place, origin: Mapping[str, str]) -> list[str]
                 column="acc_x",
                 remedy=_use_map("acc", unit, origin),
             )
+    if norm < _NO_GRAVITY * gravity and overall < _FEW_GRAVITY * gravity:
+        raise place.error(
+            f"at rest the norm of acc is {norm:.4g} m/s^2: gravity was taken off, and cannot be put back",
+            column="acc_x",
+            remedy="Export the accelerometer itself, not the linear acceleration; where there is none, "
+            "state its gravity in the metadata.",
+        )
     if np.isfinite(norm) and not 5.0 < norm < 20.0:
         return [f"{place.name}: at rest the norm of acc is {norm:.4g} m/s^2, far from 9.8: check its unit"]
     return []
