@@ -12,7 +12,7 @@ from imufit.errors import InputError
 from imufit.formats.arrays import Named, tables_of
 from imufit.formats.limits import PARSED, STREAMED, check_size
 from imufit.formats.recording import Recording
-from imufit.formats.rows import Rows
+from imufit.formats.rows import Rows, number
 
 FORM: Final = "JSON"
 _LINES: Final = (".jsonl", ".ndjson")
@@ -80,12 +80,8 @@ def _add_rows(rows: Rows, table: str, content: list[Any]) -> None:
     for value in content:
         if isinstance(value, dict):
             rows.append(table, rows.flat(value))
-        elif isinstance(value, list):
-            rows.append(table, {f"c{index + 1}": member for index, member in enumerate(_numbers(value))})
-
-
-def _numbers(value: list[Any]) -> list[float]:
-    return list(np.asarray(value[:1024], dtype=float)) if all(isinstance(k, int | float) for k in value) else []
+        elif isinstance(value, list) and value and all(isinstance(member, int | float) for member in value):
+            rows.append(table, {f"c{index + 1}": number(member) for index, member in enumerate(value)})
 
 
 def _add(named: Named, rows: Rows, name: str, value: Any, depth: int) -> None:

@@ -13,8 +13,8 @@ VALUES: Final = 50_000_000
 """Values of all columns together: as float64 they are 400 MB, which leaves room for a second copy within 1 GB."""
 WHOLE: Final = 256_000_000
 """Bytes of a file that its library holds in memory as a whole, beside the columns: with `VALUES` within 1 GB."""
-PARSED: Final = 40_000_000
-"""Bytes of a file that becomes Python objects: ``[],`` takes 64 bytes of memory for 3 of the file, 850 MB in all."""
+PARSED: Final = 30_000_000
+"""Bytes of a file that becomes Python objects: ``[],`` was measured at 84 bytes of memory for 3 of the file."""
 STREAMED: Final = 20_000_000_000
 """Bytes of a file that is read message by message: an hour with two cameras; more takes longer than anyone waits."""
 RATIO: Final = 100

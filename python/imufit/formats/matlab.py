@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import zlib
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,14 +11,12 @@ import numpy as np
 from imufit.errors import InputError
 from imufit.formats import hdf5
 from imufit.formats.arrays import Named, tables_of
-from imufit.formats.limits import RATIO, UNSUSPECTED, WHOLE, check_expansion, check_size, check_values
+from imufit.formats.limits import WHOLE, check_size, check_values
+from imufit.formats.matlab_elements import HEADER, check_elements
 from imufit.formats.recording import Recording
 
 FORM: Final = "MATLAB file"
 _MAGIC: Final = b"MATLAB 5.0 MAT-file"
-_HEADER: Final = 128
-_PACKED: Final = 15
-"""Type of an element whose content is packed by zlib, by MATLAB's description of the format."""
 _DEPTH: Final = 16
 """Levels of structs within structs; those that a motion capture system writes have 4."""
 _LIST: Final = 64
@@ -30,7 +27,7 @@ def recognises(head: bytes, _path: Path) -> bool:
     """Return whether a file begins with MATLAB's text, or names its version where the text is another."""
     return head.startswith((_MAGIC, b"MATLAB 7.3 MAT-file")) or (
         # the first 116 bytes are free text; behind them stand version 1.0 and the order of bytes
-        len(head) >= _HEADER and head[124:128] in (b"\x00\x01IM", b"\x01\x00MI") and b"\0" not in head[:16]
+        len(head) >= HEADER and head[124:128] in (b"\x00\x01IM", b"\x01\x00MI") and b"\0" not in head[:16]
     )
 
 
@@ -44,7 +41,7 @@ def read(path: Path) -> Recording:
 
     check_size(path, WHOLE)
     data = path.read_bytes()
-    _check_packed(path, data)
+    check_elements(path, data)
     source: Any = io.BytesIO(data)  # scipy reads open files as well, which its types do not say
     declared = scipy.io.whosmat(source)
     check_values(path, sum(int(np.prod([max(int(k), 1) for k in shape], dtype=float)) for _, shape, _ in declared))
@@ -85,25 +82,3 @@ def _add(named: Named, name: str, value: Any, depth: int) -> None:
         named.add(name, value)
     else:
         named.left_out.append(name)
-
-
-def _check_packed(path: Path, data: bytes) -> None:
-    """Refuse elements that unpack to more than readings can, before they are unpacked into memory."""
-    if len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
-        return
-    order = "little" if data[126:128] == b"IM" else "big"
-    at, total, packed = _HEADER, 0, 0
-    most = max(UNSUSPECTED, RATIO * len(data))
-    while at + 8 <= len(data):
-        kind = int.from_bytes(data[at : at + 4], order)  # type: ignore[arg-type]
-        length = int.from_bytes(data[at + 4 : at + 8], order)  # type: ignore[arg-type]
-        if kind == _PACKED:
-            packed += length
-            unpacker = zlib.decompressobj()
-            rest = data[at + 8 : at + 8 + length]
-            while rest:
-                total += len(unpacker.decompress(rest, 1 << 20))
-                rest = unpacker.unconsumed_tail
-                if total > min(most, WHOLE):
-                    check_expansion(path, packed, total)
-        at += 8 + length

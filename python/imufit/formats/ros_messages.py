@@ -136,6 +136,9 @@ class Messages:
             self._field(getattr(message, field), f"{prefix}.{field}" if prefix else field, values, depth)
 
     def _field(self, value: Any, name: str, values: dict[str, Any], depth: int) -> None:
+        if type(value) in (float, int):  # nearly all fields: an hour of messages has tens of millions
+            values[name] = float(value)
+            return
         kind = getattr(value, "__msgtype__", None)
         if kind in _STAMPS:
             values[name] = _seconds(value)

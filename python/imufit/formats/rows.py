@@ -150,7 +150,8 @@ class _Growing:
                     continue  # nothing tells yet whether it will hold numbers or texts
                 column = self.columns[name] = [] if isinstance(value, str) else array("d")
                 begun += 1
-            self._fill(column, self.n)
+            if len(column) < self.n:
+                self._fill(column, self.n)
             if isinstance(column, list):
                 column.append(None if value is None else value if isinstance(value, str) else f"{value:g}")
             else:
