@@ -511,7 +511,7 @@ def hostile_dataflash(path: Path) -> None:
 
 def unknown_kind(path: Path) -> None:
     """Values of a kind that MATLAB does not have, at which scipy looks beyond the end of a list in memory."""
-    data = foreign_files.matlab(path, compressed=False).read_bytes()
+    data = format_files.matlab(path, compressed=False).read_bytes()
     values = struct.pack("<II", 9, 8 * N)
     assert values in data
     path.write_bytes(data.replace(values, struct.pack("<II", 0xEEEE, 8 * N)))

@@ -28,6 +28,8 @@ class Maker:
         Pattern of columns that are specific force although their names say that gravity was taken off.
     opposite : tuple of str
         Sensors whose readings have the opposite sign: gravity instead of specific force.
+    arbitrary : tuple of str
+        Sensors that are given in a unit of the maker's own.
     source : str
         Where the layout is documented.
     """
@@ -39,6 +41,7 @@ class Maker:
     left_out: str = r"(?!)"
     force: str = r"(?!)"
     opposite: tuple[str, ...] = ()
+    arbitrary: tuple[str, ...] = ()
     source: str = ""
 
     def made(self, names: Sequence[str]) -> bool:
@@ -94,6 +97,7 @@ MAKERS: Final = (
         (r"(^|\.)SampleTimeFine$", r"(^|\.)Acc_X$"),
         {"acc": "m/s^2"},
         ticks=("10000 Hz", "us"),
+        arbitrary=("mag",),
         source="Movella, MT Manager and DOT user manuals",
     ),
     Maker("Shimmer Consensys", (r"shimmer.*(Accel|Gyro|Mag)_",), source="Shimmer, Consensys user guide"),

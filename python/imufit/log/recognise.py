@@ -19,7 +19,7 @@ from imufit.log.place import Place
 from imufit.log.time_unit import time_unit
 from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, turned
 from imufit.log.unit_check import HEAD
-from imufit.log.units import conversion
+from imufit.log.units import conversion, lookup
 from imufit.log.words import COMPUTED, Words, names_time, sensor_of, strange, unit_of, words_of
 
 Array = NDArray[np.float64]
@@ -69,11 +69,12 @@ class Recognised:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """Columns that may be one sensor, or the time."""
+    """Columns that may be one sensor, or the time; an arbitrary unit is a scale of the maker's own."""
 
     columns: tuple[str, ...]
     unit: str | None
     strange: int
+    arbitrary: bool = False
 
 
 def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place) -> Recognised:
@@ -245,7 +246,10 @@ def _candidates(group: str, parsed: Sequence[Words], maker: Maker | None) -> lis
             named = sensor_of(tuple(word for word in axes["x"].words if not (force and word in COMPUTED)))
             if named is not None and named[0] == group:
                 unit, rest = unit_of(group, named[1], axes["x"].bracket)
-                made.append(_Candidate(tuple(axes[axis].column for axis in "xyz"), unit or fixed, strange(rest)))
+                own = unit is None and axes["x"].bracket != "" and lookup(axes["x"].bracket) is None
+                own |= maker is not None and group in maker.arbitrary
+                columns = tuple(axes[axis].column for axis in "xyz")
+                made.append(_Candidate(columns, unit or fixed, strange(rest), own))
     return sorted(made, key=lambda each: (each.strange, each.unit is None))
 
 
@@ -296,7 +300,7 @@ class _Readings:
         if "gyr" in units and units["gyr"] is None and gyr is not None and t is not None:
             fields = [(_filled(t, each), each is mag) for each in (acc, mag) if each is not None]
             units["gyr"] = gyr_unit(t, gyr, fields, self._stacked("ref_q"))
-        if "mag" in units and units["mag"] is None and mag is not None:
+        if "mag" in units and units["mag"] is None and mag is not None and not self.chosen["mag"].arbitrary:
             rate = units.get("gyr", "rad/s")
             moves = t is not None and gyr is not None and rate is not None
             units["mag"] = mag_unit(mag, moves and turned(t, gyr * conversion("gyr_x", rate).factor))  # type: ignore

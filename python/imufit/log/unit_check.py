@@ -140,8 +140,11 @@ def _other_clock(seen: str, unit: str, place: Place, column: str) -> InputError:
     )
 
 
-def rest_norm(acc: Array, rows: int = 50) -> float:
-    """Median norm of an (n, 3) sensor in the quietest tenth of the windows of 50 rows; NaN without any."""
+def rest_norm(acc: Array, rows: int = 50, relative: bool = True) -> float:
+    """Median norm of an (n, 3) sensor in the quietest tenth of the windows of 50 rows; NaN without any.
+
+    Quiet is where the spread is small, as a share of the norm (in any unit) or by itself.
+    """
     norm = np.linalg.norm(acc, axis=1)
     complete = np.isfinite(norm)
     acc, norm = acc[complete], norm[complete]
@@ -151,7 +154,7 @@ def rest_norm(acc: Array, rows: int = 50) -> float:
     shaped = acc[: windows * rows].reshape(windows, rows, 3)
     spread = np.sqrt(np.sum(np.var(shaped, axis=1), axis=1))
     size = np.median(norm[: windows * rows].reshape(windows, rows), axis=1)
-    quiet = np.argsort(spread / np.maximum(size, 1e-12))[: max(1, windows // 10)]
+    quiet = np.argsort(spread / np.maximum(size, 1e-12) if relative else spread)[: max(1, windows // 10)]
     return float(np.median(size[quiet]))
 
 
@@ -165,9 +168,10 @@ def _check_acc(acc: Array, gravity: float, place: Place, origin: Mapping[str, st
                 column="acc_x",
                 remedy=_use_map("acc", unit, origin),
             )
-    if norm < _NO_GRAVITY * gravity and overall < _FEW_GRAVITY * gravity:
+    still = rest_norm(acc, relative=False)
+    if still < _NO_GRAVITY * gravity and overall < _FEW_GRAVITY * gravity:
         raise place.error(
-            f"at rest the norm of acc is {norm:.4g} m/s^2: gravity was taken off, and cannot be put back",
+            f"at rest the norm of acc is {still:.4g} m/s^2: gravity was taken off, and cannot be put back",
             column="acc_x",
             remedy="Export the accelerometer itself, not the linear acceleration; where there is none, "
             "state its gravity in the metadata.",
