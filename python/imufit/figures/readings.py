@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 DENSE = 2000
 """Points of a line from which on it is drawn thin: they stand closer than a pixel."""
+HALF_CIRCLE = 180.0
+"""Extent of angles, deg, from which on right angles are marked."""
 ROBUST = 1.5
 """A reference that goes beyond the readings by this factor does not decide the scale: its outliers are cut off."""
 
@@ -90,15 +92,24 @@ def _panel(axes: Axes, panel: PanelLines) -> None:
     width = 0.6 if len(panel.t) > DENSE else 1.1
     for k, label in enumerate(panel.labels):
         # A sample between two missing ones has no line: a dot shows it.
-        marker = {"marker": ".", "markersize": 3.0} if len(panel.t) < 100 else {}
+        marker: dict[str, Any] = {"marker": ".", "markersize": 3.0} if len(panel.t) < 100 else {}
         axes.plot(panel.t, panel.values[:, k], color=colours[k], linewidth=width, label=label or None, **marker)
     if panel.beside is not None:
         t, values = panel.beside
+        # Close lines would hide the readings: there the reference lies under them, and shows where it differs.
+        dense = max(len(t), len(panel.t)) > DENSE
+        look: dict[str, Any] = {
+            "color": style.GREY if dense else style.INK,
+            "linewidth": 0.6,
+            "zorder": 1.5 if dense else 2.5,
+        }
         for k, label in enumerate(panel.labels):
-            axes.plot(t, values[:, k], color=style.INK, linewidth=0.6, linestyle=style.LINES[label], alpha=0.75)
-        axes.plot([], [], color=style.INK, linewidth=0.6, label="reference")
+            axes.plot(t, values[:, k], linestyle="-" if dense else style.LINES[label], **look)
+        axes.plot([], [], label="reference", **look)
         _scale_by_readings(axes, panel)
     axes.set_ylabel(f"{printable(panel.name, NAME)}{f', {panel.unit}' if panel.unit else ''}", fontsize=9)
+    if panel.unit == "deg" and np.nanmax(panel.values) - np.nanmin(panel.values) > HALF_CIRCLE:
+        axes.set_yticks([-180.0, -90.0, 0.0, 90.0, 180.0])
     if any(panel.labels):
         axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5), handlelength=1.2)
     style.tidy(axes)

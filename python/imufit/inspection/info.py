@@ -55,7 +55,7 @@ def info(log: LogSource, *, effects: bool = True, progress: Progress | None = No
     found = [item for item in (each.found() for each in series.values()) if item is not None]
     moves = motion.found()
     rests = rests_of(log)
-    told = shown(log, held, moves, progress) if effects else Shown((), None, "", None)
+    told = shown(log, held, moves, progress) if effects else Shown((), None)
     return LogInfo(
         name="log" if log.path is None else log.path.name,
         contents=held,
@@ -66,6 +66,7 @@ def info(log: LogSource, *, effects: bool = True, progress: Progress | None = No
         reference=_reference(log, held, {item.name: item for item in found}, (referenced, filled, exact), told),
         judged_by=told.judged_by,
         refusal=told.refusal,
+        remedy=told.remedy,
         effects=told.effects,
         notes=_notes(told),
     )
@@ -74,7 +75,7 @@ def info(log: LogSource, *, effects: bool = True, progress: Progress | None = No
 def _reference(
     log: LogSource, held: Contents, series: dict[str, SeriesInfo], counts: tuple[int, int, int], told: Shown
 ) -> ReferenceInfo:
-    """Say what the readings can be held against; `counts` are rows with a reference, of these told and measured ones."""
+    """Say what the readings can be held against; `counts` are rows with a reference, and of them told and measured."""
     referenced, filled, exact = counts
     labels = next((column.labels for column in held.columns if column.name == "pose"), ())
     frame = log.metadata.frame

@@ -49,7 +49,7 @@ class MotionSeen:
             self._forces += length.size
 
     def found(self) -> MotionInfo:
-        """What was seen."""
+        """Return what was seen."""
         there = self._count > 0
         return MotionInfo(
             rate_low=tuple(_known(self._low, there)),

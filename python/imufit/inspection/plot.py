@@ -15,7 +15,7 @@ from imufit.inspection.rests import rests_of
 from imufit.inspection.series import sample_rows, usual_steps
 from imufit.inspection.traces import Trace
 from imufit.joining.course import reference_course
-from imufit.log import Log, LogSource, SomeRows
+from imufit.log import Log, LogSource, SomeRows, judged_rows
 from imufit.log.columns import nearest
 from imufit.log.contents import SENSOR_NAMES
 from imufit.log.size import BLOCK_ROWS
@@ -89,7 +89,9 @@ def plot(
     if not panels:
         what = "a reference" if show == "reference" else "readings"
         raise InputError(f"there is nothing to draw: no {what.removeprefix('a ')} in this part", file=log.path)
-    rests = [(max(a, low), min(b, high)) for a, b in rests_of(part).spans if a < high and b > low]
+    # Rests of stretches of a long log would be shaded in these alone.
+    spans = rests_of(part).spans if judged_rows(part) is part else ()
+    rests = [(max(a, low), min(b, high)) for a, b in spans if a < high and b > low]
     name = "log" if log.path is None else log.path.name
     return readings_figure(panels, rests, (low, high), name)
 
@@ -133,7 +135,7 @@ class _Drawn:
             if name not in numbers - {"t"}:
                 near = nearest(name, numbers - {"t"})
                 raise InputError(
-                    f"there is no column {name} of numbers",
+                    "there is no such column of numbers",
                     file=log.path,
                     column=name,
                     remedy=f"Did you mean {near[0]}?" if near else "imufit info lists the columns.",
@@ -167,9 +169,9 @@ class _Drawn:
         assert self._rates is not None
         t, q = np.concatenate([self._left[0], t]), np.concatenate([self._left[1], q])
         every = max(1, int(np.ceil(RATE_SPAN / self._usual.get("ref_q", RATE_SPAN) - 1e-6)))
-        chosen = slice(0, None, every)
-        t, q = t[chosen], q[chosen]
-        self._left = t[-1:], q[-1:]
+        last = (t.size - 1) // every * every
+        self._left = t[last:], q[last:]
+        t, q = t[::every].copy(), q[::every].copy()
         if t.size < 2:
             return
         course = reference_course(t, q)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from imufit.log import LogSource, judged_rows, whole
-from imufit.results.log_info import RestInfo
 from imufit.rests import distinct, find_poses
+from imufit.results.log_info import RestInfo
 
 FEWEST = 3
 """Rows that rests are looked for in at least: fewer have no scatter."""

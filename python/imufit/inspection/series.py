@@ -153,7 +153,7 @@ class SeriesSeen:
             self._listed.append(LogGap(float(at), float(at + step)))
 
     def found(self) -> SeriesInfo | None:
-        """What was seen; None for a series without a sample."""
+        """Return what was seen; None for a series without a sample."""
         if not self._samples:
             return None
         known = np.isfinite(self._usual)

@@ -50,16 +50,17 @@ class Shown:
         Every effect of the catalogue, the user's, and those of the log's own columns.
     judged_by : str or None
         ``reference`` or ``rests``; None where nothing can be judged.
-    refusal : str
-        Why nothing can be judged.
     surveyed : SurveyedLog or None
         The log after its first pass.
+    refusal, remedy : str
+        Why nothing can be judged, and what to do about it; empty where something can.
     """
 
     effects: tuple[EffectSight, ...]
     judged_by: str | None
-    refusal: str
-    surveyed: SurveyedLog | None
+    surveyed: SurveyedLog | None = None
+    refusal: str = ""
+    remedy: str = ""
 
 
 def shown(log: LogSource, held: Contents, motion: MotionInfo, progress: Progress) -> Shown:
@@ -79,11 +80,11 @@ def shown(log: LogSource, held: Contents, motion: MotionInfo, progress: Progress
     try:
         analysis = Analysis.of(EffectStack([]), [log], progress)
     except InputError as error:
-        return Shown(tuple(_unjudged(held, error.problem)), None, error.problem, None)
+        return Shown(tuple(_unjudged(held, error.problem)), None, refusal=error.problem, remedy=error.remedy or "")
     surveyed = analysis.logs[0].surveyed
     sight = _Sight(analysis, held, motion)
     ids = dict.fromkeys([*effects(), *(key for key in analysis.candidates if key not in effects())])
-    return Shown(tuple(sight.of(key) for key in ids), analysis.judged_by, "", surveyed)
+    return Shown(tuple(sight.of(key) for key in ids), analysis.judged_by, surveyed)
 
 
 def _unjudged(held: Contents, problem: str) -> list[EffectSight]:
@@ -116,7 +117,7 @@ class _Sight:
         self._alike = _Alike(analysis, [*analysis.unnamed, *(analysis.slots[slot] for slot in self._offsets)])
 
     def of(self, key: str) -> EffectSight:
-        """What the log shows of one effect."""
+        """Say what the log shows of one effect."""
         effect = self._known.get(key)
         refused = self._evidence.surveyed.refused.get(key)
         if effect is None or key not in self._slots or refused is not None:
@@ -133,12 +134,16 @@ class _Sight:
         unseen = [p.name for p in parameters if not p.seen]
         if not unseen:
             return EffectSight(key, parameters, "yes", "", like)
-        return EffectSight(key, parameters, "in part", (
-            f"not {' '.join(unseen)}" if len(unseen) <= len(seen) else f"only {' '.join(seen)}"
-        ), like)
+        return EffectSight(
+            key,
+            parameters,
+            "in part",
+            (f"not {' '.join(unseen)}" if len(unseen) <= len(seen) else f"only {' '.join(seen)}"),
+            like,
+        )
 
     def _errors(self, slots: list[int], slot: int) -> Array:
-        """Standard errors of the parameters of one slot, beside others."""
+        """Return standard errors of the parameters of one slot, beside others."""
         chosen = sorted({*slots, slot, *self._analysis.fitted_slots})
         counts = [len(self._known[self._analysis.slots[each]].parameters) for each in chosen]
         errors = np.asarray(self._analysis.problem.estimate(chosen)["standard_error"])
@@ -177,12 +182,14 @@ class _Sight:
         return tuple(ParameterSight(name, unit, error, smallest(size, error), size) for name, unit, size, error in kept)
 
     def _why(self, effect: _imufit.Effect) -> str:
-        """What the log lacks for an effect to be seen; empty where no single thing stands out."""
+        """Say what the log lacks for an effect to be seen; empty where no single thing stands out."""
         column = None if effect.column is None else self._columns.get(effect.column)
         if column is not None and column.low is not None and column.high is not None:
             unit = f" {column.unit}" if column.unit else ""
             return f"{column.name} spans only {column.high - column.low:.2g}{unit}"
-        largest = max((abs(v) for v in (*self._motion.rate_low, *self._motion.rate_high) if v is not None), default=None)
+        largest = max(
+            (abs(v) for v in (*self._motion.rate_low, *self._motion.rate_high) if v is not None), default=None
+        )
         if "gyr" in effect.sensors and largest is not None and largest < SLOW and effect.affine != "offset":
             return f"the sensor hardly turns (at most {np.degrees(largest):.2g} deg/s)"
         slot = self._slots[effect.id]
@@ -233,7 +240,7 @@ class _Alike:
         return bool(self._bases[key].size)
 
     def errors(self, key: str) -> Array:
-        """Standard errors by the rows alone, offsets aside; infinite where no row tells."""
+        """Return standard errors by the rows alone, offsets aside; infinite where no row tells."""
         base = self._bases[key]
         squares = np.sum(base**2, axis=1)
         whole = base.shape[1] == base.shape[0]

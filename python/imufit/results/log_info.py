@@ -29,7 +29,7 @@ SHOWN_GAPS: Final = 10
 """Gaps that are printed; the JSON has up to a thousand of each series."""
 AXES: Final = "xyz"
 EVEN: Final = 1e-5
-"""Part of a step that stamps may be off and count as even: the sixth digit of a time in seconds, which text often cuts."""
+"""Part of a step that stamps may be off and count as even: text often cuts times after a few digits."""
 NO_NOISE: Final = 1e-6
 """Noise, rad and m, below which a reference was computed, not measured: an interferometer reads micrometres."""
 
@@ -340,8 +340,8 @@ class LogInfo:
         What its readings can be held against.
     judged_by : str or None
         What effects would be judged by: ``reference`` or ``rests``; None where nothing can be judged, or was asked.
-    refusal : str
-        Why nothing can be judged; empty where something can.
+    refusal, remedy : str
+        Why nothing can be judged, and what to do about it; empty where something can.
     effects : tuple of EffectSight
         Every effect: whether this log can show it, from which size on, and why not. Empty if it was not asked.
     notes : tuple of str
@@ -357,6 +357,7 @@ class LogInfo:
     reference: ReferenceInfo
     judged_by: str | None
     refusal: str
+    remedy: str
     effects: tuple[EffectSight, ...]
     notes: tuple[str, ...]
 
@@ -401,6 +402,7 @@ class LogInfo:
             "reference": self.reference.to_dict(),
             "judged_by": self.judged_by,
             "refusal": self.refusal or None,
+            "remedy": self.remedy or None,
             "effects": [item.to_dict() for item in self.effects],
             "notes": list(self.notes),
         }
@@ -428,7 +430,7 @@ class LogInfo:
         if not self.effects:
             return ""
         if self.refusal:
-            return f"It can show no effect: {self.refusal}."
+            return f"It can show no effect: {self.refusal}. {self.remedy}".rstrip()
         named = [item for item in self.effects if not item.open]
         shown = sum(item.shown != "no" for item in named)
         by = "Without a reference attitude it" if self.judged_by == "rests" else "It"
@@ -521,5 +523,3 @@ def _series_row(item: SeriesInfo) -> tuple[str, ...]:
 
 def _cell(value: float | None) -> str:
     return "-" if value is None else f"{value:.4g}"
-
-
