@@ -192,7 +192,7 @@ class _Drawn:
             lines = self._attitude.lines()
             if np.isfinite(lines[1]).any():
                 angles = ("roll", "pitch", "yaw")
-                found.append(PanelLines("reference", "deg", angles, lines[0], _without_wraps(lines[1])))
+                found.append(PanelLines("reference", "deg", angles, lines[0], _without_wraps(*lines)))
             if "gyr" not in self._sensors and rates is not None and np.isfinite(rates[1]).any():
                 found.append(PanelLines("rates of the reference", "deg/s", tuple("xyz"), *rates))
         for name, trace in self._extra.items():
@@ -202,7 +202,8 @@ class _Drawn:
         return found
 
 
-def _without_wraps(angles: Array) -> Array:
-    """Interrupt angles, deg, where they jump from one end of the circle to the other."""
+def _without_wraps(t: Array, angles: Array) -> Array:
+    """Interrupt angles, deg, where they jump from one end of the circle to the other; what one pixel spans is kept."""
     jumps = np.abs(np.diff(angles, axis=0, prepend=angles[:1])) > 180.0
-    return np.where(jumps, np.nan, angles)
+    within = np.diff(t, prepend=-np.inf) == 0.0
+    return np.where(jumps & ~within[:, None], np.nan, angles)

@@ -34,6 +34,8 @@ SHADOWED: Final = 3.0
 SLOW: Final = np.radians(5.0)
 """Largest rate, rad/s, of a log that hardly turns: at 5 deg/s a scale error of 1 % makes 0.05 deg/s, which is the noise
 of one sample of a low-cost gyroscope."""
+SIZES: Final = (1.0, 0.2, 0.04, 0.008)
+"""Parts of the typical size that a diagnosis thinks equally likely, as `SIZES` in `rust/inference/src/stack.rs`."""
 UNDER_NOISE: Final = "under the noise"
 """Why an effect is not seen where nothing else stands out."""
 VANISHES: Final = 1e-9
@@ -153,7 +155,7 @@ class _Sight:
         """Smallest sizes of the parameters that the readings determine; those that are only searched for are left out.
 
         A diagnosis names an effect whose log Bayes factor reaches a threshold. That factor is half the square of the
-        value over its error, less what the freedom of all parameters costs by their typical sizes.
+        value over its error, less what the freedom of all parameters costs by their typical sizes, or parts of these.
         """
         found = self._analysis.found.get(effect.id)
         if effect.tried_at_full_size:
@@ -171,15 +173,25 @@ class _Sight:
             # Where no card bounds a size, an error far below what the rows themselves give comes from the prior.
             own = dict(zip((name for name, _, _ in effect.parameters), self._alike.errors(effect.id), strict=True))
             kept = [(n, u, s, error if error > 0.5 * own[n] else np.inf) for n, u, s, error in kept]
-        cost = sum(np.log1p((size / error) ** 2) for _, _, size, error in kept if size and error > 0.0)
-        steps = float(np.sqrt(self._least + cost)) + POWER
+        sizes = [(size, error) for _, _, size, error in kept if size and error > 0.0]
 
         def smallest(size: float | None, error: float) -> float:
             if not (np.isfinite(error) and error > 0.0) or (size is not None and error > UNTOLD * size):
                 return np.inf
-            return steps * error
+            return error * (self._steps(size, error, sizes) + POWER)
 
         return tuple(ParameterSight(name, unit, error, smallest(size, error), size) for name, unit, size, error in kept)
+
+    def _steps(self, size: float | None, error: float, sizes: list[tuple[float, float]]) -> float:
+        """Return how many standard errors a value has that is seen as often as not, beside all others' freedom."""
+        if size is None:
+            return float(np.sqrt(self._least))
+        squares = []
+        for part in SIZES:
+            cost = sum(np.log1p((part * other / its) ** 2) for other, its in sizes)
+            known = (part * size / error) ** 2
+            squares.append((self._least + 2.0 * np.log(len(SIZES)) + cost) * (1.0 + known) / known)
+        return float(np.sqrt(min(squares)))
 
     def _why(self, effect: _imufit.Effect) -> str:
         """Say what the log lacks for an effect to be seen; empty where no single thing stands out."""
