@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from imufit import figures as figures
     from imufit import fit as fit
     from imufit import grade as grade
+    from imufit import inspection as inspection
     from imufit import joining as joining
     from imufit import log as log
     from imufit import model as model
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from imufit import tune as tune
     from imufit._imufit import __version__
     from imufit.errors import InputError
+    from imufit.inspection.info import info as info
+    from imufit.inspection.plot import plot as plot
     from imufit.joining.join import join as join
     from imufit.log import Log, LogStream, open_log, read
     from imufit.loop import Fit, SensorModel, ladder
@@ -53,6 +56,7 @@ else:
         "figures",
         "fit",
         "grade",
+        "inspection",
         "joining",
         "log",
         "model",
@@ -67,6 +71,7 @@ else:
     _HOMES = {
         "_imufit": ("__version__",),
         "errors": ("InputError",),
+        "inspection": ("info", "plot"),
         "joining": ("join",),
         "log": ("Log", "LogStream", "open_log", "read"),
         "loop": ("Fit", "SensorModel", "ladder"),
@@ -107,10 +112,12 @@ __all__ = [
     "catalogue",
     "effect",
     "explain",
+    "info",
     "join",
     "ladder",
     "load_effects",
     "open_log",
+    "plot",
     "read",
     "replay",
     "simulate",

@@ -23,10 +23,12 @@ from imufit.cli.explain import explain
 from imufit.cli.export import export
 from imufit.cli.fit import fit
 from imufit.cli.grade import grade
+from imufit.cli.info import info
 from imufit.cli.join import join
 from imufit.cli.ladder import ladder
 from imufit.cli.monitor import monitor
 from imufit.cli.names import unknown
+from imufit.cli.plot import plot
 from imufit.cli.record import record
 from imufit.cli.recover import recover
 from imufit.cli.replay import replay
@@ -80,6 +82,8 @@ def imufit(ctx: click.Context) -> None:
 
 
 for _command in (
+    info,
+    plot,
     calibrate,
     compare,
     diagnose,

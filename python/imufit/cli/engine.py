@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from imufit.emulate import Emulator
     from imufit.grade import BlindGrade
     from imufit.joining import Joined
     from imufit.log import Contents, Log
     from imufit.log.metadata import Frame
-    from imufit.results import EffectCard, Ladder, Recording
+    from imufit.results import EffectCard, Ladder, LogInfo, Recording
     from imufit.simulate import Grade, Simulation, Truth
 
 Progress = Callable[[int, int, str], None]
@@ -111,6 +113,20 @@ def contents(log: Any) -> Contents:
     from imufit.log import contents  # noqa: PLC0415
 
     return contents(log)
+
+
+def info(log: Any, effects: bool, progress: Progress) -> LogInfo:
+    """Return what is in a log, and which effects it can show."""
+    from imufit.inspection import info  # noqa: PLC0415
+
+    return info(log, effects=effects, progress=progress)
+
+
+def plot(log: Any, progress: Progress, **options: Any) -> Figure:
+    """Return a figure of the readings of a log over time."""
+    from imufit.inspection import plot  # noqa: PLC0415
+
+    return plot(log, progress=progress, **options)
 
 
 def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:

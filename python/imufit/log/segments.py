@@ -12,6 +12,21 @@ GAP_STEPS: Final = 3.5
 """A step of more than this many median steps is a gap: one or two samples that were lost are not."""
 
 
+def is_gap(steps: NDArray[np.float64], usual: float, factor: float = GAP_STEPS) -> NDArray[np.bool_]:
+    """Say which steps of time are gaps, where the usual step is known: of a log that is read chunk by chunk.
+
+    Parameters
+    ----------
+    steps : (n,) array
+        Steps from one sample to the next, s.
+    usual : float
+        Median step, s.
+    factor : float
+        A step of more than this many median steps is a gap.
+    """
+    return np.asarray(steps > factor * usual)
+
+
 def gap_after(t: NDArray[np.float64], factor: float = GAP_STEPS) -> NDArray[np.bool_]:
     """Say after which samples a gap follows.
 
@@ -28,7 +43,7 @@ def gap_after(t: NDArray[np.float64], factor: float = GAP_STEPS) -> NDArray[np.b
         Empty for n < 2.
     """
     steps = np.diff(t)
-    return np.asarray(steps > factor * np.median(steps)) if steps.size else np.zeros(0, np.bool_)
+    return is_gap(steps, float(np.median(steps)), factor) if steps.size else np.zeros(0, np.bool_)
 
 
 def gaps(t: NDArray[np.float64], factor: float = GAP_STEPS) -> list[tuple[int, int]]:

@@ -10,8 +10,18 @@ from imufit.results.data_fault import DataFault
 from imufit.results.diagnosis import Candidate, Diagnosis, Rival, Unexplained
 from imufit.results.disagreement import Disagreement, Without
 from imufit.results.effect_card import EffectCard
+from imufit.results.effect_sight import EffectSight, ParameterSight
 from imufit.results.judged import Judged
 from imufit.results.ladder import Ladder, Revision, Step
+from imufit.results.log_info import (
+    ClippedInfo,
+    LogGap,
+    LogInfo,
+    MotionInfo,
+    ReferenceInfo,
+    RestInfo,
+    SeriesInfo,
+)
 from imufit.results.log_parameters import LogParameters
 from imufit.results.noise_part import NoisePart
 from imufit.results.parameter import Parameter
@@ -26,23 +36,32 @@ __all__ = [
     "AttitudeDependence",
     "Candidate",
     "ChannelResidual",
+    "ClippedInfo",
     "Comparison",
     "DataFault",
     "Diagnosis",
     "Disagreement",
     "EffectCard",
+    "EffectSight",
     "Judged",
     "Ladder",
+    "LogGap",
+    "LogInfo",
     "LogParameters",
     "Mark",
+    "MotionInfo",
     "NoisePart",
     "Panel",
     "Parameter",
+    "ParameterSight",
     "Recording",
     "RecordingClock",
     "RecordingGap",
+    "ReferenceInfo",
+    "RestInfo",
     "Revision",
     "Rival",
+    "SeriesInfo",
     "Spectrum",
     "Step",
     "Table",

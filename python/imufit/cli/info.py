@@ -1,0 +1,35 @@
+"""``imufit info``: what is in a log, and what it can show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from imufit.cli import engine
+from imufit.cli.arguments import effects_from_option, json_option, keep_inputs, log_argument
+from imufit.cli.output import Output
+from imufit.cli.progress import ProgressBar
+
+
+@click.command(short_help="What is in a log: rates, gaps, rests, reference, and the effects that it can show.")
+@log_argument
+@click.option("--quick", is_flag=True, help="Leave out which effects the log can show, which takes most of the time.")
+@effects_from_option
+@json_option
+def info(log: Path, *, mapping: tuple[str, ...], quick: bool, json_file: Path | None) -> None:
+    """Tell what is in LOG, and which effects it can and cannot show.
+
+    An effect can be shown if its typical size stands out from the noise of this log: its parameters' standard errors
+    follow from the log's own normal equations. Without a reference attitude the rests stand in for one.
+    """
+    keep_inputs([log], [json_file])
+    out = Output(json_file)
+    with ProgressBar() as progress:
+        found = engine.info(engine.open_log(log, mapping), effects=not quick, progress=progress)
+    first, *others = found.sentences()
+    out.say(first, bold=True)
+    out.say(*others)
+    out.tables(found.tables())
+    out.say(*found.alike(), *found.remarks())
+    out.json(found.to_dict())
