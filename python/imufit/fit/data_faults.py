@@ -16,8 +16,7 @@ from imufit.results import DataFault
 
 
 def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float]) -> tuple[DataFault, ...]:
-    """Name what is wrong with the data of a log: what its rows showed, clipped readings, wrong units and frames, a
-    late reference.
+    """Name what is wrong with the data of a log: rows, clipped readings, units, frames, a late reference.
 
     Parameters
     ----------
