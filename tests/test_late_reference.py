@@ -1,4 +1,4 @@
-"""A reference that is late by more than an effect can follow is named with its lag, and the remedy cures it."""
+"""A reference that is late by more than an effect can follow: its lag is named, and the remedy's command cures it."""
 
 from __future__ import annotations
 

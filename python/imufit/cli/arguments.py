@@ -145,7 +145,8 @@ def map_option(command: Command) -> Command:
         "mapping",
         multiple=True,
         metavar="COL=NAME[unit]",
-        help="Column COL of the log is the file's column NAME in that unit, e.g. acc_x=AccX[g]. Repeatable.",
+        help="Column COL of the log is the file's column NAME in that unit, e.g. acc_x=AccX[g], or a number in every "
+        "row, e.g. temp=21. Repeatable.",
     )(command)
 
 

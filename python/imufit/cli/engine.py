@@ -463,6 +463,14 @@ def status_line(mapping: Sequence[str], quiet: bool, **options: Any) -> Any:
     return StatusLine(parse_mapping(*mapping) or None, quiet, **options)
 
 
+def rig(axis: str, angle: str, say: Callable[[str], None]) -> Any:
+    """Return a one-axis rig at an angle such as ``5deg``, whose next angles are typed into the terminal."""
+    from imufit.record import Rig, TypedAngles  # noqa: PLC0415
+    from imufit.record.rig import angle_of  # noqa: PLC0415
+
+    return Rig(axis, angle_of(angle), TypedAngles(say))  # type: ignore[arg-type]
+
+
 def record(port: str, path: Path, mapping: Sequence[str], **options: Any) -> Recording:
     """Record a device; `mapping` as for `open_log`."""
     from imufit.log import parse_mapping  # noqa: PLC0415

@@ -54,8 +54,7 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
     "reference_mapping",
     multiple=True,
     metavar="COL=NAME[unit]",
-    help="The same for the columns of REFERENCE, e.g. ref_qw=w. Repeatable. "
-    "If REFERENCE is SENSOR itself, --map holds.",
+    help="The same for the columns of REFERENCE, e.g. ref_qw=w. Repeatable. Where REFERENCE is SENSOR, --map holds.",
 )
 @click.option(
     "--attitude",

@@ -18,6 +18,13 @@ from imufit.cli.port import duration_option, frame_option, port_argument
 @click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
 @frame_option
 @duration_option
+@click.option(
+    "--angle",
+    metavar="ANGLE",
+    help="Commanded angle of a one-axis rig, e.g. 5deg: the column ref_angle. While it runs, type the next angle and "
+    "Enter; type only Enter while the rig moves.",
+)
+@click.option("--axis", type=click.Choice(["x", "y", "z"]), help="Body axis about which the rig turns.")
 @click.option("--force", is_flag=True, help="Overwrite LOG if it is there already.")
 @click.option("--quiet", is_flag=True, help="No status line and no messages of the device.")
 @json_option
@@ -32,6 +39,8 @@ def record(
     frame: str,
     duration: float | None,
     give_up: float | None,
+    angle: str | None,
+    axis: str | None,
     force: bool,
     quiet: bool,
     json_file: Path | None,
@@ -43,7 +52,10 @@ def record(
     """
     keep_inputs([], [output, json_file])
     out = Output(json_file)
+    if (angle is None) != (axis is None):
+        raise click.UsageError("--angle and --axis belong together, e.g. --angle 5deg --axis x")
     with engine.status_line(mapping, quiet, frame=frame) as status:
+        rig = None if angle is None or axis is None else engine.rig(axis, angle, status.say)
         result = engine.record(
             port,
             output,
@@ -56,6 +68,7 @@ def record(
             give_up=give_up,
             force=force,
             watch=status,
+            rig=rig,
         )
     out.say(result.sentence, bold=True)
     out.say(*result.sentences()[1:])

@@ -29,8 +29,8 @@ Part = Mapping[str, Any]
 AS_DECLARED: Final = Aligned(0.0, 0.0, 0.0, 0.0, np.eye(3), 0.0, 0)
 """Reference and sensor on one clock, with parallel axes."""
 BLOCKS: Final = 60
-"""Blocks of the attitude that the lag is refined by, of 1.5 s each: of a log of 25 minutes they give it to a
-millisecond or two in seconds, where all of its blocks take minutes."""
+"""Blocks of the attitude, of 1.5 s each, by which the lag is refined. Of a log of 25 minutes all blocks take minutes;
+these take seconds, and still give the lag to some milliseconds."""
 
 
 def late_faults(
@@ -49,7 +49,7 @@ def late_faults(
         Of the log as declared.
     chunks : callable
         Gives the whole log as the compiled core takes it, chunk by chunk. It is called only where an ideal gyroscope
-        misses a fifth of the readings' power.
+        misses a fifth of the readings.
     path : Path or None
         File of the log, for the remedy.
 
@@ -84,8 +84,8 @@ def late_faults(
 def _left_by_an_effect(declared: CommonRates) -> float:
     """Return the share of the rates (square) that the declared clock leaves if `ref.delay` comes to help.
 
-    The effect starts from the derivative of the ideal readings. Where this column leaves less than a fifth of the
-    rates, the effect finds the lag.
+    The effect starts from the derivative of the ideal readings. Where this column leaves less than a fifth, the effect
+    finds the lag.
     """
     if not len(declared.measured):
         # At the declared times the two have no motion in common.

@@ -54,9 +54,9 @@ def check_truth_values(plan: Plan, truths: Mapping[str, tuple[int | None, str]],
         To name the file in errors.
     """
     for column in plan.columns:
-        if column.target in NUMERIC and column.source is not None and column.source in truths:
-            row, text = truths[column.source]
-            raise truth_value(text, column.source, row, place)
+        if column.target in NUMERIC and column.name is not None and column.name in truths:
+            row, text = truths[column.name]
+            raise truth_value(text, column.name, row, place)
 
 
 def fields_of(
@@ -89,7 +89,7 @@ def fields_of(
     for column in plan.columns:
         if column.target == "t":
             continue
-        raw = block[column.source] if column.source is not None else None
+        raw = block[column.name] if column.name is not None else None
         if column.target == "pose":
             text["pose"] = _poses(raw, rows, start, place)
         elif (
@@ -101,9 +101,7 @@ def fields_of(
             text[column.target] = checked_labels(raw)
         else:
             values = _numbers(column, block, start, rows, place)
-            numbers[column.target] = checked_readings(
-                values, column.target, column.source or column.target, start, place
-            )
+            numbers[column.target] = checked_readings(values, column.target, column.name or column.target, start, place)
     t = repair.apply(time_of(plan, block, start, rows, place), start)
     return group_fields(t, numbers, text, start=start, metadata=metadata, place=place)
 
@@ -182,8 +180,8 @@ def attitude_of_rig(angle: NDArray[np.float64], axis: str) -> NDArray[np.float64
 
 
 def _numbers(column: PlannedColumn, block: RawBlock, start: int, rows: int, place: Place) -> NDArray[np.float64]:
-    if column.source is None:
-        return column.conversion.apply(np.arange(start, start + rows, dtype=np.float64))
+    if not isinstance(column.source, str):
+        return column.conversion.apply(column.source.numbers(start, rows))
     raw = block[column.source]
     if raw.dtype == object:
         raw = numbers_from_text(raw, column.source, start, place)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.columns import CONTRACT, GROUPS, SENSORS, meant, nearest
@@ -16,6 +20,39 @@ from imufit.printable import NAME, printable
 
 ROW: Final = "row"
 """Name that stands for the row number in a mapping, when the file has no column of that name."""
+NUMBER: Final = re.compile(r"[+-]?\s*(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+"""What stands for a constant in a mapping, when the file has no column of that name."""
+
+
+@dataclass(frozen=True)
+class RowNumber:
+    """The number of the row, from 0, instead of a column of the file."""
+
+    text: str = ROW
+
+    def numbers(self, start: int, rows: int) -> NDArray[np.float64]:
+        """Values of some rows from `start` on, (rows,)."""
+        return np.arange(start, start + rows, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Constant:
+    """One number for every row, instead of a column of the file.
+
+    Parameters
+    ----------
+    value : float
+        In the unit that the mapping names.
+    text : str
+        As the mapping writes it.
+    """
+
+    value: float
+    text: str
+
+    def numbers(self, start: int, rows: int) -> NDArray[np.float64]:
+        """Values of some rows from `start` on, (rows,)."""
+        return np.full(rows, self.value)
 
 
 @dataclass(frozen=True)
@@ -26,15 +63,25 @@ class PlannedColumn:
     ----------
     target : str
         Column of the log.
-    source : str or None
-        Column of the file; None for the row number.
+    source : str, RowNumber or Constant
+        Column of the file, or what stands for one.
     conversion : Conversion
         To SI.
     """
 
     target: str
-    source: str | None
+    source: str | RowNumber | Constant
     conversion: Conversion
+
+    @property
+    def name(self) -> str | None:
+        """Column of the file; None if the values do not come from one."""
+        return self.source if isinstance(self.source, str) else None
+
+    @property
+    def origin(self) -> str:
+        """Text that stands for the source in a mapping."""
+        return self.source if isinstance(self.source, str) else self.source.text
 
 
 @dataclass(frozen=True)
@@ -55,12 +102,12 @@ class Plan:
     @property
     def sources(self) -> tuple[str, ...]:
         """Columns of the file that are read, each once."""
-        return tuple(dict.fromkeys(column.source for column in self.columns if column.source is not None))
+        return tuple(dict.fromkeys(column.name for column in self.columns if column.name is not None))
 
     @property
     def origin(self) -> dict[str, str]:
         """Column of the file for each column of the log."""
-        return {column.target: column.source or ROW for column in self.columns}
+        return {column.target: column.origin for column in self.columns}
 
     @property
     def time(self) -> PlannedColumn:
@@ -78,7 +125,7 @@ def plan_columns(
     names : sequence of str
         Columns of the file.
     mapping : mapping, optional
-        Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
+        Source text for target columns, such as ``{"acc_x": "-AccX[g]", "temp": "21"}``.
     place : Place
         To name the file in errors.
     bare : bool
@@ -99,15 +146,15 @@ def plan_columns(
             )
     mapped = [_resolve(target, text, names, place) for target, text in (mapping or {}).items()]
     targets = {column.target for column in mapped}
-    used = {column.source for column in mapped}
+    used = {column.name for column in mapped if column.name is not None}
     kept = [PlannedColumn(shown[name], name, Conversion()) for name in names if name not in targets | used]
     for column in mapped:
-        if column.target not in CONTRACT and column.target != column.source and (close := meant(column.target)):
+        if column.target not in CONTRACT and column.target != column.name and (close := meant(column.target)):
             raise place.error(
                 f"the mapping makes a column {column.target}; did you mean {close}?", column=column.target
             )
     lost = [shown[name] for name in names if name in targets - used]
-    changed = [column.target for column in kept if column.target != column.source]
+    changed = [column.target for column in kept if column.target != column.name]
     for index, name in enumerate(changed):
         if name in changed[:index] or name in names or name in targets:
             raise place.error(f"column {name} is there twice", column=name, remedy="Give these columns other names.")
@@ -125,7 +172,7 @@ def plan_columns(
 
 
 def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> PlannedColumn:
-    """Find the column, sign and unit that a mapping's source text means."""
+    """Find the column, sign and unit, or the constant, that a mapping's source text means."""
     bare, unit = _bracket(text)
     for name, given in ((text.strip(), None), (bare, unit)):
         for sign, given_name in _signed(name):
@@ -134,6 +181,8 @@ def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> Plan
                 column = next((each for each in names if printable(each, NAME) == given_name), column)
             if column in names or (column == ROW and ROW not in names):
                 return _planned(target, column, sign=sign, unit=given, names=names, place=place)
+    if NUMBER.fullmatch(bare):
+        return _constant(target, bare, unit, names=names, place=place)
     wanted = bare.lstrip("+-").strip()
     names = [printable(name, NAME) for name in names]
     close = nearest(wanted, names, n=3)
@@ -144,17 +193,34 @@ def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> Plan
     )
 
 
+def _constant(target: str, text: str, unit: str, *, names: Sequence[str], place: Place) -> PlannedColumn:
+    """Plan a column that is the same number in every row."""
+    value = float("".join(text.split()))
+    if target in ("t", "pose") or not math.isfinite(value):
+        listed = ", ".join(printable(name, NAME) for name in names[:12])
+        problem = f"{target} cannot be a number that is the same in every row"
+        raise place.error(
+            problem if math.isfinite(value) else f"{text} is too large a number",
+            column=target,
+            remedy=f"The columns are {listed}.",
+        )
+    return PlannedColumn(target, Constant(value, text), _to_si(target, unit, place))
+
+
+def _to_si(target: str, unit: str, place: Place) -> Conversion:
+    try:
+        return conversion(target, unit)
+    except InputError as error:
+        raise place.error(error.problem, column=error.column, remedy=error.remedy) from None
+
+
 def _planned(
     target: str, column: str, *, sign: float, unit: str | None, names: Sequence[str], place: Place
 ) -> PlannedColumn:
-    try:
-        text = unit if unit is not None else unit_in_header(column, target)
-        to_si = conversion(target, text)
-    except InputError as error:
-        raise place.error(error.problem, column=error.column, remedy=error.remedy) from None
+    to_si = _to_si(target, unit if unit is not None else unit_in_header(column, target), place)
     if sign < 0.0:
         to_si = Conversion(-to_si.factor, -to_si.offset)
-    return PlannedColumn(target, column if column in names else None, to_si)
+    return PlannedColumn(target, column if column in names else RowNumber(), to_si)
 
 
 def _bracket(text: str) -> tuple[str, str]:

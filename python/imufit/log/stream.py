@@ -62,8 +62,8 @@ class LogStream:
 
     def _scan(self) -> TimeRepair:
         scan, time = TimeScan(self._place), self._plan.time
-        for start, rows, block in self._source.scan([time.source] if time.source is not None else []):
-            if time.source in self._source.truths:
+        for start, rows, block in self._source.scan([time.name] if time.name is not None else []):
+            if time.name in self._source.truths:
                 break
             scan.add(time_of(self._plan, block, start, rows, self._place))
         check_truth_values(self._plan, self._source.truths, self._place)
@@ -134,7 +134,7 @@ class LogStream:
     @property
     def size(self) -> int:
         """Bytes that the whole log would take in memory, told by rows and columns."""
-        text = sum(column.source in self._source.text for column in self._plan.columns)
+        text = sum(column.name in self._source.text for column in self._plan.columns)
         numbers = len(self._plan.columns) - text
         if "ref_angle" in self._columns and self._metadata.rig_axis is not None:
             numbers += 4  # the reference attitude that follows from the angle

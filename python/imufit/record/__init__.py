@@ -3,5 +3,6 @@
 from imufit.record.live_rows import LiveConverter, LiveRows
 from imufit.record.recorder import record
 from imufit.record.recover import recover
+from imufit.record.rig import Rig, TypedAngles
 
-__all__ = ["LiveConverter", "LiveRows", "record", "recover"]
+__all__ = ["LiveConverter", "LiveRows", "Rig", "TypedAngles", "record", "recover"]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.log.check import UNIT_TOLERANCE
 from imufit.log.columns import GROUPS
-from imufit.log.foreign import Plan, plan_columns
+from imufit.log.foreign import Plan, RowNumber, plan_columns
 from imufit.log.place import Place
 from imufit.record.arrived import Announced
 from imufit.record.ticks import time_column
@@ -70,9 +70,11 @@ class Columns:
         """
         columns = {}
         for column in self._plan.columns:
-            if column.target == "t" or column.source is None:
+            source = column.source
+            if column.target == "t" or isinstance(source, RowNumber):
                 continue
-            numbers = column.conversion.apply(values[:, self._places[column.source]])
+            raw = values[:, self._places[source]] if isinstance(source, str) else source.numbers(0, len(values))
+            numbers = column.conversion.apply(raw)
             columns[column.target] = np.where(np.isinf(numbers), np.nan, numbers)
         if all(name in columns for name in _REFERENCE):
             norm = np.sqrt(sum(columns[name] ** 2 for name in _REFERENCE))

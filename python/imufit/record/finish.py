@@ -66,6 +66,28 @@ class _Timed:
                 end = float(t[-1]) + late
 
 
+@dataclass(frozen=True)
+class _Commanded:
+    """Commanded angle of the rig: from each time on another one, rad; NaN where it moves."""
+
+    axis: str
+    since: Array
+    angle: Array
+
+    @classmethod
+    def of(cls, parts: Sequence[Part]) -> _Commanded | None:
+        rig = parts[0].about.get("rig")
+        if rig is None:
+            return None
+        later = [tuple(each) for part in parts for note in part.told for each in note.get("angles", ())]
+        since, angle = np.array([(-np.inf, rig["angle"]), *later], dtype=np.float64).T
+        return cls(rig["axis"], since, angle)
+
+    def at(self, t: Array) -> Array:
+        """Angle at some times, s on the host's clock, (n,)."""
+        return np.asarray(self.angle[np.searchsorted(self.since, t, side="right") - 1])
+
+
 @dataclass
 class _Survey:
     """What a pass over all rows finds: when they begin and end, runs of the clock, gaps, and steps from row to row."""
@@ -133,7 +155,10 @@ def make_log(parts: Sequence[Part], file: Path, ended: str | None = None, cpu_sh
     timed = _Timed.of(parts)
     held = timed.parts
     columns = [Columns(part.announced, part.about.get("mapping")) for part in held]
+    commanded = _Commanded.of(held)
     names = tuple(dict.fromkeys(name for each in columns for name in each.names))
+    if commanded is not None:
+        names = (*names, "ref_angle")
     seen = _Survey.of(timed.pieces())
     told: dict[str, Any] = {}
     for part in parts:
@@ -175,11 +200,15 @@ def make_log(parts: Sequence[Part], file: Path, ended: str | None = None, cpu_sh
     ]
     kept = {name: value for name, value in read_sidecar(file).items() if name not in (KEY, "sensor")}
     own = _metadata(recording, held, messages[:MESSAGES])
-    metadata = Metadata.from_mapping({**own.to_mapping(), **kept}, sidecar_path(file))
+    # The axis and the angles belong together, whatever a recording of that name had before.
+    rig = {} if commanded is None else {"rig_axis": commanded.axis}
+    metadata = Metadata.from_mapping({**own.to_mapping(), **kept, **rig}, sidecar_path(file))
 
     def tables() -> Iterator[dict[str, NDArray[Any]]]:
         for piece in timed.pieces():
             known = columns[piece.part].of(piece.rows.values)
+            if commanded is not None:
+                known["ref_angle"] = commanded.at(piece.t)
             numbers = {name: known.get(name, np.full(piece.rows.n, np.nan)) for name in names}
             t = piece.t - seen.first
             fields = group_fields(t, numbers, {}, start=0, metadata=own, place=Place())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ from imufit.record.columns import Columns
 from imufit.record.finish import utc_now
 from imufit.record.part import PartFile, part_path
 from imufit.record.reception import Reception
+from imufit.record.rig import Rig
 
 EVERY: Final = 0.2
 """Time after which rows are written, s: with the time that reading and writing take, a crash costs less than 0.25 s."""
@@ -39,6 +41,8 @@ class Journal:
         Source text for target columns.
     frame : {"NED", "ENU", "NWU"}
         Reference frame that the log will name.
+    rig : Rig, optional
+        The rig that the device is on, whose commanded angle becomes a column.
 
     Raises
     ------
@@ -47,18 +51,27 @@ class Journal:
     """
 
     def __init__(
-        self, log: Path, reception: Reception, mapping: Mapping[str, str] | None, frame: Frame = "NED"
+        self,
+        log: Path,
+        reception: Reception,
+        mapping: Mapping[str, str] | None,
+        frame: Frame = "NED",
+        rig: Rig | None = None,
     ) -> None:
         self._log = log
         self._reception = reception
         self._mapping = mapping
-        self._about = {
+        self._about: dict[str, Any] = {
             "port": reception.line.port,
             "utc": utc_now(),
             "monotonic": time.monotonic(),
             "mapping": None if mapping is None else dict(mapping),
             "frame": frame,
         }
+        self._rig = rig
+        if rig is not None:
+            self._about["rig"] = {"axis": rig.axis, "angle": _plain(rig.angle)}
+        self._angles: list[tuple[float, float | None]] = []
         self._held: list[Arrived] = []
         self._texts: list[tuple[float, str]] = []
         self._lost_since: float | None = None
@@ -110,8 +123,18 @@ class Journal:
                 self._write()
             self._held.append(part)
         told = self._lost_since != self._reception.line.lost_since
-        if now >= self._next and (self._held or told):
+        if now >= self._next and (self._held or told or self._angles):
             self._write()
+
+    def command(self, angle: float) -> None:
+        """Note that from now on another angle of the rig is commanded; it is written with the rows of that time.
+
+        Parameters
+        ----------
+        angle : float
+            rad; NaN while the rig moves.
+        """
+        self._angles.append((time.monotonic(), _plain(angle)))
 
     @property
     def n(self) -> int:
@@ -164,7 +187,13 @@ class Journal:
         self._next = now + EVERY
         self._lost_since = self._reception.line.lost_since
         if held and held[0].announced != self._parts[-1].announced:
-            Columns(held[0].announced, self._mapping)
+            names = Columns(held[0].announced, self._mapping).names
+            if self._rig is not None and "ref_angle" in names:
+                raise InputError(
+                    "the device sends ref_angle itself",
+                    column="ref_angle",
+                    remedy="Record without --angle and --axis, and name rig_axis in the metadata.",
+                )
             if self._parts[-1].announced is not None:
                 self._parts.append(self._made(len(self._parts) + 1))
             self._parts[-1].begin(held[0].announced, self._about)
@@ -175,6 +204,8 @@ class Journal:
         told: dict[str, Any] = {"counts": self._reception.counts, "now": now, "lost_since": self._lost_since, **more}
         if texts:
             told["texts"] = texts
+        if self._angles:
+            told["angles"], self._angles = self._angles, []
         self._guarded(part, lambda: part.write(Arrived.joined(held) if held else None, told))
 
     @staticmethod
@@ -183,3 +214,8 @@ class Journal:
             write()
         except OSError as error:
             raise DiskError(f"{part.path} cannot be written ({error.strerror or error})") from None
+
+
+def _plain(angle: float) -> float | None:
+    """Angle as JSON has it: None for one that is not known."""
+    return None if math.isnan(angle) else angle

@@ -15,6 +15,7 @@ from imufit.record.journal import DiskError, Journal
 from imufit.record.live_rows import check_mapping
 from imufit.record.part import part_path, read_part
 from imufit.record.reception import Reception, listen
+from imufit.record.rig import Rig
 from imufit.record.signals import requests_to_end
 from imufit.record.transport import Line
 from imufit.results import Recording
@@ -37,6 +38,7 @@ def record(
     force: bool = False,
     stopped: Callable[[], bool] = lambda: False,
     watch: Watch | None = None,
+    rig: Rig | None = None,
 ) -> Recording:
     """Record a device until it is stopped: by Ctrl-C, SIGTERM, `duration`, `give_up` or `stopped`.
 
@@ -70,6 +72,8 @@ def record(
         Ends the recording when it returns True.
     watch : callable, optional
         Called after each read, some hundred times a second.
+    rig : Rig, optional
+        The one-axis rig that the device is on: its commanded angle becomes the column `ref_angle`.
 
     Returns
     -------
@@ -84,13 +88,17 @@ def record(
     """
     path = Path(log)
     check_mapping(mapping)
+    if rig is not None and mapping and "ref_angle" in mapping:
+        raise InputError(
+            "ref_angle is both mapped and the angle of a rig", column="ref_angle", remedy="Leave one of them out."
+        )
     check_target(path, force)
     line = Line(port, baud)
     reception = Reception(line, form, header)
     with requests_to_end() as interrupted:
         line.open()
         try:
-            journal = Journal(path, reception, mapping, frame)
+            journal = Journal(path, reception, mapping, frame, rig)
             begin = time.monotonic(), time.process_time()
             try:
                 end = _run(
@@ -100,6 +108,7 @@ def record(
                     duration=duration,
                     give_up=give_up,
                     stopped=lambda: interrupted() or stopped(),
+                    rig=rig,
                 )
             finally:
                 journal.close()
@@ -118,11 +127,18 @@ def _run(
     duration: float | None,
     give_up: float | None,
     stopped: Callable[[], bool],
+    rig: Rig | None,
 ) -> tuple[str, InputError | None]:
     """Record; return why it ended, and the error if that was no ordinary end."""
     try:
         for rows in listen(reception, duration=duration, give_up=give_up, stopped=stopped):
             texts = reception.take_texts()
+            if rig is not None:
+                # Before any row is written a crash would lose the angle, but keep the bytes that rows come out of.
+                rows_came = journal.n > 0
+                for angle in rig.typed(rows_came):
+                    if rows_came:
+                        journal.command(angle)
             journal.take(rows, texts)
             if watch is not None:
                 watch(reception, rows, texts)

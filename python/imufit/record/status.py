@@ -101,6 +101,11 @@ class StatusLine:
 
             self._live.update(Text(self._line(reception, now), no_wrap=True, overflow="ellipsis"), refresh=True)
 
+    def say(self, text: str) -> None:
+        """Print a line above the status, unless nothing is to be said at all."""
+        if not self._quiet:
+            self._say(text)
+
     def _say(self, text: str) -> None:
         """Print a line above the status."""
         plain = "".join(c if c.isprintable() else " " for c in text)
