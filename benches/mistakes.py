@@ -1,6 +1,6 @@
 """What `imufit diagnose` answers to logs that people spoilt (tests/mistakes); writes into docs/faults.md.
 
-Run: ``python benches/mistakes.py [--logs N] [--seed FIRST] [--processes P] [--rows ID,ID,...] [--no-recordings]
+Run: ``python benches/mistakes.py [--logs N] [--seed FIRST] [--processes P] [--rows ID,ID,...] [--recordings N]
 [--keep DIR] [--list FILE] [--write]``. A log takes three seconds; all rows on three simulated logs and the recordings
 take half an hour on one core. ``--keep`` keeps the spoilt logs, so that the commands of ``--list`` can be run again.
 """
@@ -22,14 +22,14 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from mistakes.catalogue import CATALOGUE, Mistake, by_id  # noqa: E402  lies beside the tests
 from mistakes.judge import Answer, Judgement, Kind, ask, judge, write  # noqa: E402
-from mistakes.sound import MOVING, OTHERS, Sound, recordings, simulated  # noqa: E402
+from mistakes.sound import MOVING, OTHERS, RECORDINGS, Sound, recordings, simulated  # noqa: E402
 
 PAGE = ROOT / "docs" / "faults.md"
 BEGIN, END = "<!-- mistakes -->", "<!-- /mistakes -->"
 FIRST_SEED = 1000
 """Seeds from here on were never looked at while faults were built."""
-LONG = 150
-"""Longest part of an answer on the list, characters."""
+LONG = 600
+"""Longest part of an answer that is shown, characters: three faults with their remedies."""
 
 
 def clean_answer(directory: Path, numbered: tuple[int, Sound]) -> Answer:
@@ -43,21 +43,23 @@ def one(directory: Path, seed: int, asked: tuple[str, Sound, Answer]) -> Judgeme
     name, sound, baseline = asked
     found = judge(by_id(name), sound, baseline, directory, seed)
     if found is not None:
-        print(f"{name:22} {sound.name:45} {found.kind}", file=sys.stderr, flush=True)
+        said = "" if found.right else found.message[:LONG]
+        print(f"{name:22} {sound.name:45} {found.kind:30} {said}", file=sys.stderr, flush=True)
     return found
 
 
 def cases(
-    rows: list[Mistake], sounds: list[Sound], answers: list[Answer], logs: int
+    rows: list[Mistake], sounds: list[Sound], answers: list[Answer], logs: int, recorded: int
 ) -> list[tuple[str, Sound, Answer]]:
-    """Mistakes with logs that they apply to: so many simulated ones each, and every recording."""
+    """Mistakes with logs that they apply to: so many simulated ones and so many recordings each."""
     chosen = []
     for place, row in enumerate(rows):
-        fitting = [(s, a) for s, a in zip(sounds, answers, strict=True) if row.needs <= s.has]
-        made = [pair for pair in fitting if not pair[0].real]
-        # Rows begin with different logs, so that a row seen once is not always seen in the same scenario.
-        turned = made[place % len(made) :] + made[: place % len(made)] if made else []
-        chosen += [(row.id, *pair) for pair in [*turned[:logs], *(pair for pair in fitting if pair[0].real)]]
+        fitting = [pair for pair in zip(sounds, answers, strict=True) if row.needs <= pair[0].has]
+        for real, most in ((False, logs), (True, recorded)):
+            own = [pair for pair in fitting if pair[0].real is real]
+            # Rows begin with different logs, so that a row seen once is not always seen in the same scenario.
+            first = place % max(len(own), 1)
+            chosen += [(row.id, *pair) for pair in [*own[first:], *own[:first]][:most]]
     return chosen
 
 
@@ -107,7 +109,7 @@ def listed(found: list[Judgement]) -> str:
     wrong = sorted((each for each in found if not each.right), key=lambda each: order.index(each.kind))
     return "\n".join(
         f"- **{each.kind}** {each.mistake} ({by_id(each.mistake).line}) in {each.log}: `{each.command}`\n  "
-        f"{each.message[: 4 * LONG]}"
+        f"{each.message[:LONG]}"
         for each in wrong
     )
 
@@ -118,7 +120,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=FIRST_SEED)
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--rows", help="ids of rows, with commas between; otherwise all")
-    parser.add_argument("--no-recordings", action="store_true")
+    parser.add_argument("--recordings", type=int, default=len(RECORDINGS), help="recordings for each row")
     parser.add_argument("--keep", type=Path, help="directory for the spoilt logs")
     parser.add_argument("--list", type=Path, help="file for the wrong outcomes")
     parser.add_argument("--write", action="store_true")
@@ -128,9 +130,9 @@ def main() -> None:
         directory = given.keep or Path(temporary)
         directory.mkdir(parents=True, exist_ok=True)
         made = [simulated(kind, given.seed + k, directory) for k in range(given.logs) for kind in (*MOVING, *OTHERS)]
-        sounds = [*made, *([] if given.no_recordings else recordings())]
+        sounds = [*made, *(recordings() if given.recordings else ())]
         answers = list(pool.map(partial(clean_answer, directory), enumerate(sounds)))
-        asked = cases(rows, sounds, answers, given.logs)
+        asked = cases(rows, sounds, answers, given.logs, given.recordings)
         found = [each for each in pool.map(partial(one, directory, given.seed), asked) if each is not None]
     text = f"Seeds from {given.seed} on.\n{summary(found, sounds, answers)}\n\n{markdown(table(rows, found))}"
     if given.list:

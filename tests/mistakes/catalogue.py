@@ -173,7 +173,7 @@ UNITS = (
         "acc divided by its own length",
         s.normalised("acc"),
         MOVED | {Need.POSITION},
-        ("length", "unit vector*", "normalis*", "norm", "direction*", "[g]"),
+        ("length", "unit vector*", "normalis*", "direction*"),
         ("acc*",),
     ),
     Mistake(
@@ -182,7 +182,7 @@ UNITS = (
         "mag divided by its own length",
         s.normalised("mag"),
         MOVED_MAG,
-        ("length", "unit vector*", "normalis*", "norm", "direction*"),
+        ("length", "unit vector*", "normalis*", "direction*"),
         ("mag*",),
     ),
 )

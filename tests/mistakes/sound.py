@@ -22,8 +22,8 @@ OTHERS = ("tilt", "still")
 FRAMES = ("NED", "ENU", "NWU")
 DURATION = 60
 """Length of a simulated log, s: the least in which every scenario turns through all of its directions."""
-ROWS = 8000
-"""Rows taken of a recording: a minute or two, so that an answer takes seconds."""
+ROWS = 6000
+"""Rows taken of a recording: 20 s to a minute, so that an answer takes seconds."""
 TURNS, PULLS = 0.08, 1.0
 """Standard deviations of rate (rad/s) and specific force (m/s^2) from which on an axis counts as moved: a hundred times
 the noise of a consumer sensor."""
