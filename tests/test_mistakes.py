@@ -55,6 +55,8 @@ def test_an_answer_without_a_name_is_not_taken_for_one(sound, baseline, tmp_path
     ):
         answer = Answer(0, "", {**said, **change})
         assert kind_of(mistake, sound, sound.log, baseline, answer, path) is kind
+    mapped = Answer(2, "acc looks like milli-g. Use --map 'acc_x=acc_x[mg]'", None)
+    assert kind_of(mistake, sound, sound.log, baseline, mapped, path) is Kind.MISLED
     assert kind_of(mistake, sound, sound.log, baseline, Answer(2, "no such file", None), path) is Kind.REFUSED_OTHERWISE
     assert kind_of(mistake, sound, sound.log, baseline, Answer(1, "Traceback", None), path) is Kind.CRASHED
 

@@ -31,6 +31,7 @@ class Kind(StrEnum):
 
     WRONG_MISSING = "wrong missing"
     BELIEVED = "believed"
+    MISLED = "another mistake named"
     CRASHED = "crashed"
     INVENTED = "named though harmless"
     WRONG_REMEDY = "named, but the mapping does not restore"
@@ -154,16 +155,18 @@ def kind_of(mistake: Mistake, sound: Sound, spoilt: Log, baseline: Answer, answe
     """Judge an answer."""
     if answer.code not in (0, 2) or "Traceback" in answer.stderr or (answer.code == 0 and answer.json is None):
         return Kind.CRASHED
+    fresh = [text for key, text in answer.faults.items() if key not in baseline.faults]
     if mistake.harmless:
-        fresh = set(answer.faults) - set(baseline.faults)
         return Kind.INVENTED if fresh or answer.verdict != baseline.verdict else Kind.UNTOUCHED
-    texts = [text for key, text in answer.faults.items() if key not in baseline.faults]
     # A note of the sound log names its file: what differs by that alone is no new note.
     known = {note.split(": ", 1)[-1] for note in baseline.notes}
-    texts += [note for note in answer.notes if note.split(": ", 1)[-1] not in known]
+    texts = fresh + [note for note in answer.notes if note.split(": ", 1)[-1] not in known]
     told = " ".join(texts).replace(path.stem, "")
     if names(told, mistake) or answer.blamed & set(mistake.effects):
         return remedy_of(mistake, sound.log, told, path)
+    if MAP.search(told) or (fresh and answer.verdict == "unknown"):
+        # The user would follow a remedy for something else, and spoil the log once more.
+        return Kind.MISLED
     return unnamed(mistake, sound, spoilt, baseline, answer, path)
 
 
