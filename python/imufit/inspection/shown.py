@@ -15,7 +15,7 @@ from imufit.fit.analysis import Analysis
 from imufit.fit.passes import CHANNELS
 from imufit.fit.surveyed_log import SurveyedLog
 from imufit.log import Contents, LogSource
-from imufit.log.contents import SENSOR_NAMES
+from imufit.log.columns import SENSOR_NAMES
 from imufit.model.catalogue import effects, find_effect
 from imufit.model.effect_stack import EffectStack
 from imufit.progress import Progress

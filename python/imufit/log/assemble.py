@@ -32,7 +32,7 @@ RawBlock = Mapping[str, NDArray[Any]]
 def time_of(plan: Plan, block: RawBlock, start: int, rows: int, place: Place) -> NDArray[np.float64]:
     """Time stamps of one block in s, (n,), before any repair."""
     column = plan.time
-    raw = None if column.source is None else block[column.source]
+    raw = block[column.source] if isinstance(column.source, str) else None
     if raw is None or raw.dtype != object:
         return _numbers(column, block, start, rows, place)
     times = seconds_from_cells(raw)
