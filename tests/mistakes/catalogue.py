@@ -586,7 +586,7 @@ ROWS = (
         "commas",
         "commas between cells and in numbers",
         s.text(s.thousands_commas),
-        ("comma*", "cells", "columns", "separat*"),
+        ("comma*", "cells", "fields", "separat*"),
     ),
 )
 
