@@ -439,7 +439,7 @@ CLOCK = (
     ),
     _clock(
         "t_0_1_hz",
-        "10 s from row to row, 100 Hz in truth",
+        "t by row number, 0.1 Hz instead of 100 Hz",
         s.clock_by_row,
         ("Hz", "rate", "row*", "ms", "*0.001"),
         step=0.02,
@@ -586,7 +586,7 @@ ROWS = (
         "commas",
         "commas between cells and in numbers",
         s.text(s.thousands_commas),
-        ("comma*", "cells", "columns", "separat*"),
+        ("comma*", "cells", "fields", "separat*"),
     ),
 )
 

@@ -225,16 +225,17 @@ def restores(path: Path, mapping: str | None, sound: Log, step: float) -> bool:
                 return False
             continue
         got = table.column(name).to_numpy(zero_copy_only=False).astype(float)
-        if got.shape != truth.shape or not near(name, got, truth, step):
+        # Without the field told, the negative of the field and of the readings fits as well.
+        either = name.startswith("ref_q") or (name.startswith("mag") and "mag_reference" not in sound.metadata)
+        if got.shape != truth.shape or not near(got, truth, step, either=either, origin=name == "t"):
             return False
     return True
 
 
-def near(name: str, got: np.ndarray[Any, Any], truth: np.ndarray[Any, Any], step: float) -> bool:
-    """Whether a column is the sound one; times may have another origin, quaternions the other sign."""
-    if name == "t":
+def near(got: np.ndarray[Any, Any], truth: np.ndarray[Any, Any], step: float, *, either: bool, origin: bool) -> bool:
+    """Whether a column is the sound one, of either sign or from another origin where that is as good."""
+    if origin:
         got, truth = got - got[0], truth - truth[0]
     rms = float(np.sqrt(np.nanmean(truth**2)))
-    limit = NEAR * rms + step
-    errors = [float(np.sqrt(np.nanmean((sign * got - truth) ** 2))) for sign in ((1, -1) if "ref_q" in name else (1,))]
-    return min(errors) <= limit
+    errors = [float(np.sqrt(np.nanmean((sign * got - truth) ** 2))) for sign in ((1, -1) if either else (1,))]
+    return min(errors) <= NEAR * rms + step

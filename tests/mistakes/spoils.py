@@ -277,8 +277,8 @@ def clock(change: Callable[[Array], Array]) -> Spoil:
 
 
 def clock_by_row(log: Log, _: np.random.Generator) -> Log:
-    """Ten seconds from row to row: a log at 100 Hz that claims to be one at 0.1 Hz."""
-    return log.put(t=np.arange(log.n) * 10.0)
+    """A step from row to row a thousand times too long: a log at 100 Hz that claims to be one at 0.1 Hz."""
+    return log.put(t=np.arange(log.n) * (1000.0 / rate(log)))
 
 
 def clock_steps_back(log: Log, rng: np.random.Generator) -> Log:
