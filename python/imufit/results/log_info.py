@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from imufit.figures import quantity
-from imufit.log.columns import SENSOR_NAMES, Contents
+from imufit.log.columns import SENSOR_NAMES
+from imufit.log.contents import Contents
 from imufit.results.effect_sight import EffectSight, alike, open_table, seen_table, unseen_table, weak_table
 from imufit.results.json_value import json_fields, json_value
 from imufit.results.table import Table, html, page
