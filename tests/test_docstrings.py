@@ -18,6 +18,7 @@ PARTS = (
     "fit",
     "compare",
     "diagnose",
+    "inspection",
     "results",
     "report",
     "export",

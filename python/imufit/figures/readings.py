@@ -78,7 +78,7 @@ def readings_figure(
     for axes, panel in zip(grid, panels, strict=True):
         _panel(axes, panel)
         for begin, end in rests:
-            axes.axvspan(begin, end, color=style.PALE, linewidth=0.0, zorder=0)
+            axes.axvspan(begin, end, color=style.PALE, alpha=0.6, linewidth=0.0, zorder=0)
     grid[-1].set_xlabel("time, s", fontsize=9)
     if extent[1] > extent[0]:
         grid[-1].set_xlim(*extent)

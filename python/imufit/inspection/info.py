@@ -8,7 +8,7 @@ from imufit.inspection.motion import MotionSeen, RangesSeen, clipped
 from imufit.inspection.rests import rests_of
 from imufit.inspection.series import series_seen, usual_steps
 from imufit.inspection.shown import Shown, shown
-from imufit.log import LogSource, contents
+from imufit.log import LogSource, contents, judged_rows
 from imufit.log.contents import Contents
 from imufit.log.size import BLOCK_ROWS
 from imufit.progress import Progress, silent
@@ -68,7 +68,7 @@ def info(log: LogSource, *, effects: bool = True, progress: Progress | None = No
         refusal=told.refusal,
         remedy=told.remedy,
         effects=told.effects,
-        notes=_notes(told),
+        notes=_notes(log, told),
     )
 
 
@@ -102,8 +102,7 @@ def _reference(
     )
 
 
-def _notes(told: Shown) -> tuple[str, ...]:
-    """Return what the first pass of a fit noticed of the log."""
-    if told.surveyed is None:
-        return ()
-    return (*told.surveyed.log.notes, *told.surveyed.passes.empty)
+def _notes(log: LogSource, told: Shown) -> tuple[str, ...]:
+    """Return by which rows rests and effects are told, and what the first pass of a fit noticed."""
+    empty = [] if told.surveyed is None else told.surveyed.passes.empty
+    return tuple(note for note in (*judged_rows(log).notes, *empty) if note not in log.notes)

@@ -207,7 +207,7 @@ class _Sight:
         slot = self._slots[effect.id]
         if slot not in self._offsets and not effect.tried_at_full_size:
             alone, beside = self._errors([], slot), self._errors(self._offsets, slot)
-            if np.all(beside > SHADOWED * alone):
+            if np.any(beside > SHADOWED * alone):
                 return "it looks like a constant offset: there are too few different attitudes and rates"
         return ""
 

@@ -10,6 +10,7 @@ import numpy as np
 from imufit.figures import quantity
 from imufit.log.columns import SENSOR_NAMES
 from imufit.log.contents import Contents
+from imufit.printable import NAME, printable
 from imufit.results.effect_sight import EffectSight, alike, open_table, seen_table, unseen_table, weak_table
 from imufit.results.json_value import json_fields, json_value
 from imufit.results.table import Table, html, page
@@ -28,6 +29,8 @@ SERIES_NAMES: Final = {
 """What the series of a log are called."""
 SHOWN_GAPS: Final = 10
 """Gaps that are printed; the JSON has up to a thousand of each series."""
+LABELS: Final = 8
+"""Labels of a column of text that are printed: a line has room for them, and a body has six sides."""
 AXES: Final = "xyz"
 EVEN: Final = 1e-5
 """Part of a step that stamps may be off and count as even: text often cuts times after a few digits."""
@@ -470,7 +473,7 @@ class LogInfo:
         rows = tuple(
             (column.name, column.unit, str(column.samples), *map(_cell, (column.low, column.median, column.high)))
             if not column.labels
-            else (column.name, "text", str(column.samples), "", "", "")
+            else (column.name, _labels(column.labels), str(column.samples), "", "", "")
             for column in self.contents.columns
         )
         return Table("Columns", ("column", "unit", ">samples", ">smallest", ">median", ">largest"), rows)
@@ -520,6 +523,12 @@ def _series_row(item: SeriesInfo) -> tuple[str, ...]:
         f"{item.longest_gap:.3g} s" if item.gap_count else "",
         jitter,
     )
+
+
+def _labels(labels: tuple[str, ...]) -> str:
+    """Name the first labels of a column of text."""
+    shown = " ".join(printable(label, NAME) for label in labels[:LABELS])
+    return f"{shown} ..." if len(labels) > LABELS else shown
 
 
 def _cell(value: float | None) -> str:
