@@ -51,9 +51,10 @@ class LogStream:
         self._metadata = read_metadata(self._path, self._source.embedded)
         self._repair = self._scan()
         head = self._head()
-        # what says of itself that it is a log keeps to the log's units
-        stated = "t" in found.mapping or bool(self._source.embedded) or sidecar_path(self._path).is_file()
-        odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin, stated)
+        # what says of itself that it is a log may have rows as far apart as it says
+        is_log = bool(self._source.embedded) or sidecar_path(self._path).is_file()
+        clock = "stated" if "t" in found.mapping else "a log's" if is_log else "open"
+        odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin, clock)
         self._columns = head.columns
         notes = (*self._source.notes, *found.notes, *self._plan.notes, self._repair.note, *odd)
         if "ref_angle" in self._columns and "ref_qw" not in self._columns:
