@@ -13,7 +13,7 @@ from imufit.log.foreign import plan_columns
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import TimeScan
-from imufit.log.unit_check import HEAD, check_units
+from imufit.log.unit_check import HEAD, Clock, check_units
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,9 +52,8 @@ def fields_from_frame(df: pd.DataFrame, mapping: Mapping[str, str] | None, metad
     sensors: dict[str, NDArray[np.float64] | None] = {
         name: fields[name][:HEAD] for name in ("acc", "gyr", "mag", "ref_q") if name in fields
     }
-    odd = check_units(
-        fields["t"][:HEAD], sensors, metadata, place, plan.origin, "t" in (mapping or {}) or metadata != Metadata()
-    )
+    clock: Clock = "stated" if "t" in (mapping or {}) else "a log's" if metadata != Metadata() else "open"
+    odd = check_units(fields["t"][:HEAD], sensors, metadata, place, plan.origin, clock)
     notes = tuple(note for note in (*plan.notes, repair.note, *odd) if note)
     return {**fields, "metadata": metadata, "notes": notes}
 

@@ -19,7 +19,7 @@ from imufit.log.size import HELD, KEPT, NUMBER, TEXT_CELL, size_in_words
 from imufit.log.source import open_source
 from imufit.log.tables import TablesSource
 from imufit.log.time_order import TimeRepair, TimeScan
-from imufit.log.unit_check import HEAD, check_units
+from imufit.log.unit_check import HEAD, Clock, check_units
 from imufit.log.writer import write_rows
 
 
@@ -53,7 +53,7 @@ class LogStream:
         head = self._head()
         # what says of itself that it is a log may have rows as far apart as it says
         is_log = bool(self._source.embedded) or sidecar_path(self._path).is_file()
-        clock = "stated" if "t" in found.mapping else "a log's" if is_log else "open"
+        clock: Clock = "stated" if "t" in found.mapping else "a log's" if is_log else "open"
         odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin, clock)
         self._columns = head.columns
         notes = (*self._source.notes, *found.notes, *self._plan.notes, self._repair.note, *odd)

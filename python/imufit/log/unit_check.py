@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ HEAD: Final = 200_000
 """Rows from the start of the log on which units are judged."""
 
 Array = NDArray[np.float64]
+Clock = Literal["stated", "a log's", "open"]
 
 ACC_UNITS: Final = (
     (1.0, "g", "g"),
@@ -63,7 +64,7 @@ def check_units(
     metadata: Metadata,
     place: Place,
     origin: Mapping[str, str] | None = None,
-    clock_stated: bool = False,
+    clock: Clock = "open",
 ) -> list[str]:
     """Refuse a log whose readings are unmistakably in another unit.
 
@@ -79,8 +80,9 @@ def check_units(
         To name the file in errors.
     origin : mapping, optional
         Column of the file for each column of the log, to word the remedy.
-    clock_stated : bool
-        Whether the unit of the time was stated: rows may then be as far apart as they are.
+    clock : {"stated", "a log's", "open"}
+        Whether the unit of the time was stated, or the table has metadata as a log has: rows may then be as far apart as
+        they are. Where it was not stated, a gyroscope that turns a thousand times too fast shows that the clock is in ms.
 
     Returns
     -------
@@ -95,7 +97,7 @@ def check_units(
     acc, gyr, mag, ref_q = (sensors.get(name) for name in ("acc", "gyr", "mag", "ref_q"))
     notes: list[str] = []
     origin = origin or {}
-    _check_time(t, place, origin, clock_stated)
+    _check_time(t, place, origin, clock != "open")
     if acc is not None:
         notes += _check_acc(acc, metadata.gravity, place, origin)
     if gyr is not None:
@@ -106,7 +108,7 @@ def check_units(
             ref_q,
             place=place,
             origin=origin,
-            stated=clock_stated,
+            stated=clock == "stated",
         )
     if mag is not None:
         notes += _check_mag(mag, metadata, place, origin)
