@@ -81,8 +81,8 @@ def check_units(
     origin : mapping, optional
         Column of the file for each column of the log, to word the remedy.
     clock : {"stated", "a log's", "open"}
-        Whether the unit of the time was stated, or the table has metadata as a log has: rows may then be as far apart as
-        they are. Where it was not stated, a gyroscope that turns a thousand times too fast shows that the clock is in ms.
+        Whether the unit of the time was stated, or the table has metadata as a log has: rows may then be as far apart
+        as they are. Where it was not stated, a gyroscope a thousand times too fast shows a clock in ms.
 
     Returns
     -------
