@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.clock_text import seconds_from_cells
-from imufit.log.columns import CONTRACT, EULER, GROUPS, SENSOR_NAMES, SENSORS
+from imufit.log.columns import CONTRACT, EULER, GROUPS, LARGEST_COVARIATE, SENSOR_NAMES, SENSORS
 from imufit.log.makers import Maker, maker_of
 from imufit.log.place import Place
 from imufit.log.time_unit import time_unit
@@ -110,7 +110,7 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         # a file of one sensor has the sensor's name in its own
         parsed = [replace(words, words=(*words_of(place.file.stem).words, *words.words)) for words in parsed]
         found |= {group: each for group, each in _found(wanted, parsed, maker).items() if group != "t"}
-    if not mapping and not found and all(_NUMBERED.fullmatch(name) for name in names):
+    if names and not mapping and not found and all(_NUMBERED.fullmatch(name) for name in names):
         raise _without_names(source, place)
     if not any(group in found for group in SENSORS) and not ("t" in found and _has_any(names, given)):
         return Recognised(given, told)
@@ -155,7 +155,7 @@ def _angles(source: Readable, names: Sequence[str], given: Mapping[str, str]) ->
     unit = next((unit for _, unit in found.values() if unit), "")
     if not unit:
         rows = _first_rows(source, [name for name, _ in found.values()])
-        largest = max(float(np.nanmax(np.abs(values), initial=0.0)) for values in rows.values())
+        largest = max((float(np.nan_to_num(np.abs(values)).max(initial=0.0)) for values in rows.values()), default=0.0)
         unit = "deg" if largest > _WHOLE_TURN else "rad"
     return {target: f"{name}[{unit}]" for target, (name, _) in found.items()}
 
@@ -184,12 +184,12 @@ def _without_names(source: Readable, place: Place) -> InputError:
     names = source.names
     rows = _first_rows(source, names)
     complete, free = {"t": ROW_RATE}, list(names)
-    first = rows[names[0]]
+    first = rows.get(names[0], np.empty(0))
     if first.size > 1 and np.all(np.diff(first) > 0.0):
         complete["t"] = f"{names[0]}[{time_unit(first) or 's'}]"
         free = free[1:]
     triples = [tuple(free[k : k + 3]) for k in range(0, len(free) - 2, 3)]
-    fitting = [acc_unit(np.stack([rows[name] for name in triple], axis=1)) for triple in triples]
+    fitting = [acc_unit(np.stack([rows[name] for name in triple], axis=1)) for triple in triples] if rows else []
     if any(fitting):
         k = next(k for k, unit in enumerate(fitting) if unit)
         unit = fitting[k] or ""
@@ -311,7 +311,8 @@ class _Readings:
         if group == "gyr":
             return _LIKELY_GYR.get(units.get("acc") or "m/s^2", COUNTS)
         if group == "mag":
-            size = np.linalg.norm(self._stacked("mag"), axis=1)  # type: ignore[arg-type]
+            field = self._stacked("mag")
+            size = np.empty(0) if field is None else np.linalg.norm(field, axis=1)
             size = size[np.isfinite(size) & (size > 0.0)]
             return f"*{_USUAL_FIELD / float(np.median(size)):.3g}" if size.size else "uT"
         return {"t": "ms", "acc": "g"}[group]
@@ -324,7 +325,9 @@ def _first_rows(source: Readable, columns: Sequence[str]) -> dict[str, Array]:
     for _, rows, block in source.scan(list(dict.fromkeys(columns))):
         for column in columns:
             cells = block[column]
-            pieces[column].append(seconds_from_cells(cells) if cells.dtype == object else cells)
+            values = seconds_from_cells(cells) if cells.dtype == object else cells
+            # squares of readings and their sums have room in a float64
+            pieces[column].append(np.where(np.abs(values) <= LARGEST_COVARIATE, values, np.nan))
         count += rows
         if count >= HEAD:
             break
