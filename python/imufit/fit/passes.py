@@ -74,8 +74,9 @@ class Passes:
 
     def __init__(self, log: LogSource, progress: Progress) -> None:
         self.log = log
-        computed = computed_columns(log)
-        self.covariates = [name for name in covariate_names(log) if name not in computed]
+        names = covariate_names(log)
+        computed = computed_columns(log) if names else ()
+        self.covariates = [name for name in names if name not in computed]
         self.empty: list[str] = []
         """What is to be said of columns that are not used."""
         if computed:

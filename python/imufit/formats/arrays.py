@@ -41,7 +41,7 @@ class Named:
     settings : dict
         Single numbers.
     left_out : list of str
-        What is neither.
+        Names that are neither.
     """
 
     separator: str
@@ -93,7 +93,7 @@ def tables_of(path: Path, named: Named) -> tuple[tuple[Table, ...], tuple[str, .
         Named after the group of their clock, which their columns then leave out of their path; with a column `t`
         where a rate is given and no array of times.
     notes : tuple of str
-        What was left out.
+        Names that were left out.
     """
     check_values(path, sum(array.size for array in named.arrays.values()))
     columns = _columns(named)

@@ -37,7 +37,7 @@ def read(path: Path) -> Recording:
     with path.open("rb") as file:
         if file.read(4) == b"FEA1":
             raise InputError(
-                "the file is of the first version of Feather, which is no longer read",
+                "the file is of the first version of Feather, which current libraries do not read",
                 file=path,
                 remedy="Write it as Parquet with the program that made it.",
             )

@@ -128,8 +128,8 @@ class _Walk:
         last = max((float(np.nanmax(table.columns[table.time])) for table in tables if table.time), default=0.0)
         if rest > 0 and not (rest <= _FILLED and not self._data[self._end :].strip(b"\0\xff")):
             yield (
-                f"The file is cut off or damaged: its last {rest} of {size} bytes are no whole message, and the last "
-                f"message read is of {last:.3f} s."
+                f"The file is cut off or damaged: its last {rest} of {size} bytes do not make a whole message, and the "
+                f"last message read is of {last:.3f} s."
             )
         within = self._skipped - max(rest, 0)
         if within > 0:

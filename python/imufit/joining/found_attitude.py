@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
 from imufit.joining.join import join
@@ -16,13 +15,13 @@ from imufit.joining.joined import Joined
 from imufit.joining.likeliest import WORSE
 from imufit.joining.reference import KINDS, with_attitude
 from imufit.log import Log
+from imufit.log.arrays import rotation_from_quaternions
+from imufit.log.columns import WHOLE_TURN
 
 _NAMED: Final = re.compile(r"(?P<base>.*?)[._ ]?q?[._ ]?(?P<part>[wxyz])", re.IGNORECASE)
 _NUMBERED: Final = re.compile(r"(?P<base>.*?)(?:\[(?P<index>\d)\]|_?(?P<digit>\d))")
 _ATTITUDE: Final = re.compile(r"q|quat|orient|rot|att|dcm|\br$", re.IGNORECASE)
-_ANGLE: Final = re.compile(r"(?P<base>.*?)(?P<part>roll|pitch|yaw)(?P<unit>.*deg.*)?.*", re.IGNORECASE)
-_WHOLE_TURN: Final = 6.4
-"""Largest angle of an attitude in rad: a whole turn, and rounding."""
+_ANGLE: Final = re.compile(r"(?P<base>.*?)(?P<part>roll|pitch|yaw).*", re.IGNORECASE)
 _UPRIGHT: Final = 0.35
 """Largest angle between the mean specific force and the vertical, rad: 20 degrees; of readings that differ by an
 exchange of axes the wrong ones are 90 degrees off, or lie anywhere."""
@@ -127,7 +126,7 @@ def _off_vertical(log: Log) -> float:
     known = np.isfinite(log.acc).all(axis=1) & log.has_reference
     if not known.any():
         return float("nan")
-    mean = Rotation.from_quat(log.ref_q[known][:, [1, 2, 3, 0]]).apply(log.acc[known]).mean(axis=0)
+    mean = rotation_from_quaternions(log.ref_q[known]).apply(log.acc[known]).mean(axis=0)
     return float(np.arccos(np.clip(np.abs(mean[2]) / max(float(np.linalg.norm(mean)), 1e-30), 0.0, 1.0)))
 
 
@@ -174,5 +173,5 @@ def _angles(reference: Log, names: Sequence[str]) -> Iterator[tuple[str, tuple[s
     for parts in sets.values():
         if set(parts) == {"roll", "pitch", "yaw"}:
             largest = max(float(np.nanmax(np.abs(reference.covariates[name]))) for name in parts.values())
-            unit = "[deg]" if largest > _WHOLE_TURN or any("deg" in name.lower() for name in parts.values()) else ""
+            unit = "[deg]" if largest > WHOLE_TURN or any("deg" in name.lower() for name in parts.values()) else ""
             yield "euler-ZYX", tuple(f"{parts[part]}{unit}" for part in ("yaw", "pitch", "roll"))

@@ -22,6 +22,8 @@ SENSOR_NAMES: Final = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magne
 
 EULER: Final = ("ref_roll", "ref_pitch", "ref_yaw")
 """Reference attitude as angles, rad: a file may have them in place of `ref_q`, a log has not."""
+WHOLE_TURN: Final = 6.4
+"""Largest angle of an attitude, rad: a whole turn, and rounding. Larger ones are in degrees."""
 
 CONTRACT: Final[tuple[str, ...]] = (
     "t",

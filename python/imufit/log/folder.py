@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.formats import Recording, Table
 from imufit.log.tables import too_large
-from imufit.log.text import looks_like_text, open_text
+from imufit.log.text import TEXT_SUFFIXES, looks_like_text, open_text
 from imufit.log.transcript import TranscriptSource
 from imufit.log.unpacked import copy_bounded, damaged
 
-TEXT: Final = (".csv", ".txt", ".tsv", ".dat", ".log")
 LARGEST: Final = 500 << 20
 """Bytes of all text files of a folder: as numbers they take about as much, and are held at once."""
 MOST_FILES: Final = 200
@@ -38,7 +37,7 @@ def recording_of_folder(path: Path) -> Recording:
     InputError
         There is no table in it, or more than can be held in memory.
     """
-    files = sorted(file for file in path.iterdir() if file.is_file() and file.suffix.lower() in TEXT)
+    files = sorted(file for file in path.iterdir() if file.is_file() and file.suffix.lower() in TEXT_SUFFIXES)
     return _recording(path, "folder of text files", files)
 
 
@@ -60,8 +59,8 @@ def recording_of_zip(path: Path) -> Recording:
         try:
             with zipfile.ZipFile(path) as archive:
                 members = [m for m in archive.infolist() if not m.is_dir() and _is_text(m.filename)]
-                if sum(member.file_size for member in members) > LARGEST:
-                    raise too_large(path, sum(member.file_size for member in members))
+                if (size := sum(member.file_size for member in members)) > LARGEST:
+                    raise too_large(path, size)
                 for k, member in enumerate(members[:MOST_FILES]):
                     file = Path(place) / str(k) / PurePosixPath(member.filename).name
                     file.parent.mkdir()
@@ -77,12 +76,12 @@ def recording_of_zip(path: Path) -> Recording:
 
 def _is_text(name: str) -> bool:
     member = PurePosixPath(name)
-    return member.suffix.lower() in TEXT and not any(part.startswith((".", "__")) for part in member.parts)
+    return member.suffix.lower() in TEXT_SUFFIXES and not any(part.startswith((".", "__")) for part in member.parts)
 
 
 def _recording(path: Path, form: str, files: list[Path]) -> Recording:
-    if sum(file.stat().st_size for file in files) > LARGEST:
-        raise too_large(path, sum(file.stat().st_size for file in files))
+    if (size := sum(file.stat().st_size for file in files)) > LARGEST:
+        raise too_large(path, size)
     tables: list[Table] = []
     notes: list[str] = []
     for file in files[:MOST_FILES]:

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.clock_text import seconds_from_cells
-from imufit.log.columns import CONTRACT, EULER, GROUPS, LARGEST_COVARIATE, SENSOR_NAMES, SENSORS
+from imufit.log.columns import CONTRACT, EULER, GROUPS, LARGEST_COVARIATE, SENSOR_NAMES, SENSORS, WHOLE_TURN
 from imufit.log.makers import Maker, maker_of
 from imufit.log.place import Place
 from imufit.log.time_unit import time_unit
 from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, turned
 from imufit.log.unit_check import HEAD
 from imufit.log.units import conversion, lookup
-from imufit.log.words import COMPUTED, Words, names_time, sensor_of, strange, unit_of, words_of
+from imufit.log.words import COMPUTED, Words, sensor_of, strange, time_columns, unit_of, words_of
 
 Array = NDArray[np.float64]
 
@@ -30,8 +30,6 @@ COUNTS: Final = "131 LSB/(deg/s)"
 """Counts of the usual sensor in its smallest range (InvenSense, MPU-6050 product specification)."""
 ROW_RATE: Final = "row[100Hz]"
 """Time by row number, with the rate that is most usual."""
-_WHOLE_TURN: Final = 6.4
-"""Largest angle of an attitude, rad: a whole turn, and rounding."""
 _USUAL_FIELD: Final = 50.0
 """Magnitude of the earth's field in the middle latitudes, uT (World Magnetic Model)."""
 _NUMBERED: Final = re.compile(r"(?:(?P<table>.*)\.)?c(?P<number>\d+)")
@@ -156,7 +154,7 @@ def _angles(source: Readable, names: Sequence[str], given: Mapping[str, str]) ->
     if not unit:
         rows = _first_rows(source, [name for name, _ in found.values()])
         largest = max((float(np.nan_to_num(np.abs(values)).max(initial=0.0)) for values in rows.values()), default=0.0)
-        unit = "deg" if largest > _WHOLE_TURN else "rad"
+        unit = "deg" if largest > WHOLE_TURN else "rad"
     return {target: f"{name}[{unit}]" for target, (name, _) in found.items()}
 
 
@@ -230,10 +228,7 @@ def _candidates(group: str, parsed: Sequence[Words], maker: Maker | None) -> lis
     fixed = maker.units.get(group) if maker is not None else None
     made: list[_Candidate] = []
     if group == "t":
-        for words in parsed:
-            if not words.axis and names_time(words.words):
-                unit, rest = unit_of("t", words.words, words.bracket)
-                made.append(_Candidate((words.column,), unit or fixed, strange(rest)))
+        made += [_Candidate((column,), unit or fixed, odd) for column, unit, odd in time_columns(parsed)]
     else:
         triples: dict[tuple[str, ...], dict[str, Words]] = {}
         for words in parsed:

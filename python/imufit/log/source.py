@@ -16,10 +16,9 @@ from imufit.log.folder import recording_of_folder, recording_of_zip
 from imufit.log.npz import NpzSource
 from imufit.log.parquet import ParquetSource
 from imufit.log.tables import TablesSource
-from imufit.log.text import looks_like_text, open_text
+from imufit.log.text import TEXT_SUFFIXES, looks_like_text, open_text
 from imufit.log.unpacked import COMPRESSED, is_utf_16, open_unpacked
 
-TEXT_SUFFIXES: Final = (".csv", ".txt", ".tsv", ".dat", ".log")
 SUFFIXES: Final = (".parquet", ".npz", *TEXT_SUFFIXES)
 
 Block = tuple[int, int, dict[str, NDArray[Any]]]
@@ -77,12 +76,12 @@ _ARRAYS: Final[Mapping[str, Callable[[Path], Source]]] = {".parquet": ParquetSou
 
 
 def open_source(path: Path) -> Source:
-    """Open a log file: Parquet and NPZ by their suffix, text by its content.
+    """Open a log: Parquet and NPZ by their suffix, other programs' files and text by their content, folders as one log.
 
     Raises
     ------
     InputError
-        The file is missing, empty, a directory or of no known format.
+        The file is missing, empty, damaged or of no known format.
     """
     if not path.exists():
         raise InputError(f"there is no file {path}", file=path, remedy="Check the name.")

@@ -16,7 +16,7 @@ from imufit.log.makers import maker_of
 from imufit.log.size import BLOCK_ROWS, size_in_words
 from imufit.log.time_unit import time_unit
 from imufit.log.units import conversion
-from imufit.log.words import names_time, strange, unit_of, words_of
+from imufit.log.words import time_columns, words_of
 from imufit.printable import NAME, printable
 
 _SHOWN: Final = 8
@@ -139,12 +139,7 @@ def _time_of(table: Table, fixed: str | None) -> tuple[str, NDArray[np.float64]]
     if table.time is not None:
         return table.time, np.asarray(table.columns[table.time], np.float64)
     names = list(table.columns)
-    found = []
-    for name in names:
-        words = words_of(name)
-        if not words.axis and names_time(words.words):
-            unit, rest = unit_of("t", words.words, words.bracket)
-            found.append((strange(rest), unit is None, name, unit))
+    found = [(odd, unit is None, name, unit) for name, unit, odd in time_columns(map(words_of, names))]
     if not found and all(name == f"c{k + 1}" for k, name in enumerate(names)):
         found = [(0, True, "c1", None)]
     for _, _, name, stated in sorted(found, key=lambda each: each[:2]):

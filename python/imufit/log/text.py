@@ -11,6 +11,8 @@ from imufit.log.named_values import is_table_line
 from imufit.log.record import find_record
 from imufit.log.transcript import TranscriptSource, lines_of
 
+TEXT_SUFFIXES: Final = (".csv", ".txt", ".tsv", ".dat", ".log")
+"""Suffixes that text of a log usually has; its content decides."""
 _SAMPLE: Final = 1 << 16
 _LINES: Final = 60
 

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from imufit.log.metadata import STANDARD_GRAVITY
 from imufit.log.unit_check import ACC_UNITS, GYR_UNITS, MAG_UNITS, field_ratio, rate_ratio, rest_norm
 
 Array = NDArray[np.float64]
@@ -33,7 +34,7 @@ def acc_unit(acc: Array) -> str | None:
         Readings as they stand in the file.
     """
     norm = rest_norm(acc)
-    known = ((9.80665, "", "m/s^2"), *ACC_UNITS)
+    known = ((STANDARD_GRAVITY, "", "m/s^2"), *ACC_UNITS)
     return next((unit for size, _, unit in known if abs(norm / size - 1.0) < _NEAR), None)
 
 

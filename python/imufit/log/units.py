@@ -189,6 +189,11 @@ def _positive(number: float, target: str, unit: str) -> float:
     return number
 
 
+def without_inner(text: str) -> str:
+    """Take the parentheses out of a unit: ``m/(s^2)`` becomes ``m/s^2``."""
+    return text.replace("(", "").replace(")", "")
+
+
 def _without_parentheses(text: str) -> str:
     text = text.strip()
     return text[1:-1] if text.startswith("(") and text.endswith(")") else text

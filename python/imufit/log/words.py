@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from imufit.log.units import lookup
+from imufit.log.units import lookup, without_inner
 
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _STUCK: Final = re.compile(r"(a|f|g|m|w|b|h|acc|accel|gyr|gyro|mag|magn|omega|raw)([xyz])")
@@ -283,13 +283,14 @@ def unit_of(group: str, rest: tuple[str, ...], bracket: str) -> tuple[str | None
     (unit or None, words)
         The words that are left.
     """
-    stated = lookup(bracket.replace("(", "").replace(")", "")) if bracket else None
-    unit = bracket.replace("(", "").replace(")", "") if stated is not None and stated[0] == _QUANTITY[group] else None
+    name = without_inner(bracket)
+    stated = lookup(name) if name else None
+    unit = name if stated is not None and stated[0] == _QUANTITY[group] else None
     for length in (3, 2, 1):
         tail = " ".join(rest[-length:])
-        for name, spellings in _UNIT_WORDS[group].items():
+        for known, spellings in _UNIT_WORDS[group].items():
             if len(rest) >= length and tail in spellings:
-                return unit or name, rest[:-length]
+                return unit or known, rest[:-length]
     return unit, rest
 
 
@@ -298,6 +299,21 @@ def strange(rest: tuple[str, ...]) -> int:
     return sum(word not in _NEUTRAL for word in rest)
 
 
-def names_time(words: tuple[str, ...]) -> bool:
-    """Whether a column is a time stamp by its words."""
+def time_columns(parsed: Iterable[Words]) -> list[tuple[str, str | None, int]]:
+    """Find the columns that are time stamps by their words.
+
+    Returns
+    -------
+    list of (column, unit, strange)
+        Each with the unit that its name states, None without, and the count of its strange words.
+    """
+    found = []
+    for words in parsed:
+        if not words.axis and _names_time(words.words):
+            unit, rest = unit_of("t", words.words, words.bracket)
+            found.append((words.column, unit, strange(rest)))
+    return found
+
+
+def _names_time(words: tuple[str, ...]) -> bool:
     return bool(set(words) & TIME_WORDS or {"sample", "fine"} <= set(words)) and not set(words) & _NO_TIME
