@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,7 +12,6 @@ from imufit.cli.arguments import (
     html_option,
     json_option,
     keep_inputs,
-    logs_argument,
     model_option,
     model_output,
     plot_option,
@@ -20,6 +20,10 @@ from imufit.cli.arguments import (
 from imufit.cli.names import check_effects
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.reading import logs_argument
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 
 @click.command(short_help="Add an effect, refit, show the error before, expected and after.")
@@ -34,7 +38,7 @@ def add(
     effect: str,
     logs: tuple[Path, ...],
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     model: Path | None,
     output: Path | None,
     json_file: Path | None,
@@ -49,7 +53,7 @@ def add(
     check_effects([effect])
     out = Output(json_file)
     with ProgressBar() as progress:
-        opened = engine.open_logs(logs, mapping)
+        opened = engine.open_logs(logs, reading)
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
         addition = fit.add(effect, progress=progress)
     out.say(addition.sentence, bold=True)

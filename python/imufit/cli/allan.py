@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs, log_argument, plot_option
+from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs, plot_option
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.reading import log_argument
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 
 @click.command(short_help="Noise density, bias instability and random walk of sensors at rest.")
@@ -33,7 +38,7 @@ from imufit.cli.progress import ProgressBar
 def allan(
     log: Path,
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     output: Path | None,
     settings_file: Path | None,
     json_file: Path | None,
@@ -46,7 +51,7 @@ def allan(
     keep_inputs([log], [output, settings_file, json_file, plot_file])
     out = Output(json_file)
     with ProgressBar() as progress:
-        recorded = engine.read_log(log, mapping)
+        recorded = engine.read_log(log, reading)
         found = engine.allan(recorded, progress)
     settings = engine.filter_noise(found)
     out.say(found.sentence, bold=True)

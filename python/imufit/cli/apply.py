@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import (
-    EXISTING,
-    LOG_ENDINGS,
-    OutputFile,
-    effects_from_option,
-    json_option,
-    keep_inputs,
-    log_argument,
-)
+from imufit.cli.arguments import EXISTING, LOG_ENDINGS, OutputFile, effects_from_option, json_option, keep_inputs
 from imufit.cli.output import Output
+from imufit.cli.reading import log_argument
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 
 @click.command(short_help="A log with the model's effects taken out of its readings.")
@@ -27,7 +24,7 @@ from imufit.cli.output import Output
     "-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="OUT", help="Write the corrected log."
 )
 @json_option
-def apply(model: Path, log: Path, *, mapping: tuple[str, ...], output: Path, json_file: Path | None) -> None:
+def apply(model: Path, log: Path, *, reading: Reading, output: Path, json_file: Path | None) -> None:
     """Take the effects of MODEL out of the readings of LOG; rows and all other columns stay as they are."""
     from imufit.figures import quantity  # noqa: PLC0415
     from imufit.results import Table  # noqa: PLC0415
@@ -35,7 +32,7 @@ def apply(model: Path, log: Path, *, mapping: tuple[str, ...], output: Path, jso
     keep_inputs([model, log], [output, json_file])
     out = Output(json_file)
     stack = engine.sensor_model(path=model)
-    recorded = engine.read_log(log, mapping)
+    recorded = engine.read_log(log, reading)
     corrected = stack.apply(recorded)
     changes = engine.changes(recorded, corrected)
     out.say(f"{corrected.n} rows: {' + '.join(stack.effects) or 'no effect'} taken out.", bold=True)

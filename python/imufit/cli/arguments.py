@@ -134,41 +134,6 @@ class OutputDirectory(click.ParamType):  # type: ignore[type-arg]
 
 
 EXISTING = NamedFile(exists=True)
-LOG = NamedFile(exists=True, folder=True)
-"""A log, or a folder of files that make one."""
-
-
-def map_option(command: Command) -> Command:
-    """Add --map."""
-    return click.option(
-        "--map",
-        "mapping",
-        multiple=True,
-        metavar="COL=NAME[unit]",
-        help="Column COL of the log is the file's column NAME in that unit, e.g. acc_x=AccX[g], or a number in every "
-        "row, e.g. temp=21. Repeatable.",
-    )(command)
-
-
-def log_argument(command: Command) -> Command:
-    """Add LOG and --map."""
-    command = map_option(command)
-    return click.argument("log", metavar="LOG", type=LOG)(command)
-
-
-def logs_argument(command: Command) -> Command:
-    """Add LOG... and --map: one log, or several of one sensor."""
-    command = map_option(command)
-    return click.argument("logs", metavar="LOG...", type=LOG, nargs=-1, required=True, callback=_each_once)(command)
-
-
-def _each_once(_ctx: click.Context, _param: click.Parameter, logs: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Refuse a file that is named twice: its rows must not count twice."""
-    known = [identity(path) for path in logs]
-    for k, path in enumerate(logs):
-        if known[k] in known[:k]:
-            raise click.UsageError(f"{str(path)!r} is named twice: each log counts once")
-    return logs
 
 
 def title_of(logs: Sequence[Path]) -> str:

@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import (
-    EXISTING,
     LOG_ENDINGS,
     OutputFile,
     Real,
     Whole,
     json_option,
     keep_inputs,
-    map_option,
     model_output,
     plot_option,
 )
 from imufit.cli.live_screen import LiveScreen
 from imufit.cli.output import Output
+from imufit.cli.reading import LOG, reading_options
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 
 @click.command(short_help="Calibrate accelerometer, gyro and magnetometer.")
-@click.argument("logs", metavar="LOG...", type=EXISTING, nargs=-1)
-@map_option
+@click.argument("logs", metavar="LOG...", type=LOG, nargs=-1)
+@reading_options
 @click.option(
     "--cost",
     type=click.Choice(["vector", "magnitude"]),
@@ -65,7 +67,7 @@ from imufit.cli.output import Output
 def calibrate(
     logs: tuple[Path, ...],
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     cost: str | None,
     sensors: tuple[str, ...],
     hold: float | None,
@@ -90,16 +92,18 @@ def calibrate(
         if not logs:
             raise click.UsageError("name a LOG, or a device with --live PORT")
         keep_inputs(logs, [output, json_file, plot_file])
-        read = [engine.read_log(path, mapping) for path in logs]
+        read = [engine.read_log(path, reading) for path in logs]
         result = engine.calibrate(read, cost, sensors, settings)
     else:
         if logs:
             raise click.UsageError("calibrate either a LOG or a device with --live PORT")
+        if reading.frame or reading.noise or reading.drop:
+            raise click.UsageError("--frame, --noise and --drop are for a LOG, not for --live PORT")
         keep = _place_of(given.pop("keep", None), output)
         keep_inputs([], [output, json_file, plot_file, keep])
         with LiveScreen(quiet=str(json_file) == "-") as screen:
             result, log = engine.calibrate_live(
-                port, keep, mapping, cost=cost, sensors=sensors, settings=settings, show=screen, **given
+                port, keep, reading.mapping, cost=cost, sensors=sensors, settings=settings, show=screen, **given
             )
         read = [log]
         out.wrote(keep)

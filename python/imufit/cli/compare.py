@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import html_option, json_option, keep_inputs, log_argument, model_option, plot_option
+from imufit.cli.arguments import html_option, json_option, keep_inputs, model_option, plot_option
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.reading import log_argument
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 
 @click.command(short_help="Where the model fails: by channel, segment and covariate.")
@@ -21,7 +26,7 @@ from imufit.cli.progress import ProgressBar
 def compare(
     log: Path,
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     model: Path | None,
     json_file: Path | None,
     html_file: Path | None,
@@ -31,7 +36,7 @@ def compare(
     keep_inputs([log, model], [json_file, html_file, plot_file])
     output = Output(json_file)
     with ProgressBar() as progress:
-        opened = engine.open_log(log, mapping)
+        opened = engine.open_log(log, reading)
         comparison = engine.sensor_model(path=model).compare(opened, progress=progress)
     first, *others = comparison.sentences()
     output.say(first, bold=True)

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import LOG, LOG_ENDINGS, OutputFile, json_option, keep_inputs, map_option
+from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs
 from imufit.cli.output import Output
+from imufit.cli.reading import LOG, reading_options
 from imufit.printable import NAME, printable
 
 if TYPE_CHECKING:
-    from imufit.log import Contents
+    from imufit.log import Contents, Reading
     from imufit.log.contents import ColumnContents
     from imufit.results import Table
 
@@ -39,12 +40,12 @@ class RowRange(click.ParamType):  # type: ignore[type-arg]
 
 @click.command(short_help="Another maker's file, a text table or a serial transcript becomes a log.")
 @click.argument("file", metavar="FILE", type=LOG)
-@map_option
+@reading_options
 @click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
 @click.option("--rows", type=RowRange(), metavar="FIRST:STOP", help="Take these rows alone, counted from 0.")
 @json_option
 def convert(
-    file: Path, *, mapping: tuple[str, ...], output: Path, rows: tuple[int, int] | None, json_file: Path | None
+    file: Path, *, reading: Reading, output: Path, rows: tuple[int, int] | None, json_file: Path | None
 ) -> None:
     """Make a log of FILE: a table of numbers, a serial transcript with named values, or another log.
 
@@ -55,7 +56,7 @@ def convert(
     """
     keep_inputs([file], [output, json_file])
     out = Output(json_file)
-    log = engine.open_log(file, mapping)
+    log = engine.open_log(file, reading)
     if rows is not None:
         log = engine.some_rows(log, rows)
     found = engine.contents(log)

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import (
-    html_option,
-    json_option,
-    keep_inputs,
-    logs_argument,
-    model_option,
-    plot_option,
-    title_of,
-)
+from imufit.cli.arguments import html_option, json_option, keep_inputs, model_option, plot_option, title_of
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.reading import logs_argument
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 
 @click.command(short_help="Which effect is missing, with its expected gain.")
@@ -29,7 +26,7 @@ from imufit.cli.progress import ProgressBar
 def diagnose(
     logs: tuple[Path, ...],
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     model: Path | None,
     json_file: Path | None,
     html_file: Path | None,
@@ -46,7 +43,7 @@ def diagnose(
     keep_inputs([*logs, model], [json_file, html_file, plot_file])
     output = Output(json_file)
     with ProgressBar() as progress:
-        opened = engine.open_logs(logs, mapping)
+        opened = engine.open_logs(logs, reading)
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
         diagnosis = fit.diagnose(progress=progress)
         compared = html_file is not None and diagnosis.evidence == "reference"

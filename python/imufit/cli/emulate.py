@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import NamedFile, OutputFile, Real, Whole, json_option, keep_inputs, map_option
+from imufit.cli.arguments import NamedFile, OutputFile, Real, Whole, json_option, keep_inputs
 from imufit.cli.output import Output
+from imufit.cli.reading import reading_options
 from imufit.cli.simulate import chosen_effects
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 DEVICES = ("floats", "mpu6050", "gy86")
 FORMS = ("binary", "text")
@@ -47,7 +51,7 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
 
 @click.command(short_help="A device without hardware: a scenario or a log on a pty or socket.")
 @click.argument("source", metavar="SCENARIO|LOG")
-@map_option
+@reading_options
 @click.option("--on", default="pty", show_default=True, metavar="pty|socket://127.0.0.1:PORT", help="Where it is read.")
 @click.option(
     "--link",
@@ -94,7 +98,7 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
 def emulate(
     source: str,
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     tick: int,
     clock_drift: float,
     clock_jitter: float,
@@ -115,12 +119,12 @@ def emulate(
     out = Output(json_file)
     device = engine.emulator(
         source,
+        reading,
         faults=faults,
         fault_rates=fault_rates,
         clock={"tick": tick, "drift": clock_drift, "jitter": clock_jitter, "start": clock_start},
         effects=chosen_effects(effects),
         sent=sent or False,
-        mapping=mapping,
         **options,
     )
     with engine.running(device):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from imufit.emulate import Emulator
     from imufit.grade import BlindGrade
     from imufit.joining import Joined
-    from imufit.log import Contents, Log
+    from imufit.log import Contents, Log, Reading
     from imufit.log.metadata import Frame
     from imufit.results import EffectCard, Ladder, LogInfo, Recording
     from imufit.simulate import Grade, Simulation, Truth
@@ -21,27 +21,35 @@ if TYPE_CHECKING:
 Progress = Callable[[int, int, str], None]
 
 
-def open_log(path: Path, mapping: Sequence[str] = ()) -> Any:
-    """Open a log; `mapping` holds texts such as ``acc_x=AccX[g]``."""
-    from imufit.log import open_log, parse_mapping  # noqa: PLC0415
+def reading(mapping: Sequence[str], frame: Frame | None, noise: Sequence[str], drop: Sequence[str]) -> Reading:
+    """Return how a log is to be read; `mapping` and `noise` hold texts such as ``acc_x=AccX[g]`` and ``acc=0.02``."""
+    from imufit.log import Reading  # noqa: PLC0415
 
-    return open_log(path, mapping=parse_mapping(*mapping) or None)
+    return Reading.of_texts(mapping, frame, noise, drop)
 
 
-def open_logs(paths: Sequence[Path], mapping: Sequence[str] = ()) -> list[Any]:
-    """Open logs of one sensor; `mapping` as for `open_log`."""
-    return [open_log(path, mapping) for path in paths]
+def open_log(path: Path, reading: Reading | None = None) -> Any:
+    """Open a log, as it is to be read."""
+    from imufit.log import Reading, open_log  # noqa: PLC0415
+
+    way = reading or Reading()
+    return open_log(path, way.mapping, frame=way.frame, noise=way.noise, drop=way.drop)
+
+
+def open_logs(paths: Sequence[Path], reading: Reading) -> list[Any]:
+    """Open logs of one sensor, all read the same way."""
+    return [open_log(path, reading) for path in paths]
 
 
 def read_log(
     path: Path,
-    mapping: Sequence[str] = (),
+    reading: Reading,
     more: int = 0,
     gigabytes: float = 1.0,
     option: str = "",
     bare: bool = False,
 ) -> Log:
-    """Read a whole log into memory; `mapping` as for `open_log`, `more` the bytes that will be made of each row.
+    """Read a whole log into memory; `more` are the bytes that will be made of each row.
 
     A `bare` one needs neither a sensor nor a reference.
 
@@ -52,9 +60,10 @@ def read_log(
     InputError
         It is too large for that.
     """
-    from imufit.log import LogStream, parse_mapping  # noqa: PLC0415
+    from imufit.log import LogStream  # noqa: PLC0415
 
-    return LogStream(path, mapping=parse_mapping(*mapping) or None, bare=bare).held(more, gigabytes, option)
+    stream = LogStream(path, reading.mapping, bare, frame=reading.frame, noise=reading.noise, drop=reading.drop)
+    return stream.held(more, gigabytes, option)
 
 
 def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], settings: Mapping[str, float]) -> Any:
@@ -65,32 +74,21 @@ def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], set
 
 
 def calibrate_live(
-    port: str, keep: Path, mapping: Sequence[str], *, sensors: Sequence[str], **options: Any
+    port: str, keep: Path, mapping: Mapping[str, str] | None, *, sensors: Sequence[str], **options: Any
 ) -> tuple[Any, Log]:
     """Guide through a calibration of the device at `port`; return it and the log that was kept."""
     from imufit.calibrate import calibrate_live  # noqa: PLC0415
-    from imufit.log import parse_mapping  # noqa: PLC0415
 
     chosen = sensors or ("acc", "gyr", "mag")
-    return calibrate_live(port, keep, mapping=parse_mapping(*mapping) or None, sensors=chosen, **options)
+    return calibrate_live(port, keep, mapping=mapping, sensors=chosen, **options)
 
 
-def reference_log(
-    path: Path,
-    mapping: Sequence[str],
-    attitude: tuple[str, tuple[str, ...]] | None,
-    inverse: bool,
-    frame: Frame | None,
-) -> Log:
+def reference_log(path: Path, reading: Reading, attitude: tuple[str, tuple[str, ...]] | None, inverse: bool) -> Log:
     """Read a reference; its attitude stands in the columns of its kind, or in those of a log."""
-    from dataclasses import replace  # noqa: PLC0415
-
     from imufit.joining import with_attitude  # noqa: PLC0415
 
-    log = read_log(path, mapping, bare=True)
-    if attitude is not None:
-        log = with_attitude(log, *attitude, inverse=inverse)
-    return log if frame is None else replace(log, metadata=replace(log.metadata, frame=frame))
+    log = read_log(path, reading, bare=True)
+    return log if attitude is None else with_attitude(log, *attitude, inverse=inverse)
 
 
 def join(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joined:
@@ -391,7 +389,13 @@ def save_simulation(simulation: Simulation, path: Path) -> Path:
 
 
 def emulator(
-    source: str, *, faults: Sequence[str], fault_rates: Sequence[str], clock: Mapping[str, Any], **settings: Any
+    source: str,
+    reading: Reading,
+    *,
+    faults: Sequence[str],
+    fault_rates: Sequence[str],
+    clock: Mapping[str, Any],
+    **settings: Any,
 ) -> Emulator:
     """Return a device without hardware, not yet plugged in; faults and their rates as on the command line.
 
@@ -401,9 +405,17 @@ def emulator(
         It cannot be emulated; the message says why.
     """
     from imufit.emulate import Clock, Emulator, parse_fault_rate  # noqa: PLC0415
+    from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.log import Reading  # noqa: PLC0415
+    from imufit.simulate import SCENARIOS  # noqa: PLC0415
 
     rates = dict(parse_fault_rate(text) for text in fault_rates)
-    return Emulator(source, faults=faults, fault_rates=rates, clock=Clock(**clock), **settings)
+    given: str | Log = source
+    if source not in SCENARIOS and Path(source).exists():
+        given = read_log(Path(source), reading)
+    elif reading != Reading():
+        raise InputError("--map, --frame, --noise and --drop are for a log", remedy="Leave them out for a scenario.")
+    return Emulator(given, faults=faults, fault_rates=rates, clock=Clock(**clock), **settings)
 
 
 @contextmanager
@@ -456,7 +468,7 @@ def grade_blind(*, sets: Sequence[str], logs: int, seed: int, processes: int | N
 
 
 def status_line(mapping: Sequence[str], quiet: bool, **options: Any) -> Any:
-    """Return the status line of a recording; `mapping` as for `open_log`."""
+    """Return the status line of a recording; `mapping` holds texts such as ``acc_x=AccX[g]``."""
     from imufit.log import parse_mapping  # noqa: PLC0415
     from imufit.record.status import StatusLine  # noqa: PLC0415
 
@@ -472,7 +484,7 @@ def rig(axis: str, angle: str, say: Callable[[str], None]) -> Any:
 
 
 def record(port: str, path: Path, mapping: Sequence[str], **options: Any) -> Recording:
-    """Record a device; `mapping` as for `open_log`."""
+    """Record a device; `mapping` as for `status_line`."""
     from imufit.log import parse_mapping  # noqa: PLC0415
     from imufit.record import record  # noqa: PLC0415
 
@@ -487,7 +499,7 @@ def recover(file: Path, path: Path | None, **options: Any) -> Recording:
 
 
 def monitor(port: str, filters: Sequence[str], mapping: Sequence[str], model: Any, **options: Any) -> Iterator[Any]:
-    """Give states of a device until it is stopped; `mapping` as for `open_log`."""
+    """Give states of a device until it is stopped; `mapping` as for `status_line`."""
     from imufit.log import parse_mapping  # noqa: PLC0415
     from imufit.monitor import Monitor  # noqa: PLC0415
     from imufit.record.signals import requests_to_end  # noqa: PLC0415

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import effects_from_option, json_option, keep_inputs, logs_argument, model_output, plot_option
+from imufit.cli.arguments import effects_from_option, json_option, keep_inputs, model_output, plot_option
 from imufit.cli.names import check_effects
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.reading import logs_argument
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 
 @click.command(short_help="Fit a stack of effects.")
@@ -25,7 +30,7 @@ from imufit.cli.progress import ProgressBar
 def fit(
     logs: tuple[Path, ...],
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     effects: tuple[str, ...],
     output: Path | None,
     json_file: Path | None,
@@ -46,7 +51,7 @@ def fit(
     check_effects(names)
     out = Output(json_file)
     with ProgressBar() as progress:
-        fitted = engine.sensor_model(names).fit(engine.open_logs(logs, mapping), progress=progress)
+        fitted = engine.sensor_model(names).fit(engine.open_logs(logs, reading), progress=progress)
     out.say(f"{' + '.join(names)}: residual {quantity.ratio(fitted.ratio)} times the noise floor.", bold=True)
     out.table(parameter_table(fitted.parameters, "Fitted parameters"))
     out.table(log_table(fitted.by_log))

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import effects_from_option, json_option, keep_inputs, log_argument
+from imufit.cli.arguments import effects_from_option, json_option, keep_inputs
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.reading import log_argument
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 
 @click.command(short_help="What is in a log: rates, gaps, rests, reference, and the effects that it can show.")
@@ -17,7 +22,7 @@ from imufit.cli.progress import ProgressBar
 @click.option("--quick", is_flag=True, help="Leave out which effects the log can show, which takes most of the time.")
 @effects_from_option
 @json_option
-def info(log: Path, *, mapping: tuple[str, ...], quick: bool, json_file: Path | None) -> None:
+def info(log: Path, *, reading: Reading, quick: bool, json_file: Path | None) -> None:
     """Tell what is in LOG, and which effects it can and cannot show.
 
     An effect can be shown if its typical size stands out from the noise of this log: its parameters' standard errors
@@ -26,7 +31,7 @@ def info(log: Path, *, mapping: tuple[str, ...], quick: bool, json_file: Path | 
     keep_inputs([log], [json_file])
     out = Output(json_file)
     with ProgressBar() as progress:
-        found = engine.info(engine.open_log(log, mapping), effects=not quick, progress=progress)
+        found = engine.info(engine.open_log(log, reading), effects=not quick, progress=progress)
     first, *others = found.sentences()
     out.say(first, bold=True)
     out.say(*others, *found.remarks())

@@ -8,20 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import (
-    LOG,
-    LOG_ENDINGS,
-    OutputFile,
-    json_option,
-    keep_inputs,
-    map_option,
-    plot_option,
-)
+from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs, plot_option
 from imufit.cli.output import Output
+from imufit.cli.reading import LOG, reading_options
 from imufit.whole_file import identity
 
 if TYPE_CHECKING:
-    from imufit.log.metadata import Frame
+    from imufit.log import Reading
 
 
 class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
@@ -48,13 +41,16 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
 @click.command(short_help="A sensor's log and somebody else's reference, on two clocks, become one log.")
 @click.argument("sensor", metavar="SENSOR", type=LOG)
 @click.argument("reference", metavar="REFERENCE", type=LOG)
-@map_option
+@reading_options
 @click.option(
     "--reference-map",
     "reference_mapping",
     multiple=True,
     metavar="COL=NAME[unit]",
     help="The same for the columns of REFERENCE, e.g. ref_qw=w. Repeatable. Where REFERENCE is SENSOR, --map holds.",
+)
+@click.option(
+    "--reference-drop", multiple=True, metavar="COLUMN", help="Leave this column of REFERENCE out. Repeatable."
 )
 @click.option(
     "--attitude",
@@ -65,7 +61,6 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
     "euler-ZYX:YAW[deg],PITCH[deg],ROLL[deg] (capitals: about the turned axes), angle-x:ANGLE[deg].",
 )
 @click.option("--inverse", is_flag=True, help="The attitude turns vectors of the reference frame into the body.")
-@click.option("--frame", type=click.Choice(("NED", "ENU", "NWU")), help="Frame of the reference attitude.")
 @click.option("--lag", type=float, metavar="S", help="Time by which the reference's stamps are late, if it is known.")
 @click.option("--skew", type=float, metavar="PPM", help="How much the reference's clock is fast, if it is known.")
 @click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
@@ -75,11 +70,11 @@ def join(
     sensor: Path,
     reference: Path,
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     reference_mapping: tuple[str, ...],
+    reference_drop: tuple[str, ...],
     attitude: tuple[str, tuple[str, ...]] | None,
     inverse: bool,
-    frame: Frame | None,
     lag: float | None,
     skew: float | None,
     output: Path,
@@ -93,11 +88,13 @@ def join(
     """
     keep_inputs([sensor, reference], [output, json_file, plot_file])
     out = Output(json_file)
-    log = engine.read_log(sensor, mapping)
+    log = engine.read_log(sensor, reading)
     if not reference_mapping and identity(reference) == identity(sensor):
         # One log whose reference is late: its columns are the same, whoever asks for them.
-        reference_mapping = mapping
-    other = engine.reference_log(reference, reference_mapping, attitude, inverse, frame)
+        own = reading
+    else:
+        own = engine.reading(reference_mapping, reading.frame, (), reference_drop)
+    other = engine.reference_log(reference, own, attitude, inverse)
     found = engine.join(log, other, lag, None if skew is None else 1e-6 * skew)
     engine.write_log(found.log, output)
     out.say(found.sentence, bold=True)

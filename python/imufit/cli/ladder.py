@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,7 +12,6 @@ from imufit.cli.arguments import (
     html_option,
     json_option,
     keep_inputs,
-    logs_argument,
     model_option,
     model_output,
     plot_option,
@@ -19,6 +19,10 @@ from imufit.cli.arguments import (
 )
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.reading import logs_argument
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 
 @click.command(short_help="Repeat diagnose and add until nothing is missing.")
@@ -31,7 +35,7 @@ from imufit.cli.progress import ProgressBar
 def ladder(
     logs: tuple[Path, ...],
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     model: Path | None,
     output: Path | None,
     json_file: Path | None,
@@ -45,7 +49,7 @@ def ladder(
     keep_inputs(logs, [output, json_file, html_file, plot_file])
     out = Output(json_file)
     with ProgressBar() as progress:
-        opened = engine.open_logs(logs, mapping)
+        opened = engine.open_logs(logs, reading)
         start = engine.sensor_model(path=model) if model is not None else None
         result = engine.ladder(opened, start, progress)
     verdict, *rest = result.sentences()

@@ -10,10 +10,11 @@ import click
 import numpy as np
 
 from imufit.cli import engine
-from imufit.cli.arguments import EXISTING, Real, effects_from_option, json_option, keep_inputs, map_option
+from imufit.cli.arguments import EXISTING, Real, effects_from_option, json_option, keep_inputs
 from imufit.cli.names import FILTERS, KnownList
 from imufit.cli.output import Output
 from imufit.cli.port import duration_option, frame_option, port_argument
+from imufit.cli.reading import map_option
 from imufit.printable import printable
 
 if TYPE_CHECKING:

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import PLOT_ENDINGS, OutputFile, Real, keep_inputs, log_argument
+from imufit.cli.arguments import PLOT_ENDINGS, OutputFile, Real, keep_inputs
 from imufit.cli.convert import RowRange
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.reading import log_argument
 
 if TYPE_CHECKING:
     from imufit.inspection.plot import Show
+    from imufit.log import Reading
 
 
 class ColumnNames(click.ParamType):  # type: ignore[type-arg]
@@ -60,7 +62,7 @@ class ColumnNames(click.ParamType):  # type: ignore[type-arg]
 def plot(
     log: Path,
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     output: Path | None,
     columns: tuple[tuple[str, ...], ...],
     show: Show,
@@ -78,7 +80,7 @@ def plot(
     out = Output()
     with ProgressBar() as progress:
         figure = engine.plot(
-            engine.open_log(log, mapping),
+            engine.open_log(log, reading),
             progress,
             columns=tuple(dict.fromkeys(name for names in columns for name in names)),
             show=show,

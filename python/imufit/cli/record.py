@@ -7,9 +7,10 @@ from pathlib import Path
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs, map_option
+from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs
 from imufit.cli.output import Output
 from imufit.cli.port import duration_option, frame_option, port_argument
+from imufit.cli.reading import map_option
 
 
 @click.command(short_help="From a serial device to a log that cannot be lost.")

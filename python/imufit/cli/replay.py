@@ -16,15 +16,16 @@ from imufit.cli.arguments import (
     effects_from_option,
     json_option,
     keep_inputs,
-    log_argument,
     plot_option,
 )
 from imufit.cli.names import FILTERS, KnownList
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.reading import log_argument
 from imufit.cli.settings import set_option, settings_from
 
 if TYPE_CHECKING:
+    from imufit.log import Reading
     from imufit.results import Table
 
 _MADE = 100
@@ -77,7 +78,7 @@ _MADE = 100
 def replay(
     log: Path,
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     filters: tuple[tuple[str, ...], ...],
     model_file: Path | None,
     assignments: tuple[str, ...],
@@ -100,7 +101,7 @@ def replay(
     for group, values in settings_from(assignments).items():
         settings[group] = {**settings.get(group, {}), **values}
     out = Output(json_file)
-    rows = engine.read_log(log, mapping, _MADE * len(names or FILTERS), memory, "--memory")
+    rows = engine.read_log(log, reading, _MADE * len(names or FILTERS), memory, "--memory")
     if model_file is not None:
         model = engine.sensor_model(path=model_file)
         rows = model.apply(rows)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import OutputFile, Real, json_option, keep_inputs, log_argument, plot_option
+from imufit.cli.arguments import OutputFile, Real, json_option, keep_inputs, plot_option
 from imufit.cli.names import FILTERS, Known
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
+from imufit.cli.reading import log_argument
 from imufit.cli.settings import set_option, settings_from
+
+if TYPE_CHECKING:
+    from imufit.log import Reading
 
 
 @click.command(short_help="Gains of a filter: by its error, or without reference by its predictions.")
@@ -59,7 +64,7 @@ from imufit.cli.settings import set_option, settings_from
 def tune(
     log: Path,
     *,
-    mapping: tuple[str, ...],
+    reading: Reading,
     filter_name: str,
     gains: tuple[str, ...],
     assignments: tuple[str, ...],
@@ -77,7 +82,7 @@ def tune(
     out = Output(json_file)
     with ProgressBar() as progress:
         found = engine.tune(
-            engine.read_log(log, mapping),
+            engine.read_log(log, reading),
             filter_name,
             progress,
             by=by,

@@ -5,6 +5,7 @@ from imufit.log.contents import Contents, contents
 from imufit.log.excerpt import judged_rows
 from imufit.log.log import Chunk, Log, LogSource, concatenate, whole
 from imufit.log.metadata import Metadata
+from imufit.log.reading import Reading, parse_noise
 from imufit.log.segments import gaps
 from imufit.log.some_rows import SomeRows
 from imufit.log.stream import LogStream, open_log, read
@@ -18,6 +19,7 @@ __all__ = [
     "LogSource",
     "LogStream",
     "Metadata",
+    "Reading",
     "SomeRows",
     "concatenate",
     "contents",
@@ -25,6 +27,7 @@ __all__ = [
     "judged_rows",
     "open_log",
     "parse_mapping",
+    "parse_noise",
     "read",
     "whole",
 ]

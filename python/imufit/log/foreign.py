@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -116,7 +116,12 @@ class Plan:
 
 
 def plan_columns(
-    names: Sequence[str], mapping: Mapping[str, str] | None, place: Place, bare: bool = False, rest: bool = True
+    names: Sequence[str],
+    mapping: Mapping[str, str] | None,
+    place: Place,
+    bare: bool = False,
+    rest: bool = True,
+    dropped: Collection[str] = (),
 ) -> Plan:
     """Decide which columns of the file become which columns of the log.
 
@@ -132,6 +137,8 @@ def plan_columns(
         True if the file needs neither a sensor nor a reference: what it has becomes covariates.
     rest : bool
         Whether columns that are neither mapped nor a log's own become covariates.
+    dropped : collection of str
+        Columns to leave out, of the file and of the log.
 
     Raises
     ------
@@ -144,21 +151,31 @@ def plan_columns(
             raise place.error(
                 f"column {shown[name]} is there twice", column=name, remedy="Rename or delete one of them."
             )
-    mapped = [_resolve(target, text, names, place) for target, text in (mapping or {}).items()]
+    resolved = [_resolve(target, text, names, place) for target, text in (mapping or {}).items()]
+    mapped = [column for column in resolved if column.target not in dropped]
+    for column in mapped:
+        if column.name in dropped:
+            raise place.error(
+                f"column {column.name} is to be left out, but the mapping takes {column.target} from it",
+                column=column.name,
+                remedy="Choose one of them.",
+            )
+    # What was only read for a column that is left out is no covariate either.
+    dropped = {*dropped, *(column.origin for column in resolved if column.target in dropped)}
     targets = {column.target for column in mapped}
     used = {column.name for column in mapped if column.name is not None}
-    kept = [PlannedColumn(shown[name], name, Conversion()) for name in names if name not in targets | used]
+    kept = [PlannedColumn(shown[name], name, Conversion()) for name in names if name not in {*targets, *used, *dropped}]
     for column in mapped:
         if column.target not in CONTRACT and column.target != column.name and (close := meant(column.target)):
             raise place.error(
                 f"the mapping makes a column {column.target}; did you mean {close}?", column=column.target
             )
-    lost = [shown[name] for name in names if name in targets - used]
+    lost = [shown[name] for name in names if name in targets - used and name not in dropped]
     changed = [column.target for column in kept if column.target != column.name]
     for index, name in enumerate(changed):
         if name in changed[:index] or name in names or name in targets:
             raise place.error(f"column {name} is there twice", column=name, remedy="Give these columns other names.")
-    unused = [shown[n] for n in names if n not in used]
+    unused = [shown[n] for n in names if n not in used and n not in dropped]
     if not rest:
         kept = [column for column in kept if column.target in CONTRACT]
     columns = [*mapped, *kept]

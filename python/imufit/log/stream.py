@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from imufit.log.assemble import check_truth_values, fields_of, time_of
+from imufit.log.columns import CONTRACT, EULER
 from imufit.log.cut import cut
 from imufit.log.foreign import plan_columns
 from imufit.log.log import Chunk, Log, concatenate, gathered
-from imufit.log.metadata import Metadata, read_metadata, sidecar_path
+from imufit.log.metadata import Frame, Metadata, read_metadata, read_sidecar, sidecar_path
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.place import Place
-from imufit.log.recognise import recognise
+from imufit.log.reading import Reading
+from imufit.log.recognise import Readable, recognise
 from imufit.log.size import HELD, KEPT, NUMBER, TEXT_CELL, size_in_words
 from imufit.log.source import open_source
 from imufit.log.tables import TablesSource
@@ -37,18 +42,35 @@ class LogStream:
         Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
     bare : bool
         True if the file needs neither a sensor nor a reference: what it has becomes covariates.
+    frame, noise, drop
+        As for `Reading`.
     """
 
-    def __init__(self, path: str | Path, mapping: Mapping[str, str] | None = None, bare: bool = False) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        mapping: Mapping[str, str] | None = None,
+        bare: bool = False,
+        *,
+        frame: Frame | None = None,
+        noise: Mapping[str, float] | None = None,
+        drop: str | Sequence[str] = (),
+    ) -> None:
+        reading = Reading(mapping, frame, noise or {}, (drop,) if isinstance(drop, str) else tuple(drop))
         self._path = Path(path)
         self._source = open_source(self._path)
         self._place = Place(self._path, self._source.line_of)
-        found = recognise(self._source, mapping, self._place)
+        names = self._source.names
+        dropped = reading.dropped(names, [*CONTRACT, *EULER, *(mapping or {})], self._place)
+        found = recognise(_Left(self._source, dropped) if dropped else self._source, mapping, self._place)
+        dropped = reading.dropped(names, found.mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
-        self._plan = plan_columns(self._source.names, found.mapping, self._place, bare, rest=bare or not several)
+        rest = bare or not several
+        self._plan = plan_columns(names, found.mapping, self._place, bare, rest=rest, dropped=dropped)
         if isinstance(self._source, TablesSource):
             self._source.choose(self._plan.sources)
-        self._metadata = read_metadata(self._path, self._source.embedded)
+        stated = read_metadata(self._path, self._source.embedded)
+        self._metadata = reading.metadata(stated)
         self._repair = self._scan()
         head = self._head()
         # what says of itself that it is a log may have rows as far apart as it says
@@ -56,7 +78,8 @@ class LogStream:
         clock: Clock = "stated" if "t" in found.mapping else "a log's" if is_log else "open"
         odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin, clock)
         self._columns = head.columns
-        notes = (*self._source.notes, *found.notes, *self._plan.notes, self._repair.note, *odd)
+        told = reading.notes({**self._source.embedded, **read_sidecar(self._path)}, self._place)
+        notes = (*self._source.notes, *found.notes, *told, *self._plan.notes, self._repair.note, *odd)
         if "ref_angle" in self._columns and "ref_qw" not in self._columns:
             notes = (*notes, f"{self._place.name}: ref_angle makes no reference without the metadata rig_axis")
         self._notes = tuple(note for note in notes if note)
@@ -185,7 +208,32 @@ class LogStream:
         return f"LogStream({self._path.name}: {self.n} rows; {', '.join(self._columns)}; {self._metadata.frame})"
 
 
-def open_log(path: str | Path, mapping: Mapping[str, str] | None = None, stream: bool | None = None) -> Log | LogStream:
+class _Left:
+    """A source without the columns that are left out, for recognising the others."""
+
+    def __init__(self, source: Readable, dropped: Collection[str]) -> None:
+        self._source = source
+        self._dropped = frozenset(dropped)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Columns of the file that are not left out."""
+        return tuple(name for name in self._source.names if name not in self._dropped)
+
+    def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
+        """First pass over the file, with the named columns only."""
+        return self._source.scan(columns)
+
+
+def open_log(
+    path: str | Path,
+    mapping: Mapping[str, str] | None = None,
+    stream: bool | None = None,
+    *,
+    frame: Frame | None = None,
+    noise: Mapping[str, float] | None = None,
+    drop: str | Sequence[str] = (),
+) -> Log | LogStream:
     """Open a log file, in memory or as a stream.
 
     Parameters
@@ -197,14 +245,23 @@ def open_log(path: str | Path, mapping: Mapping[str, str] | None = None, stream:
     stream : bool, optional
         Whether to leave the log on disk; None does so if it would take more than 200 MB of memory, which its rows and
         columns tell.
+    frame, noise, drop
+        As for `read`.
     """
-    log = LogStream(path, mapping)
+    log = LogStream(path, mapping, frame=frame, noise=noise, drop=drop)
     if stream is None:
         stream = log.size > HELD
     return log if stream else log.read()
 
 
-def read(path: str | Path, mapping: Mapping[str, str] | None = None) -> Log:
+def read(
+    path: str | Path,
+    mapping: Mapping[str, str] | None = None,
+    *,
+    frame: Frame | None = None,
+    noise: Mapping[str, float] | None = None,
+    drop: str | Sequence[str] = (),
+) -> Log:
     """Read a log file into memory.
 
     Parameters
@@ -213,10 +270,18 @@ def read(path: str | Path, mapping: Mapping[str, str] | None = None) -> Log:
         Parquet, NPZ or text file.
     mapping : mapping, optional
         Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
+    frame : {"NED", "ENU", "NWU"}, optional
+        Reference frame, whatever the file states.
+    noise : mapping, optional
+        White noise standard deviation of one sample of "acc" (m/s^2), "gyr" (rad/s) and "mag" (uT), whatever the file
+        states.
+    drop : str or sequence of str, optional
+        Columns to leave out, of the file or of the log; "acc", "gyr", "mag", "ref_q" and "ref_p" stand for all of
+        that group.
 
     Raises
     ------
     InputError
         The file cannot be used; the message names row, column and remedy.
     """
-    return LogStream(path, mapping).read()
+    return LogStream(path, mapping, frame=frame, noise=noise, drop=drop).read()
