@@ -88,27 +88,46 @@ class Reading:
         """
         shown = {printable(name, NAME): name for name in names}
         known = dict.fromkeys([*shown, *targets])
+        by_words: dict[str, list[str]] = {}
+        for name in names:
+            by_words.setdefault(_column_meant(name), []).append(name)
         found: set[str] = set()
         for text in self.drop:
             whole = text.strip() in known
             for name in [text.strip()] if whole else [part.strip() for part in text.split(",") if part.strip()]:
-                meant = [name] if name in known else [each for each in GROUPS.get(name, ()) if each in known]
+                wanted = (name,) if name in shown else (name, *GROUPS.get(name, ()))
+                meant = {shown.get(each, each) for each in wanted if each in known}
+                meant |= {column for each in wanted if each not in shown for column in by_words.get(each, ())}
                 if not meant:
-                    near = nearest(name, [*known, *(group for group in GROUPS if known.keys() & set(GROUPS[group]))])
-                    listed = ", ".join(list(known)[:12])
-                    raise place.error(
-                        f"column {printable(name, NAME)} is to be left out, but it is not in the file",
-                        column=name,
-                        remedy=f"Did you mean {near[0]}?" if near else f"The columns are {listed}.",
-                    )
-                found |= {shown.get(each, each) for each in meant} | set(meant)
-        found |= {name for name in names if _column_meant(name) in found}
+                    raise self._not_there(name, known, place)
+                found |= meant
+        for group, members in GROUPS.items():
+            columns = {each: [each] if each in names else by_words.get(each, []) for each in members}
+            gone = [each for each, made in columns.items() if made and found.issuperset(made)]
+            stays = [each for each, made in columns.items() if made and each not in gone]
+            if gone and stays:
+                raise place.error(
+                    f"column {gone[0]} is to be left out, but {' and '.join(stays)} stay",
+                    column=gone[0],
+                    remedy=f"They belong together: leave out {group}.",
+                )
         for target in self.mapping or {}:
             if target in found and target not in names:
                 raise place.error(
                     f"column {target} is mapped and left out at once", column=target, remedy="Choose one of them."
                 )
         return frozenset(found)
+
+    def _not_there(self, name: str, known: Mapping[str, None], place: Place) -> InputError:
+        """Make the error for a column to leave out that is not there, with the nearest one that is."""
+        groups = [group for group, columns in GROUPS.items() if known.keys() & set(columns)]
+        near = nearest(name, [*known, *groups])
+        listed = ", ".join(list(known)[:12])
+        return place.error(
+            f"column {printable(name, NAME)} is to be left out, but it is not in the file",
+            column=name,
+            remedy=f"Did you mean {near[0]}?" if near else f"The columns are {listed}.",
+        )
 
     def metadata(self, stated: Metadata) -> Metadata:
         """Return metadata with this frame and noise in the place of those in the file.
