@@ -304,3 +304,23 @@ def test_a_log_without_what_it_needs_says_what_to_record() -> None:
     assert found.remedy
     with pytest.raises(InputError):
         SensorModel().fit(Log.from_arrays(t, gyr=wave))
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["phone_qualisys/Thibaud_Nexus5_NoDist_AR.parquet", "robot_arm/MPU9150_path1_300mms.parquet"],
+)
+def test_what_a_recording_can_show_agrees_with_its_diagnosis(name: str):
+    """What is missing is taken into account by both alike: no effect is seen from twice the size on."""
+    log = imufit.open_log(recording(name))
+    told = imufit.info(log)
+    compared = []
+    for candidate in imufit.SensorModel().fit(log).diagnose().candidates:
+        own = {parameter.name: parameter for parameter in told.effect(candidate.effect).parameters}
+        for parameter in candidate.parameters:
+            if parameter.name in own and parameter.name in candidate.minimal_detectable:
+                compared.append(own[parameter.name].standard_error / parameter.standard_error)
+    assert len(compared) > 30
+    # An offset that the diagnosis does not find stands beside an effect all the same.
+    assert np.quantile(compared, 0.05) > 1.0 / 1.5
+    assert np.quantile(compared, 0.95) < 1.5

@@ -37,7 +37,8 @@ from imufit.cli.simulate import simulate
 from imufit.cli.tune import tune
 from imufit.printable import MESSAGE, printable
 
-SUCCESS, INTERNAL, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
+SUCCESS, INTERNAL, UNUSABLE, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 130, 141
+"""Exit codes; the last two are those of a program that a signal ends, 128 + SIGINT and 128 + SIGPIPE."""
 DEBUG = "IMUFIT_DEBUG"
 _LONGEST_MESSAGE = 3 * MESSAGE
 """Characters: place, problem and remedy, each of which is bounded."""
@@ -121,7 +122,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 on success, 2 on unusable input or arguments, 130 when interrupted, 1 on a fault of the program.
+        0 on success, 2 on unusable input or arguments, 130 when interrupted, 141 when nobody reads the output any
+        more, 1 on a fault of the program.
     """
     if "_IMUFIT_COMPLETE" in os.environ:
         imufit.main(prog_name="imufit")
@@ -130,14 +132,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with warnings.catch_warnings():
             if not os.environ.get(DEBUG):
                 warnings.simplefilter("ignore")
-            with imufit.make_context("imufit", given) as ctx:
-                imufit.invoke(ctx)
-                sys.stdout.flush()
+            return _run(given)
+    except BrokenPipeError:
+        # What is still to be flushed at the end goes nowhere.
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        return PIPE_CLOSED
+
+
+def _run(given: list[str]) -> int:
+    """Run the program; return its exit code."""
+    code = SUCCESS
+    try:
+        with imufit.make_context("imufit", given) as ctx:
+            imufit.invoke(ctx)
+    except BrokenPipeError:
+        raise
     except Exception as error:
-        return _report(error)
+        code = _report(error)
     except KeyboardInterrupt:
-        return _fail("interrupted", INTERRUPTED)
-    return SUCCESS
+        code = _fail("interrupted", INTERRUPTED)
+    sys.stdout.flush()
+    return code
 
 
 def _report(error: Exception) -> int:
@@ -146,9 +162,6 @@ def _report(error: Exception) -> int:
         return error.exit_code
     if isinstance(error, click.exceptions.Abort):
         return _fail("interrupted", INTERRUPTED)
-    if isinstance(error, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return SUCCESS
     message = _unusable(error)
     if message is not None:
         return _fail(message, UNUSABLE)

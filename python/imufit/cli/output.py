@@ -39,10 +39,17 @@ class Output:
     def __init__(self, json_file: Path | None = None) -> None:
         from rich.console import Console  # noqa: PLC0415
 
+        class Piped(Console):
+            """A console that leaves a closed pipe to the program, which ends quietly."""
+
+            def on_broken_pipe(self) -> None:
+                """Hand on what rich has caught."""
+                raise BrokenPipeError
+
         self._json_file = json_file
         quiet = json_file is not None and str(json_file) == "-"
         width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else _WIDTH_OF_FILES
-        self._console = Console(quiet=quiet, width=width, highlight=False, markup=False, emoji=False)
+        self._console = Piped(quiet=quiet, width=width, highlight=False, markup=False, emoji=False)
 
     def say(self, *sentences: str, bold: bool = False) -> None:
         """Print sentences, one paragraph each."""
