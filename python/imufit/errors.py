@@ -50,7 +50,9 @@ class InputError(ValueError):
         self.line = line
         super().__init__(self._message())
 
-    def _message(self) -> str:
+    @property
+    def where(self) -> str:
+        """Row, line and column, as far as they are known."""
         where = []
         if self.row is not None:
             where.append(f"row {self.row}" + ("" if self.line is None else f" (line {self.line})"))
@@ -60,8 +62,11 @@ class InputError(ValueError):
             column = printable(self.column, NAME)
             if not self.problem.startswith(f"column {column} "):
                 where.append(f"column {column}")
+        return ", ".join(where)
+
+    def _message(self) -> str:
         parts = [printable(Path(self.file).name, NAME)] if self.file else []
-        parts += [", ".join(where)] if where else []
+        parts += [self.where] if self.where else []
         text = ": ".join([*parts, self.problem])
         if not text.endswith((".", "?", "!")):
             text += "."

@@ -110,7 +110,7 @@ def calibrate(
     for sensor in result.sensors.values():
         out.say(sensor.sentence(), bold=True)
     remarks = [remark for sensor in result.sensors.values() for remark in sensor.remarks]
-    out.say(*remarks, *result.notes)
+    out.say(*remarks, *result.notes, *(f"Note: {note}." for log in read for note in log.notes))
     out.tables([result.pose_table(), result.correction_table()])
     if output is not None:
         result.save(output)

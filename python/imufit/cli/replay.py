@@ -102,7 +102,9 @@ def replay(
         settings[group] = {**settings.get(group, {}), **values}
     out = Output(json_file)
     rows = engine.read_log(log, reading, _MADE * len(names or FILTERS), memory, "--memory")
-    if model_file is not None:
+    if model_file is None:
+        out.say(*(f"Note: {note}." for note in rows.notes))
+    else:
         model = engine.sensor_model(path=model_file)
         rows = model.apply(rows)
         out.say(f"{' + '.join(model.effects) or 'No effect'} taken out.", *(f"Note: {note}." for note in rows.notes))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.figures.readings import PanelLines, readings_figure
+from imufit.inspection.circle import Unwound, on_circle
 from imufit.inspection.rests import rests_of
 from imufit.inspection.series import sample_rows, usual_steps
 from imufit.inspection.traces import Trace
@@ -124,6 +125,7 @@ class _Drawn:
         referenced = show != "readings" and "ref_qw" in log.columns
         self._attitude = self._trace("ref_q", 3) if referenced else None
         self._rates = self._trace("ref_q", 3) if referenced else None
+        self._unwound = Unwound()
         self._left: tuple[Array, Array] = (np.empty(0), np.empty((0, 4)))
 
     def _checked(self, log: LogSource, columns: Sequence[str]) -> dict[str, Trace]:
@@ -160,7 +162,7 @@ class _Drawn:
         if there is None or log.ref_q is None or not there.any():
             return
         t, q = log.t[there], log.ref_q[there]
-        self._attitude.add(t, np.degrees(_imufit.euler_from_quaternion(q)))
+        self._attitude.add(t, self._unwound.add(np.degrees(_imufit.euler_from_quaternion(q))))
         self._add_rates(t, q)
 
     def _add_rates(self, t: Array, q: Array) -> None:
@@ -191,7 +193,7 @@ class _Drawn:
             lines = self._attitude.lines()
             if np.isfinite(lines[1]).any():
                 angles = ("roll", "pitch", "yaw")
-                found.append(PanelLines("reference", "deg", angles, lines[0], _without_wraps(*lines)))
+                found.append(PanelLines("reference", "deg", angles, *on_circle(*lines)))
             if "gyr" not in self._sensors and rates is not None and np.isfinite(rates[1]).any():
                 found.append(PanelLines("rates of the reference", "deg/s", tuple("xyz"), *rates))
         for name, trace in self._extra.items():
@@ -199,10 +201,3 @@ class _Drawn:
             if np.isfinite(lines[1]).any():
                 found.append(PanelLines(name, "°C" if name == "temp" else "", ("",), *lines))
         return found
-
-
-def _without_wraps(t: Array, angles: Array) -> Array:
-    """Interrupt angles, deg, where they jump from one end of the circle to the other; what one pixel spans is kept."""
-    jumps = np.abs(np.diff(angles, axis=0, prepend=angles[:1])) > 180.0
-    within = np.diff(t, prepend=-np.inf) == 0.0
-    return np.where(jumps & ~within[:, None], np.nan, angles)

@@ -11,11 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
 from imufit.log.assemble import group_fields
-from imufit.log.check import check_poses, checked_labels, checked_readings, truth_value
+from imufit.log.check import check_poses, checked_labels, truth_value
 from imufit.log.columns import CONTRACT, GROUPS, meant
 from imufit.log.metadata import KNOWN, Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import TimeScan
+from imufit.log.unmeasured import Unmeasured
 
 Array = NDArray[np.float64]
 
@@ -110,12 +111,15 @@ def fields_from_arrays(
         if name in CONTRACT:
             raise place.error("a covariate cannot have the name of a log column", column=name, remedy="Rename it.")
         numbers[name] = contiguous(values, name, (time.size,))
-    numbers = {column: checked_readings(values, column, column, 0, place) for column, values in numbers.items()}
+    unmeasured = Unmeasured(place)
+    numbers = unmeasured.left_out(numbers, {column: column for column in numbers}, 0)
+    unmeasured.check()
     cells = {name: checked_labels(np.array(column, dtype=object)) for name, column in text.items()}
     check_poses(cells.get("pose", np.empty(0, object)), 0, place)
     repair = scan.finish()
     fields = group_fields(repair.apply(time, 0), numbers, cells, start=0, metadata=metadata, place=place)
-    return {**fields, "metadata": metadata, "notes": (repair.note,) if repair.note else ()}
+    notes = (*([repair.note] if repair.note else []), *unmeasured.notes)
+    return {**fields, "metadata": metadata, "notes": notes}
 
 
 def _split(name: str, values: ArrayLike, n: int) -> dict[str, Array]:

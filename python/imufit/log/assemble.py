@@ -13,7 +13,6 @@ from imufit.log.check import (
     check_poses,
     checked_attitude,
     checked_labels,
-    checked_readings,
     numbers_from_text,
     truth_value,
 )
@@ -24,6 +23,7 @@ from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import TimeRepair
 from imufit.log.units import Conversion
+from imufit.log.unmeasured import Unmeasured
 
 RawBlock = Mapping[str, NDArray[Any]]
 """File columns by name: (n,) float64 for numbers, (n,) object for text."""
@@ -60,7 +60,15 @@ def check_truth_values(plan: Plan, truths: Mapping[str, tuple[int | None, str]],
 
 
 def fields_of(
-    plan: Plan, block: RawBlock, start: int, rows: int, *, repair: TimeRepair, metadata: Metadata, place: Place
+    plan: Plan,
+    block: RawBlock,
+    start: int,
+    rows: int,
+    *,
+    repair: TimeRepair,
+    metadata: Metadata,
+    place: Place,
+    unmeasured: Unmeasured,
 ) -> dict[str, Any]:
     """Check one block and group its columns into the fields of a log.
 
@@ -78,6 +86,8 @@ def fields_of(
         Its rig axis turns `ref_angle` into an attitude.
     place : Place
         To name the file in errors.
+    unmeasured : Unmeasured
+        Leaves out what nothing can have measured.
 
     Returns
     -------
@@ -100,8 +110,9 @@ def fields_of(
         ):
             text[column.target] = checked_labels(raw)
         else:
-            values = _numbers(column, block, start, rows, place)
-            numbers[column.target] = checked_readings(values, column.target, column.name or column.target, start, place)
+            numbers[column.target] = _numbers(column, block, start, rows, place)
+    names = {column.target: column.name or column.target for column in plan.columns}
+    numbers = unmeasured.left_out(numbers, names, start)
     t = repair.apply(time_of(plan, block, start, rows, place), start)
     return group_fields(t, numbers, text, start=start, metadata=metadata, place=place)
 

@@ -1,4 +1,4 @@
-"""Values that no log may hold, row by row: infinite readings, bad quaternions, unknown poses, text for numbers."""
+"""Values that no log may hold, row by row: bad quaternions, unknown poses, text for numbers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
-from imufit.log.columns import GROUPS, LARGEST, LARGEST_COVARIATE, POSES, SMALLEST
+from imufit.log.columns import GROUPS, POSES
 from imufit.log.place import Place
 from imufit.printable import NAME, printable
 
@@ -63,9 +63,6 @@ def truth_value(text: str, column: str, row: int | None, place: Place) -> InputE
     )
 
 
-_SENSORS = frozenset((*GROUPS["acc"], *GROUPS["gyr"], *GROUPS["mag"]))
-
-
 def numbers_from_text(cells: NDArray[np.object_], column: str, start: int, place: Place) -> NDArray[np.float64]:
     """Read a text column that has to hold numbers; (n,) float64."""
     values = np.empty(len(cells))
@@ -82,50 +79,6 @@ def numbers_from_text(cells: NDArray[np.object_], column: str, start: int, place
                 raise truth_value(text, column, start + i, place) from None
             raise place.error(f"{shown!r} is not a number", row=start + i, column=column, remedy=remedy) from None
     return values
-
-
-def checked_readings(
-    values: NDArray[np.float64], target: str, column: str, start: int, place: Place
-) -> NDArray[np.float64]:
-    """Refuse values that nothing can have measured, infinite ones first; NaN is a missing sample.
-
-    Whatever works on a log relies on it: squares of readings and their sums are finite, and none is zero unless the
-    reading is.
-
-    Parameters
-    ----------
-    values : (n,) array
-        In SI units.
-    target : str
-        Column of the log.
-    column : str
-        Column of the file, to be named.
-    start : int
-        Row of the log at which the block begins.
-    place : Place
-        To name the file in errors.
-
-    Returns
-    -------
-    (n,) array
-        The values; readings of a sensor nearer to zero than `SMALLEST` are zero.
-    """
-    largest = LARGEST.get(target, LARGEST_COVARIATE)
-    size = np.abs(values)
-    bad = np.flatnonzero(size > largest)
-    if not bad.size:
-        tiny = (size < SMALLEST) & (size > 0.0) if target in _SENSORS else np.False_
-        return np.where(tiny, 0.0, values) if tiny.any() else values
-    value = values[bad[0]]
-    remedy = "Write NaN (or leave the cell empty) for a missing sample."
-    if np.isinf(value):
-        problem = f"{value} is not a reading"
-    elif target in LARGEST:
-        problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that {target} can measure"
-        remedy += " Or is it another unit? --map takes it."
-    else:
-        problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that is measured"
-    raise place.error(problem, row=start + int(bad[0]), column=column, remedy=remedy)
 
 
 def checked_attitude(q: NDArray[np.float64], start: int, place: Place) -> NDArray[np.float64]:

@@ -40,6 +40,18 @@ CONTRACT: Final[tuple[str, ...]] = (
 
 NUMERIC: Final = frozenset(CONTRACT) - {"pose"}
 
+UNITS: Final = {
+    "t": "s",
+    **dict.fromkeys(GROUPS["acc"], "m/s^2"),
+    **dict.fromkeys(GROUPS["gyr"], "rad/s"),
+    **dict.fromkeys(GROUPS["mag"], "uT"),
+    "temp": "degC",
+    **dict.fromkeys(GROUPS["ref_q"], "1"),
+    **dict.fromkeys(GROUPS["ref_p"], "m"),
+    "ref_angle": "rad",
+}
+"""Unit of each column that has a fixed one."""
+
 LARGEST: Final[dict[str, float]] = {
     # ns since 1970 are 2e18; check_units says so with the mapping, so they must come through
     "t": 1e19,

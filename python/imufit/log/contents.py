@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.log.columns import GROUPS, SENSOR_NAMES
+from imufit.log.columns import GROUPS, SENSOR_NAMES, UNITS
 from imufit.log.log import LogSource
 from imufit.log.parquet import ROW_GROUP
 
@@ -20,16 +20,6 @@ SAMPLED: Final = 500_000
 LABELS: Final = 1000
 """Different texts of a column that are told at most."""
 
-_UNITS: Final = {
-    "t": "s",
-    **dict.fromkeys(GROUPS["acc"], "m/s^2"),
-    **dict.fromkeys(GROUPS["gyr"], "rad/s"),
-    **dict.fromkeys(GROUPS["mag"], "uT"),
-    "temp": "degC",
-    **dict.fromkeys(GROUPS["ref_q"], "1"),
-    **dict.fromkeys(GROUPS["ref_p"], "m"),
-    "ref_angle": "rad",
-}
 _WANTED: Final = {
     **SENSOR_NAMES,
     "temp": "temperature",
@@ -167,7 +157,7 @@ class _Summary:
             self._kept.append(known[:: self._every].copy())
 
     def column(self) -> ColumnContents:
-        unit = _UNITS.get(self._name, "")
+        unit = UNITS.get(self._name, "")
         if not self._kept:
             return ColumnContents(self._name, unit, self._samples, labels=tuple(self._labels))
         median = float(np.median(np.concatenate(self._kept)))

@@ -14,6 +14,7 @@ from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import TimeScan
 from imufit.log.unit_check import HEAD, Clock, check_units
+from imufit.log.unmeasured import Unmeasured
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,13 +49,15 @@ def fields_from_frame(df: pd.DataFrame, mapping: Mapping[str, str] | None, metad
     scan = TimeScan(place)
     scan.add(time_of(plan, block, 0, len(df), place))
     repair = scan.finish()
-    fields = fields_of(plan, block, 0, len(df), repair=repair, metadata=metadata, place=place)
+    unmeasured = Unmeasured(place)
+    fields = fields_of(plan, block, 0, len(df), repair=repair, metadata=metadata, place=place, unmeasured=unmeasured)
+    unmeasured.check()
     sensors: dict[str, NDArray[np.float64] | None] = {
         name: fields[name][:HEAD] for name in ("acc", "gyr", "mag", "ref_q") if name in fields
     }
     clock: Clock = "stated" if "t" in (mapping or {}) else "a log's" if metadata != Metadata() else "open"
     odd = check_units(fields["t"][:HEAD], sensors, metadata, place, plan.origin, clock)
-    notes = tuple(note for note in (*plan.notes, repair.note, *odd) if note)
+    notes = tuple(note for note in (*plan.notes, repair.note, *odd, *unmeasured.notes) if note)
     return {**fields, "metadata": metadata, "notes": notes}
 
 

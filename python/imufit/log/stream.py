@@ -25,6 +25,7 @@ from imufit.log.source import open_source
 from imufit.log.tables import TablesSource
 from imufit.log.time_order import TimeRepair, TimeScan
 from imufit.log.unit_check import HEAD, Clock, check_units
+from imufit.log.unmeasured import Unmeasured
 from imufit.log.writer import write_rows
 
 
@@ -72,6 +73,7 @@ class LogStream:
         stated = read_metadata(self._path, self._source.embedded)
         self._metadata = reading.metadata(stated)
         self._repair = self._scan()
+        self._unmeasured = Unmeasured(self._place)
         head = self._head()
         # what says of itself that it is a log may have rows as far apart as it says
         is_log = bool(self._source.embedded) or sidecar_path(self._path).is_file()
@@ -127,16 +129,24 @@ class LogStream:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What reading noticed or changed."""
-        return self._notes
+        """What reading noticed or changed, in the rows that have been read so far."""
+        return (*self._notes, *self._unmeasured.notes)
 
     def pieces(self) -> Iterator[Log]:
         """Give the checked rows in blocks of whatever size the file offers."""
         for start, rows, block in self._source.blocks(self._plan.sources):
             fields = fields_of(
-                self._plan, block, start, rows, repair=self._repair, metadata=self._metadata, place=self._place
+                self._plan,
+                block,
+                start,
+                rows,
+                repair=self._repair,
+                metadata=self._metadata,
+                place=self._place,
+                unmeasured=self._unmeasured,
             )
             yield Log(**fields, metadata=self._metadata, path=self._path)
+        self._unmeasured.check()
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:
         """Cut into chunks of `rows` rows with up to `margin` rows more on either side.
@@ -149,11 +159,12 @@ class LogStream:
             Rows of context on either side, fewer at the ends of the log.
         """
         for chunk in cut(self.pieces(), rows, margin):
-            yield replace(chunk, log=replace(chunk.log, notes=self._notes))
+            yield replace(chunk, log=replace(chunk.log, notes=self.notes))
 
     def read(self) -> Log:
         """Whole log in memory, however large it is."""
-        return replace(gathered(self.pieces(), self.n), notes=self._notes)
+        log = gathered(self.pieces(), self.n)
+        return replace(log, notes=self.notes)
 
     @property
     def size(self) -> int:

@@ -1,0 +1,140 @@
+"""Single readings that nothing can have measured: they are left out and told; a log with many of them is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.log.columns import GROUPS, LARGEST, LARGEST_COVARIATE, SENSORS, SMALLEST, UNITS
+from imufit.log.place import Place
+
+Array = NDArray[np.float64]
+
+MOST: Final = 0.01
+"""Share of the samples of a column that may be left out. Transmission errors that spoil whole numbers are rarer by
+orders of magnitude; what is more frequent is another unit, a filler, or bytes that are not numbers."""
+TOLD: Final = 5
+"""Readings that are told one by one; of more the number is told."""
+
+_SENSOR_COLUMNS: Final = frozenset(column for sensor in SENSORS for column in GROUPS[sensor])
+
+
+@dataclass
+class _Column:
+    """What was seen of one column so far.
+
+    Parameters
+    ----------
+    name : str
+        Column of the file, to be named.
+    rows, samples, bad : int
+        Rows counted, and of these the samples, and the samples that cannot be.
+    first : list of (int, float)
+        Row and value of the first ones that cannot be, SI units.
+    """
+
+    name: str
+    rows: int = 0
+    samples: int = 0
+    bad: int = 0
+    first: list[tuple[int, float]] = field(default_factory=list)
+
+
+class Unmeasured:
+    """Leaves out readings beyond `LARGEST`, infinite ones too, and counts them, each row once however often it is read.
+
+    Whatever works on a log relies on it: squares of readings and their sums are finite, and none is zero unless the
+    reading is.
+
+    Parameters
+    ----------
+    place : Place
+        To name the file in errors and notes.
+    """
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        self._columns: dict[str, _Column] = {}
+
+    def left_out(self, values: Mapping[str, Array], names: Mapping[str, str], start: int) -> dict[str, Array]:
+        """Return columns without what cannot be; of a sensor, attitude or position without the whole sample.
+
+        Parameters
+        ----------
+        values : mapping
+            Columns of the log, (n,) each, SI units; NaN is a missing sample.
+        names : mapping
+            Column of the file for each of them, to be named.
+        start : int
+            Row of the log at which the block begins.
+        """
+        found = dict(values)
+        bad: dict[str, NDArray[np.bool_]] = {}
+        for target, column in values.items():
+            size = np.abs(column)
+            beyond = size > LARGEST.get(target, LARGEST_COVARIATE)
+            self._count(target, names[target], column, beyond, start)
+            if beyond.any():
+                bad[target] = beyond
+            tiny = (size < SMALLEST) & (size > 0.0) if target in _SENSOR_COLUMNS else np.False_
+            if tiny.any():
+                found[target] = np.where(tiny, 0.0, column)
+        for target, beyond in bad.items():
+            members = next((group for group in GROUPS.values() if target in group), (target,))
+            for member in members:
+                if member in found:
+                    found[member] = np.where(beyond, np.nan, found[member])
+        return found
+
+    def _count(self, target: str, name: str, values: Array, bad: NDArray[np.bool_], start: int) -> None:
+        seen = self._columns.setdefault(target, _Column(name))
+        new = max(0, seen.rows - start)
+        if new >= values.size:
+            return
+        seen.samples += int(np.count_nonzero(~np.isnan(values[new:])))
+        places = np.flatnonzero(bad[new:]) + new
+        seen.bad += places.size
+        seen.first += [(start + int(k), float(values[k])) for k in places[: TOLD - len(seen.first)]]
+        seen.rows = start + values.size
+
+    def check(self) -> None:
+        """Refuse a log in which a column has too many of them, once all rows have been read.
+
+        Raises
+        ------
+        InputError
+            Names the first of them.
+        """
+        many = {target: seen for target, seen in self._columns.items() if seen.bad > MOST * seen.samples}
+        if not many:
+            return
+        target, seen = min(many.items(), key=lambda item: item[1].first[0][0])
+        row, value = seen.first[0]
+        remedy = "Write NaN (or leave the cell empty) for a missing sample."
+        largest = LARGEST.get(target, LARGEST_COVARIATE)
+        if np.isinf(value):
+            problem = f"{value} is not a reading"
+        elif target in LARGEST:
+            problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that {target} can measure"
+            remedy += " Or is it another unit? --map takes it."
+        else:
+            problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that is measured"
+        raise self._place.error(problem, row=row, column=seen.name, remedy=remedy)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out of the rows read so far."""
+        told = [(row, target, value) for target, seen in self._columns.items() for row, value in seen.first]
+        notes = []
+        for row, target, value in sorted(told)[:TOLD]:
+            place = self._place.error("", row=row, column=self._columns[target].name).where
+            unit = f" {UNITS[target]}" if UNITS.get(target, "1") != "1" else ""
+            notes.append(f"{self._place.name}: {place}: {value:.6g}{unit} cannot be measured; left out")
+        count = sum(seen.bad for seen in self._columns.values())
+        if count > len(notes):
+            notes.append(f"{self._place.name}: {count - len(notes)} more readings cannot be measured; left out")
+        return tuple(notes)
