@@ -55,14 +55,14 @@ def at(suffix: str, row: int) -> str:
     return f"row {row} (line {row + 2})" if suffix == ".csv" else f"row {row}"
 
 
-def changed(tmp_path: Path, suffix: str, row: int, column: str, value: object) -> Path:
+def changed(tmp_path: Path, suffix: str, row: int | slice, column: str, value: object) -> Path:
     df = with_reference()
     df.loc[row, column] = value
     return save(df, tmp_path / f"walk{suffix}")
 
 
 def test_infinite_reading(tmp_path: Path, suffix: str) -> None:
-    path = changed(tmp_path, suffix, 57, "gyr_y", np.inf)
+    path = changed(tmp_path, suffix, slice(57, 58), "gyr_y", np.inf)  # of 100 rows one alone would be left out
     assert message(path) == (
         f"walk{suffix}: {at(suffix, 57)}, column gyr_y: inf is not a reading. "
         "Write NaN (or leave the cell empty) for a missing sample."
@@ -72,12 +72,12 @@ def test_infinite_reading(tmp_path: Path, suffix: str) -> None:
 def test_infinite_covariate(tmp_path: Path, suffix: str) -> None:
     df = frame()
     df["vbat"] = 12.0
-    df.loc[3, "vbat"] = -np.inf
+    df.loc[3:4, "vbat"] = -np.inf
     assert f"{at(suffix, 3)}, column vbat: -inf is not a reading." in message(save(df, tmp_path / f"a{suffix}"))
 
 
 def test_error_carries_its_parts(tmp_path: Path, suffix: str) -> None:
-    path = changed(tmp_path, suffix, 57, "gyr_y", np.inf)
+    path = changed(tmp_path, suffix, slice(57, 58), "gyr_y", np.inf)  # of 100 rows one alone would be left out
     with pytest.raises(InputError) as caught:
         read(path)
     error = caught.value

@@ -23,7 +23,7 @@ from imufit.log.recognise import Readable, recognise
 from imufit.log.size import HELD, KEPT, NUMBER, TEXT_CELL, size_in_words
 from imufit.log.source import open_source
 from imufit.log.tables import TablesSource
-from imufit.log.time_order import TimeRepair, TimeScan
+from imufit.log.time_order import Copies, TimeRepair, TimeScan
 from imufit.log.unit_check import HEAD, Clock, check_units
 from imufit.log.unmeasured import Unmeasured
 from imufit.log.writer import write_rows
@@ -95,7 +95,15 @@ class LogStream:
         check_truth_values(self._plan, self._source.truths, self._place)
         if self._source.n == 0:
             raise self._place.error("the file has a header but no rows", remedy="Record or copy it again.")
-        return scan.finish()
+        repair = scan.finish()
+        if repair.rows.size:
+            copies = Copies(repair)
+            columns = [name for name in self._plan.sources if name != time.name]
+            for start, _, block in self._source.blocks(columns):
+                copies.add(block, start)
+            if copies.many:
+                raise scan.repeated()
+        return repair
 
     def _head(self) -> Log:
         pieces: list[Log] = []

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,18 @@ DAY: Final = 86400.0
 """Length of a day, s."""
 COARSE_AT_LEAST: Final = 10
 COARSE_AT_MOST: Final = 0.02
+"""Share of rows that repeat a stamp below which it says nothing of the clock's step how many rows a step has."""
 _PARTS: Final = 10
 _PARTS_AT_LEAST: Final = 4
 _KEPT_STEPS: Final = 100_000
+EVEN: Final = 0.9
+"""Share of the clock's steps that have as many rows as their length says, by one row or a quarter. Of steps of a clock
+all do; 0.9 leaves room for rows that were lost."""
+PAUSE: Final = 3.5
+"""Usual steps of the clock from which on a step is a pause of the recording, as for `is_gap`."""
+COPIED: Final = 0.5
+"""Share of the rows with a repeated stamp that say the same as the row before from which on they are copies of it,
+where other rows do not so as often."""
 
 
 def over_midnight(before: float, after: float) -> bool:
@@ -33,7 +43,7 @@ def over_midnight(before: float, after: float) -> bool:
 
 @dataclass(frozen=True)
 class TimeRepair:
-    """New time stamps for the second rows of pairs that share one.
+    """New time stamps for rows that share one, all but the first.
 
     Parameters
     ----------
@@ -62,19 +72,19 @@ class TimeRepair:
 class TimeScan:
     """Goes once over all time stamps, block by block, before anything else is read.
 
-    A stamp that is not finite or that goes back is an error at once. Repeated stamps are collected: when there are at
-    least 10, scattered over the log, never more than two rows at one stamp and under 2 % of the rows, the clock is
-    coarser than the sampling, and the second row of each pair goes halfway to the next stamp. Otherwise the first
-    repeated stamp is an error, since it means a splice or a copied block.
+    A stamp that is not finite or that goes back is an error at once. Repeated stamps are collected. When there are at
+    least 10, scattered over the log, and each step of the clock has as many rows as its length says, the clock is
+    coarser than the sampling, and the rows of a step are spread evenly over it. Otherwise the first repeated stamp is
+    an error, since it means a splice or a copied block.
     """
 
     def __init__(self, place: Place) -> None:
         self._place = place
         self._n = 0
         self._last: float | None = None
-        self._rows: list[int] = []
-        self._stamps: list[float] = []
-        self._next: list[float] = []
+        self._rows: list[NDArray[np.int64]] = []
+        self._stamps: list[NDArray[np.float64]] = []
+        self._next: list[NDArray[np.float64]] = []
         self._steps: list[NDArray[np.float64]] = []
         self._kept = 0
 
@@ -121,36 +131,50 @@ class TimeScan:
             )
 
     def _collect(self, t: NDArray[np.float64], steps: NDArray[np.float64], offset: int) -> None:
-        if len(self._next) < len(self._rows) and steps.size:
-            self._next.append(float(t[1]))
-        for i in np.flatnonzero(steps == 0.0):
-            self._rows.append(offset + int(i) + 1)
-            self._stamps.append(float(t[i]))
-            if i + 2 < t.size:
-                self._next.append(float(t[i + 2]))
-        if len(self._rows) > COARSE_AT_LEAST + COARSE_AT_MOST * (offset + t.size) + _KEPT_STEPS:
-            raise self._repeated()
+        if self._next and np.isnan(self._next[-1][-1]) and steps.size:
+            self._next[-1][-1] = t[1]
+        found = np.flatnonzero(steps == 0.0) + 1
+        if found.size:
+            self._rows.append(offset + found)
+            self._stamps.append(t[found])
+            self._next.append(np.append(t, np.nan)[found + 1])
 
     def finish(self) -> TimeRepair:
         """Judge the repeated stamps once every block has been taken."""
         if not self._rows:
             return TimeRepair(np.empty(0, np.int64), np.empty(0))
-        rows, stamps = np.array(self._rows, np.int64), np.array(self._stamps)
-        following = np.array(self._next)
-        if following.size < rows.size:
-            following = np.append(following, stamps[-1] + self.median_step)
+        rows = np.concatenate(self._rows)
+        stamps, after = np.concatenate(self._stamps), np.concatenate(self._next)
+        last = np.flatnonzero(np.diff(stamps, append=np.inf) != 0.0)
+        counts = np.diff(last, prepend=-1) + 1
+        lengths = after[last] - stamps[last]
+        usual = float(np.median(lengths[np.isfinite(lengths)])) if np.isfinite(lengths).any() else self.median_step
         parts = np.unique(rows * _PARTS // self._n).size
-        pairs = not np.any(following == stamps)
-        if rows.size < COARSE_AT_LEAST or rows.size >= COARSE_AT_MOST * self._n or parts < _PARTS_AT_LEAST or not pairs:
-            raise self._repeated()
-        note = (
-            f"{self._place.name}: {rows.size} repeated time stamps: clock coarser than the sampling; "
+        if rows.size < COARSE_AT_LEAST or parts < _PARTS_AT_LEAST or not usual > 0.0:
+            raise self.repeated()
+        seldom = rows.size < COARSE_AT_MOST * self._n and bool(np.all(counts == 2))
+        # Over a pause, and behind the last row, a step is as long as usual.
+        steps = np.where(lengths < PAUSE * usual, lengths, usual)
+        if not seldom:
+            row = float(steps.sum() / counts.sum())
+            even = np.abs(counts * row - steps) <= np.maximum(1.01 * row, 0.25 * steps)
+            if np.mean(even) < EVEN:
+                raise self.repeated()
+        elif not np.isfinite(lengths[-1]):
+            steps[-1] = self.median_step
+        of = np.repeat(np.arange(last.size), counts - 1)
+        place = np.arange(rows.size) - np.repeat(last - counts + 2, counts - 1) + 1
+        note = f"{self._place.name}: {rows.size} repeated time stamps: clock coarser than the sampling; "
+        note += (
             "the second row of each pair was moved halfway to the next stamp"
+            if seldom
+            else f"it goes in steps of {usual:.3g} s, over each of which its rows were spread evenly"
         )
-        return TimeRepair(rows, stamps + 0.5 * (following - stamps), note)
+        return TimeRepair(rows, stamps + place / counts[of] * steps[of], note)
 
-    def _repeated(self) -> Exception:
-        row, stamp = self._rows[0], self._stamps[0]
+    def repeated(self) -> Exception:
+        """Make the error for stamps that repeat one another and are not those of a coarse clock."""
+        row, stamp = int(self._rows[0][0]), float(self._stamps[0][0])
         return self._place.error(
             f"t = {stamp!r} repeats t = {stamp!r} of row {row - 1}",
             row=row,
@@ -163,3 +187,50 @@ class TimeScan:
         """Median time from row to row over the first 100,000 rows, s."""
         steps = np.concatenate(self._steps) if self._steps else np.empty(0)
         return float(np.median(steps)) if steps.size else float("nan")
+
+
+class Copies:
+    """Counts rows that say the same as the row before them, of those with a repeated stamp and of the others.
+
+    Parameters
+    ----------
+    repair : TimeRepair
+        Rows with a repeated stamp.
+    """
+
+    def __init__(self, repair: TimeRepair) -> None:
+        self._rows = repair.rows
+        self._last: dict[str, NDArray[Any]] = {}
+        self._same = np.zeros(2, int)
+        self._n = np.zeros(2, int)
+
+    def add(self, columns: Mapping[str, NDArray[Any]], start: int) -> None:
+        """Take the next rows.
+
+        Parameters
+        ----------
+        columns : mapping
+            Columns of the file but the time, (n,) each.
+        start : int
+            First row.
+        """
+        same = None
+        for name, values in columns.items():
+            joined = np.concatenate([self._last.get(name, values[:0]), values])
+            equal = joined[1:] == joined[:-1]
+            if joined.dtype != object:
+                equal |= np.isnan(joined[1:]) & np.isnan(joined[:-1])
+            same = equal if same is None else same & equal
+            self._last[name] = joined[-1:]
+        if same is None or not same.size:
+            return
+        rows = np.arange(same.size) + (1 if start == 0 else start)
+        repeated = np.isin(rows, self._rows, assume_unique=True)
+        self._same += [np.count_nonzero(same & ~repeated), np.count_nonzero(same & repeated)]
+        self._n += [np.count_nonzero(~repeated), np.count_nonzero(repeated)]
+
+    @property
+    def many(self) -> bool:
+        """Whether the rows with a repeated stamp are copies: they are alike, and the others are not."""
+        share = self._same / np.maximum(self._n, 1)
+        return bool(share[1] > COPIED and share[0] < COPIED * share[1])
