@@ -54,7 +54,7 @@ def test_over_a_pause_the_rows_stay_close(table, tmp_path: Path):
 
 def test_rows_that_are_copies_of_one_another_are_refused(table, tmp_path: Path):
     twice = table.iloc[::4].loc[lambda rows: rows.index.repeat(2)].reset_index(drop=True)
-    with pytest.raises(InputError, match="repeats t = .* of row 0"):
+    with pytest.raises(InputError, match=r"repeats t = .* of row 0"):
         imufit.read(saved(twice, twice["t"].to_numpy(), tmp_path))
 
 
