@@ -351,12 +351,11 @@ def test_coarse_clock_with_a_pair_at_the_end(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "repeats",
-    [np.arange(50, 2000, 250), np.arange(500, 520, 2), np.arange(2, 2000, 20), np.array([*range(50, 2000, 150), 51])],
-    ids=["too few", "in one place", "too many", "three at one stamp"],
+    [np.arange(50, 2000, 250), np.arange(500, 520, 2)],
+    ids=["too few", "in one place"],
 )
 def test_other_repeated_times_are_an_error(tmp_path: Path, suffix: str, repeats: np.ndarray) -> None:
-    df = coarse(2000, np.sort(repeats))
-    df.loc[51, "t"] = df.loc[50, "t"] if 51 in repeats else df.loc[51, "t"]
+    df = coarse(2000, repeats)
     assert f"column t: t = {df['t'][repeats[0]]} repeats" in message(save(df, tmp_path / f"a{suffix}"))
 
 

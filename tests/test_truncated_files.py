@@ -132,7 +132,7 @@ def test_a_packed_log_with_damaged_bytes(packed: dict[str, bytes], tmp_path: Pat
 @pytest.fixture(scope="module")
 def readings() -> Sound:
     whole = sound("handheld", 774301)
-    rows = slice(0, 150)
+    rows = slice(0, 600)
     return Sound(whole.kind, *(getattr(whole, name)[rows] for name in ("t", "acc", "gyr", "mag", "q")))
 
 

@@ -96,7 +96,7 @@ class LogStream:
         if self._source.n == 0:
             raise self._place.error("the file has a header but no rows", remedy="Record or copy it again.")
         repair = scan.finish()
-        if repair.rows.size:
+        if repair.often:
             copies = Copies(repair)
             columns = [name for name in self._plan.sources if name != time.name]
             for start, _, block in self._source.blocks(columns):

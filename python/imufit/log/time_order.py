@@ -53,11 +53,15 @@ class TimeRepair:
         Their new time, s.
     note : str
         What was done; empty when nothing was.
+    often : bool
+        Whether so many rows share a stamp that they may be copies: seldom pairs may well hold a reading that the
+        sensor has not renewed.
     """
 
     rows: NDArray[np.int64]
     times: NDArray[np.float64]
     note: str = ""
+    often: bool = False
 
     def apply(self, t: NDArray[np.float64], start: int) -> NDArray[np.float64]:
         """Repair the (n,) block of time stamps that begins at row `start`."""
@@ -170,7 +174,7 @@ class TimeScan:
             if seldom
             else f"it goes in steps of {usual:.3g} s, over each of which its rows were spread evenly"
         )
-        return TimeRepair(rows, stamps + place / counts[of] * steps[of], note)
+        return TimeRepair(rows, stamps + place / counts[of] * steps[of], note, often=not seldom)
 
     def repeated(self) -> Exception:
         """Make the error for stamps that repeat one another and are not those of a coarse clock."""
