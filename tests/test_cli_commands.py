@@ -2,6 +2,7 @@
 
 import pytest
 from cli_stand_in import install, run, strict_json
+from imufit.log import Reading
 
 
 @pytest.fixture(autouse=True)
@@ -85,7 +86,7 @@ def test_model_and_mapping_reach_the_engine(capsys, calls, tmp_path, log):
     model = tmp_path / "model.toml"
     model.write_text("")
     run(capsys, "compare", log, "--model", model, "--map", "acc_x=AccX[g]", "--map", "t=time[ms]")
-    assert ("open_log", (log, ("acc_x=AccX[g]", "t=time[ms]")), {}) in calls
+    assert ("open_log", (log, Reading({"acc_x": "AccX[g]", "t": "time[ms]"})), {}) in calls
     assert ("sensor_model", (), {"path": model}) in calls
 
 

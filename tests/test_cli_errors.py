@@ -183,5 +183,5 @@ def test_reader_that_goes_away_is_no_fault():
         text=True,
         check=False,
     )
-    assert done.stdout.strip() == "0"
+    assert done.stdout.strip() in ("0", "141")
     assert done.stderr == ""
