@@ -151,12 +151,16 @@ class TimeScan:
 
     def _repeated(self) -> Exception:
         row, stamp = self._rows[0], self._stamps[0]
-        return self._place.error(
-            f"t = {stamp!r} repeats t = {stamp!r} of row {row - 1}",
-            row=row,
-            column="t",
-            remedy="Two samples cannot share a time: delete the copied rows or split the log there.",
-        )
+        problem = f"t = {stamp!r} repeats t = {stamp!r} of row {row - 1}"
+        remedy = "Two samples cannot share a time: delete the copied rows or split the log there."
+        # A stamp that single precision holds exactly, as copies of float64 stamps hardly ever all are.
+        if all(float(np.float32(each)) == each for each in self._stamps) and len(self._stamps) >= COARSE_AT_LEAST:
+            digit = float(np.spacing(np.float32(stamp)))
+            typical = float(np.median(np.diff(np.unique(self._stamps)))) if len(set(self._stamps)) > 1 else digit
+            if digit > 0.5 * typical:
+                problem += f": t is in single precision (float32), which tells times of this size only to {digit:g} s"
+                remedy = "Write t as float64, or subtract the first time before it is rounded; record or export again."
+        return self._place.error(problem, row=row, column="t", remedy=remedy)
 
     @property
     def median_step(self) -> float:
