@@ -8,6 +8,7 @@ the reference was made of the readings.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -61,20 +62,22 @@ def own_filter_faults(turning: Turning, facts: _imufit.Facts) -> list[DataFault]
     if not (innovation > 0.0 and left < CLOSER * innovation):
         return []
     words = fault_words.own_filter(left, innovation)
-    return [DataFault("own_filter", "ref", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
+    fault = DataFault("own_filter", "ref", None, facts.t_start, facts.t_end, facts.n, *words)
+    return [replace(fault, false_readings=True, spoils_sensors=("acc", "gyr"))]
 
 
 def _errors(turning: Turning, at: NDArray[np.intp], attitude: Rotation) -> list[Array]:
     """Errors of the attitude that accelerometer and magnetometer show, (k, 3) rad each, and the same turned about."""
     found = []
-    for readings in (turning.acc[at], turning.mag[at]):
+    for readings, vertical in ((turning.acc[at], True), (turning.mag[at], False)):
         there = np.isfinite(readings).all(axis=1)
         if np.mean(there) < 0.9:
             continue
         size = np.linalg.norm(readings, axis=1, keepdims=True)
         direction = np.where(there[:, None], readings / np.maximum(size, 1e-12), 0.0)
         seen = attitude.apply(direction)
-        mean = seen.mean(axis=0)
+        # Filters hold gravity against the vertical, which is z in every frame.
+        mean = np.array([0.0, 0.0, 1.0]) if vertical else seen.mean(axis=0)
         mean /= max(float(np.linalg.norm(mean)), 1e-12)
         found.append(np.cross(direction, attitude.inv().apply(mean)))
     return found

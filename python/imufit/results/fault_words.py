@@ -271,6 +271,16 @@ def backlog(rows: int, span: tuple[float, float], rate: float, usual: float, *, 
     )
 
 
+def jump(when: float, turned: float, read: float) -> Words:
+    """Say that the reference goes on somewhere else, the time, s, and by how much both turned in that step, rad."""
+    return (
+        f"From the row at t = {when:.6g} s to the next the reference turns by {np.degrees(turned):.3g} deg and the "
+        f"gyroscope by {np.degrees(read):.2g} deg: rows were lost there and t goes on as if none were missing, or the "
+        "reference jumped.",
+        f"Cut the log in two at t = {when:.6g} s, and let the sensor stamp its samples instead of counting rows.",
+    )
+
+
 def clipped(channel: str, end: float, rows: int, span: tuple[float, float]) -> Words:
     """Say that readings stand at the end of a range."""
     sensor = channel[:3]
