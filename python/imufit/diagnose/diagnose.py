@@ -70,12 +70,10 @@ def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
         return _spoilt(fit, faults)
     best = next((c for c in candidates if result.best is not None and c.effect == ids[result.best]), None)
     named = best.effect if best is not None and result.kind in (Kind.MISSING, Kind.AMBIGUOUS) else None
-    if named is not None:
-        # What a filter of its own readings says of a sensor is no evidence against this sensor.
-        acts_on = set(analysis.candidates[named].sensors)
-        faults = tuple(replace(f, spoils=f.spoils or bool(acts_on & set(f.spoils_sensors))) for f in faults)
-        if any(fault.spoils for fault in faults):
-            return _spoilt(fit, faults)
+    # What a filter of a sensor's own readings says is evidence neither for nor against this sensor.
+    open_to = {sensor for fault in faults for sensor in fault.spoils_sensors}
+    if open_to and (named is None or open_to & set(analysis.candidates[named].sensors)):
+        return _spoilt(fit, tuple(replace(fault, spoils=bool(fault.spoils_sensors)) for fault in faults))
     rivals = tuple(ids[slot] for slot in result.rivals) if result.kind == Kind.AMBIGUOUS else ()
     cards = [card_of(analysis.candidates[key]) for key in (named, *rivals) if key is not None]
     unshown = _needing_reference(fit)

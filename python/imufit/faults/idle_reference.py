@@ -13,7 +13,7 @@ from imufit.results import fault_words
 from imufit.results.data_fault import DataFault
 
 STANDS: Final = 0.02
-"""Part of the gyroscope's swing that a reference goes through at most which stands: noise of a tracker, nothing else."""
+"""Part of the gyroscope's swing, half a turn at most, that a reference which stands goes through: noise of a tracker."""
 MOVED: Final = 5.0
 """A pause of the reference counts where the gyroscope turned by this many times the usual noise of one step meanwhile.
 """
@@ -39,7 +39,7 @@ def idle_faults(turning: Turning, facts: _imufit.Facts) -> list[DataFault]:
     span = facts.t_start, facts.t_end
     q = turning.ref_q[turning.rows]
     far = 2.0 * np.arccos(np.clip(np.abs(q @ q[len(q) // 2]), 0.0, 1.0))
-    if float(np.quantile(far, 0.95)) < STANDS * turning.swing:
+    if float(np.quantile(far, 0.95)) < STANDS * min(turning.swing, np.pi):
         words = fault_words.reference_stands(turning.swing)
         return [DataFault("stands", "ref", None, *span, facts.n, *words, spoils=True)]
     number = np.cumsum(np.concatenate(([0], np.any(np.diff(q, axis=0) != 0.0, axis=1))))

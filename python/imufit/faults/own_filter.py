@@ -63,7 +63,7 @@ def own_filter_faults(turning: Turning, facts: _imufit.Facts) -> list[DataFault]
         return []
     words = fault_words.own_filter(left, innovation)
     fault = DataFault("own_filter", "ref", None, facts.t_start, facts.t_end, facts.n, *words)
-    return [replace(fault, false_readings=True, spoils_sensors=("acc", "gyr"))]
+    return [replace(fault, spoils_sensors=("acc", "gyr"))]
 
 
 def _errors(turning: Turning, at: NDArray[np.intp], attitude: Rotation) -> list[Array]:
