@@ -13,7 +13,7 @@ from imufit.results import fault_words
 from imufit.results.data_fault import DataFault
 
 STANDS: Final = 0.02
-"""Part of the gyroscope's swing, half a turn at most, that a reference which stands goes through: noise of a tracker."""
+"""Part of the gyroscope's swing, half a turn at most, that a reference which stands goes through: a tracker's noise."""
 MOVED: Final = 5.0
 """A pause of the reference counts where the gyroscope turned by this many times the usual noise of one step meanwhile.
 """
@@ -65,4 +65,4 @@ def idle_faults(turning: Turning, facts: _imufit.Facts) -> list[DataFault]:
 def _noise(turning: Turning) -> float:
     """Noise of the gyroscope's turn over one step, rad, by what changes from step to step."""
     change = np.diff(turning.read, n=2, axis=0)
-    return float(np.median(np.linalg.norm(change, axis=1))) / np.sqrt(6.0)
+    return float(np.median(np.linalg.norm(change, axis=1)) / np.sqrt(6.0))

@@ -42,7 +42,7 @@ def jumps(chunk: Chunk) -> list[RowFault]:
     none = np.full((log.n, 3), np.nan)
     turning = Turning(log.t, log.gyr, none, none, log.ref_q)
     known = np.isfinite(log.gyr).all(axis=1)
-    if min(np.count_nonzero(known), len(turning.rows)) < 4 * AROUND:
+    if min(int(np.count_nonzero(known)), len(turning.rows)) < 4 * AROUND:
         return []
     more = turning.turned - turning.read
     size = np.where(turning.seen, np.linalg.norm(more, axis=1), 0.0)

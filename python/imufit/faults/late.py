@@ -2,12 +2,13 @@
 
 A reference that is late, or early, by more than `ref.delay` can follow has the rates of the gyroscope at another time.
 The lag is looked for as `imufit.joining` does between two recordings; here both stand in one log. Where no lag serves
-the whole log, one that grows may: the clocks run at different rates. Where none of them does, the reference is of another
-motion.
+the whole log, one that grows may: the clocks run at different rates. Where none of them does, the reference is of
+another motion.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -176,7 +177,7 @@ class Drift:
         most = LARGEST_START + LARGEST_SKEW * span
         lags = np.arange(-most, most, rates.step)
         gains, middles = [], []
-        for low, high in zip(places[:-1], places[1:], strict=True):
+        for low, high in itertools.pairwise(places):
             if high - low < 3:
                 continue
             piece = Course(*(each[low:end] for each, end in zip(_fields(body), _ends(high), strict=True)))
@@ -197,12 +198,12 @@ class Drift:
             common = CommonRates.of(sensor, body, rates, aligned)
             return common.correlation(common.mount()) if len(common.measured) else 0.0
 
-        first = np.array([best[1], best[2] * span])
+        first: NDArray[np.float64] = np.array([best[1], best[2] * span])
         simplex = first + np.array([[0.0, 0.0], [rates.step, 0.0], [0.0, rates.step]])
-        done = minimize(
+        found = minimize(
             lambda values: -correlation(values), first, method="Nelder-Mead", options={"initial_simplex": simplex}
-        )
-        return cls(float(done.x[0]), float(done.x[1]) / span, correlation(done.x))
+        ).x
+        return cls(float(found[0]), float(found[1]) / span, correlation(found))
 
 
 def _fields(course: Course) -> tuple[NDArray[Any], ...]:

@@ -24,8 +24,8 @@ from imufit.results.data_fault import DataFault
 Array = NDArray[np.float64]
 
 CLOSER: Final = 0.25
-"""What is left over what cannot be foretold, below which the reference follows the noise: no instrument leaves less than
-0.7, and a filter leaves rounding."""
+"""What is left over what cannot be foretold, below which the reference follows the noise: no instrument leaves less
+than 0.7, and a filter leaves rounding."""
 AROUND: Final = 8
 """Readings on either side that a reading is foretold from."""
 EVEN: Final = 0.2
@@ -47,8 +47,9 @@ def own_filter_faults(turning: Turning, facts: _imufit.Facts) -> list[DataFault]
         Of the log as declared.
     """
     step = np.diff(turning.t)
-    even = np.abs(step - np.median(step)) < EVEN * np.median(step)
-    known = np.isfinite(turning.gyr).all(axis=1) & np.isfinite(turning.ref_q).all(axis=1)
+    usual = float(np.median(step))
+    even = np.asarray(np.abs(step - usual) < EVEN * usual)
+    known: NDArray[np.bool_] = np.isfinite(turning.gyr).all(axis=1) & np.isfinite(turning.ref_q).all(axis=1)
     at = np.flatnonzero(even & known[1:] & known[:-1])[:MOST_ROWS]
     if len(at) < LEAST_ROWS:
         return []
@@ -70,7 +71,7 @@ def _errors(turning: Turning, at: NDArray[np.intp], attitude: Rotation) -> list[
     """Errors of the attitude that accelerometer and magnetometer show, (k, 3) rad each, and the same turned about."""
     found = []
     for readings, vertical in ((turning.acc[at], True), (turning.mag[at], False)):
-        there = np.isfinite(readings).all(axis=1)
+        there = np.asarray(np.isfinite(readings).all(axis=1))
         if np.mean(there) < 0.9:
             continue
         size = np.linalg.norm(readings, axis=1, keepdims=True)

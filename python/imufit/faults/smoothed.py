@@ -1,8 +1,8 @@
 """A reference that lost fast motion by more than `ref.lowpass` can follow: it was smoothed before it was written.
 
 The map from the gyroscope's turning to the reference's is told by their spectra, band by band: where both see the same
-motion (coherence), the reference shows it at a gain. A sound reference has a gain of one in every band, a gyroscope with
-an error of scale another one in all of them. Of a smoothed reference the gain falls with the frequency.
+motion (coherence), the reference shows it at a gain. A sound reference has a gain of one in every band, a gyroscope
+with an error of scale another one in all of them. Of a smoothed reference the gain falls with the frequency.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ BEYOND: Final = 2e-4
 """Part of the power of the rates that the effect cannot follow, from which on the fault is named: where it is less, the
 effect explains what there is to explain."""
 LEAST_LOST: Final = 1e-3
-"""Part of the power of the rates that lies in lost bands. Of the recordings that this project is tried on none has any."""
+"""Part of the power of the rates that lies in lost bands: sound recordings have none in them."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,9 @@ class Gain:
             return None
         own, other, shared = np.zeros(length // 2 + 1), np.zeros(length // 2 + 1), np.zeros(length // 2 + 1, complex)
         for at in starts:
-            a, b = (np.fft.rfft((x[at : at + length] - x[at : at + length].mean(axis=0)) * window, axis=0) for x in rates)
+            a, b = (
+                np.fft.rfft((x[at : at + length] - x[at : at + length].mean(axis=0)) * window, axis=0) for x in rates
+            )
             own += np.sum(np.abs(a) ** 2, axis=1)
             other += np.sum(np.abs(b) ** 2, axis=1)
             shared += np.sum(a * np.conj(b), axis=1)

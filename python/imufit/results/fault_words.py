@@ -67,7 +67,9 @@ def quaternion(places: Sequence[int], signs: Sequence[float]) -> Words:
     last = "has its scalar last" if places[0] == 3 else ""
     turned = [f"ref_q{PARTS[place]}" for place, sign in zip(places, signs, strict=True) if sign < 0.0]
     if len(turned) == 3:
-        other = "is the inverse: it takes vectors of the reference frame into the body, or its angle counts the other way"
+        other = (
+            "is the inverse: it takes vectors of the reference frame into the body, or its angle counts the other way"
+        )
     elif turned:
         hand = " (a reference of the other hand)" if len(turned) == 2 else " (mirrored)"
         other = f"has the wrong sign in {' and '.join(turned)}{hand}"
