@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import fmin
 
 from imufit import _imufit
 from imufit.faults.frames import MISSED, explains
@@ -193,16 +193,17 @@ class Drift:
             place = int(np.argmax(total))
             best = max(best, (float(np.asarray(total)[place]), float(starts[place]), float(skew)))
 
+        def missing(values: Array) -> float:
+            return 1.0 - correlation(values)
+
         def correlation(values: Array) -> float:
             aligned = Aligned(float(values[0]), 0.0, float(values[1]) / span, 0.0, np.eye(3), 0.0, 0)
             common = CommonRates.of(sensor, body, rates, aligned)
             return common.correlation(common.mount()) if len(common.measured) else 0.0
 
-        first: NDArray[np.float64] = np.array([best[1], best[2] * span])
+        first = np.array((best[1], best[2] * span))
         simplex = first + np.array([[0.0, 0.0], [rates.step, 0.0], [0.0, rates.step]])
-        found = minimize(
-            lambda values: -correlation(values), first, method="Nelder-Mead", options={"initial_simplex": simplex}
-        ).x
+        found = fmin(missing, first, initial_simplex=simplex, disp=False)
         return cls(float(found[0]), float(found[1]) / span, correlation(found))
 
 

@@ -49,7 +49,7 @@ def own_filter_faults(turning: Turning, facts: _imufit.Facts) -> list[DataFault]
     step = np.diff(turning.t)
     usual = float(np.median(step))
     even = np.asarray(np.abs(step - usual) < EVEN * usual)
-    known: NDArray[np.bool_] = np.isfinite(turning.gyr).all(axis=1) & np.isfinite(turning.ref_q).all(axis=1)
+    known = np.asarray(np.isfinite(np.concatenate((turning.gyr, turning.ref_q), axis=1)).all(axis=1))
     at = np.flatnonzero(even & known[1:] & known[:-1])[:MOST_ROWS]
     if len(at) < LEAST_ROWS:
         return []
