@@ -70,6 +70,11 @@ def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
         return _spoilt(fit, faults)
     best = next((c for c in candidates if result.best is not None and c.effect == ids[result.best]), None)
     named = best.effect if best is not None and result.kind in (Kind.MISSING, Kind.AMBIGUOUS) else None
+    # What a filter of a sensor's own readings says is evidence neither for nor against this sensor.
+    open_to = {sensor for fault in faults for sensor in fault.spoils_sensors}
+    adequate = result.kind == Kind.ADEQUATE
+    if open_to and (adequate or (named is not None and open_to & set(analysis.candidates[named].sensors))):
+        return _spoilt(fit, tuple(replace(fault, spoils=bool(fault.spoils_sensors)) for fault in faults))
     rivals = tuple(ids[slot] for slot in result.rivals) if result.kind == Kind.AMBIGUOUS else ()
     cards = [card_of(analysis.candidates[key]) for key in (named, *rivals) if key is not None]
     unshown = _needing_reference(fit)

@@ -8,7 +8,7 @@ effects until they are put right.
 from imufit.faults.clipped import ClippedRows
 from imufit.faults.frames import frame_faults
 from imufit.faults.knock import knock_faults
-from imufit.faults.late import late_faults
+from imufit.faults.reference import reference_faults
 from imufit.faults.rows import LeftOut, row_faults
 
-__all__ = ["ClippedRows", "LeftOut", "frame_faults", "knock_faults", "late_faults", "row_faults"]
+__all__ = ["ClippedRows", "LeftOut", "frame_faults", "knock_faults", "reference_faults", "row_faults"]

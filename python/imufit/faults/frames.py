@@ -38,7 +38,7 @@ MIN_ROWS: Final = 200
 EXCITED: Final = {"acc": 1.0, "gyr": 0.05, "mag": 3.0}
 """RMS of the ideal readings, m/s^2, rad/s and uT, from which on they say something."""
 
-KINDS: Final = ("reference", "axes", "frame", "mount")
+KINDS: Final = ("clock", "reference", "axes", "frame", "mount")
 """What is named first where the log cannot tell."""
 FRAMES: Final = ("NED", "ENU", "NWU")
 
@@ -58,12 +58,13 @@ PERMUTATIONS: Final = _signed_permutations()
 OWN: Final = PERMUTATIONS[:1]
 """Axes as they are declared."""
 
-REFERENCES: Final = (
-    ([0, 1, 2, 3], [1.0, -1.0, -1.0, -1.0], fault_words.INVERSE),
-    ([3, 0, 1, 2], [1.0, 1.0, 1.0, 1.0], fault_words.SCALAR_LAST),
-    ([3, 0, 1, 2], [1.0, -1.0, -1.0, -1.0], fault_words.INVERSE_SCALAR_LAST),
-)
-"""Places and signs of the recorded numbers in the true w x y z, and what is to be said of it."""
+PLACES: Final = ((0, 1, 2, 3), (3, 0, 1, 2))
+"""Columns in which the true w x y z may stand: as declared, and with the scalar last."""
+SIGNS: Final = tuple((1.0, *signs) for signs in itertools.product((1.0, -1.0), repeat=3))
+"""Signs of the recorded w x y z; those of all four together mean nothing."""
+CLOCKS: Final = tuple(factor for base in (2.0, 4.0, 8.0, 10.0) for factor in (base, 1.0 / base))
+"""Factors of a clock that are tried: slips of a rate, or of a divider of a timer. Larger ones, of units, are refused on
+reading (`imufit.log.clock_check`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +177,7 @@ def frame_faults(parts: Sequence[Part], facts: _imufit.Facts, metadata: Metadata
     missed = [sensor for sensor, share in declared.items() if share > MISSED]
     if not missed:
         return []
-    changes = _changes(parts, rows, facts, metadata, list(declared))
+    changes = _changes(parts, rows, facts, metadata, declared)
     readings = [Reading.of(change, declared, field_estimated=facts.field_estimated) for change in changes]
     readings = [r for r in readings if len(r.good) > len(declared) - len(missed) and r.changes]
     if not readings:
@@ -212,9 +213,10 @@ def explains(share: float, declared: float) -> bool:
 
 
 def _changes(
-    parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, metadata: Metadata, sensors: Sequence[str]
+    parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, metadata: Metadata, declared: Mapping[str, float]
 ) -> Iterator[Change]:
     """Go through the table of changes that are tried."""
+    sensors = list(declared)
     yield Change("axes", rows, PERMUTATIONS)
     for matrix in PERMUTATIONS[1:] if len(sensors) > 1 else ():
         if np.linalg.det(matrix) > 0.0:
@@ -226,9 +228,17 @@ def _changes(
         change = metadata.gravity * (up[frame] - up[metadata.frame])
         if any(change):
             yield Change("frame", rows.with_force(change), OWN, fault_words.frame(frame, metadata.frame))
-    for places, signs, words in REFERENCES:
+    if declared.get("gyr", 0.0) <= MISSED:
+        # A reference that is read otherwise turns otherwise, and so does one on another clock.
+        return
+    for places, signs in itertools.product(PLACES, SIGNS):
+        if places == PLACES[0] and signs == SIGNS[0]:
+            continue
         other = ({**part, "ref_q": np.ascontiguousarray(part["ref_q"][:, places] * signs)} for part in parts)
-        yield Change("reference", samples(other, facts), OWN, words)
+        yield Change("reference", samples(other, facts), OWN, fault_words.quaternion(places, signs))
+    resting = samples(({**part, "ref_p": None} for part in parts), facts) if "acc" in facts.sensors else rows
+    for factor in CLOCKS:
+        yield Change("clock", rows.on_clock(factor, resting), OWN, fault_words.clock(factor))
 
 
 def _explains(sensor: str, match: Match, declared: float) -> bool:
@@ -282,6 +292,18 @@ def _fits(view: tuple[Array, Array] | None, matrices: Array) -> Array:
     return np.stack([1.0 - np.maximum(inner, 0.0) ** 2 / max(power * total, 1e-300), inner / max(power, 1e-300)])
 
 
+def _words(reading: Reading, good: Sequence[str]) -> fault_words.Words | None:
+    """Say what a reading means that fits as well as another one."""
+    if reading.change.words is not None:
+        return reading.change.words
+    for sensor in good:
+        match = reading.matches[sensor]
+        unit = wrong_unit(sensor, match.ratio)
+        if not (match.usual or match.turned) and unit is not None:
+            return fault_words.wrong_unit(sensor, match.ratio, unit.words, unit.unit, unit.factor)
+    return None
+
+
 def _worded(
     best: Reading,
     good: Sequence[str],
@@ -298,8 +320,9 @@ def _worded(
     change = best.change
     left = {s: fault_words.falls(s, declared[s], best.matches[s].share) for s in good}
     if change.words is not None:
-        other = next((r.change.words for r in alike if r.change.words and r.change.kind != change.kind), None)
-        sensor = None if change.kind == "mount" else "ref"
+        others = (_words(r, good) for r in alike if r.change.kind != change.kind)
+        other = next((words for words in others if words), None)
+        sensor = {"mount": None, "clock": None}.get(change.kind, "ref")
         add(change.kind, sensor, fault_words.changed(change.words, list(left.values()), other))
     frame = next((r.change.words[1] for r in alike if r.change.words and r.change.kind == "frame"), "")
     for sensor in good:

@@ -33,7 +33,7 @@ class RowFault:
     Attributes
     ----------
     fault : str
-        ``stuck``, ``duplicate`` or ``backlog``.
+        ``stuck``, ``duplicate``, ``backlog`` or ``jump``.
     sensors : tuple of str
         Sensors concerned.
     axes : str

@@ -1,4 +1,4 @@
-"""Faults of some rows of a log: stuck values, blocks recorded twice, rows stamped with their arrival."""
+"""Faults of some rows of a log: stuck values, blocks recorded twice, rows stamped with their arrival, rows lost."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Final
 
 from imufit.faults.backlog import backlogs
 from imufit.faults.duplicate import duplicates
+from imufit.faults.jump import jumps
 from imufit.faults.row_fault import RowFault, joined
 from imufit.faults.stuck import stuck
 from imufit.log import LogSource
@@ -39,7 +40,7 @@ def row_faults(log: LogSource) -> tuple[list[DataFault], list[LeftOut]]:
     """
     found: list[RowFault] = []
     for chunk in log.chunks(CHUNK_ROWS, MARGIN):
-        for look in (stuck, duplicates, backlogs):
+        for look in (stuck, duplicates, backlogs, jumps):
             found += look(chunk)
     found = joined(found)
     faults, left_out = [], []
@@ -67,6 +68,8 @@ def _named(item: RowFault, *, left_out: bool, spoils: bool) -> DataFault:
         words = fault_words.stuck(item.sensors[0], item.axes, rows, span, figures["moved"])
     elif item.fault == "duplicate":
         words = fault_words.duplicate(item.sensors, rows, span, figures["lag"])
+    elif item.fault == "jump":
+        words = fault_words.jump(figures["when"], figures["turned"], figures["read"])
     else:
         words = fault_words.backlog(rows, span, figures["rate"], figures["usual"], moved=bool(figures["moved"]))
     return DataFault(

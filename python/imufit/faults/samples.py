@@ -84,6 +84,23 @@ class Samples:
         force = {name: x + more @ self.attitude for name, x in self.ideal.items() if name == "acc"}
         return Samples(self.readings, {**self.ideal, **force}, self.attitude)
 
+    def on_clock(self, factor: float, resting: Samples) -> Samples:
+        """Return the samples as they are if the time that passed is a multiple of what `t` says.
+
+        Parameters
+        ----------
+        factor : float
+            Time that passed over that of `t`.
+        resting : Samples
+            The same rows with a body that does not translate: what an accelerometer reads without its motion.
+        """
+        ideal = dict(self.ideal)
+        if "gyr" in ideal:
+            ideal["gyr"] = ideal["gyr"] / factor
+        if "acc" in ideal:
+            ideal["acc"] = resting.ideal["acc"] + (ideal["acc"] - resting.ideal["acc"]) / factor**2
+        return Samples(self.readings, ideal, self.attitude)
+
     def with_own_field(self, matrix: Array) -> Samples:
         """Return the samples of the magnetometer, its axes put right, with the field that its readings then give.
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from imufit import _imufit
-from imufit.faults import ClippedRows, frame_faults, late_faults
+from imufit.faults import ClippedRows, frame_faults, reference_faults
 from imufit.faults.samples import windows
 from imufit.faults.wrapped import wrapped_faults
 from imufit.fit.passes import Passes
@@ -40,9 +40,8 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
     parts = windows(counted(), facts)
     faults = frame_faults(parts, facts, passes.log.metadata)
     if not any(fault.sensor in ("gyr", "ref", None) for fault in faults):
-        # Rates that another way of reading the log explains need no other time.
-        path = passes.log.path
-        faults += late_faults(parts, facts, lambda: passes.chunks(0, "looking for a late reference"), path)
+        # Rates that another way of reading the log explains need no other reference.
+        faults += reference_faults(passes.chunks(0, "looking at the reference"), parts, facts, passes.log.path)
     faults += wrapped_faults(parts, facts, ends)
     return (*faults, *passes.row_faults, *clipped.faults(), *_packets(passes.log, facts))
 

@@ -112,7 +112,8 @@ def checked_attitude(q: NDArray[np.float64], start: int, place: Place) -> NDArra
     off = np.abs(norm - 1.0)
     bad = np.flatnonzero(off > UNIT_TOLERANCE)
     if bad.size:
-        i = int(bad[0])
+        # Euler angles of a body at rest in these columns are zero: the rows in which they are not show what they are.
+        i = int(bad[np.argmax(norm[bad] > 0.0)])
         if norm[i] == 0.0:
             problem, remedy = "the quaternion is all zero", "Write NaN in all four parts for a missing reference."
         else:

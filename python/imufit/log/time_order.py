@@ -178,13 +178,19 @@ class TimeScan:
 
     def repeated(self) -> Exception:
         """Make the error for stamps that repeat one another and are not those of a coarse clock."""
-        row, stamp = int(self._rows[0][0]), float(self._stamps[0][0])
-        return self._place.error(
-            f"t = {stamp!r} repeats t = {stamp!r} of row {row - 1}",
-            row=row,
-            column="t",
-            remedy="Two samples cannot share a time: delete the copied rows or split the log there.",
-        )
+        stamps = np.concatenate(self._stamps)
+        row, stamp = int(self._rows[0][0]), float(stamps[0])
+        problem = f"t = {stamp!r} repeats t = {stamp!r} of row {row - 1}"
+        remedy = "Two samples cannot share a time: delete the copied rows or split the log there."
+        # A stamp that single precision holds exactly, as copies of float64 stamps hardly ever all are.
+        if stamps.size >= COARSE_AT_LEAST and bool(np.all(stamps == stamps.astype(np.float32))):
+            digit = float(np.spacing(np.float32(stamp)))
+            different = np.unique(stamps)
+            typical = float(np.median(np.diff(different))) if different.size > 1 else digit
+            if digit > 0.5 * typical:
+                problem += f": t is in single precision (float32), which tells times of this size only to {digit:g} s"
+                remedy = "Write t as float64, or subtract the first time before it is rounded; record or export again."
+        return self._place.error(problem, row=row, column="t", remedy=remedy)
 
     @property
     def median_step(self) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
+from imufit.log.clock_check import other_clock, turn_ratio
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 from imufit.log.time_unit import time_unit
@@ -23,6 +24,8 @@ LEAST_STEP: Final = 1e-6
 SLOWEST_STEP: Final = 2.0
 """Median time from row to row, s, from which a clock that was not stated is taken for one of another unit: at 0.5 Hz a
 hand turns a sensor over between two samples. A log of rests may be as slow, and then says so."""
+_ROWS_OF_A_CLOCK: Final = 20
+"""Rows from which on the steps of a clock are judged."""
 HEAD: Final = 200_000
 """Rows from the start of the log on which units are judged."""
 
@@ -40,10 +43,6 @@ GYR_UNITS: Final = (
     (1e-3 * _DEG, "milli-deg/s", "mdps"),
     *((_DEG / c, f"raw counts of {c:g} LSB/(deg/s)", f"{c:g} LSB/(deg/s)") for c in (131.0, 65.5, 32.8, 16.4)),
 )
-_LIKE_CLOCK: Final = 0.3
-"""Logarithm of a ratio of rates over 1/1000 up to which the clock is in ms: noise takes some 10 % of it."""
-_COARSE_STEP: Final = 0.1
-"""Rows so far apart, s, may be 0.1 ms and more apart; at 10 kHz and faster nothing is logged with a clock in ms."""
 _NO_GRAVITY: Final = 0.1
 """Norm at rest over gravity below which gravity was taken off: an accelerometer of any make is wrong by less."""
 _FEW_GRAVITY: Final = 0.5
@@ -100,16 +99,17 @@ def check_units(
     _check_time(t, place, origin, clock != "open")
     if acc is not None:
         notes += _check_acc(acc, metadata.gravity, place, origin)
-    if gyr is not None:
-        _check_gyr(
-            t,
-            gyr,
-            [(v, v is mag) for v in (acc, mag) if v is not None],
-            ref_q,
-            place=place,
-            origin=origin,
-            stated=clock == "stated",
-        )
+    vouched = gyr is not None and _check_gyr(
+        t,
+        gyr,
+        [(v, v is mag) for v in (acc, mag) if v is not None],
+        ref_q,
+        place=place,
+        origin=origin,
+        stated=clock == "stated",
+    )
+    if clock == "a log's" and not vouched:
+        notes += _slow_clock(t, place, origin.get("t", "t"))
     if mag is not None:
         notes += _check_mag(mag, metadata, place, origin)
     return notes
@@ -117,7 +117,7 @@ def check_units(
 
 def _check_time(t: Array, place: Place, origin: Mapping[str, str], stated: bool) -> None:
     """Refuse rows closer or farther apart than any sensor samples."""
-    if t.size < 20:
+    if t.size < _ROWS_OF_A_CLOCK:
         return
     mean = float(t[-1] - t[0]) / (t.size - 1)
     column = origin.get("t", "t")
@@ -132,6 +132,18 @@ def _check_time(t: Array, place: Place, origin: Mapping[str, str], stated: bool)
     dt = float(np.median(np.diff(t)))
     if dt >= SLOWEST_STEP and not stated:
         raise _other_clock(f"the time steps are around {dt:g}", time_unit(t) or "ms", place, column)
+
+
+def _slow_clock(t: Array, place: Place, column: str) -> list[str]:
+    """Say that rows lie far apart where nothing turns that would show the unit of the clock."""
+    step = float(np.median(np.diff(t))) if t.size >= _ROWS_OF_A_CLOCK else 0.0
+    unit = time_unit(t) if step >= SLOWEST_STEP else None
+    if unit in (None, "s"):
+        return []
+    return [
+        f"{place.name}: rows are {step:.4g} s apart, and nothing turns that would show whether t is in s: if it is in "
+        f"{unit}, use --map {shlex.quote(f't={column}[{unit}]')}"
+    ]
 
 
 def _other_clock(seen: str, unit: str, place: Place, column: str) -> InputError:
@@ -192,16 +204,23 @@ def _check_gyr(
     place: Place,
     origin: Mapping[str, str],
     stated: bool,
-) -> None:
-    ratios = [(rate_ratio(t, gyr, ref_q), "the reference attitude turns")] if ref_q is not None else []
+) -> bool:
+    """Refuse rates in another unit, and a clock in another one; say whether what turns vouches for both."""
+    ratios = [(turn_ratio(t, gyr, ref_q), "the reference attitude turns")] if ref_q is not None else []
     ratios += [(field_ratio(t, gyr, v, iron), "the field in the other sensors turns") for v, iron in vectors]
     for ratio, who in ratios:
-        if ratio > 0.2:
-            return
+        if 0.2 < ratio < 1.0 / _OTHER_UNIT:
+            return True
+        column = origin.get("t", "t")
+        clock = None if stated else other_clock(t, ratio, tuple(size for size, *_ in GYR_UNITS), column)
+        if clock is not None:
+            raise place.error(
+                f"{who} at {ratio:.3g} of the rate in gyr, with rows {float(np.median(np.diff(t))):.3g} s apart: "
+                f"{clock[0]}, not in s",
+                column="t",
+                remedy=f"Use --map {clock[1]}, or {shlex.quote(f't={column}[s]')} if it is s.",
+            )
         if ratio < _OTHER_UNIT:
-            if not stated and abs(np.log(ratio / 1e-3)) < _LIKE_CLOCK and float(np.median(np.diff(t))) >= _COARSE_STEP:
-                seen = f"{who} at {ratio:.3g} of the rate in gyr, with rows {float(np.median(np.diff(t))):.3g} s apart"
-                raise _other_clock(seen, "ms", place, origin.get("t", "t"))
             _, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
             raise place.error(
                 f"{who} at {ratio:.3g} of the rate in gyr, which looks like {words}, not rad/s",
@@ -218,6 +237,7 @@ def _check_gyr(
             column="gyr_x",
             remedy=_use_map("gyr", unit, origin),
         )
+    return False
 
 
 def rate_ratio(t: Array, gyr: Array, ref_q: Array) -> float:

@@ -38,6 +38,8 @@ class DataFault:
         True if the sensor read falsely in these rows, and what is said of the others is not the whole truth about it.
     spoils : bool
         True if nothing can be said of effects before it is put right.
+    spoils_sensors : tuple of str
+        Sensors of whose effects nothing can be said before it is put right.
     gain : float
         Drop of the sum of squares, in units of the noise, that it explains beside every effect; NaN where not asked.
     file : str or None
@@ -55,6 +57,7 @@ class DataFault:
     left_out: bool = False
     false_readings: bool = False
     spoils: bool = False
+    spoils_sensors: tuple[str, ...] = ()
     gain: float = math.nan
     file: str | None = None
 

@@ -17,6 +17,7 @@ from imufit.log.columns import SENSOR_NAMES
 Array = NDArray[np.float64]
 
 AXES: Final = "xyz"
+PARTS: Final = "wxyz"
 UNITS: Final = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
 
 Words = tuple[str, str]
@@ -53,20 +54,48 @@ def frame(name: str, declared: str) -> Words:
     return f"The reference is in the frame {name}, not {declared} as the log says.", f'Declare frame = "{name}".'
 
 
-INVERSE: Final = (
-    "The reference attitude is the inverse: it takes vectors of the reference frame into the body, or its angle "
-    "counts the other way.",
-    "Conjugate it: --map ref_qx=-ref_qx,ref_qy=-ref_qy,ref_qz=-ref_qz.",
-)
-SCALAR_LAST: Final = (
-    "The reference attitude has its scalar last.",
-    "Put the scalar first: --map ref_qw=ref_qz,ref_qx=ref_qw,ref_qy=ref_qx,ref_qz=ref_qy.",
-)
-INVERSE_SCALAR_LAST: Final = (
-    "The reference attitude has its scalar last, and is the inverse: it takes vectors of the reference frame into "
-    "the body.",
-    "Put the scalar first and conjugate it: --map ref_qw=ref_qz,ref_qx=-ref_qw,ref_qy=-ref_qx,ref_qz=-ref_qy.",
-)
+def quaternion(places: Sequence[int], signs: Sequence[float]) -> Words:
+    """Say how the four numbers of the reference have to be read.
+
+    Parameters
+    ----------
+    places : sequence of int
+        Column, counted from ``ref_qw``, in which each of the true w x y z stands.
+    signs : sequence of float
+        Sign of each.
+    """
+    last = "has its scalar last" if places[0] == 3 else ""
+    turned = [f"ref_q{PARTS[place]}" for place, sign in zip(places, signs, strict=True) if sign < 0.0]
+    if len(turned) == 3:
+        other = (
+            "is the inverse: it takes vectors of the reference frame into the body, or its angle counts the other way"
+        )
+    elif turned:
+        hand = " (a reference of the other hand)" if len(turned) == 2 else " (mirrored)"
+        other = f"has the wrong sign in {' and '.join(turned)}{hand}"
+    else:
+        other = ""
+    to_do = [*(["Put the scalar first"] if last else [])]
+    to_do += ["conjugate it" if len(turned) == 3 else f"turn the sign of {' and '.join(turned)}"] if turned else []
+    said = [
+        f"ref_q{part}={'-' if sign < 0.0 else ''}ref_q{PARTS[place]}"
+        for part, place, sign in zip(PARTS, places, signs, strict=True)
+        if sign < 0.0 or PARTS[place] != part
+    ]
+    remedy = " and ".join(to_do)
+    return (
+        f"The reference attitude {', and '.join(each for each in (last, other) if each)}.",
+        f"{remedy[0].upper()}{remedy[1:]}: --map {','.join(said)}.",
+    )
+
+
+def clock(factor: float) -> Words:
+    """Say that the time that passed is a multiple of what `t` says."""
+    size = f"{factor:g} times as long as" if factor > 1.0 else f"1/{1.0 / factor:g} of what"
+    return (
+        f"The clock is at another rate: by the turns of the reference, the steps between rows are {size} t says.",
+        f"Put t right: --map 't=t[*{factor:g}]'.",
+    )
 
 
 def axes(sensor: str, matrix: Array, left: str, other: str) -> Words:
@@ -149,6 +178,72 @@ def late(lag: float, correlation: float, declared: float, path: Path | None) -> 
     )
 
 
+def skew(lag: float, rate: float, correlation: float, declared: float, path: Path | None) -> Words:
+    """Say that the reference's clock runs at another rate, from a lag on, s, and how well the rates agree then."""
+    log = "LOG" if path is None else shlex.quote(str(path))
+    return (
+        f"The clock of the reference runs {100.0 * abs(rate):.3g} % {'fast' if rate > 0.0 else 'slow'} against the "
+        f"sensors' (correlation of the rates {correlation:.2f}, {declared:.2f} as declared).",
+        f"Put the reference on their clock: imufit join {log} {log} --lag {lag:.4f} --skew {1e6 * rate:.0f} "
+        "-o joined.parquet",
+    )
+
+
+def another_motion(declared: float, lags: Sequence[tuple[float, float]], *, fits: bool) -> Words:
+    """Say that the reference is of another motion; lags, s, with the correlation of the rates at each."""
+    shown = " and ".join(f"{lag:.2f} s ({correlation:.2f})" for lag, correlation in lags)
+    if fits:
+        text = (
+            f"As declared, ref_q shows another motion than the sensors (correlation of the rates {declared:.2f}), and "
+            f"not one lag alone puts them together, but each of {shown} as well as the other: the motion repeats "
+            "itself, or the reference was put together from another recording."
+        )
+        return text, "Look whether it is the right file; where the lag is known, imufit join LOG LOG --lag S moves it."
+    text = (
+        "ref_q belongs to another motion: its rates and those of the gyroscope have nothing in common at any time "
+        f"(correlation {declared:.2f} as declared{f', at best after a lag of {shown}' if shown else ''})."
+    )
+    return text, "Look for the reference of this recording, and whether it is of the same body."
+
+
+def smoothed(corner: float, lost: float) -> Words:
+    """Say that the reference was smoothed, from which frequency on, Hz, and which part of the motion lies there."""
+    return (
+        f"The reference is smoothed: ref_q shows less than half of every motion faster than {corner:.2g} Hz, in which "
+        f"{100.0 * lost:.2g} % of the gyroscope's power lie.",
+        "Export the reference without its low-pass filter.",
+    )
+
+
+def reference_stands(swing: float) -> Words:
+    """Say that the reference does not move, while the gyroscope turned by an angle in rad."""
+    return (
+        f"The reference does not move: ref_q stands at one attitude, while the gyroscope turned by "
+        f"{np.degrees(swing):.0f} deg.",
+        "Look for a tracker that lost the body, or a column that was filled with one value, and record the reference "
+        "again.",
+    )
+
+
+def reference_held(rows: float, rate: float) -> Words:
+    """Say that each attitude of the reference is repeated, over so many rows, and how many there are in a second."""
+    return (
+        f"The reference is held: ref_q repeats each attitude in {rows:.0f} rows, {rate:.3g} of them a second, while "
+        "the gyroscope turns.",
+        "Write each attitude in the row of its own time alone, and leave ref_* empty in the rows between.",
+    )
+
+
+def own_filter(left: float, unforeseen: float) -> Words:
+    """Say that the reference follows the readings: what is left, and what an instrument would leave at least, rad/s."""
+    return (
+        "The reference was made from the log's own readings: ref_q follows the noise of the gyroscope sample by sample "
+        f"(to {quantity.quantity(left, 'rad/s')}, where the noise is {quantity.quantity(unforeseen, 'rad/s')}), as a "
+        "filter of these readings does.",
+        "Such a filter shares the errors of the sensor: take the reference from another instrument.",
+    )
+
+
 def stuck(sensor: str, axes: str, rows: int, span: tuple[float, float], moved: float) -> Words:
     """Say that a value stood still."""
     which = f"{sensor}_{axes}" if len(axes) == 1 else f"{sensor} ({', '.join(axes)})"
@@ -175,6 +270,16 @@ def backlog(rows: int, span: tuple[float, float], rate: float, usual: float, *, 
         f"{rows} rows at {quantity.span(*span)} come at {rate:.0f} a second instead of {usual:.0f}: their times are "
         f"those of arrival, not of sampling.{harmless}",
         "Let the sensor stamp its samples, or cut these rows off.",
+    )
+
+
+def jump(when: float, turned: float, read: float) -> Words:
+    """Say that the reference goes on somewhere else, the time, s, and by how much both turned in that step, rad."""
+    return (
+        f"From the row at t = {when:.6g} s to the next the reference turns by {np.degrees(turned):.3g} deg and the "
+        f"gyroscope by {np.degrees(read):.2g} deg: rows were lost there and t goes on as if none were missing, or the "
+        "reference jumped.",
+        f"Cut the log in two at t = {when:.6g} s, and let the sensor stamp its samples instead of counting rows.",
     )
 
 
