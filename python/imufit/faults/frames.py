@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.faults.byte_order import bytes_swapped
 from imufit.faults.samples import SENSORS, Samples, samples
-from imufit.faults.units import EARTH, KNOWN, POSSIBLE, USUAL, WrongUnit, units_of_field, wrong_units
+from imufit.faults.units import KNOWN, POSSIBLE, USUAL, WrongUnit, units_of_field, wrong_units
 from imufit.log.metadata import STANDARD_GRAVITY, Metadata
 from imufit.results import column_words, fault_words
 from imufit.results.data_fault import DataFault
@@ -230,6 +230,9 @@ def _changed(parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, metadat
         *_metadata(rows, facts, metadata),
     )
     readings = [Reading.of(change, declared, field_estimated=facts.field_estimated) for change in changes]
+    if _false_field(rows, facts, metadata):
+        # Readings of the size of the earth's field are in uT.
+        readings = [r for r in readings if "mag" not in r.matches or r.matches["mag"].usual]
     readings = [r for r in readings if len(r.good) > len(declared) - len(missed) and r.changes]
     if not readings:
         return []
@@ -317,6 +320,15 @@ def _metadata(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> Iterat
             ideal = np.where(np.isfinite(rows.ideal["mag"]), field @ rows.attitude, np.nan)
             words = column_words.field_told(metadata.mag_reference, field)
             yield Change("field", Samples(rows.readings, {**rows.ideal, "mag": ideal}, rows.attitude), OWN, words, "mag")
+
+
+def _false_field(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> bool:
+    """Whether the field that is told has no size that a field has, while the readings have."""
+    told = metadata.mag_reference
+    if told is None or "mag" not in facts.sensors:
+        return False
+    told_size, read = float(np.linalg.norm(told)), float(np.linalg.norm(rows.own_field()))
+    return not POSSIBLE[0] <= told_size <= POSSIBLE[1] and POSSIBLE[0] <= read <= POSSIBLE[1]
 
 
 def _without_gravity(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> list[DataFault]:
