@@ -48,7 +48,7 @@ NO_GRAVITY: Final = 0.1
 SHORT: Final = 0.5
 """Median length of such readings, in gravities, at most."""
 EARTHLY: Final = 0.15
-"""Difference from standard gravity, m/s^2, from which on gravity is not that of a place on the ground (9.76 to 9.84)."""
+"""Difference from standard gravity, m/s^2, from which on gravity is that of no place on the ground: 9.76 to 9.84."""
 PLACES: Final = {"mm": 1e-3, "cm": 1e-2}
 """Units in which positions are written, m."""
 
@@ -117,7 +117,7 @@ class Change:
     sensor: str | None = None
 
     def open_to(self, sensor: str) -> Array:
-        """Maps (k, 3, 3) that are open to a sensor."""
+        """Return the maps (k, 3, 3) that are open to a sensor."""
         return np.concatenate([self.matrices, COLUMNS[sensor]]) if self.kind == "axes" else self.matrices
 
 
@@ -319,7 +319,9 @@ def _metadata(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> Iterat
         if POSSIBLE[0] <= np.linalg.norm(field) <= POSSIBLE[1]:
             ideal = np.where(np.isfinite(rows.ideal["mag"]), field @ rows.attitude, np.nan)
             words = column_words.field_told(metadata.mag_reference, field)
-            yield Change("field", Samples(rows.readings, {**rows.ideal, "mag": ideal}, rows.attitude), OWN, words, "mag")
+            yield Change(
+                "field", Samples(rows.readings, {**rows.ideal, "mag": ideal}, rows.attitude), OWN, words, "mag"
+            )
 
 
 def _false_field(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> bool:
@@ -443,12 +445,16 @@ def _worded(
         match = best.matches[sensor]
         if match.column is not None:
             factor = match.ratio * match.matrix[match.column, match.column]
-            words = column_words.wrong_unit(
-                sensor, "xyz"[match.column], factor, _named(wrong_units(sensor, factor))
-            )
+            words = column_words.wrong_unit(sensor, "xyz"[match.column], factor, _named(wrong_units(sensor, factor)))
             found.append(
                 DataFault(
-                    "units", sensor, f"{sensor}_{'xyz'[match.column]}", facts.t_start, facts.t_end, facts.n, *words,
+                    "units",
+                    sensor,
+                    f"{sensor}_{'xyz'[match.column]}",
+                    facts.t_start,
+                    facts.t_end,
+                    facts.n,
+                    *words,
                     spoils=True,
                 )
             )

@@ -65,7 +65,7 @@ def rig_angle_faults(log: LogSource, facts: _imufit.Facts) -> list[DataFault]:
 
 
 def _pieces(log: LogSource) -> tuple[Array, Array]:
-    """Turns of the angle, (k,), and of the gyroscope about each axis, (k, 3), in pieces of the log."""
+    """Return the turns of the angle, (k,), and of the gyroscope about each axis, (k, 3), in pieces of the log."""
     angles, turns = [], []
     for chunk in log.chunks(CHUNK_ROWS, 0):
         t, angle, gyr = chunk.log.t, chunk.log.ref_angle, chunk.log.gyr

@@ -8,7 +8,7 @@ from typing import Final
 
 G: Final = 9.80665
 DEG: Final = 180.0 / math.pi
-TOLERANCE: Final = 0.2
+TOLERANCE: Final = math.log(1.25)
 """How far the logarithm of a ratio may lie from that of a known factor: scale errors of sensors are smaller, and nearly
 all factors lie two and more apart."""
 UNDECIDED: Final = 0.03

@@ -12,8 +12,8 @@ from imufit.log.log import LogSource
 from imufit.log.words import words_of
 
 _SAME: Final = 0.9999
-"""Correlation with readings, or with the length of their vectors, from which a column is computed from these: printed with three digits it
-has more, and no quantity measured beside a sensor follows the sensor's noise."""
+"""Correlation with readings, or with the length of their vectors, from which a column is computed from them: printed
+with three digits it has more, and no quantity measured beside a sensor follows the sensor's noise."""
 _LOOKED_AT: Final = 4096
 """Rows that are looked at."""
 _ROWS: Final = 20

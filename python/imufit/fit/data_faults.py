@@ -52,7 +52,7 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
         path = passes.log.path
         faults += late_faults(parts, facts, lambda: passes.chunks(0, "looking for a late reference"), path)
     if not faults:
-        faults = wrapped_faults(parts, facts, ends)
+        faults = wrapped_faults(parts, facts)
     return (*faults, *passes.row_faults, *clipped.faults(), *_packets(passes.log, facts))
 
 

@@ -60,8 +60,8 @@ MAG_UNITS: Final = (
     (2e-5, 7e-5, "T", "T"),
 )
 _TESLA: Final = 2e-3
-"""Norm below which a magnetometer reads in T: 2 mT is beyond the range of all that measure the earth's field, and 2 nT is
-below the noise of all that are built beside accelerometers."""
+"""Norm below which a magnetometer reads in T: 2 mT is beyond the range of all that measure the earth's field, and 2 nT
+is below the noise of all that are built beside accelerometers."""
 _EARTH: Final = (20.0, 70.0)
 """Magnitude of the earth's field, uT (World Magnetic Model: 22 to 67)."""
 _COUNTS: Final = tuple(
@@ -148,7 +148,9 @@ def _check_exchange(acc: Array, gyr: Array, gravity: float, place: Place, origin
     """Refuse a log in which gravity is in gyr and nothing in acc."""
     still = rest_norm(acc, relative=False)
     if still < _NO_GRAVITY * gravity and abs(rest_norm(gyr) / gravity - 1.0) < _NEAR_GRAVITY:
-        pairs = [(f"{one}_{axis}", f"{other}_{axis}") for one, other in (("acc", "gyr"), ("gyr", "acc")) for axis in "xyz"]
+        pairs = [
+            (f"{one}_{axis}", f"{other}_{axis}") for one, other in (("acc", "gyr"), ("gyr", "acc")) for axis in "xyz"
+        ]
         mapping = ",".join(f"{target}={origin.get(source, source)}" for target, source in pairs)
         raise place.error(
             f"at rest gyr shows gravity and acc {still:.4g}: the columns of acc and gyr are exchanged",
@@ -314,11 +316,15 @@ def _check_gyr(
             if not stated and abs(np.log(ratio / 1e-3)) < _LIKE_CLOCK and float(np.median(np.diff(t))) >= _COARSE_STEP:
                 seen = f"{who} at {ratio:.3g} of the rate in gyr, with rows {float(np.median(np.diff(t))):.3g} s apart"
                 raise _other_clock(seen, "ms", place, origin.get("t", "t"))
-            _, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
+            size, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
+            axes = _axes_in(t, gyr, ref_q, vectors, size)
+            name = "gyr" if axes == "xyz" else f"gyr_{axes}"
             raise place.error(
-                f"{who} at {ratio:.3g} of the rate in gyr, which looks like {words}, not rad/s",
-                column="gyr_x",
-                remedy="Use " + _map("gyr", unit, origin),
+                f"{who} at {ratio:.3g} of the rate in gyr: {name} looks like {words}, not rad/s"
+                if len(axes) == 1
+                else f"{who} at {ratio:.3g} of the rate in gyr, which looks like {words}, not rad/s",
+                column=f"gyr_{axes[0]}",
+                remedy="Use " + _map("gyr", unit, origin, axes),
             )
     norm = np.linalg.norm(gyr, axis=1)
     norm = norm[np.isfinite(norm)]

@@ -119,7 +119,10 @@ def own_length(sensor: str, length: float) -> Words:
 def copied(copy: str, original: str, *, sure: bool) -> Words:
     """Say that one column repeats another."""
     which = f"{copy} is a copy of {original}" if sure else f"{copy} and {original} are the same, one of them a copy"
-    return f"{which}: the two are equal in every row.", f"Look for the axis that is read twice, and record {copy} again."
+    return (
+        f"{which}: the two are equal in every row.",
+        f"Look for the axis that is read twice, and record {copy} again.",
+    )
 
 
 def strangers(channel: str, rows: int, span: tuple[float, float], values: tuple[float, float], usual: float) -> Words:
