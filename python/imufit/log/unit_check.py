@@ -255,7 +255,7 @@ def _nearest(size: float, known: Sequence[tuple[float, str, str]], most: float) 
 
 
 def _looks_like(units: Sequence[tuple[float, str, str]], si: str) -> str:
-    return f"looks like {', or '.join(words for _, words, _ in units)}, not {si}"
+    return f"looks like {units[0][1]}, not {si}"
 
 
 def _use_one(sensor: str, units: Sequence[tuple[float, str, str]], origin: Mapping[str, str]) -> str:
