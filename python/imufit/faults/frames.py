@@ -369,7 +369,9 @@ def _named(units: Sequence[WrongUnit]) -> list[column_words.Unit]:
 def _explains(sensor: str, match: Match, declared: float) -> bool:
     if declared <= MISSED and match.usual and not match.turned:
         return match.share <= MISSED
-    known = match.usual or bool(wrong_units(sensor, match.ratio)) or not 1.0 / UNHEARD < match.ratio < UNHEARD
+    known = (
+        match.usual or bool(wrong_units(sensor, match.ratio, match.share)) or not 1.0 / UNHEARD < match.ratio < UNHEARD
+    )
     return known and explains(match.share, declared)
 
 
@@ -445,7 +447,9 @@ def _worded(
         match = best.matches[sensor]
         if match.column is not None:
             factor = match.ratio * match.matrix[match.column, match.column]
-            words = column_words.wrong_unit(sensor, "xyz"[match.column], factor, _named(wrong_units(sensor, factor)))
+            words = column_words.wrong_unit(
+                sensor, "xyz"[match.column], factor, _named(wrong_units(sensor, factor, match.share))
+            )
             found.append(
                 DataFault(
                     "units",
@@ -462,6 +466,6 @@ def _worded(
             kind = "frame" if sensor == "acc" and np.array_equal(match.matrix, -np.eye(3)) else "axes"
             add(kind, sensor, fault_words.axes(sensor, match.matrix, left[sensor], frame))
         if not match.usual:
-            units = _named(wrong_units(sensor, match.ratio))
+            units = _named(wrong_units(sensor, match.ratio, match.share))
             add("units", sensor, column_words.wrong_unit(sensor, "xyz", match.ratio, units))
     return found

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
 from imufit.log import LogSource
@@ -26,6 +27,10 @@ LEFT: Final = 0.2
 """Share of the turns' sum of squares that may be left."""
 NEAR: Final = 0.25
 """Relative difference of the factor from one, or from that of degrees."""
+ZEROS: Final = (0, 90, -90, 180)
+"""Zeros of an encoder that are looked for, deg."""
+CLEARLY: Final = 1.5
+"""Times more of the specific force that another zero must explain."""
 CHUNK_ROWS: Final = 65536
 
 
@@ -56,12 +61,33 @@ def rig_angle_faults(log: LogSource, facts: _imufit.Facts) -> list[DataFault]:
         return []
     found = []
     if abs(abs(factor) * math.pi / 180.0 - 1.0) < NEAR:
-        found.append(("units", column_words.angle_in_degrees(abs(factor))))
+        sign = -1 if factor < 0.0 else 1
+        found.append(("units", column_words.angle_in_degrees(abs(factor), sign, _zero(log, sign))))
     if "xyz"[axis] != told and rms[axis] > 3.0 * rms["xyz".index(told)]:
         found.append(("rig_axis", column_words.other_rig_axis(told, "xyz"[axis])))
     return [
         DataFault(kind, "ref", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True) for kind, words in found
     ]
+
+
+def _zero(log: LogSource, sign: int) -> int:
+    """Return the angle, deg, at which the body stands upright, by gravity: a multiple of 90; 0 where nothing shows it.
+
+    The angle of the encoder is an arbitrary one. Where the sensor is mounted a quarter turn round, so is its zero.
+    """
+    axis = "xyz".index(str(log.metadata.rig_axis))
+    up = np.array(_imufit.frame_vectors(log.metadata.frame)["up"])
+    sums = np.zeros(len(ZEROS))
+    for chunk in log.chunks(CHUNK_ROWS, 0):
+        angle, acc = chunk.log.ref_angle, chunk.log.acc
+        if angle is None or acc is None:
+            return 0
+        known = np.isfinite(angle) & np.isfinite(acc).all(axis=1)
+        for k, zero in enumerate(ZEROS):
+            vectors = np.radians(sign * angle[known] - zero)[:, None] * np.eye(3)[axis]
+            sums[k] += float(np.sum(acc[known] * Rotation.from_rotvec(vectors).inv().apply(up)))
+    best = int(np.argmax(sums))
+    return ZEROS[best] if sums[best] > CLEARLY * max(sums[0], 0.0) else 0
 
 
 def _pieces(log: LogSource) -> tuple[Array, Array]:

@@ -11,8 +11,8 @@ DEG: Final = 180.0 / math.pi
 TOLERANCE: Final = math.log(1.25)
 """How far the logarithm of a ratio may lie from that of a known factor: scale errors of sensors are smaller, and nearly
 all factors lie two and more apart."""
-UNDECIDED: Final = 0.03
-"""Logarithm by which one factor must be nearer than another: what scale errors of consumer accelerometers come to."""
+UNDECIDED: Final = 0.05
+"""Logarithm by which one factor must be nearer than another: what scale errors of consumer sensors come to."""
 USUAL: Final = 1.25
 """Up to this factor either way a reading is that of a sensor with an error of scale."""
 EARTH: Final = (20.0, 70.0)
@@ -53,7 +53,7 @@ KNOWN: Final[dict[str, list[WrongUnit]]] = {
         _factor(G, "converted from g to m/s^2 twice"),
         *_counts(1.0 / G, "g", (16384.0, 8192.0, 4096.0, 2048.0)),
         *_RANGES,
-        *_TENS,
+        *(ten for ten in _TENS if ten.factor != 100.0),
     ],
     "gyr": [
         WrongUnit(DEG, "deg/s", "deg/s"),
@@ -78,7 +78,7 @@ KNOWN: Final[dict[str, list[WrongUnit]]] = {
 }
 
 
-def wrong_units(sensor: str, ratio: float) -> tuple[WrongUnit, ...]:
+def wrong_units(sensor: str, ratio: float, share: float = 0.0) -> tuple[WrongUnit, ...]:
     """Find the unit in which readings are `ratio` times what they should be, the nearest first.
 
     Parameters
@@ -86,7 +86,10 @@ def wrong_units(sensor: str, ratio: float) -> tuple[WrongUnit, ...]:
     sensor : str
         ``acc``, ``gyr`` or ``mag``.
     ratio : float
-        Reading over ideal reading.
+        Reading over ideal reading, by least squares.
+    share : float
+        Share of the readings' sum of squares that is left. As far as it is the ideal reading that is off, the true
+        ratio is larger, by up to 1 / (1 - share).
 
     Returns
     -------
@@ -95,7 +98,9 @@ def wrong_units(sensor: str, ratio: float) -> tuple[WrongUnit, ...]:
     """
     if not ratio > 0.0:
         return ()
-    off = {item: abs(math.log(ratio / item.factor)) for item in KNOWN[sensor]}
+    low, high = math.log(ratio), math.log(ratio) - math.log1p(-min(share, 0.5))
+    logs = {item: math.log(item.factor) for item in KNOWN[sensor]}
+    off = {item: max(low - at, at - high, 0.0) for item, at in logs.items()}
     return _nearest({item: away for item, away in off.items() if away < TOLERANCE})
 
 

@@ -41,6 +41,11 @@ GYR_UNITS: Final = (
     (1e-3 * _DEG, "milli-deg/s", "mdps"),
     *((_DEG / c, f"raw counts of {c:g} LSB/(deg/s)", f"{c:g} LSB/(deg/s)") for c in (131.0, 65.5, 32.8, 16.4)),
 )
+_RPM: Final = (np.pi / 30.0, "rpm", "rpm")
+_AGREES: Final = 0.3
+"""Logarithm of a ratio of rates up to which they agree: half of what lies between two units."""
+_CLEARER: Final = 0.1
+"""The same by which a single axis must agree better than all of them; noise takes some 10 % of a ratio."""
 _LIKE_CLOCK: Final = 0.3
 """Logarithm of a ratio of rates over 1/1000 up to which the clock is in ms: noise takes some 10 % of it."""
 _COARSE_STEP: Final = 0.1
@@ -147,7 +152,7 @@ def check_units(
 def _check_exchange(acc: Array, gyr: Array, gravity: float, place: Place, origin: Mapping[str, str]) -> None:
     """Refuse a log in which gravity is in gyr and nothing in acc."""
     still = rest_norm(acc, relative=False)
-    if still < _NO_GRAVITY * gravity and abs(rest_norm(gyr) / gravity - 1.0) < _NEAR_GRAVITY:
+    if still < _FEW_GRAVITY * gravity and abs(rest_norm(gyr) / gravity - 1.0) < _NEAR_GRAVITY:
         pairs = [
             (f"{one}_{axis}", f"{other}_{axis}") for one, other in (("acc", "gyr"), ("gyr", "acc")) for axis in "xyz"
         ]
@@ -317,12 +322,10 @@ def _check_gyr(
                 seen = f"{who} at {ratio:.3g} of the rate in gyr, with rows {float(np.median(np.diff(t))):.3g} s apart"
                 raise _other_clock(seen, "ms", place, origin.get("t", "t"))
             size, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
-            axes = _axes_in(t, gyr, ref_q, vectors, size)
-            name = "gyr" if axes == "xyz" else f"gyr_{axes}"
+            words, unit, axes = _by_turns(t, gyr, ref_q, vectors, (size, words, unit))
+            name = "" if axes == "xyz" else f", all of it gyr_{axes}'s"
             raise place.error(
-                f"{who} at {ratio:.3g} of the rate in gyr: {name} looks like {words}, not rad/s"
-                if len(axes) == 1
-                else f"{who} at {ratio:.3g} of the rate in gyr, which looks like {words}, not rad/s",
+                f"{who} at {ratio:.3g} of the rate in gyr{name}, which looks like {words}, not rad/s",
                 column=f"gyr_{axes[0]}",
                 remedy="Use " + _map("gyr", unit, origin, axes),
             )
@@ -330,8 +333,8 @@ def _check_gyr(
     norm = norm[np.isfinite(norm)]
     high = float(np.quantile(norm, 0.99)) if norm.size else 0.0
     if high > 100.0:
-        words, unit = ("deg/s", "deg/s") if high < 4500.0 else ("raw counts", "131 LSB/(deg/s)")
-        axes = _axes_in(t, gyr, ref_q, vectors, _DEG if unit == "deg/s" else _DEG / 131.0)
+        likely = GYR_UNITS[0] if high < 4500.0 else GYR_UNITS[2]
+        words, unit, axes = _by_turns(t, gyr, ref_q, vectors, likely)
         name = "gyr" if axes == "xyz" else f"gyr_{axes}"
         raise place.error(
             f"{name} reaches {high:.4g}, more than any sensor in rad/s: it looks like {words}",
@@ -340,17 +343,29 @@ def _check_gyr(
         )
 
 
-def _axes_in(t: Array, gyr: Array, ref_q: Array | None, vectors: list[tuple[Array, bool]], factor: float) -> str:
-    """Find the axes that are in another unit: all of them, or a single one where everything else says so."""
+def _by_turns(
+    t: Array, gyr: Array, ref_q: Array | None, vectors: list[tuple[Array, bool]], likely: tuple[float, str, str]
+) -> tuple[str, str, str]:
+    """Find words and unit of a gyroscope, and the axes that are in it: all, or a single one where only that agrees.
 
-    def off(axes: str) -> float:
-        converted = gyr * np.array([factor if axis in axes else 1.0 for axis in "xyz"])
+    A candidate agrees where the gyroscope, converted so, turns as the reference does, or as the field in the other
+    sensors. Where nothing turns or nothing agrees, it is the likely unit on all axes.
+    """
+
+    def off(unit: tuple[float, str, str], axes: str) -> float:
+        converted = gyr * np.array([unit[0] if axis in axes else 1.0 for axis in "xyz"])
         ratios = [] if ref_q is None else [rate_ratio(t, converted, ref_q)]
         ratios += [field_ratio(t, converted, vector, iron) for vector, iron in vectors]
         return next((abs(math.log(ratio)) for ratio in ratios if ratio > 0.0), math.inf)
 
-    # All axes first: it is the commoner mistake, and where nothing else turns it stays.
-    return min(("xyz", "x", "y", "z"), key=off)
+    units = (likely, *(unit for unit in (*GYR_UNITS, _RPM) if unit is not likely))
+    together, alone = (
+        min(((off(unit, axes), unit, axes) for axes in tried for unit in units), key=lambda each: each[0])
+        for tried in (("xyz",), ("x", "y", "z"))
+    )
+    best = alone if alone[0] < together[0] - _CLEARER else together
+    _, unit, axes = best if best[0] < _AGREES else (0.0, likely, "xyz")
+    return unit[1], unit[2], axes
 
 
 def rate_ratio(t: Array, gyr: Array, ref_q: Array) -> float:

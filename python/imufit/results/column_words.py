@@ -138,11 +138,24 @@ def strangers(channel: str, rows: int, span: tuple[float, float], values: tuple[
     )
 
 
-def angle_in_degrees(factor: float) -> Words:
-    """Say that the commanded angle of a rig is in degrees, by the gyroscope."""
+def angle_in_degrees(factor: float, sign: int, zero: int) -> Words:
+    """Say that the commanded angle of a rig is in degrees, by the gyroscope.
+
+    Parameters
+    ----------
+    factor : float
+        Turn of the angle over that of the gyroscope.
+    sign : int
+        -1 where the angle counts the other way.
+    zero : int
+        Angle, deg, at which the body stands upright.
+    """
+    way = ", and counts the other way" if sign < 0 else ""
+    where = f", and the body stands upright at {zero} deg" if zero else ""
+    unit = "deg" if not zero else f"deg - {zero}" if zero > 0 else f"deg + {-zero}"
     return (
-        f"ref_angle turns {factor:.4g} times as far as the gyroscope: it is in degrees.",
-        "Declare the unit: --map 'ref_angle=ref_angle[deg]'.",
+        f"ref_angle turns {factor:.4g} times as far as the gyroscope: it is in degrees{way}{where}.",
+        f"Declare the unit: --map 'ref_angle={'-' if sign < 0 else ''}ref_angle[{unit}]'.",
     )
 
 
