@@ -369,6 +369,9 @@ def _named(units: Sequence[WrongUnit]) -> list[column_words.Unit]:
 def _explains(sensor: str, match: Match, declared: float) -> bool:
     if declared <= MISSED and match.usual and not match.turned:
         return match.share <= MISSED
+    if match.column is not None and not match.usual:
+        # Two units at once, one of them on a single axis: any factor would come about so.
+        return False
     known = (
         match.usual or bool(wrong_units(sensor, match.ratio, match.share)) or not 1.0 / UNHEARD < match.ratio < UNHEARD
     )

@@ -47,12 +47,12 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
         faults = own_length_faults(rows, facts) + copied_faults(rows, facts)
     if not faults:
         faults = frame_faults(parts, facts, passes.log.metadata)
+    if not faults:
+        faults = wrapped_faults(parts, facts)
     if not any(fault.sensor in ("gyr", "ref", None) for fault in faults):
         # Rates that another way of reading the log explains need no other time.
         path = passes.log.path
         faults += late_faults(parts, facts, lambda: passes.chunks(0, "looking for a late reference"), path)
-    if not faults:
-        faults = wrapped_faults(parts, facts)
     return (*faults, *passes.row_faults, *clipped.faults(), *_packets(passes.log, facts))
 
 
