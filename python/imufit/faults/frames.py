@@ -1,10 +1,11 @@
-"""Wrong units, turned or exchanged axes, a reference in another frame: what concerns every row of a log.
+"""Wrong units, turned or exchanged columns, a reference in another frame: what concerns every row of a log.
 
 Readings are held against ideal ones in rows from all over the log. Only where an ideal sensor misses most of a reading
-is the table of changes gone through: each sensor with its axes permuted and signed (48 ways); all sensors turned alike
-(a mount); the reference conjugated, with its scalar last, or in another frame; each with any factor. One comparison
-serves all of them, and the change is named that takes away nearly all of what the log as declared leaves, with the
-fewest changes beside it.
+is the table of changes gone through: each sensor with its axes permuted and signed (48 ways), or with one axis in
+another unit; columns exchanged between sensors; all sensors turned alike (a mount); the reference conjugated, with its
+scalar last, or in another frame; its positions in another unit; gravity or field not as the metadata say; gravity taken
+off; the bytes of counts swapped. Each goes with any factor for a whole sensor. One comparison serves all of them, and
+the change is named that takes away nearly all of what the log as declared leaves, with the fewest changes beside it.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
+from imufit.faults.byte_order import bytes_swapped
 from imufit.faults.samples import SENSORS, Samples, samples
-from imufit.faults.units import DEG, TOLERANCE, USUAL, wrong_unit
-from imufit.log.metadata import Metadata
-from imufit.results import fault_words
+from imufit.faults.units import KNOWN, POSSIBLE, USUAL, WrongUnit, units_of_field, wrong_units
+from imufit.log.metadata import STANDARD_GRAVITY, Metadata
+from imufit.results import column_words, fault_words
 from imufit.results.data_fault import DataFault
 
 Array = NDArray[np.float64]
@@ -29,17 +31,43 @@ Part = Mapping[str, Any]
 
 MISSED: Final = 0.2
 """Share of a reading's sum of squares that an ideal sensor must leave before anything else is tried."""
-LEFT: Final = 0.1
-"""Share of a reading's sum of squares that another way of reading the log may leave at most."""
+LEFT: Final = MISSED
+"""Share of a reading's sum of squares that another way of reading the log may leave at most: nothing is missed then."""
 QUARTER: Final = 0.25
 """The same, as a share of what the log as declared leaves."""
 TIE: Final = 0.01
 MIN_ROWS: Final = 200
-EXCITED: Final = {"acc": 1.0, "gyr": 0.05, "mag": 3.0}
-"""RMS of the ideal readings, m/s^2, rad/s and uT, from which on they say something."""
+EXCITED: Final = {"acc": 1.0, "gyr": 0.05}
+"""RMS of the ideal readings, m/s^2 and rad/s, from which on they say something."""
+EXCITED_FIELD: Final = 0.06
+"""The same of the changes of the field, as a part of the field."""
+UNHEARD: Final = 2.5
+"""Factor of a whole sensor, either way, that no error of scale comes near: it is wrong whatever its name."""
+NO_GRAVITY: Final = 0.1
+"""Part of gravity that readings have along the vertical, below which gravity was taken off."""
+SHORT: Final = 0.5
+"""Median length of such readings, in gravities, at most."""
+EARTHLY: Final = 0.15
+"""Difference from standard gravity, m/s^2, from which on gravity is that of no place on the ground: 9.76 to 9.84."""
+LENGTHS: Final = {"mm": 1e-3, "cm": 1e-2}
+"""Units in which positions are written, m."""
 
-KINDS: Final = ("clock", "reference", "axes", "frame", "mount")
+KINDS: Final = (
+    "clock",
+    "reference",
+    "gravity",
+    "axes",
+    "frame",
+    "mount",
+    "exchange",
+    "position",
+    "bytes",
+    "removed",
+    "field",
+)
 """What is named first where the log cannot tell."""
+SHOWN: Final = {"position": "units", "gravity": "metadata", "field": "metadata", "exchange": "axes"}
+"""Kinds of faults that are called otherwise."""
 FRAMES: Final = ("NED", "ENU", "NWU")
 
 
@@ -67,6 +95,16 @@ CLOCKS: Final = tuple(factor for base in (2.0, 4.0, 8.0, 10.0) for factor in (ba
 reading (`imufit.log.clock_check`)."""
 
 
+def _one_column(sensor: str) -> Array:
+    factors = [unit.factor for unit in KNOWN[sensor] if not 1.0 / UNHEARD < unit.factor < UNHEARD]
+    eye = np.eye(3)
+    return np.stack([np.diag(1.0 + (factor - 1.0) * axis) for axis in eye for factor in factors])
+
+
+COLUMNS: Final = {sensor: _one_column(sensor) for sensor in SENSORS}
+"""Maps of a sensor of which one column is in another unit, (k, 3, 3)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Change:
     """Another way to read a log.
@@ -78,15 +116,22 @@ class Change:
     rows : Samples
         Readings beside the ideal ones that are expected then.
     matrices : ndarray
-        (k, 3, 3) signed permutations from the ideal reading to the reading that are open to a sensor.
+        (k, 3, 3) maps from the ideal reading to the reading that are open to a sensor.
     words : tuple of str
         What it means, and what is to be done about it; of single sensors they depend on how these fit.
+    sensor : str or None
+        The one that it is about.
     """
 
     kind: str
     rows: Samples
     matrices: Array
     words: fault_words.Words | None = None
+    sensor: str | None = None
+
+    def open_to(self, sensor: str) -> Array:
+        """Return the maps (k, 3, 3) that are open to a sensor."""
+        return np.concatenate([self.matrices, COLUMNS[sensor]]) if self.kind == "axes" else self.matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +143,7 @@ class Match:
     share : float
         Sum of squares left, over that of the readings.
     matrix : ndarray
-        (3, 3) signed permutation from the ideal reading to the reading.
+        (3, 3) map from the ideal reading to the reading: a signed permutation, or one column in another unit.
     ratio : float
         Reading over ideal reading.
     """
@@ -116,6 +161,12 @@ class Match:
     def turned(self) -> bool:
         """True if the axes are not as declared."""
         return not np.array_equal(self.matrix, np.eye(3))
+
+    @property
+    def column(self) -> int | None:
+        """The axis that is in another unit than the others, if one is."""
+        off = np.abs(np.diag(self.matrix) - 1.0)
+        return int(np.argmax(off)) if np.count_nonzero(self.matrix) == 3 and off.max() not in (0.0, 1.0, 2.0) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +194,7 @@ class Reading:
         matches = {}
         for sensor, share in declared.items():
             single = change.kind == "axes" and share <= MISSED
-            matches[sensor] = _match(sensor, change.rows, OWN if single else change.matrices, field_estimated)
+            matches[sensor] = _match(sensor, change.rows, OWN if single else change.open_to(sensor), field_estimated)
         good = tuple(sensor for sensor, match in matches.items() if _explains(sensor, match, declared[sensor]))
         turned = sum(match.turned for match in matches.values()) if change.kind == "axes" else 1
         return cls(change, matches, good, turned + sum(not match.usual for match in matches.values()))
@@ -173,12 +224,28 @@ def frame_faults(parts: Sequence[Part], facts: _imufit.Facts, metadata: Metadata
     if not parts:
         return []
     rows = samples(parts, facts)
+    found = _changed(parts, rows, facts, metadata)
+    if not any(fault.sensor in ("acc", None) for fault in found):
+        found += _without_gravity(rows, facts, metadata)
+    if not any(fault.sensor in ("mag", None) for fault in found):
+        found += _field_of_another_size(rows, facts)
+    return found
+
+
+def _changed(parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> list[DataFault]:
     declared = declared_shares(rows, facts.sensors)
     missed = [sensor for sensor, share in declared.items() if share > MISSED]
     if not missed:
         return []
-    changes = _changes(parts, rows, facts, metadata, declared)
+    changes = (
+        *_changes(parts, rows, facts, metadata, declared),
+        *_columns(parts, rows, facts, missed),
+        *_metadata(rows, facts, metadata),
+    )
     readings = [Reading.of(change, declared, field_estimated=facts.field_estimated) for change in changes]
+    if _false_field(rows, facts, metadata):
+        # Readings of the size of the earth's field are in uT.
+        readings = [r for r in readings if "mag" not in r.matches or r.matches["mag"].usual]
     readings = [r for r in readings if len(r.good) > len(declared) - len(missed) and r.changes]
     if not readings:
         return []
@@ -241,10 +308,95 @@ def _changes(
         yield Change("clock", rows.on_clock(factor, resting), OWN, fault_words.clock(factor))
 
 
+def _columns(parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, missed: Sequence[str]) -> Iterator[Change]:
+    """Columns that hold something else: another sensor's readings, swapped bytes, positions in another unit."""
+    for one, other in itertools.combinations(facts.sensors, 2):
+        if not {one, other} & set(missed):
+            continue
+        names = [[f"{sensor}_{axis}" for axis in "xyz"] for sensor in (one, other)]
+        single = [[pair] for pair in itertools.product(*names)]
+        for pairs in (*single, list(zip(*names, strict=True))):
+            yield Change("exchange", rows.exchanged(pairs), OWN, column_words.exchanged(pairs))
+    for sensor in missed:
+        swapped = bytes_swapped(rows.readings[sensor])
+        if swapped is not None:
+            other_order = rows.with_readings(**{sensor: swapped})
+            yield Change("bytes", other_order, OWN, column_words.swapped_bytes(sensor), sensor)
+    if "acc" in missed and any(part["ref_p"] is not None for part in parts):
+        still = samples(({**part, "ref_p": None} for part in parts), facts)
+        for unit, factor in LENGTHS.items():
+            yield Change("position", rows.with_position(still, factor), OWN, column_words.positions(unit), "ref")
+
+
+def _metadata(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> Iterator[Change]:
+    """Gravity and field that the metadata do not tell as the readings show them."""
+    up = np.array(_imufit.frame_vectors(metadata.frame)["up"])
+    if "acc" in facts.sensors:
+        if abs(metadata.gravity - STANDARD_GRAVITY) > EARTHLY:
+            words = column_words.gravity_told(metadata.gravity, STANDARD_GRAVITY)
+            yield Change("gravity", rows.with_force((STANDARD_GRAVITY - metadata.gravity) * up), OWN, words, "acc")
+        yield Change("removed", rows.with_force(-metadata.gravity * up), OWN, column_words.GRAVITY_REMOVED, "acc")
+    if "mag" in facts.sensors and not facts.field_estimated and metadata.mag_reference is not None:
+        field = rows.own_field()
+        if POSSIBLE[0] <= np.linalg.norm(field) <= POSSIBLE[1]:
+            ideal = np.where(np.isfinite(rows.ideal["mag"]), field @ rows.attitude, np.nan)
+            words = column_words.field_told(metadata.mag_reference, field)
+            yield Change(
+                "field", Samples(rows.readings, {**rows.ideal, "mag": ideal}, rows.attitude), OWN, words, "mag"
+            )
+
+
+def _false_field(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> bool:
+    """Whether the field that is told has no size that a field has, while the readings have."""
+    told = metadata.mag_reference
+    if told is None or "mag" not in facts.sensors:
+        return False
+    told_size, read = float(np.linalg.norm(told)), float(np.linalg.norm(rows.own_field()))
+    return not POSSIBLE[0] <= told_size <= POSSIBLE[1] and POSSIBLE[0] <= read <= POSSIBLE[1]
+
+
+def _without_gravity(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> list[DataFault]:
+    """Name an accelerometer that shows nothing of gravity along the vertical of the reference."""
+    if "acc" not in facts.sensors:
+        return []
+    readings = rows.readings["acc"]
+    known = np.isfinite(readings).all(axis=1) & np.isfinite(rows.ideal["acc"]).all(axis=1)
+    if np.count_nonzero(known) < MIN_ROWS:
+        return []
+    up = np.array(_imufit.frame_vectors(metadata.frame)["up"]) @ rows.attitude[known]
+    along = float(np.mean(np.sum(readings[known] * up, axis=1)))
+    length = float(np.median(np.linalg.norm(readings[known], axis=1)))
+    if abs(along) > NO_GRAVITY * metadata.gravity or length > SHORT * metadata.gravity:
+        return []
+    words = column_words.GRAVITY_REMOVED
+    return [DataFault("removed", "acc", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
+
+
+def _field_of_another_size(rows: Samples, facts: _imufit.Facts) -> list[DataFault]:
+    """Name a magnetometer that turns in a field of a size that is not on earth, where nothing tells the field."""
+    if "mag" not in facts.sensors or not facts.field_estimated or _view("mag", rows) is None:
+        return []
+    size = float(np.linalg.norm(rows.own_field()))
+    units = units_of_field(size)
+    if not units:
+        return []
+    words = column_words.field_in_another_unit(size, _named(units))
+    return [DataFault("units", "mag", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
+
+
+def _named(units: Sequence[WrongUnit]) -> list[column_words.Unit]:
+    return [(unit.words, unit.unit) for unit in units]
+
+
 def _explains(sensor: str, match: Match, declared: float) -> bool:
     if declared <= MISSED and match.usual and not match.turned:
         return match.share <= MISSED
-    known = match.usual or wrong_unit(sensor, match.ratio) is not None
+    if match.column is not None and not match.usual:
+        # Two units at once, one of them on a single axis: any factor would come about so.
+        return False
+    known = (
+        match.usual or bool(wrong_units(sensor, match.ratio, match.share)) or not 1.0 / UNHEARD < match.ratio < UNHEARD
+    )
     return known and explains(match.share, declared)
 
 
@@ -255,13 +407,15 @@ def _view(sensor: str, rows: Samples) -> tuple[Array, Array] | None:
     if np.count_nonzero(known) < MIN_ROWS:
         return None
     y, x = y[known], x[known]
+    field = float(np.sqrt(np.mean(np.sum(x * x, axis=1))))
     if sensor == "mag":
         y, x = y - y.mean(axis=0), x - x.mean(axis=0)
     # A few blows must not decide.
     size = np.linalg.norm(y, axis=1)
     usual = size <= np.quantile(size, 0.995)
     y, x = y[usual], x[usual]
-    excited = float(np.sqrt(np.mean(np.sum(x * x, axis=1)))) > EXCITED[sensor] and bool(np.any(y))
+    least = EXCITED_FIELD * field if sensor == "mag" else EXCITED[sensor]
+    excited = float(np.sqrt(np.mean(np.sum(x * x, axis=1)))) > least and bool(np.any(y))
     return (y, x) if excited else None
 
 
@@ -276,9 +430,10 @@ def _match(sensor: str, rows: Samples, matrices: Array, field_estimated: bool) -
     # Axes that do not move may have any sign: what changes least stands first.
     alike = share <= share.min() + TIE
     k = int(np.argmax(alike))
-    if sensor == "acc" and k and alike[-1]:
+    opposite = len(PERMUTATIONS) - 1
+    if sensor == "acc" and k and len(share) > opposite and alike[opposite]:
         # Gravity instead of specific force.
-        k = len(share) - 1
+        k = opposite
     return Match(float(share[k]), matrices[k], float(ratio[k]))
 
 
@@ -287,9 +442,10 @@ def _fits(view: tuple[Array, Array] | None, matrices: Array) -> Array:
     if view is None:
         return np.ones((2, len(matrices)))
     y, x = view
-    power, total = float(np.sum(x * x)), float(np.sum(y * y))
+    total = float(np.sum(y * y))
+    power = np.maximum(np.einsum("kij,jl,kil->k", matrices, x.T @ x, matrices), 1e-300)
     inner = np.einsum("kij,ij->k", matrices, y.T @ x)
-    return np.stack([1.0 - np.maximum(inner, 0.0) ** 2 / max(power * total, 1e-300), inner / max(power, 1e-300)])
+    return np.stack([1.0 - np.maximum(inner, 0.0) ** 2 / np.maximum(power * total, 1e-300), inner / power])
 
 
 def _words(reading: Reading, good: Sequence[str]) -> fault_words.Words | None:
@@ -298,9 +454,9 @@ def _words(reading: Reading, good: Sequence[str]) -> fault_words.Words | None:
         return reading.change.words
     for sensor in good:
         match = reading.matches[sensor]
-        unit = wrong_unit(sensor, match.ratio)
-        if not (match.usual or match.turned) and unit is not None:
-            return fault_words.wrong_unit(sensor, match.ratio, unit.words, unit.unit, unit.factor)
+        units = _named(wrong_units(sensor, match.ratio, match.share))
+        if not (match.usual or match.turned) and units:
+            return column_words.wrong_unit(sensor, "xyz", match.ratio, units)
     return None
 
 
@@ -322,19 +478,32 @@ def _worded(
     if change.words is not None:
         others = (_words(r, good) for r in alike if r.change.kind != change.kind)
         other = next((words for words in others if words), None)
-        sensor = {"mount": None, "clock": None}.get(change.kind, "ref")
-        add(change.kind, sensor, fault_words.changed(change.words, list(left.values()), other))
+        sensor = None if change.kind in ("mount", "exchange", "clock") else change.sensor or "ref"
+        add(SHOWN.get(change.kind, change.kind), sensor, fault_words.changed(change.words, list(left.values()), other))
     frame = next((r.change.words[1] for r in alike if r.change.words and r.change.kind == "frame"), "")
     for sensor in good:
         match = best.matches[sensor]
-        if change.words is None and match.turned:
+        if match.column is not None:
+            factor = match.ratio * match.matrix[match.column, match.column]
+            words = column_words.wrong_unit(
+                sensor, "xyz"[match.column], factor, _named(wrong_units(sensor, factor, match.share))
+            )
+            found.append(
+                DataFault(
+                    "units",
+                    sensor,
+                    f"{sensor}_{'xyz'[match.column]}",
+                    facts.t_start,
+                    facts.t_end,
+                    facts.n,
+                    *words,
+                    spoils=True,
+                )
+            )
+        elif change.words is None and match.turned:
             kind = "frame" if sensor == "acc" and np.array_equal(match.matrix, -np.eye(3)) else "axes"
             add(kind, sensor, fault_words.axes(sensor, match.matrix, left[sensor], frame))
-        if match.usual:
-            continue
-        unit = wrong_unit(sensor, match.ratio)
-        if metadata.rig_axis is not None and sensor == "gyr" and abs(match.ratio * DEG - 1.0) < TOLERANCE:
-            add("units", "ref", fault_words.angle_in_degrees(match.ratio))
-        elif unit is not None:
-            add("units", sensor, fault_words.wrong_unit(sensor, match.ratio, unit.words, unit.unit, unit.factor))
+        if not match.usual:
+            units = _named(wrong_units(sensor, match.ratio, match.share))
+            add("units", sensor, column_words.wrong_unit(sensor, "xyz", match.ratio, units))
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -101,17 +101,67 @@ class Samples:
             ideal["acc"] = resting.ideal["acc"] + (ideal["acc"] - resting.ideal["acc"]) / factor**2
         return Samples(self.readings, ideal, self.attitude)
 
+    def with_position(self, still: Samples, factor: float) -> Samples:
+        """Return the samples with the motion along the reference's path taken times a factor.
+
+        Parameters
+        ----------
+        still : Samples
+            The same rows, the body taken not to move along.
+        factor : float
+            What positions are multiplied by.
+        """
+        force = {"acc": still.ideal["acc"] + factor * (self.ideal["acc"] - still.ideal["acc"])}
+        return Samples(self.readings, {**self.ideal, **force}, self.attitude)
+
+    def exchanged(self, pairs: Sequence[tuple[str, str]]) -> Samples:
+        """Return the samples with pairs of columns exchanged, such as ``acc_x`` and ``gyr_x``.
+
+        Parameters
+        ----------
+        pairs : sequence of (str, str)
+            Names of columns.
+        """
+        readings = {name: values.copy() for name, values in self.readings.items()}
+        for one, other in pairs:
+            for target, source in ((one, other), (other, one)):
+                readings[target[:3]][:, "xyz".index(target[4])] = self.readings[source[:3]][:, "xyz".index(source[4])]
+        return Samples(readings, self.ideal, self.attitude)
+
+    def with_readings(self, **readings: Array) -> Samples:
+        """Return the samples with other readings of some sensors, (n, 3) each."""
+        return Samples({**self.readings, **readings}, self.ideal, self.attitude)
+
+    def own_field(self, matrix: Array | None = None) -> Array:
+        """Return the field (3,) in the reference frame that fits the magnetometer best, iron on the body beside it.
+
+        Parameters
+        ----------
+        matrix : ndarray, optional
+            (3, 3) map M from true vectors to readings, which is undone first.
+        """
+        readings = self.readings["mag"] if matrix is None else self.readings["mag"] @ np.linalg.inv(matrix).T
+        known = np.isfinite(readings).all(axis=1)
+        if not known.any():
+            return np.zeros(3)
+        turned, readings = self.attitude[known], readings[known]
+        # Least squares of y = R^T m + b: the mean over the rows of R y and of y.
+        mean = turned.mean(axis=0)
+        normal = np.block([[np.eye(3), mean], [mean.T, np.eye(3)]])
+        right = np.concatenate([np.einsum("nij,nj->ni", turned, readings).mean(axis=0), readings.mean(axis=0)])
+        # Where the turns do not tell field and iron apart, the smallest of both.
+        return np.asarray(np.linalg.lstsq(normal, right, rcond=1e-3)[0][:3])
+
     def with_own_field(self, matrix: Array) -> Samples:
         """Return the samples of the magnetometer, its axes put right, with the field that its readings then give.
 
         Parameters
         ----------
         matrix : ndarray
-            (3, 3) signed permutation P: the reading is P times the true vector.
+            (3, 3) map M: the reading is M times the true vector.
         """
-        readings = self.readings["mag"] @ matrix
-        field = np.nanmean(np.einsum("nij,nj->ni", self.attitude, readings), axis=0)
-        return Samples({"mag": readings}, {"mag": field @ self.attitude}, self.attitude)
+        readings = self.readings["mag"] @ np.linalg.inv(matrix).T
+        return Samples({"mag": readings}, {"mag": self.own_field(matrix) @ self.attitude}, self.attitude)
 
 
 def samples(parts: Iterable[Mapping[str, Any]], facts: _imufit.Facts) -> Samples:
@@ -142,8 +192,13 @@ def samples(parts: Iterable[Mapping[str, Any]], facts: _imufit.Facts) -> Samples
         attitudes.append(part["ref_q"][core])
     q = np.concatenate(attitudes)
     q = np.where(np.isfinite(q).all(axis=1)[:, None], q, [1.0, 0.0, 0.0, 0.0])
-    return Samples(
+    found = Samples(
         {name: np.concatenate(values) for name, values in readings.items()},
         {name: np.concatenate(values) for name, values in ideal.items()},
         Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_matrix(),
     )
+    if "mag" in facts.sensors and facts.field_estimated:
+        # The mean over a log that does not turn evenly takes iron on the body for a part of the field.
+        field = np.where(np.isfinite(found.ideal["mag"]), found.own_field() @ found.attitude, np.nan)
+        return Samples(found.readings, {**found.ideal, "mag": field}, found.attitude)
+    return found

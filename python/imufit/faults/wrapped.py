@@ -12,20 +12,25 @@ from imufit.faults.samples import samples
 from imufit.results import fault_words
 from imufit.results.data_fault import DataFault
 
-BEYOND: Final = 1.05
-"""Part of the end of the range from which on an ideal reading is beyond it, scale errors and noise aside."""
-NEAR: Final = 0.1
-"""Part of the whole range by which a reading that came in again may differ from the ideal one less the range."""
-MOST: Final = 0.8
-"""Part of the rows beyond the range that came in again; the others lie about the end itself."""
-LEAST: Final = 5
-"""Rows that chance does not make."""
+BEYOND: Final = 0.8
+"""Part of the end of the range from which on an ideal reading may be beyond it, errors of it aside."""
+OFF: Final = 1.2
+"""Part of the end of the range by which a reading there is off, at least: a wrapped one is by two."""
+NEAR: Final = 0.5
+"""Part of the end of the range by which such a reading, whole ranges added, may be off; chance brings half of them
+there."""
+MOST: Final = 0.85
+"""Part of the rows so far off that came in again."""
+LEAST: Final = 10
+"""Rows that chance does not make: of ten, nine are so near once in a hundred times."""
+WITHIN: Final = 0.8
+"""Part of the end of the range up to which ideal readings show the sensor's scale."""
 
 
-def wrapped_faults(
-    parts: Sequence[Mapping[str, Any]], facts: _imufit.Facts, ends: Mapping[str, float]
-) -> list[DataFault]:
+def wrapped_faults(parts: Sequence[Mapping[str, Any]], facts: _imufit.Facts) -> list[DataFault]:
     """Name sensors whose readings wrap around.
+
+    A number of too few bits covers its whole range: the range ends where the largest reading lies.
 
     Parameters
     ----------
@@ -33,20 +38,29 @@ def wrapped_faults(
         Windows of the log, see `imufit.faults.samples.windows`.
     facts : Facts
         Of the log as declared.
-    ends : mapping
-        End of the range of each sensor that may have one, m/s^2 and rad/s, whether or not it can be judged.
     """
-    if not ends:
+    if not parts:
         return []
     rows = samples(parts, facts)
     found = []
-    for sensor, reading in rows.readings.items():
-        if sensor not in ends:
+    for sensor in facts.sensors:
+        if sensor == "mag":
             continue
-        ideal, end = rows.ideal[sensor], ends[sensor]
-        beyond = np.abs(ideal) > BEYOND * end
-        again = np.abs(ideal - np.sign(ideal) * 2.0 * end - reading) < NEAR * 2.0 * end
-        count, wrapped = int(np.count_nonzero(beyond)), int(np.count_nonzero(beyond & again))
+        reading, ideal = rows.readings[sensor], rows.ideal[sensor]
+        known = np.isfinite(reading) & np.isfinite(ideal)
+        if not known.any():
+            continue
+        reading, ideal = reading[known], ideal[known]
+        end = float(np.abs(reading).max())
+        inside = np.abs(ideal) < WITHIN * end
+        power = float(ideal[inside] @ ideal[inside])
+        # Of a sensor with an error of scale, what is beyond by several ranges would seem to be somewhere else.
+        ideal = ideal * (float(reading[inside] @ ideal[inside]) / power if power > 0.0 else 1.0)
+        off = ideal - reading
+        beyond = (np.abs(ideal) > BEYOND * end) & (np.abs(off) > OFF * end)
+        turns = np.round(off / (2.0 * end))
+        again = beyond & (np.abs(off - turns * 2.0 * end) < NEAR * end)
+        count, wrapped = int(np.count_nonzero(beyond)), int(np.count_nonzero(again))
         if wrapped < LEAST or wrapped < MOST * count:
             continue
         words = fault_words.wrapped(sensor, end, wrapped, count)

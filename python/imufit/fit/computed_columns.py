@@ -12,8 +12,8 @@ from imufit.log.log import LogSource
 from imufit.log.words import words_of
 
 _SAME: Final = 0.9999
-"""Correlation with the length of a vector of readings from which a column is that length: printed with three digits it
-has more, and no quantity measured beside a sensor follows the sensor's noise."""
+"""Correlation with readings, or with the length of their vectors, from which a column is computed from them: printed
+with three digits it has more, and no quantity measured beside a sensor follows the sensor's noise."""
 _LOOKED_AT: Final = 4096
 """Rows that are looked at."""
 _ROWS: Final = 20
@@ -23,7 +23,7 @@ _QUATERNION: Final = (frozenset(("qw", "qx", "qy", "qz")), frozenset(("q0", "q1"
 
 
 def computed_columns(log: LogSource) -> tuple[str, ...]:
-    """Name the covariates that are lengths of the readings' vectors, or a filter's attitude.
+    """Name the covariates that are copies of readings, lengths of their vectors, or a filter's attitude.
 
     Parameters
     ----------
@@ -34,9 +34,11 @@ def computed_columns(log: LogSource) -> tuple[str, ...]:
     if first is None:
         return ()
     head = first.log
-    lengths = [np.linalg.norm(values, axis=1) for name in SENSORS if (values := getattr(head, name)) is not None]
-    if not lengths:
+    sensors = [values for name in SENSORS if (values := getattr(head, name)) is not None]
+    if not sensors:
         return ()
+    lengths = [np.linalg.norm(values, axis=1) for values in sensors]
+    lengths += [sign * values[:, axis] for values in sensors for axis in range(3) for sign in (1.0, -1.0)]
     found = [name for name, values in head.covariates.items() if any(_follows(values, length) for length in lengths)]
     return tuple(dict.fromkeys([*found, *_attitudes(list(head.covariates))]))
 

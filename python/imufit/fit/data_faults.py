@@ -7,7 +7,10 @@ from typing import Any
 
 from imufit import _imufit
 from imufit.faults import ClippedRows, frame_faults, reference_faults
-from imufit.faults.samples import windows
+from imufit.faults.copied import copied_faults
+from imufit.faults.own_length import own_length_faults
+from imufit.faults.rig_angle import rig_angle_faults
+from imufit.faults.samples import samples, windows
 from imufit.faults.wrapped import wrapped_faults
 from imufit.fit.passes import Passes
 from imufit.fit.rest_passes import RestPasses
@@ -38,11 +41,17 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
             yield chunk
 
     parts = windows(counted(), facts)
-    faults = frame_faults(parts, facts, passes.log.metadata)
+    faults = rig_angle_faults(passes.log, facts)
+    if parts and not faults:
+        rows = samples(parts, facts)
+        faults = own_length_faults(rows, facts) + copied_faults(rows, facts)
+    if not faults:
+        faults = frame_faults(parts, facts, passes.log.metadata)
+    if not faults:
+        faults = wrapped_faults(parts, facts)
     if not any(fault.sensor in ("gyr", "ref", None) for fault in faults):
         # Rates that another way of reading the log explains need no other reference.
         faults += reference_faults(passes.chunks(0, "looking at the reference"), parts, facts, passes.log.path)
-    faults += wrapped_faults(parts, facts, ends)
     return (*faults, *passes.row_faults, *clipped.faults(), *_packets(passes.log, facts))
 
 

@@ -53,7 +53,7 @@ def fields_from_frame(df: pd.DataFrame, mapping: Mapping[str, str] | None, metad
     fields = fields_of(plan, block, 0, len(df), repair=repair, metadata=metadata, place=place, unmeasured=unmeasured)
     unmeasured.check()
     sensors: dict[str, NDArray[np.float64] | None] = {
-        name: fields[name][:HEAD] for name in ("acc", "gyr", "mag", "ref_q") if name in fields
+        name: fields[name][:HEAD] for name in ("acc", "gyr", "mag", "ref_q", "temp") if name in fields
     }
     clock: Clock = "stated" if "t" in (mapping or {}) else "a log's" if metadata != Metadata() else "open"
     odd = check_units(fields["t"][:HEAD], sensors, metadata, place, plan.origin, clock)

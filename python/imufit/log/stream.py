@@ -78,7 +78,8 @@ class LogStream:
         # what says of itself that it is a log may have rows as far apart as it says
         is_log = bool(self._source.embedded) or sidecar_path(self._path).is_file()
         clock: Clock = "stated" if "t" in found.mapping else "a log's" if is_log else "open"
-        odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin, clock)
+        read = {**head.sensors(), "temp": head.temp}
+        odd = check_units(head.t, read, self._metadata, self._place, self._plan.origin, clock)
         self._columns = head.columns
         told = reading.notes({**self._source.embedded, **read_sidecar(self._path)}, self._place)
         notes = (*self._source.notes, *found.notes, *told, *self._plan.notes, self._repair.note, *odd)

@@ -7,8 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from imufit.log.clock_check import turn_ratio
 from imufit.log.metadata import STANDARD_GRAVITY
-from imufit.log.unit_check import ACC_UNITS, GYR_UNITS, MAG_UNITS, field_ratio, rate_ratio, rest_norm
+from imufit.log.unit_check import ACC_UNITS, GYR_UNITS, MAG_UNITS, field_ratio, rest_norm
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def gyr_unit(t: Array, gyr: Array, vectors: list[tuple[Array, bool]], ref_q: Arr
     ref_q : (n, 4) array or None
         Reference attitude.
     """
-    ratios = [rate_ratio(t, gyr, ref_q)] if ref_q is not None else []
+    ratios = [turn_ratio(t, gyr, ref_q)] if ref_q is not None else []
     ratios += [field_ratio(t, gyr, vector, iron, block) for vector, iron in vectors for block in _BLOCKS]
     known = ((1.0, "", "rad/s"), *GYR_UNITS)
     for ratio in ratios:

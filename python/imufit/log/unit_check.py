@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final, Literal
 
 import numpy as np
@@ -35,6 +35,7 @@ Clock = Literal["stated", "a log's", "open"]
 ACC_UNITS: Final = (
     (1.0, "g", "g"),
     (1000.0, "milli-g", "mg"),
+    (980.665, "cm/s^2 (Gal)", "cm/s^2"),
     *((float(c), f"raw counts of {c} LSB/g", f"{c} LSB/g") for c in (16384, 8192, 4096, 2048)),
 )
 _DEG: Final = np.pi / 180.0
@@ -43,6 +44,13 @@ GYR_UNITS: Final = (
     (1e-3 * _DEG, "milli-deg/s", "mdps"),
     *((_DEG / c, f"raw counts of {c:g} LSB/(deg/s)", f"{c:g} LSB/(deg/s)") for c in (131.0, 65.5, 32.8, 16.4)),
 )
+_RPM: Final = (np.pi / 30.0, "rpm", "rpm")
+_AGREES: Final = 0.3
+"""Logarithm of a ratio of rates up to which they agree: half of what lies between two units."""
+_CLEARER: Final = 0.1
+"""The same by which a single axis must agree better than all of them; noise takes some 10 % of a ratio."""
+_NEAR_GRAVITY: Final = 0.15
+"""Relative difference up to which gravity shows the unit; nearly all units lie a factor of 2 apart."""
 _NO_GRAVITY: Final = 0.1
 """Norm at rest over gravity below which gravity was taken off: an accelerometer of any make is wrong by less."""
 _FEW_GRAVITY: Final = 0.5
@@ -55,6 +63,28 @@ MAG_UNITS: Final = (
     (2e4, 7e4, "nT", "nT"),
     (2e-5, 7e-5, "T", "T"),
 )
+_TESLA: Final = 2e-3
+"""Norm below which a magnetometer reads in T: 2 mT is beyond the range of all that measure the earth's field, and 2 nT
+is below the noise of all that are built beside accelerometers."""
+_EARTH: Final = (20.0, 70.0)
+"""Magnitude of the earth's field, uT (World Magnetic Model: 22 to 67)."""
+_COUNTS: Final = tuple(
+    (per, f"raw counts of {words}", words)
+    for per, words in ((1 / 0.15, "0.15 uT/LSB"), (10.9, "10.9 LSB/uT"), (30.0, "30 LSB/uT"), (120.0, "120 LSB/uT"))
+)
+"""Counts per uT of common magnetometers: AK8963 and AK09916, HMC5883L, QMC5883L at 8 G and at 2 G."""
+_UNDECIDED: Final = 0.03
+"""Difference of logarithms up to which two units fit equally well: errors of scale of consumer accelerometers."""
+_AT_REST: Final = 0.1
+"""Spread over size of the quietest readings up to which the sensor rested there: noise and swaying hands."""
+_ONE_LENGTH: Final = 1e-5
+"""Relative spread of the norm up to which all readings have one length; the noise of every sensor is larger."""
+_MOVES: Final = 0.1
+"""Range of each axis over the norm, from which on the sensor was turned."""
+_HOT: Final = 55.0
+"""Temperature, degC, above which boards seldom work: 13 degC reads so in degF."""
+_KELVIN: Final = 200.0
+"""The same for kelvin: no sensor beside an accelerometer works at 200 degC."""
 
 
 def check_units(
@@ -97,8 +127,10 @@ def check_units(
     notes: list[str] = []
     origin = origin or {}
     _check_time(t, place, origin, clock != "open")
+    if acc is not None and gyr is not None:
+        _check_exchange(acc, gyr, metadata.gravity, place, origin)
     if acc is not None:
-        notes += _check_acc(acc, metadata.gravity, place, origin)
+        notes += _check_acc(acc, ref_q, metadata, place, origin)
     vouched = gyr is not None and _check_gyr(
         t,
         gyr,
@@ -112,7 +144,36 @@ def check_units(
         notes += _slow_clock(t, place, origin.get("t", "t"))
     if mag is not None:
         notes += _check_mag(mag, metadata, place, origin)
+    if (temp := sensors.get("temp")) is not None:
+        notes += _check_temp(temp, place, origin)
     return notes
+
+
+def _check_exchange(acc: Array, gyr: Array, gravity: float, place: Place, origin: Mapping[str, str]) -> None:
+    """Refuse a log in which gravity is in gyr and nothing in acc."""
+    still = rest_norm(acc, relative=False)
+    if still < _FEW_GRAVITY * gravity and abs(rest_norm(gyr) / gravity - 1.0) < _NEAR_GRAVITY:
+        pairs = [
+            (f"{one}_{axis}", f"{other}_{axis}") for one, other in (("acc", "gyr"), ("gyr", "acc")) for axis in "xyz"
+        ]
+        mapping = ",".join(f"{target}={origin.get(source, source)}" for target, source in pairs)
+        raise place.error(
+            f"at rest gyr shows gravity and acc {still:.4g}: the columns of acc and gyr are exchanged",
+            column="acc_x",
+            remedy=f"Use --map {shlex.quote(mapping)}",
+        )
+
+
+def _check_temp(temp: Array, place: Place, origin: Mapping[str, str]) -> list[str]:
+    known = temp[np.isfinite(temp)]
+    usual = float(np.median(known)) if known.size else 0.0
+    if usual < _HOT:
+        return []
+    column, (unit, words) = origin.get("temp", "temp"), ("K", "kelvin") if usual > _KELVIN else ("degF", "fahrenheit")
+    return [
+        f"{place.name}: temp is around {usual:.4g}, hot for degC: if it is in {words}, use --map "
+        f"{shlex.quote(f'temp={column}[{unit}]')}"
+    ]
 
 
 def _check_time(t: Array, place: Place, origin: Mapping[str, str], stated: bool) -> None:
@@ -159,29 +220,87 @@ def rest_norm(acc: Array, rows: int = 50, relative: bool = True) -> float:
 
     Quiet is where the spread is small, as a share of the norm (in any unit) or by itself.
     """
+    return _rest(acc, rows, relative)[0]
+
+
+def _rest(acc: Array, rows: int = 50, relative: bool = True) -> tuple[float, float]:
+    """Give the norm of `rest_norm`, and the spread of these readings."""
     norm = np.linalg.norm(acc, axis=1)
     complete = np.isfinite(norm)
     acc, norm = acc[complete], norm[complete]
     if norm.size < 2 * rows:
-        return float(np.median(norm)) if norm.size else float("nan")
+        return (float(np.median(norm)), 0.0) if norm.size else (float("nan"), 0.0)
     windows = norm.size // rows
     shaped = acc[: windows * rows].reshape(windows, rows, 3)
     spread = np.sqrt(np.sum(np.var(shaped, axis=1), axis=1))
     size = np.median(norm[: windows * rows].reshape(windows, rows), axis=1)
     quiet = np.argsort(spread / np.maximum(size, 1e-12) if relative else spread)[: max(1, windows // 10)]
-    return float(np.median(size[quiet]))
+    return float(np.median(size[quiet])), float(np.median(spread[quiet]))
 
 
-def _check_acc(acc: Array, gravity: float, place: Place, origin: Mapping[str, str]) -> list[str]:
-    norm = rest_norm(acc)
+def _gravity_read(acc: Array, ref_q: Array | None) -> float:
+    """Norm of acc at rest; where the sensor never rests, what the reference attitude leaves of the mean reading."""
+    norm, spread = _rest(acc)
+    if ref_q is None or not spread > _AT_REST * norm:
+        return norm
+    known = np.isfinite(acc).all(axis=1) & np.isfinite(ref_q).all(axis=1)
+    if not known.any():
+        return norm
+    v, (w, u) = acc[known], (ref_q[known, :1], ref_q[known, 1:])
+    turn = 2.0 * np.cross(u, v)
+    # On average the reference frame sees no acceleration but gravity; with wrong axes it sees much less than the norm.
+    mean = float(np.linalg.norm(np.mean(v + w * turn + np.cross(u, turn), axis=0)))
+    return mean if mean > 0.3 * norm else norm
+
+
+def _has_one_length(readings: Array) -> bool:
+    """Whether all readings of a sensor that was turned have one length."""
+    norm = np.linalg.norm(readings, axis=1)
+    known = np.isfinite(norm)
+    if np.count_nonzero(known) < 100:
+        return False
+    size = float(norm[known].max())
+    one = float(np.ptp(norm[known])) <= _ONE_LENGTH * size
+    return one and bool(np.ptp(readings[known], axis=0).max() > _MOVES * size)
+
+
+def _nearest(size: float, known: Sequence[tuple[float, str, str]], most: float) -> list[tuple[float, str, str]]:
+    """Units in which something has a size, the nearest first; more than one where the readings leave it open."""
+    off = {unit: abs(math.log(size / unit[0])) for unit in known} if size > 0.0 else {}
+    near = {unit: away for unit, away in off.items() if away < most}
+    return [unit for unit in sorted(near, key=lambda u: near[u]) if near[unit] <= min(near.values()) + _UNDECIDED]
+
+
+def _looks_like(units: Sequence[tuple[float, str, str]], si: str) -> str:
+    return f"looks like {units[0][1]}, not {si}"
+
+
+def _use_one(sensor: str, units: Sequence[tuple[float, str, str]], origin: Mapping[str, str]) -> str:
+    first, *others = units
+    more = "".join(f", or if it is {words}: {_map(sensor, unit, origin)}" for _, words, unit in others)
+    return f"Use {_map(sensor, first[2], origin)}{more}"
+
+
+def _check_acc(
+    acc: Array, ref_q: Array | None, metadata: Metadata, place: Place, origin: Mapping[str, str]
+) -> list[str]:
+    gravity = metadata.gravity
+    norm = _gravity_read(acc, ref_q)
     overall = float(np.nanmedian(np.linalg.norm(acc, axis=1))) if np.isfinite(norm) else norm
-    for size, words, unit in ACC_UNITS:
-        if abs(norm / size - 1.0) < 0.15 and overall < 3.0 * size:
+    units = _nearest(norm, ACC_UNITS, _NEAR_GRAVITY)
+    if units and overall < 3.0 * units[0][0]:
+        if units[0][2] == "g" and abs(norm - 1.0) < _ONE_LENGTH and _has_one_length(acc):
             raise place.error(
-                f"at rest the norm of acc is {norm:.4g}, which looks like {words}, not m/s^2",
+                "every reading of acc has the length 1: each was divided by its own length, and shows a direction only",
                 column="acc_x",
-                remedy=_use_map("acc", unit, origin),
+                remedy="Export the readings themselves. For a filter, which takes directions too: "
+                + _map("acc", "g", origin),
             )
+        raise place.error(
+            f"at rest the norm of acc is {norm:.4g}, which {_looks_like(units, 'm/s^2')}",
+            column="acc_x",
+            remedy=_use_one("acc", units, origin),
+        )
     still = rest_norm(acc, relative=False)
     if still < _NO_GRAVITY * gravity and overall < _FEW_GRAVITY * gravity:
         raise place.error(
@@ -221,38 +340,52 @@ def _check_gyr(
                 remedy=f"Use --map {clock[1]}, or {shlex.quote(f't={column}[s]')} if it is s.",
             )
         if ratio < _OTHER_UNIT:
-            _, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
+            size, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
+            words, unit, axes = _by_turns(t, gyr, ref_q, vectors, (size, words, unit))
+            name = "" if axes == "xyz" else f", all of it gyr_{axes}'s"
             raise place.error(
-                f"{who} at {ratio:.3g} of the rate in gyr, which looks like {words}, not rad/s",
-                column="gyr_x",
-                remedy=_use_map("gyr", unit, origin),
+                f"{who} at {ratio:.3g} of the rate in gyr{name}, which looks like {words}, not rad/s",
+                column=f"gyr_{axes[0]}",
+                remedy="Use " + _map("gyr", unit, origin, axes),
             )
     norm = np.linalg.norm(gyr, axis=1)
     norm = norm[np.isfinite(norm)]
     high = float(np.quantile(norm, 0.99)) if norm.size else 0.0
     if high > 100.0:
-        words, unit = ("deg/s", "deg/s") if high < 4500.0 else ("raw counts", "131 LSB/(deg/s)")
+        likely = GYR_UNITS[0] if high < 4500.0 else GYR_UNITS[2]
+        words, unit, axes = _by_turns(t, gyr, ref_q, vectors, likely)
+        name = "gyr" if axes == "xyz" else f"gyr_{axes}"
         raise place.error(
-            f"gyr reaches {high:.4g}, more than any sensor in rad/s: it looks like {words}",
-            column="gyr_x",
-            remedy=_use_map("gyr", unit, origin),
+            f"{name} reaches {high:.4g}, more than any sensor in rad/s: it looks like {words}",
+            column=f"gyr_{axes[0]}",
+            remedy="Use " + _map("gyr", unit, origin, axes),
         )
     return False
 
 
-def rate_ratio(t: Array, gyr: Array, ref_q: Array) -> float:
-    """Rate of the reference over the rate in gyr, over rows that turn; NaN where too few do."""
-    step = max(1, int(np.ceil(0.05 / max(float(np.median(np.diff(t))), 1e-6)))) if t.size > 2 else 1
-    if t.size < 20 * step:
-        return float("nan")
-    dot = np.abs(np.sum(ref_q[step:] * ref_q[:-step], axis=1))
-    turned = 2.0 * np.arccos(np.clip(dot, 0.0, 1.0))
-    reference = turned / (t[step:] - t[:-step])
-    measured = np.linalg.norm(0.5 * (gyr[step:] + gyr[:-step]), axis=1)
-    moving = np.isfinite(reference) & np.isfinite(measured) & (turned > 0.01) & (reference > 0.2) & (measured > 0.0)
-    if np.count_nonzero(moving) < 20:
-        return float("nan")
-    return float(np.median(reference[moving] / measured[moving]))
+def _by_turns(
+    t: Array, gyr: Array, ref_q: Array | None, vectors: list[tuple[Array, bool]], likely: tuple[float, str, str]
+) -> tuple[str, str, str]:
+    """Find words and unit of a gyroscope, and the axes that are in it: all, or a single one where only that agrees.
+
+    A candidate agrees where the gyroscope, converted so, turns as the reference does, or as the field in the other
+    sensors. Where nothing turns or nothing agrees, it is the likely unit on all axes.
+    """
+
+    def off(unit: tuple[float, str, str], axes: str) -> float:
+        converted = gyr * np.array([unit[0] if axis in axes else 1.0 for axis in "xyz"])
+        ratios = [] if ref_q is None else [turn_ratio(t, converted, ref_q)]
+        ratios += [field_ratio(t, converted, vector, iron) for vector, iron in vectors]
+        return next((abs(math.log(ratio)) for ratio in ratios if ratio > 0.0), math.inf)
+
+    units = (likely, *(unit for unit in (*GYR_UNITS, _RPM) if unit is not likely))
+    together, alone = (
+        min(((off(unit, axes), unit, axes) for axes in tried for unit in units), key=lambda each: each[0])
+        for tried in (("xyz",), ("x", "y", "z"))
+    )
+    best = alone if alone[0] < together[0] - _CLEARER else together
+    _, unit, axes = best if best[0] < _AGREES else (0.0, likely, "xyz")
+    return unit[1], unit[2], axes
 
 
 def field_ratio(t: Array, gyr: Array, field: Array, iron: bool, block: float = 0.1) -> float:
@@ -310,22 +443,38 @@ def _check_mag(mag: Array, metadata: Metadata, place: Place, origin: Mapping[str
     if not complete.any():
         return []
     size = float(np.median(norm[complete]))
-    if metadata.mag_reference is not None and 0.2 < size / max(math.hypot(*metadata.mag_reference), 1e-9) < 5.0:
+    told = 0.0 if metadata.mag_reference is None else math.hypot(*metadata.mag_reference)
+    if told > 0.0 and 0.2 < size / told < 5.0:
         return []
-    for low, high, words, unit in MAG_UNITS:
-        if not low <= size <= high:
-            continue
-        if unit == "mG" and np.linalg.norm(np.mean(mag[complete] / norm[complete, None], axis=0)) > 0.95:
-            # never turned, or iron beside the sensor outweighs the field: it may well be uT
-            return [f"{place.name}: the norm of mag is {size:.4g} uT: iron beside the sensor, or is it milligauss?"]
-        raise place.error(
-            f"the norm of mag is {size:.4g}, which looks like {words}, not uT",
-            column="mag_x",
-            remedy=_use_map("mag", unit, origin),
-        )
-    return []
+    found = [(low, words, unit) for low, high, words, unit in MAG_UNITS if low <= size <= high]
+    if not found and size < _TESLA:
+        found = [(size, "T", "T")]
+    if not found:
+        return []
+    turns = np.linalg.norm(np.mean(mag[complete] / norm[complete, None], axis=0)) <= 0.95
+    if found[0][2] == "mG" and not turns:
+        # never turned, or iron beside the sensor outweighs the field: it may well be uT
+        return [f"{place.name}: the norm of mag is {size:.4g} uT: iron beside the sensor, or is it milligauss?"]
+    if found[0][2] == "mG":
+        found = _milligauss_or_counts(mag[complete], size, told, found[0])
+    raise place.error(
+        f"the norm of mag is {size:.4g}, which {_looks_like(found, 'uT')}",
+        column="mag_x",
+        remedy=_use_one("mag", found, origin),
+    )
 
 
-def _use_map(sensor: str, unit: str, origin: Mapping[str, str]) -> str:
-    columns = [f"{sensor}_{axis}" for axis in "xyz"]
-    return "Use --map " + shlex.quote(",".join(f"{column}={origin.get(column, column)}[{unit}]" for column in columns))
+def _milligauss_or_counts(
+    mag: Array, size: float, told: float, milligauss: tuple[float, str, str]
+) -> list[tuple[float, str, str]]:
+    """Units of about ten to the uT: by the field that is told, or by whole numbers."""
+    units = [(10.0, *milligauss[1:]), *_COUNTS]
+    if told > 0.0:
+        return _nearest(size / told, units, math.inf)
+    whole = bool(np.array_equal(mag, np.round(mag)))
+    return [unit for unit in units if unit[2] == "mG" or (whole and _EARTH[0] <= size / unit[0] <= _EARTH[1])]
+
+
+def _map(sensor: str, unit: str, origin: Mapping[str, str], axes: str = "xyz") -> str:
+    columns = [f"{sensor}_{axis}" for axis in axes]
+    return "--map " + shlex.quote(",".join(f"{column}={origin.get(column, column)}[{unit}]" for column in columns))

@@ -150,24 +150,6 @@ def _signed(row: Array, prefix: str) -> str:
     return f"{'-' if row[k] < 0.0 else ''}{prefix}{AXES[k]}"
 
 
-def wrong_unit(sensor: str, ratio: float, words: str, unit: str, factor: float) -> Words:
-    """Say in which unit a sensor seems to read."""
-    size = f"{ratio:.4g} times what it should" if ratio < 1.0 else f"{ratio:.4g} times too much"
-    columns = ",".join(f"{sensor}_{a}={sensor}_{a}[{unit}]" for a in "xyz")
-    remedy = (
-        f"Declare the unit: --map '{columns}', or convert the readings."
-        if unit
-        else f"Divide the readings of {sensor} by {factor:.6g}."
-    )
-    return f"{sensor} reads {size} on every axis alike, which looks like {words}.", remedy
-
-
-def angle_in_degrees(ratio: float) -> Words:
-    """Say that the commanded angle of a rig is in degrees, by the gyroscope's ratio to it."""
-    faster = f"The reference turns {1.0 / ratio:.4g} times as fast as the gyroscope"
-    return f"{faster}: ref_angle is in degrees.", "Declare the unit: --map 'ref_angle=ref_angle[deg]'."
-
-
 def late(lag: float, correlation: float, declared: float, path: Path | None) -> Words:
     """Say that the reference's stamps are late by a lag, s, and how well the rates agree then and as declared."""
     log = "LOG" if path is None else shlex.quote(str(path))
