@@ -59,10 +59,14 @@ def own_filter_faults(turning: Turning, facts: _imufit.Facts) -> list[DataFault]
     own, after = turning.gyr[at], turning.gyr[at + 1]
     columns = [after - own, *_errors(turning, at, first)]
     left = _left(rate - own, np.stack(columns, axis=-1))
-    innovation = _innovation(turning.gyr[known][:MOST_ROWS])
-    if not (innovation > 0.0 and left < CLOSER * innovation):
+    place = np.cumsum(known) - 1
+    unforeseen = _unforeseen(turning.gyr[known][: place[at[-1]] + 1])[place[at]]
+    # Only what nobody could foretell says who followed it: readings that stand still are followed by every reference.
+    telling = unforeseen >= np.nanmedian(unforeseen)
+    innovation, missed = float(np.median(unforeseen[telling])), float(np.median(left[telling]))
+    if not (innovation > 0.0 and missed < CLOSER * innovation):
         return []
-    words = fault_words.own_filter(left, innovation)
+    words = fault_words.own_filter(missed, innovation)
     fault = DataFault("own_filter", "ref", None, facts.t_start, facts.t_end, facts.n, *words)
     return [replace(fault, spoils_sensors=("acc", "gyr"))]
 
@@ -84,8 +88,8 @@ def _errors(turning: Turning, at: NDArray[np.intp], attitude: Rotation) -> list[
     return found
 
 
-def _left(wanted: Array, columns: Array) -> float:
-    """Return the median length of what columns (k, 3, p) leave of vectors (k, 3), those that fit worst left out."""
+def _left(wanted: Array, columns: Array) -> Array:
+    """Return the lengths (k,) of what columns (k, 3, p) leave of vectors (k, 3), those that fit worst left out."""
     kept = np.ones(len(wanted), bool)
     left = np.linalg.norm(wanted, axis=1)
     for _ in range(_TRIMS):
@@ -95,15 +99,15 @@ def _left(wanted: Array, columns: Array) -> float:
         solved = np.linalg.lstsq(design, wanted[kept].ravel(), rcond=None)[0]
         left = np.linalg.norm(wanted - columns @ solved[:-3] - solved[-3:], axis=1)
         kept = left <= np.quantile(left, 0.7)
-    return float(np.median(left))
+    return np.asarray(left)
 
 
-def _innovation(gyr: Array) -> float:
-    """Median length of what the readings around do not foretell of a reading, rad/s."""
-    missed = []
+def _unforeseen(gyr: Array) -> Array:
+    """Length (n,) of what the readings around do not foretell of each reading, rad/s; NaN at the ends."""
+    missed = np.full(gyr.shape, np.nan)
     for axis in range(3):
         around = sliding_window_view(gyr[:, axis], 2 * AROUND + 1)
         others = np.delete(around, AROUND, axis=1)
         solved = np.linalg.lstsq(others, around[:, AROUND], rcond=None)[0]
-        missed.append(around[:, AROUND] - others @ solved)
-    return float(np.median(np.linalg.norm(missed, axis=0)))
+        missed[AROUND:-AROUND, axis] = around[:, AROUND] - others @ solved
+    return np.asarray(np.linalg.norm(missed, axis=1))
