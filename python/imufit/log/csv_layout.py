@@ -13,7 +13,7 @@ from typing import IO, Final
 from imufit.errors import InputError
 from imufit.log.check import number_from_text
 from imufit.log.size import LONGEST_LINE, size_in_words
-from imufit.log.units import lookup, without_inner
+from imufit.log.units import lookup
 
 _SAMPLE: Final = 1 << 16
 _LINES: Final = 60
@@ -147,7 +147,7 @@ def _decimal(lines: list[str], separator: str) -> str:
 
 def _are_units(fields: list[str], width: int) -> bool:
     """Whether a line below the header holds units instead of readings."""
-    known = sum(lookup(without_inner(field)) is not None for field in fields)
+    known = sum(lookup(field) is not None for field in fields)
     return len(fields) == width and not any(_numeric(field) for field in fields) and 2 * known >= width
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from imufit.log.units import lookup, without_inner
+from imufit.log.units import lookup, written
 
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _STUCK: Final = re.compile(r"(a|f|g|m|w|b|h|acc|accel|gyr|gyro|mag|magn|omega|raw)([xyz])")
@@ -137,32 +137,10 @@ _NO_TIME: Final = frozenset(
     )
 )
 
-_TIME_UNITS: Final[dict[str, tuple[str, ...]]] = {
-    "s": ("s", "sec", "secs", "seconds"),
-    "ms": ("ms", "millis", "msec", "milliseconds"),
-    "us": ("us", "micros", "usec", "microseconds"),
-    "ns": ("ns", "nanos", "nsec", "nanoseconds"),
-}
-_UNIT_WORDS: Final[dict[str, dict[str, tuple[str, ...]]]] = {
-    "acc": {
-        "m/s^2": ("m s 2", "ms 2", "mps 2", "mss", "m s s", "si"),
-        "g": ("g", "gs"),
-        "mg": ("mg", "milli g"),
-    },
-    "gyr": {
-        "rad/s": ("rad s", "rads", "rad", "radps", "rad sec", "rad per s", "rps"),
-        "deg/s": ("dps", "deg s", "degs", "deg", "deg per s", "deg sec", "degrees", "degsec"),
-        "mdps": ("mdps",),
-    },
-    "mag": {
-        "uT": ("ut", "u t", "microtesla", "microteslas", "micro tesla"),
-        "G": ("ga", "gauss"),
-        "mG": ("mgauss", "milligauss", "mg"),
-        "nT": ("nt", "n t", "nanotesla"),
-    },
-    "t": _TIME_UNITS,
-    "temp": {"degC": ("c", "celsius", "degc", "deg c"), "K": ("k", "kelvin"), "degF": ("f", "fahrenheit")},
-}
+_LONGEST_UNIT: Final = 4
+"""Words that a unit within a name has at most, as in ``m_per_s_2``."""
+_SI: Final = {"acc": "m/s^2", "gyr": "rad/s"}
+"""What the word SI in a name means."""
 _QUANTITY: Final = {
     "acc": "specific force",
     "gyr": "angular rate",
@@ -283,15 +261,22 @@ def unit_of(group: str, rest: tuple[str, ...], bracket: str) -> tuple[str | None
     (unit or None, words)
         The words that are left.
     """
-    name = without_inner(bracket)
-    stated = lookup(name) if name else None
-    unit = name if stated is not None and stated[0] == _QUANTITY[group] else None
-    for length in (3, 2, 1):
-        tail = " ".join(rest[-length:])
-        for known, spellings in _UNIT_WORDS[group].items():
-            if len(rest) >= length and tail in spellings:
-                return unit or known, rest[:-length]
+    quantity = _QUANTITY[group]
+    unit = bracket if bracket and lookup(bracket, quantity) is not None else None
+    for length in range(min(_LONGEST_UNIT, len(rest)), 0, -1):
+        stated = _unit_of_words(rest[-length:], group)
+        if stated is not None:
+            return unit or stated, rest[:-length]
     return unit, rest
+
+
+def _unit_of_words(words: tuple[str, ...], group: str) -> str | None:
+    """Find the unit that words at the end of a name spell, without blanks as a mapping writes it."""
+    quantity, text = _QUANTITY[group], "".join(words)
+    if text == "si" and group in _SI:
+        return _SI[group]
+    # gyro_rad (PX4): a gyroscope measures no angle, so that it is one a second
+    return written(text, quantity) or (written(f"{text}/s", quantity) if group == "gyr" else None)
 
 
 def strange(rest: tuple[str, ...]) -> int:
