@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
+from imufit.log.clock import BETWEEN
+from imufit.log.clock_text import ORDERS
 from imufit.log.columns import CONTRACT, GROUPS, SENSORS, meant, nearest
 from imufit.log.place import Place
 from imufit.log.units import Conversion, conversion, unit_in_header
@@ -67,11 +69,22 @@ class PlannedColumn:
         Column of the file, or what stands for one.
     conversion : Conversion
         To SI.
+    day : str, optional
+        Column of dates, where `source` has the times of day: of the time alone.
+    order : str
+        Order of the numbers of dates with slashes, one of `imufit.log.clock_text.ORDERS`; of the time alone.
     """
 
     target: str
     source: str | RowNumber | Constant
     conversion: Conversion
+    day: str | None = None
+    order: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Columns of the file that it is made from."""
+        return tuple(each for each in (self.day, self.name) if each is not None)
 
     @property
     def name(self) -> str | None:
@@ -81,7 +94,8 @@ class PlannedColumn:
     @property
     def origin(self) -> str:
         """Text that stands for the source in a mapping."""
-        return self.source if isinstance(self.source, str) else self.source.text
+        source = self.source if isinstance(self.source, str) else self.source.text
+        return source if self.day is None else f"{self.day}{BETWEEN}{source}"
 
 
 @dataclass(frozen=True)
@@ -102,7 +116,7 @@ class Plan:
     @property
     def sources(self) -> tuple[str, ...]:
         """Columns of the file that are read, each once."""
-        return tuple(dict.fromkeys(column.name for column in self.columns if column.name is not None))
+        return tuple(dict.fromkeys(name for column in self.columns for name in column.names))
 
     @property
     def origin(self) -> dict[str, str]:
@@ -116,7 +130,12 @@ class Plan:
 
 
 def plan_columns(
-    names: Sequence[str], mapping: Mapping[str, str] | None, place: Place, bare: bool = False, rest: bool = True
+    names: Sequence[str],
+    mapping: Mapping[str, str] | None,
+    place: Place,
+    bare: bool = False,
+    rest: bool = True,
+    computed: Collection[str] = (),
 ) -> Plan:
     """Decide which columns of the file become which columns of the log.
 
@@ -132,6 +151,8 @@ def plan_columns(
         True if the file needs neither a sensor nor a reference: what it has becomes covariates.
     rest : bool
         Whether columns that are neither mapped nor a log's own become covariates.
+    computed : collection of str
+        Columns that are named as a sensor but are none: they mean no column of the log.
 
     Raises
     ------
@@ -146,7 +167,7 @@ def plan_columns(
             )
     mapped = [_resolve(target, text, names, place) for target, text in (mapping or {}).items()]
     targets = {column.target for column in mapped}
-    used = {column.name for column in mapped if column.name is not None}
+    used = {name for column in mapped for name in column.names}
     kept = [PlannedColumn(shown[name], name, Conversion()) for name in names if name not in targets | used]
     for column in mapped:
         if column.target not in CONTRACT and column.target != column.name and (close := meant(column.target)):
@@ -158,7 +179,7 @@ def plan_columns(
     for index, name in enumerate(changed):
         if name in changed[:index] or name in names or name in targets:
             raise place.error(f"column {name} is there twice", column=name, remedy="Give these columns other names.")
-    unused = [shown[n] for n in names if n not in used]
+    unused = [shown[n] for n in names if n not in used and n not in computed]
     if not rest:
         kept = [column for column in kept if column.target in CONTRACT]
     columns = [*mapped, *kept]
@@ -174,6 +195,13 @@ def plan_columns(
 def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> PlannedColumn:
     """Find the column, sign and unit, or the constant, that a mapping's source text means."""
     bare, unit = _bracket(text)
+    if target == "t":
+        for name, order in ((text.strip(), ""), (bare, unit)):
+            day, _, clock = name.partition(BETWEEN)
+            if day in names and clock in names and order in ("", "s", *ORDERS):
+                return PlannedColumn("t", clock, Conversion(), day, order if order in ORDERS else "")
+        if unit in ORDERS and bare in names:
+            return PlannedColumn("t", bare, Conversion(), order=unit)
     for name, given in ((text.strip(), None), (bare, unit)):
         for sign, given_name in _signed(name):
             column = given_name

@@ -58,6 +58,11 @@ class Source(Protocol):
         """What was noticed on reading."""
         ...
 
+    @property
+    def clues(self) -> tuple[str, ...]:
+        """What its maker is known by; see `imufit.log.makers.maker_of`."""
+        ...
+
     def scan(self, columns: Sequence[str]) -> Iterator[Block]:
         """First pass over the file, with the named columns only (the time)."""
         ...

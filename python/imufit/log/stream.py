@@ -45,7 +45,7 @@ class LogStream:
         self._place = Place(self._path, self._source.line_of)
         found = recognise(self._source, mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
-        self._plan = plan_columns(self._source.names, found.mapping, self._place, bare, rest=bare or not several)
+        self._plan = plan_columns(self._source.names, found.mapping, self._place, bare, rest=bare or not several, computed=found.computed)
         if isinstance(self._source, TablesSource):
             self._source.choose(self._plan.sources)
         self._metadata = read_metadata(self._path, self._source.embedded)
@@ -62,11 +62,13 @@ class LogStream:
         self._notes = tuple(note for note in notes if note)
 
     def _scan(self) -> TimeRepair:
-        scan, time = TimeScan(self._place), self._plan.time
-        for start, rows, block in self._source.scan([time.name] if time.name is not None else []):
+        time = self._plan.time
+        scan = TimeScan(self._place, abs(time.conversion.factor))
+        for start, rows, block in self._source.scan(list(time.names)):
             if time.name in self._source.truths:
                 break
-            scan.add(time_of(self._plan, block, start, rows, self._place))
+            written = time.name is not None and block[time.name].dtype == object
+            scan.add(time_of(self._plan, block, start, rows, self._place), written)
         check_truth_values(self._plan, self._source.truths, self._place)
         if self._source.n == 0:
             raise self._place.error("the file has a header but no rows", remedy="Record or copy it again.")

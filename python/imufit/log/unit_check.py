@@ -160,18 +160,48 @@ def rest_norm(acc: Array, rows: int = 50, relative: bool = True) -> float:
     return float(np.median(size[quiet]))
 
 
-def _check_acc(acc: Array, gravity: float, place: Place, origin: Mapping[str, str]) -> list[str]:
+def without_gravity(acc: Array, gravity: float) -> bool:
+    """Whether gravity was taken off an accelerometer: at rest and on the whole hardly anything is left of it.
+
+    Parameters
+    ----------
+    acc : (n, 3) array
+        m/s^2.
+    gravity : float
+        m/s^2.
+    """
+    norm = np.linalg.norm(acc, axis=1)
+    norm = norm[np.isfinite(norm)]
+    overall = float(np.median(norm)) if norm.size else float("nan")
+    return rest_norm(acc, relative=False) < _NO_GRAVITY * gravity and overall < _FEW_GRAVITY * gravity
+
+
+def in_other_unit(acc: Array) -> tuple[str, str] | None:
+    """Words and unit of readings that are unmistakably not in m/s^2; None where they may be.
+
+    Parameters
+    ----------
+    acc : (n, 3) array
+        Readings said to be in m/s^2.
+    """
     norm = rest_norm(acc)
     overall = float(np.nanmedian(np.linalg.norm(acc, axis=1))) if np.isfinite(norm) else norm
     for size, words, unit in ACC_UNITS:
         if abs(norm / size - 1.0) < 0.15 and overall < 3.0 * size:
-            raise place.error(
-                f"at rest the norm of acc is {norm:.4g}, which looks like {words}, not m/s^2",
-                column="acc_x",
-                remedy=_use_map("acc", unit, origin),
-            )
-    still = rest_norm(acc, relative=False)
-    if still < _NO_GRAVITY * gravity and overall < _FEW_GRAVITY * gravity:
+            return words, unit
+    return None
+
+
+def _check_acc(acc: Array, gravity: float, place: Place, origin: Mapping[str, str]) -> list[str]:
+    norm = rest_norm(acc)
+    if (other := in_other_unit(acc)) is not None:
+        raise place.error(
+            f"at rest the norm of acc is {norm:.4g}, which looks like {other[0]}, not m/s^2",
+            column="acc_x",
+            remedy=_use_map("acc", other[1], origin),
+        )
+    if without_gravity(acc, gravity):
+        still = rest_norm(acc, relative=False)
         raise place.error(
             f"at rest the norm of acc is {still:.4g} m/s^2: gravity was taken off, and cannot be put back",
             column="acc_x",

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from imufit.log.units import lookup, written
+from imufit.log.units import written
 
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _STUCK: Final = re.compile(r"(a|f|g|m|w|b|h|acc|accel|gyr|gyro|mag|magn|omega|raw)([xyz])")
@@ -32,8 +32,10 @@ _PAIRS: Final = {
     ("rotation", "rate"): "angularrate",
     ("magnetic", "field"): "magneticfield",
     ("magnetic", "flux"): "magneticfield",
+    ("since", "start"): "elapsed",
+    ("since", "boot"): "elapsed",
 }
-"""Two words that name a sensor together."""
+"""Two words that name a sensor or the time together."""
 COMPUTED: Final = frozenset(
     (
         "linear",
@@ -262,7 +264,7 @@ def unit_of(group: str, rest: tuple[str, ...], bracket: str) -> tuple[str | None
         The words that are left.
     """
     quantity = _QUANTITY[group]
-    unit = bracket if bracket and lookup(bracket, quantity) is not None else None
+    unit = written(bracket, quantity) if bracket else None
     for length in range(min(_LONGEST_UNIT, len(rest)), 0, -1):
         stated = _unit_of_words(rest[-length:], group)
         if stated is not None:
