@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.log.clock import BETWEEN
 from imufit.log.clock_text import ORDERS
-from imufit.log.columns import CONTRACT, GROUPS, SENSORS, meant, nearest
+from imufit.log.columns import CONTRACT, GROUPS, SENSORS, meant, nearest, without_unit
 from imufit.log.place import Place
 from imufit.log.units import Conversion, conversion, unit_in_header
 from imufit.printable import NAME, printable
@@ -206,7 +206,7 @@ def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> Plan
         for sign, given_name in _signed(name):
             column = given_name
             if column not in names:
-                column = next((each for each in names if printable(each, NAME) == given_name), column)
+                column = _named_otherwise(given_name, names) or column
             if column in names or (column == ROW and ROW not in names):
                 return _planned(target, column, sign=sign, unit=given, names=names, place=place)
     if NUMBER.fullmatch(bare):
@@ -219,6 +219,13 @@ def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> Plan
         column=wanted,
         remedy=f"Nearest are {', '.join(close)}." if close else f"The columns are {', '.join(names)}.",
     )
+
+
+def _named_otherwise(given: str, names: Sequence[str]) -> str | None:
+    """Column that a mapping names as it is shown in messages, or without the unit behind its name."""
+    shown = next((name for name in names if printable(name, NAME) == given), None)
+    plain = [name for name in names if without_unit(name) == given]
+    return shown or (plain[0] if len(plain) == 1 else None)
 
 
 def _constant(target: str, text: str, unit: str, *, names: Sequence[str], place: Place) -> PlannedColumn:
