@@ -75,9 +75,9 @@ class CsvSource:
                 yield f"{self._path.name}: {note}"
 
     def _last_value(self) -> int:
-        """Find the byte at which those rows without a single value begin that stand at the end, as spreadsheets leave them.
+        """Find the byte at which the rows without a single value at the end begin, as spreadsheets leave them.
 
-        In between such a row is a sample that was lost.
+        Such a row between others is a sample that was lost.
         """
         size = self._path.stat().st_size
         with self._path.open("rb") as file:

@@ -68,15 +68,15 @@ class Maker:
         return not (re.search(self.left_out, column) or re.search(self.other_tables, table))
 
     def unit(self, group: str, table: str) -> str | None:
-        """Unit of a sensor or of the time in a table; None where the maker does not fix it."""
+        """Give the unit of a sensor or of the time in a table; None where the maker does not fix it."""
         return None if re.search(self.varied, table) else self.units.get(group)
 
     def sensor(self, column: str) -> str | None:
-        """Sensor that a column is whatever its name says; None where the name counts."""
+        """Give the sensor that a column is whatever its name says; None where the name counts."""
         return next((sensor for sensor, pattern in self.columns.items() if re.search(pattern, column)), None)
 
     def rate_in(self, clues: Sequence[str]) -> float | None:
-        """Samples per second that the lines before the header state, Hz."""
+        """Find the samples per second that the lines before the header state, Hz."""
         found = next((found for clue in clues if self.rate and (found := re.search(self.rate, clue))), None)
         return float(found[1]) if found is not None and float(found[1]) > 0.0 else None
 

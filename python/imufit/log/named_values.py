@@ -23,7 +23,9 @@ _NAME: Final = r"(?<![\w.])(?P<name>[A-Za-z_][\w.]*)[\"']?(?:\s?(?P<unit>\([^()=
 _SIGN: Final = r"\s*(?::=|=|:)\s*"
 _PLAIN: Final = re.compile(r"(?<![\w.])[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 _ITEM: Final = re.compile(rf"{_NAME}{_SIGN}(?:(?P<open>[(\[{{])\s*(?P<in>{_VALUES})\s*[)\]}}]|(?P<bare>{_VALUES}))")
-_BEHIND: Final = re.compile(r"\s?(?P<unit>[^\s,;|=:()\[\]{}\d][^\s,;|=:()\[\]{}]{0,11})(?=\s*(?:[,;|)]|$)|\s+[A-Za-z_#])")
+_BEHIND: Final = re.compile(
+    r"\s?(?P<unit>[^\s,;|=:()\[\]{}\d][^\s,;|=:()\[\]{}]{0,11})(?=\s*(?:[,;|)]|$)|\s+[A-Za-z_#])"
+)
 """What may be a unit behind the values, as in ``9.81 m/s^2,``."""
 _MARK: Final = re.compile(rf"{_NAME}{_SIGN}")
 _ONE: Final = re.compile(f"({_NUMBER})({_UNIT})")
@@ -118,7 +120,7 @@ def named_values(line: str) -> list[Item]:
 
 
 def _unit_behind(line: str, found: re.Match[str], values: str) -> str:
-    """Unit behind the values of a name, in brackets; empty where what stands there is not a unit of a sensor."""
+    """Find the unit behind the values of a name, in brackets; empty where nothing there is a sensor's unit."""
     stuck = [word[2] for word in _ONE.finditer(values)]
     text = stuck[-1] if stuck and stuck[-1] else ""
     if not text and (behind := _BEHIND.match(line, found.end())) is not None:

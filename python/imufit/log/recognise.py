@@ -16,12 +16,12 @@ from imufit.log.clock import Clock, clocks_of
 from imufit.log.clock_text import seconds_from_cells
 from imufit.log.columns import CONTRACT, EULER, GROUPS, LARGEST_COVARIATE, SENSOR_NAMES, SENSORS, WHOLE_TURN
 from imufit.log.makers import Maker, maker_of
-from imufit.log.metadata import STANDARD_GRAVITY
+from imufit.log.metadata import STANDARD_GRAVITY, Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import counted_on
 from imufit.log.time_unit import time_unit
 from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, turned
-from imufit.log.unit_check import HEAD, in_other_unit, without_gravity
+from imufit.log.unit_check import HEAD, OtherUnitError, check_units, in_other_unit, without_gravity
 from imufit.log.units import conversion, lookup
 from imufit.log.words import Words, sensor_of, strange, time_columns, unit_of, words_of
 
@@ -33,6 +33,8 @@ COUNTS: Final = "131 LSB/(deg/s)"
 """Counts of the usual sensor in its smallest range (InvenSense, MPU-6050 product specification)."""
 ROW_RATE: Final = "row[100Hz]"
 """Time by row number, with the rate that is most usual."""
+_ROW_STEP: Final = 0.01
+"""The same as a step, s."""
 _USUAL_FIELD: Final = 50.0
 """Magnitude of the earth's field in the middle latitudes, uT (World Magnetic Model)."""
 _NUMBERED: Final = re.compile(r"(?:(?P<table>.*)\.)?c(?P<number>\d+)")
@@ -107,7 +109,9 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
     names = source.names
     angles = _angles(source, names, mapping or {})
     given = {**angles, **(mapping or {})}
-    told = (f"{place.name}: reference attitude from {', '.join(angles.values())}",) if angles else ()
+    told: tuple[str, ...] = ()
+    if angles:
+        told = (f"{place.name}: reference attitude from {', '.join(angles.values())}",)
     taken = set(given.values())
     wanted = [group for group in ("t", *SENSORS) if not _has(group, names, given)]
     maker = maker_of(source.clues)
@@ -126,6 +130,8 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
     counted = {} if clocks or "t" not in wanted else _counted(source, maker)
     given = {**given, **counted}
     if not any(group in found for group in SENSORS) and not ((clocks or counted) and _has_any(names, given)):
+        if "t" in wanted and not counted and not mapping:
+            _ask_time_and_units(source, place)
         return Recognised(given, told)
     clock = clocks[0] if clocks else None
     found, computed = _with_gravity(source, found)
@@ -165,6 +171,36 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
             remedy=_remedy(complete),
         )
     return Recognised(complete, (*told, *_notes(place, maker, timed or counted, chosen, units)), left)
+
+
+def _ask_time_and_units(source: Readable, place: Place) -> None:
+    """Ask for the time of a log together with the units that its sensors are in, where these are not a log's.
+
+    Raises
+    ------
+    InputError
+        The time is missing, and a sensor is unmistakably in another unit.
+    """
+    there = [group for group in SENSORS if all(column in source.names for column in GROUPS[group])]
+    rows = _first_rows(source, [column for group in there for column in GROUPS[group]])
+    sensors: dict[str, Array | None] = {
+        group: np.stack([rows[column] for column in GROUPS[group]], axis=1) for group in there
+    }
+    count = max((len(values) for values in rows.values()), default=0)
+    units: dict[str, str] = {}
+    try:
+        check_units(np.arange(count, dtype=np.float64) * _ROW_STEP, sensors, Metadata(), place, clock="stated")
+    except OtherUnitError as other:
+        units = other.units
+    except InputError:
+        return  # said once there is a time
+    if units:
+        mapping = {column: f"{column}[{unit}]" for group, unit in units.items() for column in GROUPS[group]}
+        raise place.error(
+            f"column t is missing, and {_named(list(units))} is not in SI units",
+            column="t",
+            remedy=_remedy({"t": ROW_RATE, **mapping}),
+        )
 
 
 def _table(column: str, stem: str) -> str:

@@ -1,4 +1,4 @@
-"""Text files whose lines are of several kinds: told by their first cell, or by the number of their sensor in a column."""
+"""Text files whose lines are of several kinds, told by their first cell or by the number of their sensor."""
 
 from __future__ import annotations
 
@@ -70,7 +70,8 @@ def recording_of_kinds(path: Path) -> Recording | None:
     whole = [_table(kind, told[kind], rows) for kind, rows in cells.items()]
     tables = tuple(table for each in whole for table in _by_instance(path, each))
     lost = sum(map(len, cells.values())) - sum(table.n for table in whole)
-    notes = (f"{path.name}: {others} lines of kinds without named columns left out",) if others else ()
+    notes: tuple[str, ...] = ()
+    notes += (f"{path.name}: {others} lines of kinds without named columns left out",) if others else ()
     notes += (f"{path.name}: {lost} lines with another number of cells than their kind left out",) if lost else ()
     clues = (*(line for line in first if is_comment(line)), *(name for names in told.values() for name in names))
     return Recording("lines of several kinds", tables, notes, clues=clues) if tables else None

@@ -45,7 +45,14 @@ class LogStream:
         self._place = Place(self._path, self._source.line_of)
         found = recognise(self._source, mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
-        self._plan = plan_columns(self._source.names, found.mapping, self._place, bare, rest=bare or not several, computed=found.computed)
+        self._plan = plan_columns(
+            self._source.names,
+            found.mapping,
+            self._place,
+            bare,
+            rest=bare or not several,
+            computed=found.computed,
+        )
         if isinstance(self._source, TablesSource):
             self._source.choose(self._plan.sources)
         self._metadata = read_metadata(self._path, self._source.embedded)

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
+from imufit.log.columns import GROUPS
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 from imufit.log.time_unit import time_unit
@@ -58,6 +60,29 @@ MAG_UNITS: Final = (
 )
 
 
+class OtherUnitError(InputError):
+    """Readings that are unmistakably in another unit, of one sensor or of several.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong with the first of them.
+    units : dict
+        Unit that each sensor ("acc", "gyr", "mag") is in.
+    place : Place
+        Names the file.
+    origin : mapping
+        Column of the file for each column of the log.
+    """
+
+    def __init__(self, problem: str, units: Mapping[str, str], place: Place, origin: Mapping[str, str]) -> None:
+        self.units = dict(units)
+        named = [(column, unit) for group, unit in units.items() for column in GROUPS[group]]
+        pairs = ",".join(f"{column}={origin.get(column, column)}[{unit}]" for column, unit in named)
+        column = named[0][0]
+        super().__init__(problem, file=place.file or "log", column=column, remedy=f"Use --map {shlex.quote(pairs)}")
+
+
 def check_units(
     t: Array,
     sensors: Mapping[str, Array | None],
@@ -98,20 +123,25 @@ def check_units(
     notes: list[str] = []
     origin = origin or {}
     _check_time(t, place, origin, clock != "open")
+    checks: list[Callable[[], list[str]]] = []
     if acc is not None:
-        notes += _check_acc(acc, metadata.gravity, place, origin)
+        checks.append(partial(_check_acc, acc, metadata.gravity, place, origin))
     if gyr is not None:
-        _check_gyr(
-            t,
-            gyr,
-            [(v, v is mag) for v in (acc, mag) if v is not None],
-            ref_q,
-            place=place,
-            origin=origin,
-            stated=clock == "stated",
-        )
+        vectors = [(v, v is mag) for v in (acc, mag) if v is not None]
+        stated = clock == "stated"
+        checks.append(partial(_check_gyr, t, gyr, vectors, ref_q, place=place, origin=origin, stated=stated))
     if mag is not None:
-        notes += _check_mag(mag, metadata, place, origin)
+        checks.append(partial(_check_mag, mag, metadata, place, origin))
+    others: list[OtherUnitError] = []
+    for check in checks:
+        try:
+            notes += check()
+        except OtherUnitError as other:
+            others.append(other)
+    if others:
+        # all of it in one mapping, so that nobody is asked twice
+        units = {group: unit for other in others for group, unit in other.units.items()}
+        raise OtherUnitError(others[0].problem, units, place, origin)
     return notes
 
 
@@ -195,10 +225,11 @@ def in_other_unit(acc: Array) -> tuple[str, str] | None:
 def _check_acc(acc: Array, gravity: float, place: Place, origin: Mapping[str, str]) -> list[str]:
     norm = rest_norm(acc)
     if (other := in_other_unit(acc)) is not None:
-        raise place.error(
+        raise OtherUnitError(
             f"at rest the norm of acc is {norm:.4g}, which looks like {other[0]}, not m/s^2",
-            column="acc_x",
-            remedy=_use_map("acc", other[1], origin),
+            {"acc": other[1]},
+            place,
+            origin,
         )
     if without_gravity(acc, gravity):
         still = rest_norm(acc, relative=False)
@@ -222,32 +253,35 @@ def _check_gyr(
     place: Place,
     origin: Mapping[str, str],
     stated: bool,
-) -> None:
+) -> list[str]:
     ratios = [(rate_ratio(t, gyr, ref_q), "the reference attitude turns")] if ref_q is not None else []
     ratios += [(field_ratio(t, gyr, v, iron), "the field in the other sensors turns") for v, iron in vectors]
     for ratio, who in ratios:
         if ratio > 0.2:
-            return
+            return []
         if ratio < _OTHER_UNIT:
             if not stated and abs(np.log(ratio / 1e-3)) < _LIKE_CLOCK and float(np.median(np.diff(t))) >= _COARSE_STEP:
                 seen = f"{who} at {ratio:.3g} of the rate in gyr, with rows {float(np.median(np.diff(t))):.3g} s apart"
                 raise _other_clock(seen, "ms", place, origin.get("t", "t"))
             _, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
-            raise place.error(
+            raise OtherUnitError(
                 f"{who} at {ratio:.3g} of the rate in gyr, which looks like {words}, not rad/s",
-                column="gyr_x",
-                remedy=_use_map("gyr", unit, origin),
+                {"gyr": unit},
+                place,
+                origin,
             )
     norm = np.linalg.norm(gyr, axis=1)
     norm = norm[np.isfinite(norm)]
     high = float(np.quantile(norm, 0.99)) if norm.size else 0.0
     if high > 100.0:
         words, unit = ("deg/s", "deg/s") if high < 4500.0 else ("raw counts", "131 LSB/(deg/s)")
-        raise place.error(
+        raise OtherUnitError(
             f"gyr reaches {high:.4g}, more than any sensor in rad/s: it looks like {words}",
-            column="gyr_x",
-            remedy=_use_map("gyr", unit, origin),
+            {"gyr": unit},
+            place,
+            origin,
         )
+    return []
 
 
 def rate_ratio(t: Array, gyr: Array, ref_q: Array) -> float:
@@ -328,14 +362,7 @@ def _check_mag(mag: Array, metadata: Metadata, place: Place, origin: Mapping[str
         if unit == "mG" and np.linalg.norm(np.mean(mag[complete] / norm[complete, None], axis=0)) > 0.95:
             # never turned, or iron beside the sensor outweighs the field: it may well be uT
             return [f"{place.name}: the norm of mag is {size:.4g} uT: iron beside the sensor, or is it milligauss?"]
-        raise place.error(
-            f"the norm of mag is {size:.4g}, which looks like {words}, not uT",
-            column="mag_x",
-            remedy=_use_map("mag", unit, origin),
+        raise OtherUnitError(
+            f"the norm of mag is {size:.4g}, which looks like {words}, not uT", {"mag": unit}, place, origin
         )
     return []
-
-
-def _use_map(sensor: str, unit: str, origin: Mapping[str, str]) -> str:
-    columns = [f"{sensor}_{axis}" for axis in "xyz"]
-    return "Use --map " + shlex.quote(",".join(f"{column}={origin.get(column, column)}[{unit}]" for column in columns))
