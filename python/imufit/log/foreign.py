@@ -285,7 +285,8 @@ def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place,
                     missing[column] = next(iter(nearest(column, free)), "")
     if "t" not in targets and "t" not in missing:
         missing["t"] = ""
-    if missing:
+    sensors = {column for group in (*SENSORS, "ref_q") for column in GROUPS[group]} | {"ref_angle"}
+    if missing and (bare or sensors & {*targets, *missing}):
         raise _missing(missing, targets, place)
     complete = [group for group in (*SENSORS, "ref_q") if all(column in targets for column in GROUPS[group])]
     if not complete and "ref_angle" not in targets and not bare:

@@ -355,11 +355,19 @@ def _candidates(group: str, parsed: Sequence[Words], maker: Maker | None, stem: 
             named = sensor_of(axes["x"].words) if known is None else (known, ())
             if named is not None and named[0] == group:
                 unit, rest = unit_of(group, named[1], axes["x"].bracket)
+                if unit is None and _measures_something_else(group, axes["x"].bracket):
+                    continue
                 own = unit is None and axes["x"].bracket != "" and lookup(axes["x"].bracket) is None
                 own |= maker is not None and group in maker.arbitrary
                 columns = tuple(axes[axis].column for axis in "xyz")
                 made.append(_Candidate(columns, unit or fixed(columns[0]), strange(rest), own))
     return sorted(made, key=lambda each: (each.strange, each.unit is None))
+
+
+def _measures_something_else(group: str, bracket: str) -> bool:
+    """Whether the unit in brackets is one of another quantity; a rate may be named by its angle."""
+    known = lookup(bracket) if bracket else None
+    return known is not None and not (group == "gyr" and known[0] == "angle")
 
 
 def _alike(candidates: Sequence[_Candidate]) -> bool:
