@@ -25,8 +25,8 @@ from foreign_files import WRITERS, sound, write  # noqa: E402  lies beside the t
 PAGE = ROOT / "docs" / "foreign_files.md"
 LAYOUTS = ("<!-- layouts -->", "<!-- /layouts -->")
 RECORDED = ("<!-- recorded -->", "<!-- /recorded -->")
-SEED = 4711
-"""Seed of the logs that the layouts are written from."""
+SEEDS = {"arm": 774102, "rest": 774104}
+"""Seeds of the logs that the layouts are written from, as in tests/test_foreign_files.py."""
 NATIVE = (
     "many_positions/mpu6050_poses_raw_counts.csv",
     "many_positions/mpu9150_unit0.log",
@@ -46,7 +46,7 @@ FIELDS = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer", "te
 
 @cache
 def body(kind):
-    return sound(kind, SEED)
+    return sound(kind, SEEDS[kind])
 
 
 def answer(path: Path) -> str:
@@ -55,9 +55,11 @@ def answer(path: Path) -> str:
         return f"read: {held(read(path))}"
     except InputError as error:
         maps = re.findall(r"--map (?:'([^']*)'|(\S+?)\.?(?:\s|$))", error.remedy or "")
+        # a message without a proposal shows how a mapping is written
+        maps = [one or other for one, other in maps if "COLUMN" not in other]
         if len(maps) != 1:
             return f"refused: {cell(error.problem)}"
-        mapping = parse_mapping(maps[0][0] or maps[0][1])
+        mapping = parse_mapping(maps[0])
     try:
         made = held(read(path, mapping))
     except InputError as again:
