@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.log.clock import BETWEEN
 from imufit.log.clock_text import ORDERS
-from imufit.log.columns import CONTRACT, GROUPS, SENSORS, meant, nearest, without_unit
+from imufit.log.columns import CONTRACT, GROUPS, SENSORS, without_unit
 from imufit.log.place import Place
 from imufit.log.units import Conversion, conversion, unit_in_header
+from imufit.log.words import meant, nearest
 from imufit.printable import NAME, printable
 
 ROW: Final = "row"

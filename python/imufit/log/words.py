@@ -1,12 +1,14 @@
-"""Names of foreign columns taken apart into words: sensor, axis, unit, and what else stands there."""
+"""Names of foreign columns taken apart into words: sensor, axis, unit, what else stands there, and what is meant."""
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from imufit.log.columns import CONTRACT, GROUPS, without_unit
 from imufit.log.units import written
 
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
@@ -304,3 +306,49 @@ def time_columns(parsed: Iterable[Words]) -> list[tuple[str, str | None, int]]:
 
 def _names_time(words: tuple[str, ...]) -> bool:
     return bool(set(words) & TIME_WORDS or {"sample", "fine"} <= set(words)) and not set(words) & _NO_TIME
+
+
+def meant(name: str) -> str | None:
+    """Contract column that a foreign name most likely means.
+
+    Parameters
+    ----------
+    name : str
+        Column name that is not itself a contract column.
+
+    Returns
+    -------
+    str or None
+        The contract column, or None when the name does not look like one.
+    """
+    key = re.sub(r"[^a-z0-9]", "", without_unit(name).lower())
+    for column in CONTRACT:
+        if key == column.replace("_", ""):
+            return column
+    words = words_of(without_unit(name))
+    sensor = sensor_of(words.words) if words.axis and not words.index else None
+    if sensor is not None and not sensor[1]:
+        return f"{sensor[0]}_{words.axis}"
+    if not words.axis and _names_time(words.words) and set(unit_of("t", words.words, "")[1]) <= TIME_WORDS:
+        return "t"
+    return _close(name)
+
+
+def _close(name: str) -> str | None:
+    """Contract column that differs from the name by a slip of the finger; a digit is no slip, it counts sensors."""
+    if re.search(r"\d", name):
+        return None
+    grouped = [column for group in GROUPS.values() for column in group]
+    for column in difflib.get_close_matches(name.lower(), grouped, n=3, cutoff=0.8):
+        if column[-1] == name.lower()[-1]:
+            return column
+    return None
+
+
+def nearest(wanted: str, names: Iterable[str], n: int = 1) -> list[str]:
+    """Return those of the given names that are most like the wanted one, best first, at most n."""
+    names = list(names)
+    sure = [name for name in names if name not in CONTRACT and meant(name) == wanted]
+    folded = {name.lower(): name for name in names}
+    close = [folded[match] for match in difflib.get_close_matches(wanted.lower(), folded, n=n, cutoff=0.4)]
+    return list(dict.fromkeys([*sure, *close]))[:n]
