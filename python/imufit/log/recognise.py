@@ -291,7 +291,7 @@ def _without_names(source: Readable, place: Place) -> InputError:
     names = source.names
     rows = _first_rows(source, names)
     complete, free = {"t": ROW_RATE}, list(names)
-    first = rows.get(names[0], np.empty(0))
+    first = counted_on(rows.get(names[0], np.empty(0)))
     if first.size > 1 and np.all(np.diff(first) > 0.0):
         complete["t"] = f"{names[0]}[{time_unit(first) or 's'}]"
         free = free[1:]
