@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.log.clock_text import MONTH_FIRST, ORDERS, is_date, joined, order_of, seconds_from_cells
+from imufit.log.clock_text import MONTH_FIRST, is_date, joined, order_of, seconds_from_cells
 from imufit.log.time_order import counted_on
 from imufit.log.time_unit import time_unit
 from imufit.log.units import conversion
@@ -133,6 +133,3 @@ def _same_pace(first: Array, second: Array) -> bool:
     first, second = first[both] - first[both][0], second[both] - second[both][0]
     step = float(np.median(np.abs(np.diff(first))))
     return bool(np.max(np.abs(first - second)) <= _SAME_PACE * step)
-
-
-__all__ = ["BETWEEN", "ORDERS", "Clock", "clocks_of"]
