@@ -26,7 +26,7 @@ _WINDOWS: Final = 60
 """Windows looked at, three minutes."""
 _CLEARLY: Final = 1.25
 """Factor by which any other unit leaves more of the specific force over. Over 24 simulated logs of hands and arms
-(tests/foreign_files.py) the right unit left least in all, half or twice the unit 1.1 to 9 times as much."""
+(tests/foreign_files.py) the right unit left least in all, half or twice the unit 1.1 to 13 times as much."""
 _FINE_STEP: Final = 0.01
 """Step to which faster readings are averaged before they are turned back, s: a hand turns by a degree in it."""
 _EARTH: Final = (20.0, 70.0)
