@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -63,35 +64,47 @@ def gyr_unit(t: Array, gyr: Array, vectors: list[tuple[Array, bool]], ref_q: Arr
     ref_q : (n, 4) array or None
         Reference attitude.
     """
-    known = ((1.0, "", "rad/s"), *GYR_UNITS)
-    for vector in (vector for vector, iron in vectors if not iron):
-        if unit := _unit_by_turning_back(t, gyr, vector, [(size, unit) for size, _, unit in known]):
-            return unit
-    ratios = [rate_ratio(t, gyr, ref_q)] if ref_q is not None else []
-    ratios += [field_ratio(t, gyr, vector, iron, block) for vector, iron in vectors for block in _BLOCKS]
-    for ratio in ratios:
+    known = {unit: size for size, _, unit in ((1.0, "", "rad/s"), *GYR_UNITS)}
+    ratios: list[tuple[float, str | None]] = []
+    if ref_q is not None:
+        ratios.append((rate_ratio(t, gyr, ref_q), None))
+    least: dict[int, str | None] = {}
+    for k, (vector, iron) in enumerate(vectors):
+        if not iron:
+            least[k], clear = _least_left_over(t, gyr, vector, known)
+            if clear:
+                return least[k]
+        ratios += [(field_ratio(t, gyr, vector, iron, block), least.get(k)) for block in _BLOCKS]
+    for ratio, other in ratios:
         if np.isfinite(ratio) and ratio > 0.0:
-            size, _, unit = min(known, key=lambda each: abs(np.log(ratio / each[0])))
-            return unit if abs(np.log(ratio / size)) < _NEAR_RATE else None
+            unit = min(known, key=lambda each: abs(np.log(ratio / known[each])))
+            # shaking that goes with the turning pulls the ratio to another unit: both ways have to agree
+            agreed = other is None or other == unit
+            return unit if agreed and abs(np.log(ratio / known[unit])) < _NEAR_RATE else None
     return None
 
 
-def _unit_by_turning_back(t: Array, gyr: Array, acc: Array, units: list[tuple[float, str]]) -> str | None:
-    """Find the unit in which the gyroscope turns the accelerometer's readings of a few seconds into one direction.
+def _least_left_over(t: Array, gyr: Array, acc: Array, known: Mapping[str, float]) -> tuple[str | None, bool]:
+    """Find the unit in which the gyroscope best turns an accelerometer's readings of some seconds into one direction.
 
     Turned back by the rates, specific force is gravity and what shakes about it, which averages out: a wrong unit
-    leaves gravity turning. None where no unit is clearly better than the others and than no turning at all, or where a
-    scale between the known units is better still.
+    leaves gravity turning.
+
+    Returns
+    -------
+    (unit, clear)
+        The unit, None where too few rows are known; and whether it is clearly better than the others, than no turning
+        at all, and than the scales between the known units.
     """
-    shares = [_left_over(t, gyr, acc, factor) for factor, _ in ((0.0, ""), *units)]
-    if not np.isfinite(shares).all():
-        return None
-    best = 1 + int(np.argmin(shares[1:]))
-    if shares[best] * _CLEARLY > min(share for k, share in enumerate(shares) if k != best):
-        return None
-    factor, unit = units[best - 1]
-    beside = min(_left_over(t, gyr, acc, factor * np.exp(off)) for off in (-_NEAR_RATE, _NEAR_RATE))
-    return unit if shares[best] <= beside else None
+    shares = {unit: _left_over(t, gyr, acc, size) for unit, size in known.items()}
+    still = _left_over(t, gyr, acc, 0.0)
+    if not np.isfinite([still, *shares.values()]).all():
+        return None, False
+    best = min(shares, key=lambda unit: shares[unit])
+    if shares[best] * _CLEARLY > min(still, *(share for unit, share in shares.items() if unit != best)):
+        return best, False
+    beside = min(_left_over(t, gyr, acc, known[best] * np.exp(off)) for off in (-_NEAR_RATE, _NEAR_RATE))
+    return best, shares[best] <= beside
 
 
 def _left_over(t: Array, gyr: Array, acc: Array, factor: float) -> float:
