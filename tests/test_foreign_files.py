@@ -80,39 +80,6 @@ def judge_question(error: InputError, foreign: Foreign) -> Log:
     return log
 
 
-OPEN = frozenset(
-    (
-        "acc_without_gravity",
-        "androsensor",
-        "ardupilot_two_imus",
-        "date_and_clock_in_two_columns",
-        "empty_first_row",
-        "gnss_logger",
-        "matlab_mobile_folder",
-        "micros_that_wrap",
-        "movella_dot",
-        "movella_dot_mag",
-        "openlog_artemis",
-        "physics_toolbox",
-        "sensor_logger_ios_uncalibrated",
-        "shimmer_consensys_local_flux",
-        "shimmer_raw_and_wide_range",
-        "sketch_named_values",
-        "spelled_3_brackets",
-        "spelled_3_parentheses",
-        "spelled_7_brackets",
-        "spelled_7_parentheses",
-        "us_date_time",
-        "ximu3_folder",
-        "xsens_mt_manager",
-        "xsens_mt_manager_mag",
-        "xsens_rate_in_preamble",
-    )
-)
-"""Files of which something is asked that they tell, or whose question is not complete: what is read of them without a
-question must be right all the same."""
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", sorted(WRITERS))
 def test_read_right_or_asked(tmp_path: Path, name: str, kind: str) -> None:
@@ -126,8 +93,6 @@ def test_read_right_or_asked(tmp_path: Path, name: str, kind: str) -> None:
         assert due != "asks", "the file does not tell, but was read without a question"
         return
     assert error is not None
-    if name in OPEN:
-        return
     assert due != "reads", f"this file tells all, but imufit asks: {error}"
     refused = due == "refuses" and "--map '" not in (error.remedy or "")
     if any((foreign.acc, foreign.gyr, foreign.mag)) and not refused:

@@ -49,9 +49,12 @@ class Recording:
         What reading noticed: how much of a truncated file was valid, what was left out.
     metadata : dict
         Metadata of a log (`frame`, `sensor`, ...) as far as the format itself fixes them.
+    clues : tuple of str
+        What else stands in it that its maker may be known by.
     """
 
     form: str
     tables: tuple[Table, ...]
     notes: tuple[str, ...] = ()
     metadata: Mapping[str, Any] = field(default_factory=dict)
+    clues: tuple[str, ...] = ()

@@ -17,8 +17,9 @@ from imufit.inspection.series import sample_rows, usual_steps
 from imufit.inspection.traces import Trace
 from imufit.joining.course import reference_course
 from imufit.log import Log, LogSource, SomeRows, judged_rows
-from imufit.log.columns import SENSOR_NAMES, nearest
+from imufit.log.columns import SENSOR_NAMES
 from imufit.log.size import BLOCK_ROWS
+from imufit.log.words import nearest
 from imufit.progress import Progress, silent
 
 if TYPE_CHECKING:

@@ -12,11 +12,12 @@ from scipy.spatial.transform import Rotation
 from imufit.errors import InputError
 from imufit.log.assemble import group_fields
 from imufit.log.check import check_poses, checked_labels, truth_value
-from imufit.log.columns import CONTRACT, GROUPS, meant
+from imufit.log.columns import CONTRACT, GROUPS
 from imufit.log.metadata import KNOWN, Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import TimeScan
 from imufit.log.unmeasured import Unmeasured
+from imufit.log.words import meant
 
 Array = NDArray[np.float64]
 

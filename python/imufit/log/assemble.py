@@ -16,7 +16,7 @@ from imufit.log.check import (
     numbers_from_text,
     truth_value,
 )
-from imufit.log.clock_text import seconds_from_cells
+from imufit.log.clock_text import joined, seconds_from_cells
 from imufit.log.columns import EULER, GROUPS, NUMERIC
 from imufit.log.foreign import Plan, PlannedColumn
 from imufit.log.metadata import Metadata
@@ -35,7 +35,7 @@ def time_of(plan: Plan, block: RawBlock, start: int, rows: int, place: Place) ->
     raw = block[column.source] if isinstance(column.source, str) else None
     if raw is None or raw.dtype != object:
         return _numbers(column, block, start, rows, place)
-    times = seconds_from_cells(raw)
+    times = seconds_from_cells(raw if column.day is None else joined(block[column.day], raw), column.order)
     if np.isnan(times).any():
         return _numbers(column, block, start, rows, place)  # names the row
     return column.conversion.apply(times)

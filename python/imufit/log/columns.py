@@ -1,10 +1,9 @@
-"""Names of a log's columns, and which of them a foreign name most likely means."""
+"""Names of a log's columns, their groups and the largest values that can be meant."""
 
 from __future__ import annotations
 
-import difflib
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from typing import Final
 
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
@@ -82,63 +81,12 @@ masses of LISA Pathfinder) resolves 1e-15 m/s^2, and fourth powers still have ro
 
 POSES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 
-_SENSOR_WORDS: Final = {
-    "acc": "acc|accel|accelerometer|acceleration|a",
-    "gyr": "gyr|gyro|gyroscope|omega|angularrate|angularvelocity|w|g",
-    "mag": "mag|magn|magnet|magnetometer|magneticfield|m",
-}
-_TIME_WORDS: Final = re.compile(r"(time|timestamp|timestamps|times|ts|sec|secs|seconds)(s|ms|us|ns|sec|seconds)?")
 _UNIT_SUFFIX: Final = re.compile(r"\s*(?:\[[^\[\]]*\]|\([^()]*(?:\([^()]*\)[^()]*)?\))\s*$")
 
 
 def without_unit(name: str) -> str:
     """Cut a bracketed unit off a column name: ``Time (s)`` becomes ``Time``."""
     return _UNIT_SUFFIX.sub("", name)
-
-
-def meant(name: str) -> str | None:
-    """Contract column that a foreign name most likely means.
-
-    Parameters
-    ----------
-    name : str
-        Column name that is not itself a contract column.
-
-    Returns
-    -------
-    str or None
-        The contract column, or None when the name does not look like one.
-    """
-    key = re.sub(r"[^a-z0-9]", "", without_unit(name).lower())
-    for column in CONTRACT:
-        if key == column.replace("_", ""):
-            return column
-    for sensor, words in _SENSOR_WORDS.items():
-        if found := re.fullmatch(f"(?:{words})([xyz])", key):
-            return f"{sensor}_{found[1]}"
-    if _TIME_WORDS.fullmatch(key):
-        return "t"
-    return _close(name)
-
-
-def _close(name: str) -> str | None:
-    """Contract column that differs from the name by a slip of the finger; a digit is no slip, it counts sensors."""
-    if re.search(r"\d", name):
-        return None
-    grouped = [column for group in GROUPS.values() for column in group]
-    for column in difflib.get_close_matches(name.lower(), grouped, n=3, cutoff=0.8):
-        if column[-1] == name.lower()[-1]:
-            return column
-    return None
-
-
-def nearest(wanted: str, names: Iterable[str], n: int = 1) -> list[str]:
-    """Return those of the given names that are most like the wanted one, best first, at most n."""
-    names = list(names)
-    sure = [name for name in names if name not in CONTRACT and meant(name) == wanted]
-    folded = {name.lower(): name for name in names}
-    close = [folded[match] for match in difflib.get_close_matches(wanted.lower(), folded, n=n, cutoff=0.4)]
-    return list(dict.fromkeys([*sure, *close]))[:n]
 
 
 def present(names: Collection[str]) -> tuple[str, ...]:

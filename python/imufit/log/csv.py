@@ -40,6 +40,8 @@ class CsvSource:
         self._layout = read_layout(path)
         self.names = self._layout.names
         self.notes = (*self._layout.notes, *self._open_end())
+        self.clues = (path.name, *self._layout.before, *self.names)
+        self._end = self._last_value()
         self.n = 0
         # "number": read as such; "word": numbers that need the slow way (True, blanks); "text": not numbers
         self._kinds = dict.fromkeys(self.names, "number")
@@ -72,6 +74,19 @@ class CsvSource:
                 note = "the last line has no line end; if the file was cut off, its last value is wrong"
                 yield f"{self._path.name}: {note}"
 
+    def _last_value(self) -> int:
+        """Find the byte at which the rows without a single value at the end begin, as spreadsheets leave them.
+
+        Such a row between others is a sample that was lost.
+        """
+        size = self._path.stat().st_size
+        with self._path.open("rb") as file:
+            file.seek(max(size - _BLOCK, self._layout.data_offset))
+            tail = file.read()
+        last = tail.rstrip(b' \t\r\n"' + self._layout.separator.encode())
+        end = tail.find(b"\n", len(last))
+        return size if end < 0 else size - len(tail) + end + 1
+
     def _data(self) -> Iterator[bytes]:
         """Whole data lines in blocks, without comments, in UTF-8, blanks reduced to one."""
         with self._path.open("rb") as file:
@@ -79,7 +94,7 @@ class CsvSource:
             if self._layout.data_offset == 0 and file.read(3) != b"\xef\xbb\xbf":
                 file.seek(0)
             rest = b""
-            while block := file.read(_BLOCK):
+            while block := file.read(min(_BLOCK, max(self._end - file.tell(), 0))):
                 block = rest + block
                 cut = block.rfind(b"\n") + 1
                 rest = block[cut:]

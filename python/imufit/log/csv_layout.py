@@ -13,11 +13,13 @@ from typing import IO, Final
 from imufit.errors import InputError
 from imufit.log.check import number_from_text
 from imufit.log.size import LONGEST_LINE, size_in_words
-from imufit.log.units import lookup, without_inner
+from imufit.log.units import lookup
 
 _SAMPLE: Final = 1 << 16
 _LINES: Final = 60
 _COMMA_NUMBER: Final = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
+_NOTHING: Final = ' \t"'
+"""What may stand in a line without values, besides separators."""
 COMMENT: Final = ("#", "%", "//")
 NOT_DATA: Final = re.compile(rb"\n[ \t]*(?:#|%|//|\r?\n)")
 """Line end before a line that holds no data: a comment or a blank line."""
@@ -43,6 +45,8 @@ class Layout:
         What was skipped.
     decimal : str
         Decimal point of its numbers: a comma where the separator is not one.
+    before : tuple of str
+        Lines before the header.
     """
 
     separator: str
@@ -52,6 +56,7 @@ class Layout:
     data_line: int
     notes: tuple[str, ...] = ()
     decimal: str = "."
+    before: tuple[str, ...] = ()
 
 
 def text_of(data: bytes) -> str:
@@ -133,8 +138,12 @@ def read_layout(path: Path) -> Layout:
     if units is not None and (fields := split_line(lines[units], separator)) and _are_units(fields, len(names)):
         names = tuple(f"{name} ({unit})" if unit else name for name, unit in zip(names, fields, strict=True))
         first = units + 1
+    while first < len(lines) and not lines[first].strip(_NOTHING + separator):
+        # a row without a single value before the first reading, as spreadsheets leave it: not a lost sample
+        first += 1
     offset = sum(len(piece) + 1 for piece in pieces[:first])
-    return Layout(separator, names, header, min(offset, path.stat().st_size), first, notes, decimal)
+    before = tuple(line for line in lines[: table[0] if header is None else header] if line.strip())
+    return Layout(separator, names, header, min(offset, path.stat().st_size), first, notes, decimal, before)
 
 
 def _decimal(lines: list[str], separator: str) -> str:
@@ -147,7 +156,7 @@ def _decimal(lines: list[str], separator: str) -> str:
 
 def _are_units(fields: list[str], width: int) -> bool:
     """Whether a line below the header holds units instead of readings."""
-    known = sum(lookup(without_inner(field)) is not None for field in fields)
+    known = sum(lookup(field) is not None for field in fields)
     return len(fields) == width and not any(_numeric(field) for field in fields) and 2 * known >= width
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.formats import Recording, Table
+from imufit.log.csv import CsvSource
 from imufit.log.tables import too_large
 from imufit.log.text import TEXT_SUFFIXES, looks_like_text, open_text
 from imufit.log.transcript import TranscriptSource
@@ -84,25 +85,45 @@ def _recording(path: Path, form: str, files: list[Path]) -> Recording:
         raise too_large(path, size)
     tables: list[Table] = []
     notes: list[str] = []
+    clues: list[str] = []
     for file in files[:MOST_FILES]:
         if file.stat().st_size == 0 or not looks_like_text(file):
             continue
         try:
-            columns = _columns(file)
+            source = open_text(file)
+            columns = columns_of(source)
         except InputError as error:
             notes.append(f"{path.name}: {file.name} left out: {error.problem}")
             continue
         tables.append(Table(file.stem, columns))
+        clues += source.clues
+        if tables[-1].n == 1:
+            clues += [f"{file.stem}.{name}={_cell(cells[0])}" for name, cells in columns.items()]
     if len(files) > MOST_FILES:
         notes.append(f"{path.name}: {len(files) - MOST_FILES} of {len(files)} text files left out")
     if not tables:
         raise InputError(f"the {form} holds no table", file=path, remedy="Name a file that holds samples.")
-    return Recording(form, tuple(tables), tuple(notes))
+    return Recording(form, tuple(tables), tuple(notes), clues=tuple(clues))
 
 
-def _columns(file: Path) -> dict[str, NDArray[Any]]:
-    """All columns of a text table."""
-    source = open_text(file)
+def _cell(cell: Any) -> str:
+    """Text of a cell; truth values are kept as numbers."""
+    return f"{cell:g}" if isinstance(cell, float) else str(cell)
+
+
+def columns_of(source: CsvSource | TranscriptSource) -> dict[str, NDArray[Any]]:
+    """All columns of a text table, in memory.
+
+    Parameters
+    ----------
+    source : CsvSource or TranscriptSource
+        The file.
+
+    Raises
+    ------
+    InputError
+        It is a transcript, or two columns have the same name.
+    """
     if isinstance(source, TranscriptSource):
         raise InputError("a transcript without a table")
     if len(set(source.names)) < len(source.names):

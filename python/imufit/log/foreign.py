@@ -13,9 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
-from imufit.log.columns import CONTRACT, GROUPS, SENSORS, meant, nearest
+from imufit.log.clock import BETWEEN
+from imufit.log.clock_text import ORDERS
+from imufit.log.columns import CONTRACT, GROUPS, SENSORS, without_unit
 from imufit.log.place import Place
 from imufit.log.units import Conversion, conversion, unit_in_header
+from imufit.log.words import meant, nearest
 from imufit.printable import NAME, printable
 
 ROW: Final = "row"
@@ -67,11 +70,22 @@ class PlannedColumn:
         Column of the file, or what stands for one.
     conversion : Conversion
         To SI.
+    day : str, optional
+        Column of dates, where `source` has the times of day: of the time alone.
+    order : str
+        Order of the numbers of dates with slashes, one of `imufit.log.clock_text.ORDERS`; of the time alone.
     """
 
     target: str
     source: str | RowNumber | Constant
     conversion: Conversion
+    day: str | None = None
+    order: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Columns of the file that it is made from."""
+        return tuple(each for each in (self.day, self.name) if each is not None)
 
     @property
     def name(self) -> str | None:
@@ -81,7 +95,8 @@ class PlannedColumn:
     @property
     def origin(self) -> str:
         """Text that stands for the source in a mapping."""
-        return self.source if isinstance(self.source, str) else self.source.text
+        source = self.source if isinstance(self.source, str) else self.source.text
+        return source if self.day is None else f"{self.day}{BETWEEN}{source}"
 
 
 @dataclass(frozen=True)
@@ -102,7 +117,7 @@ class Plan:
     @property
     def sources(self) -> tuple[str, ...]:
         """Columns of the file that are read, each once."""
-        return tuple(dict.fromkeys(column.name for column in self.columns if column.name is not None))
+        return tuple(dict.fromkeys(name for column in self.columns for name in column.names))
 
     @property
     def origin(self) -> dict[str, str]:
@@ -122,6 +137,7 @@ def plan_columns(
     bare: bool = False,
     rest: bool = True,
     dropped: Collection[str] = (),
+    computed: Collection[str] = (),
 ) -> Plan:
     """Decide which columns of the file become which columns of the log.
 
@@ -139,6 +155,8 @@ def plan_columns(
         Whether columns that are neither mapped nor a log's own become covariates.
     dropped : collection of str
         Columns to leave out, of the file and of the log.
+    computed : collection of str
+        Columns that are named as a sensor but are none: they mean no column of the log.
 
     Raises
     ------
@@ -163,7 +181,7 @@ def plan_columns(
     # What was only read for a column that is left out is no covariate either.
     dropped = {*dropped, *(column.origin for column in resolved if column.target in dropped)}
     targets = {column.target for column in mapped}
-    used = {column.name for column in mapped if column.name is not None}
+    used = {name for column in mapped for name in column.names}
     kept = [PlannedColumn(shown[name], name, Conversion()) for name in names if name not in {*targets, *used, *dropped}]
     for column in mapped:
         if column.target not in CONTRACT and column.target != column.name and (close := meant(column.target)):
@@ -175,7 +193,7 @@ def plan_columns(
     for index, name in enumerate(changed):
         if name in changed[:index] or name in names or name in targets:
             raise place.error(f"column {name} is there twice", column=name, remedy="Give these columns other names.")
-    unused = [shown[n] for n in names if n not in used and n not in dropped]
+    unused = [shown[n] for n in names if n not in {*used, *dropped, *computed}]
     if not rest:
         kept = [column for column in kept if column.target in CONTRACT]
     columns = [*mapped, *kept]
@@ -191,11 +209,18 @@ def plan_columns(
 def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> PlannedColumn:
     """Find the column, sign and unit, or the constant, that a mapping's source text means."""
     bare, unit = _bracket(text)
+    if target == "t":
+        for name, order in ((text.strip(), ""), (bare, unit)):
+            day, _, clock = name.partition(BETWEEN)
+            if day in names and clock in names and order in ("", "s", *ORDERS):
+                return PlannedColumn("t", clock, Conversion(), day, order if order in ORDERS else "")
+        if unit in ORDERS and bare in names:
+            return PlannedColumn("t", bare, Conversion(), order=unit)
     for name, given in ((text.strip(), None), (bare, unit)):
         for sign, given_name in _signed(name):
             column = given_name
             if column not in names:
-                column = next((each for each in names if printable(each, NAME) == given_name), column)
+                column = _named_otherwise(given_name, names) or column
             if column in names or (column == ROW and ROW not in names):
                 return _planned(target, column, sign=sign, unit=given, names=names, place=place)
     if NUMBER.fullmatch(bare):
@@ -208,6 +233,13 @@ def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> Plan
         column=wanted,
         remedy=f"Nearest are {', '.join(close)}." if close else f"The columns are {', '.join(names)}.",
     )
+
+
+def _named_otherwise(given: str, names: Sequence[str]) -> str | None:
+    """Column that a mapping names as it is shown in messages, or without the unit behind its name."""
+    shown = next((name for name in names if printable(name, NAME) == given), None)
+    plain = [name for name in names if without_unit(name) == given]
+    return shown or (plain[0] if len(plain) == 1 else None)
 
 
 def _constant(target: str, text: str, unit: str, *, names: Sequence[str], place: Place) -> PlannedColumn:
@@ -267,7 +299,8 @@ def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place,
                     missing[column] = next(iter(nearest(column, free)), "")
     if "t" not in targets and "t" not in missing:
         missing["t"] = ""
-    if missing:
+    sensors = {column for group in (*SENSORS, "ref_q") for column in GROUPS[group]} | {"ref_angle"}
+    if missing and (bare or sensors & {*targets, *missing}):
         raise _missing(missing, targets, place)
     complete = [group for group in (*SENSORS, "ref_q") if all(column in targets for column in GROUPS[group])]
     if not complete and "ref_angle" not in targets and not bare:

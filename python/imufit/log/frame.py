@@ -46,7 +46,7 @@ def fields_from_frame(df: pd.DataFrame, mapping: Mapping[str, str] | None, metad
     truths = {name: (None, "") for name, cells in block.items() if cells.dtype == np.bool_}
     check_truth_values(plan, truths, place)
     block = {name: cells if cells.dtype == object else cells.astype(np.float64) for name, cells in block.items()}
-    scan = TimeScan(place)
+    scan = TimeScan(place, abs(plan.time.conversion.factor))
     scan.add(time_of(plan, block, 0, len(df), place))
     repair = scan.finish()
     unmeasured = Unmeasured(place)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Final
 
 from imufit.log.check import is_truth, number_from_text
+from imufit.log.units import lookup
 
 LONGEST_LINE: Final = 4096
 """Characters of a line; what is longer is no record but noise or a binary dump."""
@@ -22,8 +23,14 @@ _NAME: Final = r"(?<![\w.])(?P<name>[A-Za-z_][\w.]*)[\"']?(?:\s?(?P<unit>\([^()=
 _SIGN: Final = r"\s*(?::=|=|:)\s*"
 _PLAIN: Final = re.compile(r"(?<![\w.])[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 _ITEM: Final = re.compile(rf"{_NAME}{_SIGN}(?:(?P<open>[(\[{{])\s*(?P<in>{_VALUES})\s*[)\]}}]|(?P<bare>{_VALUES}))")
+_BEHIND: Final = re.compile(
+    r"\s?(?P<unit>[^\s,;|=:()\[\]{}\d][^\s,;|=:()\[\]{}]{0,11})(?=\s*(?:[,;|)]|$)|\s+[A-Za-z_#])"
+)
+"""What may be a unit behind the values, as in ``9.81 m/s^2,``."""
 _MARK: Final = re.compile(rf"{_NAME}{_SIGN}")
-_ONE: Final = re.compile(f"({_NUMBER}){_UNIT}")
+_ONE: Final = re.compile(f"({_NUMBER})({_UNIT})")
+_MEASURED: Final = ("time", "specific force", "angular rate", "magnetic flux density")
+"""Quantities whose units behind a value count; a temperature or an angle has its usual one."""
 _WORD_BEFORE: Final = re.compile(r"(?<!\w)([A-Za-z_]\w*)[\s:=(\[{\"']*$")
 _LEAD: Final = re.compile(
     r"(?P<clock>(?:\d{4}-\d\d-\d\d[T ])?(?<!\d)\d{1,2}:\d\d:\d\d(?:[.,]\d+)?Z?)"
@@ -42,7 +49,8 @@ class Item:
     written : str
         The name as it stands in the line.
     unit : str
-        Unit in brackets behind the name, with the brackets; empty without.
+        Unit in brackets behind the name, with the brackets; so is one behind the values. Of three values with the names
+        of the axes that behind the last one counts for all. Empty without.
     values : tuple of float
         One number, or those of a list.
     start, end : int
@@ -101,13 +109,37 @@ def named_values(line: str) -> list[Item]:
             name = f"{group}_{name}" if group else name
         else:
             group = ""
+        unit = unit or _unit_behind(line, found, text)
         written = [one[1] for one in _ONE.finditer(text)]
         values = tuple(number_from_text(one, truth=True) for one in written)
         truth = next(filter(is_truth, written), "")
         closed = found["open"] is not None
         items.append(Item(name, found["name"], unit, values, found.start(), found.end(), closed, truth))
         end = found.end()
-    return items
+    return _with_axes(items)
+
+
+def _unit_behind(line: str, found: re.Match[str], values: str) -> str:
+    """Find the unit behind the values of a name, in brackets; empty where nothing there is a sensor's unit."""
+    stuck = [word[2] for word in _ONE.finditer(values)]
+    text = stuck[-1] if stuck and stuck[-1] else ""
+    if not text and (behind := _BEHIND.match(line, found.end())) is not None:
+        text = behind["unit"]
+    known = lookup(text) if text else None
+    return f"({text})" if known is not None and known[0] in _MEASURED else ""
+
+
+def _with_axes(items: list[Item]) -> list[Item]:
+    """Give the axes of one sensor the unit that stands behind the last of them alone."""
+    given = list(items)
+    for k in range(len(items) - 2):
+        three = items[k : k + 3]
+        stems = {item.name.rpartition("_")[0] for item in three}
+        axes = "".join(item.name[-1:].lower() for item in three)
+        if axes == "xyz" and len(stems) == 1 and three[2].unit and not three[0].unit and not three[1].unit:
+            given[k] = replace(items[k], unit=three[2].unit)
+            given[k + 1] = replace(items[k + 1], unit=three[2].unit)
+    return given
 
 
 def skeleton(text: str) -> tuple[str, list[str]]:

@@ -86,6 +86,7 @@ class NpzSource:
         except _UNKNOWN as error:
             raise self._unknown(error) from None
         self.names: tuple[str, ...] = tuple(self._members)
+        self.clues = (path.name, *self.names)
         self.n = lengths.get("t", max(lengths.values(), default=0))
         for name, length in lengths.items():
             if length != self.n:

@@ -47,6 +47,7 @@ class ParquetSource:
         self.truths: dict[str, tuple[int | None, str]] = dict.fromkeys(truths, (None, ""))
         listed = [name for name in self._schema.names if pa.types.is_nested(_value_type(self._schema, name))]
         self.names: tuple[str, ...] = tuple(name for name in self._schema.names if name not in listed)
+        self.clues = (path.name, *self.names)
         self.notes: tuple[str, ...] = tuple(f"{path.name}: column {name} left out: it holds lists" for name in listed)
         text = (self._schema.metadata or {}).get(_KEY)
         self.embedded: Mapping[str, Any] = mapping_from_json(text, path) if text else {}

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from imufit.errors import InputError
-from imufit.log.columns import GROUPS, SENSORS, nearest
+from imufit.log.columns import GROUPS, SENSORS
 from imufit.log.metadata import Frame, Metadata
 from imufit.log.place import Place
 from imufit.log.units import conversion, parse_mapping
-from imufit.log.words import sensor_of, words_of
+from imufit.log.words import nearest, sensor_of, words_of
 from imufit.printable import NAME, printable
 
 _VALUE = re.compile(r"(?P<number>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")

@@ -12,15 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
+from imufit.log.clock import Clock, clocks_of
 from imufit.log.clock_text import seconds_from_cells
 from imufit.log.columns import CONTRACT, EULER, GROUPS, LARGEST_COVARIATE, SENSOR_NAMES, SENSORS, WHOLE_TURN
 from imufit.log.makers import Maker, maker_of
+from imufit.log.metadata import STANDARD_GRAVITY, Metadata
 from imufit.log.place import Place
+from imufit.log.time_order import counted_on
 from imufit.log.time_unit import time_unit
 from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, turned
-from imufit.log.unit_check import HEAD
+from imufit.log.unit_check import HEAD, OtherUnitError, check_units, units_of_force, without_gravity
 from imufit.log.units import conversion, lookup
-from imufit.log.words import COMPUTED, Words, sensor_of, strange, time_columns, unit_of, words_of
+from imufit.log.words import Words, sensor_of, strange, time_columns, unit_of, words_of
 
 Array = NDArray[np.float64]
 
@@ -30,6 +33,8 @@ COUNTS: Final = "131 LSB/(deg/s)"
 """Counts of the usual sensor in its smallest range (InvenSense, MPU-6050 product specification)."""
 ROW_RATE: Final = "row[100Hz]"
 """Time by row number, with the rate that is most usual."""
+_ROW_STEP: Final = 0.01
+"""The same as a step, s."""
 _USUAL_FIELD: Final = 50.0
 """Magnitude of the earth's field in the middle latitudes, uT (World Magnetic Model)."""
 _NUMBERED: Final = re.compile(r"(?:(?P<table>.*)\.)?c(?P<number>\d+)")
@@ -42,6 +47,11 @@ class Readable(Protocol):
     @property
     def names(self) -> tuple[str, ...]:
         """Columns of the file."""
+        ...
+
+    @property
+    def clues(self) -> tuple[str, ...]:
+        """What its maker is known by."""
         ...
 
     def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
@@ -59,10 +69,13 @@ class Recognised:
         Source text for target columns, the user's own included.
     notes : tuple of str
         What the file was taken for.
+    computed : tuple of str
+        Columns that are named as a sensor but were computed from its readings.
     """
 
     mapping: dict[str, str]
     notes: tuple[str, ...] = ()
+    computed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,45 +109,142 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
     names = source.names
     angles = _angles(source, names, mapping or {})
     given = {**angles, **(mapping or {})}
-    told = (f"{place.name}: reference attitude from {', '.join(angles.values())}",) if angles else ()
+    told: tuple[str, ...] = ()
+    if angles:
+        told = (f"{place.name}: reference attitude from {', '.join(angles.values())}",)
     taken = set(given.values())
     wanted = [group for group in ("t", *SENSORS) if not _has(group, names, given)]
-    maker = maker_of(names)
+    maker = maker_of(source.clues)
     parsed = [_parsed(name, names) for name in names if name not in CONTRACT and name not in taken]
+    stem = place.file.stem if place.file is not None else ""
     if maker is not None:
-        parsed = [words for words in parsed if not re.search(maker.left_out, words.column)]
-    found = _found(wanted, parsed, maker)
-    if not found.keys() & set(SENSORS) and place.file is not None:
+        parsed = [words for words in parsed if maker.takes(_table(words.column, stem), words.column)]
+    found = _found(wanted, parsed, maker, stem)
+    if not found.keys() & set(SENSORS) and stem:
         # a file of one sensor has the sensor's name in its own
-        parsed = [replace(words, words=(*words_of(place.file.stem).words, *words.words)) for words in parsed]
-        found |= {group: each for group, each in _found(wanted, parsed, maker).items() if group != "t"}
+        parsed = [replace(words, words=(*words_of(stem).words, *words.words)) for words in parsed]
+        found |= {group: each for group, each in _found(wanted, parsed, maker, stem).items() if group != "t"}
     if names and not mapping and not found and all(_NUMBERED.fullmatch(name) for name in names):
         raise _without_names(source, place)
-    if not any(group in found for group in SENSORS) and not ("t" in found and _has_any(names, given)):
+    clocks = _clocks(source, found.pop("t", []), maker)
+    counted = {} if clocks or "t" not in wanted else _counted(source, maker)
+    given = {**given, **counted}
+    if not any(group in found for group in SENSORS) and not ((clocks or counted) and _has_any(names, given)):
+        if "t" in wanted and not counted and not mapping:
+            _ask_time_and_units(source, place)
         return Recognised(given, told)
+    clock = clocks[0] if clocks else None
+    found, computed = _with_gravity(source, found)
     chosen = {group: candidates[0] for group, candidates in found.items()}
     several = [group for group, candidates in found.items() if len(candidates) > 1 and _alike(candidates)]
-    readings = _Readings.of(source, chosen, names, given)
-    units = readings.units(maker.ticks if maker is not None else ())
+    readings = _Readings.of(source, clock, chosen, names, given)
+    units = readings.units()
     asked = [group for group in chosen if units[group] is None]
+    if clock is not None:
+        asked = ["t", *asked] if clock.unit is None else asked
+        several = ["t", *several] if len(clocks) > 1 else several
+    told += tuple(
+        f"{place.name}: {' '.join(each.columns)} not taken for the accelerometer: at rest hardly anything is left of "
+        "gravity, so that it was taken off"
+        for each in computed
+    )
+    left = tuple(column for each in computed for column in each.columns)
+    warm = _temperature(parsed, names, given)
+    timed = {"t": f"{clock.source}[{clock.unit or clock.likely}]"} if clock is not None else {}
     if mapping:
         chosen = {group: each for group, each in chosen.items() if group not in (*asked, *several)}
+        timed = {} if "t" in (*asked, *several) else timed
         return Recognised(
-            {**_mapping(chosen, units, maker), **_temperature(parsed, names, given), **given},
-            (*told, *_notes(place, maker, chosen, units)),
+            {**timed, **_mapping(chosen, units, maker), **warm, **given},
+            (*told, *_notes(place, maker, timed, chosen, units)),
+            left,
         )
-    warm = _temperature(parsed, names, given)
     proposed = {group: units[group] or readings.likely(group, units) for group in chosen}
-    complete = {**given, **warm, **_mapping(chosen, proposed, maker)}
-    timeless = "t" in wanted and "t" not in found
+    complete = {**given, **timed, **warm, **_mapping(chosen, proposed, maker)}
+    timeless = "t" in wanted and clock is None and not counted
     if asked or several or timeless:
         complete = {**({"t": ROW_RATE} if timeless else {}), **complete}
+        first = (asked or several or ["t"])[0]
         raise place.error(
             _question(asked, several, timeless),
-            column="t" if timeless else chosen[(asked or several)[0]].columns[0],
+            column="t" if timeless else clock.column if first == "t" and clock else chosen[first].columns[0],
             remedy=_remedy(complete),
         )
-    return Recognised(complete, (*told, *_notes(place, maker, chosen, units)))
+    return Recognised(complete, (*told, *_notes(place, maker, timed or counted, chosen, units)), left)
+
+
+def _ask_time_and_units(source: Readable, place: Place) -> None:
+    """Ask for the time of a log together with the units that its sensors are in, where these are not a log's.
+
+    Raises
+    ------
+    InputError
+        The time is missing, and a sensor is unmistakably in another unit.
+    """
+    there = [group for group in SENSORS if all(column in source.names for column in GROUPS[group])]
+    rows = _first_rows(source, [column for group in there for column in GROUPS[group]])
+    sensors: dict[str, Array | None] = {
+        group: np.stack([rows[column] for column in GROUPS[group]], axis=1) for group in there
+    }
+    count = max((len(values) for values in rows.values()), default=0)
+    units: dict[str, str] = {}
+    try:
+        check_units(np.arange(count, dtype=np.float64) * _ROW_STEP, sensors, Metadata(), place, clock="stated")
+    except OtherUnitError as other:
+        units = other.units
+    except InputError:
+        return  # said once there is a time
+    if units:
+        mapping = {column: f"{column}[{unit}]" for column, unit in units.items()}
+        groups = [group for group in SENSORS if units.keys() & set(GROUPS[group])]
+        raise place.error(
+            f"column t is missing, and {_named(groups)} is not in SI units",
+            column="t",
+            remedy=_remedy({"t": ROW_RATE, **mapping}),
+        )
+
+
+def _table(column: str, stem: str) -> str:
+    """Table that a column stands in: of a single one it is the file."""
+    return column.rpartition(".")[0] or stem
+
+
+def _clocks(source: Readable, candidates: Sequence[_Candidate], maker: Maker | None) -> list[Clock]:
+    """Columns that are the time; several where none is likelier."""
+    if not candidates:
+        return []
+    named = [(each.columns[0], each.unit, each.strange) for each in candidates]
+    ticks = maker.ticks if maker is not None else ()
+    return clocks_of(named, _first_cells(source, [name for name, _, _ in named]), None, ticks)
+
+
+def _counted(source: Readable, maker: Maker | None) -> dict[str, str]:
+    """Time by the number of the sample, where the lines before the header state its rate."""
+    rate = maker.rate_in(source.clues) if maker is not None else None
+    if maker is None or rate is None:
+        return {}
+    by_row = {"t": f"row[{rate:g}Hz]"}
+    if maker.counter not in source.names:
+        return by_row
+    counts = counted_on(_first_rows(source, [maker.counter]).get(maker.counter, np.empty(0)))
+    one_by_one = counts.size > 1 and float(np.median(np.diff(counts))) == 1.0
+    return {"t": f"{maker.counter}[{rate:g}Hz]"} if one_by_one else by_row
+
+
+def _with_gravity(
+    source: Readable, found: Mapping[str, list[_Candidate]]
+) -> tuple[dict[str, list[_Candidate]], list[_Candidate]]:
+    """Candidates without those that are said to be an accelerometer but have no gravity at rest; and these."""
+    computed = []
+    for each in found.get("acc", []):
+        if each.unit is None:
+            continue
+        rows = _first_rows(source, each.columns)
+        acc = np.stack([rows[column] for column in each.columns], axis=1) * conversion("acc_x", each.unit).factor
+        if acc.size and not units_of_force(acc) and without_gravity(acc, STANDARD_GRAVITY):
+            computed.append(each)
+    kept = {group: [each for each in candidates if each not in computed] for group, candidates in found.items()}
+    return {group: candidates for group, candidates in kept.items() if candidates}, computed
 
 
 def _angles(source: Readable, names: Sequence[str], given: Mapping[str, str]) -> dict[str, str]:
@@ -182,7 +292,7 @@ def _without_names(source: Readable, place: Place) -> InputError:
     names = source.names
     rows = _first_rows(source, names)
     complete, free = {"t": ROW_RATE}, list(names)
-    first = rows.get(names[0], np.empty(0))
+    first = counted_on(rows.get(names[0], np.empty(0)))
     if first.size > 1 and np.all(np.diff(first) > 0.0):
         complete["t"] = f"{names[0]}[{time_unit(first) or 's'}]"
         free = free[1:]
@@ -200,9 +310,11 @@ def _without_names(source: Readable, place: Place) -> InputError:
     )
 
 
-def _found(wanted: Sequence[str], parsed: Sequence[Words], maker: Maker | None) -> dict[str, list[_Candidate]]:
+def _found(
+    wanted: Sequence[str], parsed: Sequence[Words], maker: Maker | None, stem: str
+) -> dict[str, list[_Candidate]]:
     """Columns that may be each of the groups, without the groups that have none."""
-    found = {group: _candidates(group, parsed, maker) for group in wanted}
+    found = {group: _candidates(group, parsed, maker, stem) for group in wanted}
     return {group: candidates for group, candidates in found.items() if candidates}
 
 
@@ -223,12 +335,15 @@ def _parsed(name: str, names: Sequence[str]) -> Words:
     return words_of(name)
 
 
-def _candidates(group: str, parsed: Sequence[Words], maker: Maker | None) -> list[_Candidate]:
+def _candidates(group: str, parsed: Sequence[Words], maker: Maker | None, stem: str) -> list[_Candidate]:
     """Columns that may be the group, the likeliest first."""
-    fixed = maker.units.get(group) if maker is not None else None
+
+    def fixed(column: str) -> str | None:
+        return maker.unit(group, _table(column, stem)) if maker is not None else None
+
     made: list[_Candidate] = []
     if group == "t":
-        made += [_Candidate((column,), unit or fixed, odd) for column, unit, odd in time_columns(parsed)]
+        made += [_Candidate((column,), unit or fixed(column), odd) for column, unit, odd in time_columns(parsed)]
     else:
         triples: dict[tuple[str, ...], dict[str, Words]] = {}
         for words in parsed:
@@ -237,15 +352,23 @@ def _candidates(group: str, parsed: Sequence[Words], maker: Maker | None) -> lis
         for axes in triples.values():
             if set(axes) != set("xyz"):
                 continue
-            force = maker is not None and re.search(maker.force, axes["x"].column) is not None
-            named = sensor_of(tuple(word for word in axes["x"].words if not (force and word in COMPUTED)))
+            known = maker.sensor(axes["x"].column) if maker is not None else None
+            named = sensor_of(axes["x"].words) if known is None else (known, ())
             if named is not None and named[0] == group:
                 unit, rest = unit_of(group, named[1], axes["x"].bracket)
+                if unit is None and _measures_something_else(group, axes["x"].bracket):
+                    continue
                 own = unit is None and axes["x"].bracket != "" and lookup(axes["x"].bracket) is None
                 own |= maker is not None and group in maker.arbitrary
                 columns = tuple(axes[axis].column for axis in "xyz")
-                made.append(_Candidate(columns, unit or fixed, strange(rest), own))
+                made.append(_Candidate(columns, unit or fixed(columns[0]), strange(rest), own))
     return sorted(made, key=lambda each: (each.strange, each.unit is None))
+
+
+def _measures_something_else(group: str, bracket: str) -> bool:
+    """Whether the unit in brackets is one of another quantity; a rate may be named by its angle."""
+    known = lookup(bracket) if bracket else None
+    return known is not None and not (group == "gyr" and known[0] == "angle")
 
 
 def _alike(candidates: Sequence[_Candidate]) -> bool:
@@ -260,10 +383,16 @@ class _Readings:
 
     chosen: Mapping[str, _Candidate]
     rows: Mapping[str, Array]
+    t: Array | None = None
 
     @classmethod
     def of(
-        cls, source: Readable, chosen: Mapping[str, _Candidate], names: Sequence[str], given: Mapping[str, str]
+        cls,
+        source: Readable,
+        clock: Clock | None,
+        chosen: Mapping[str, _Candidate],
+        names: Sequence[str],
+        given: Mapping[str, str],
     ) -> _Readings:
         """Read them, where a unit has to be found in them."""
         if all(each.unit is not None for each in chosen.values()):
@@ -271,27 +400,26 @@ class _Readings:
         columns = [column for each in chosen.values() for column in each.columns]
         own = ("t", *GROUPS["acc"], *GROUPS["ref_q"])
         rows = _first_rows(source, [*columns, *(c for c in own if c in names and c not in given)])
-        time = rows.get(chosen["t"].columns[0] if "t" in chosen else "t")
+        time = clock.seconds if clock is not None else rows.get("t")
         known = None if time is None else np.isfinite(time)
-        return cls(chosen, rows if known is None else {name: values[known] for name, values in rows.items()})
+        if time is None or known is None:
+            return cls(chosen, rows)
+        return cls(chosen, {name: values[known] for name, values in rows.items()}, time[known])
 
     def _stacked(self, group: str) -> Array | None:
         wanted = self.chosen[group].columns if group in self.chosen else GROUPS[group]
         there = all(column in self.rows for column in wanted)
         return np.stack([self.rows[column] for column in wanted], axis=1) if there else None
 
-    def units(self, ticks: tuple[str, ...]) -> dict[str, str | None]:
+    def units(self) -> dict[str, str | None]:
         """Find the unit of each group: as its names state, else as the readings show."""
         units = {group: each.unit for group, each in self.chosen.items()}
         if not self.rows:
             return units
-        raw_t = self.rows.get(self.chosen["t"].columns[0] if "t" in self.chosen else "t")
-        if raw_t is not None and "t" in units and units["t"] is None:
-            units["t"] = time_unit(raw_t, ticks)
+        t = self.t
         acc, gyr, mag = (self._stacked(group) for group in SENSORS)
         if "acc" in units and units["acc"] is None and acc is not None:
             units["acc"] = acc_unit(acc)
-        t = None if raw_t is None else raw_t * conversion("t", units.get("t") or "s").factor
         if "gyr" in units and units["gyr"] is None and gyr is not None and t is not None:
             fields = [(_filled(t, each), each is mag) for each in (acc, mag) if each is not None]
             units["gyr"] = gyr_unit(t, gyr, fields, self._stacked("ref_q"))
@@ -310,23 +438,31 @@ class _Readings:
             size = np.empty(0) if field is None else np.linalg.norm(field, axis=1)
             size = size[np.isfinite(size) & (size > 0.0)]
             return f"*{_USUAL_FIELD / float(np.median(size)):.3g}" if size.size else "uT"
-        return {"t": "ms", "acc": "g"}[group]
+        return "g"
 
 
-def _first_rows(source: Readable, columns: Sequence[str]) -> dict[str, Array]:
-    """Columns of the first rows, as numbers; without those that hold text."""
-    pieces: dict[str, list[Array]] = {column: [] for column in columns}
+def _first_cells(source: Readable, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """Columns of the first rows as they stand in the file; a column with text is text throughout."""
+    wanted = list(dict.fromkeys(columns))
+    pieces: dict[str, list[NDArray[Any]]] = {column: [] for column in wanted}
     count = 0
-    for _, rows, block in source.scan(list(dict.fromkeys(columns))):
-        for column in columns:
-            cells = block[column]
-            values = seconds_from_cells(cells) if cells.dtype == object else cells
-            # squares of readings and their sums have room in a float64
-            pieces[column].append(np.where(np.abs(values) <= LARGEST_COVARIATE, values, np.nan))
+    for _, rows, block in source.scan(wanted):
+        for column in wanted:
+            pieces[column].append(block[column])
         count += rows
         if count >= HEAD:
             break
-    return {column: np.concatenate(parts)[:HEAD] for column, parts in pieces.items() if parts}
+    return {column: np.concatenate(parts)[:HEAD] if parts else np.empty(0) for column, parts in pieces.items()}
+
+
+def _first_rows(source: Readable, columns: Sequence[str]) -> dict[str, Array]:
+    """Columns of the first rows as numbers."""
+    rows: dict[str, Array] = {}
+    for column, cells in _first_cells(source, columns).items():
+        values = seconds_from_cells(cells) if cells.dtype == object else cells
+        # squares of readings and their sums have room in a float64
+        rows[column] = np.where(np.abs(values) <= LARGEST_COVARIATE, values, np.nan)
+    return rows
 
 
 def _filled(t: Array, values: Array) -> Array:
@@ -338,9 +474,10 @@ def _filled(t: Array, values: Array) -> Array:
 
 
 def _mapping(chosen: Mapping[str, _Candidate], units: Mapping[str, str | None], maker: Maker | None) -> dict[str, str]:
-    opposite = maker.opposite if maker is not None else ()
+    opposite = maker.opposite if maker is not None else {}
+    turned_over = {group for group, unit in opposite.items() if units.get(group) == unit}
     return {
-        target: f"{'-' if group in opposite else ''}{column}[{units[group]}]"
+        target: f"{'-' if group in turned_over else ''}{column}[{units[group]}]"
         for group, each in chosen.items()
         for target, column in zip(GROUPS.get(group, (group,)), each.columns, strict=True)
     }
@@ -360,9 +497,15 @@ def _named(groups: Sequence[str]) -> str:
 
 
 def _notes(
-    place: Place, maker: Maker | None, chosen: Mapping[str, _Candidate], units: Mapping[str, str | None]
+    place: Place,
+    maker: Maker | None,
+    timed: Mapping[str, str],
+    chosen: Mapping[str, _Candidate],
+    units: Mapping[str, str | None],
 ) -> tuple[str, ...]:
-    taken = ", ".join(f"{group} from {' '.join(each.columns)} in {units[group]}" for group, each in chosen.items())
+    parts = [f"t from {text[:-1].replace('[', ' in ')}" for text in timed.values()]
+    parts += [f"{group} from {' '.join(each.columns)} in {units[group]}" for group, each in chosen.items()]
+    taken = ", ".join(parts)
     if not taken:
         return ()
     layout = f"taken for {maker.name}: " if maker is not None else "taken "

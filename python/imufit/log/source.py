@@ -15,6 +15,7 @@ from imufit.formats.find import recording_of
 from imufit.log.folder import recording_of_folder, recording_of_zip
 from imufit.log.npz import NpzSource
 from imufit.log.parquet import ParquetSource
+from imufit.log.rows_of_kinds import recording_of_instances, recording_of_kinds
 from imufit.log.tables import TablesSource
 from imufit.log.text import TEXT_SUFFIXES, looks_like_text, open_text
 from imufit.log.unpacked import COMPRESSED, is_utf_16, open_unpacked
@@ -56,6 +57,11 @@ class Source(Protocol):
     @property
     def notes(self) -> tuple[str, ...]:
         """What was noticed on reading."""
+        ...
+
+    @property
+    def clues(self) -> tuple[str, ...]:
+        """What its maker is known by; see `imufit.log.makers.maker_of`."""
         ...
 
     def scan(self, columns: Sequence[str]) -> Iterator[Block]:
@@ -103,7 +109,11 @@ def open_source(path: Path) -> Source:
                 file=path,
                 remedy=f"Logs are {', '.join(SUFFIXES)}: export it as text, of which imufit convert makes a log.",
             )
-        return open_text(path)
+        if (found := recording_of_kinds(path)) is not None:
+            return TablesSource(path, found)
+        text = open_text(path)
+        split = recording_of_instances(path, text)
+        return text if split is None else TablesSource(path, split)
     except OSError as error:
         raise InputError(f"the file cannot be read ({error.strerror or error})", file=path) from None
 

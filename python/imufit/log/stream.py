@@ -66,8 +66,15 @@ class LogStream:
         found = recognise(_Left(self._source, dropped) if dropped else self._source, mapping, self._place)
         dropped = reading.dropped(names, found.mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
-        rest = bare or not several
-        self._plan = plan_columns(names, found.mapping, self._place, bare, rest=rest, dropped=dropped)
+        self._plan = plan_columns(
+            names,
+            found.mapping,
+            self._place,
+            bare,
+            rest=bare or not several,
+            dropped=dropped,
+            computed=found.computed,
+        )
         if isinstance(self._source, TablesSource):
             self._source.choose(self._plan.sources)
         stated = read_metadata(self._path, self._source.embedded)
@@ -88,11 +95,13 @@ class LogStream:
         self._notes = tuple(note for note in notes if note)
 
     def _scan(self) -> TimeRepair:
-        scan, time = TimeScan(self._place), self._plan.time
-        for start, rows, block in self._source.scan([time.name] if time.name is not None else []):
+        time = self._plan.time
+        scan = TimeScan(self._place, abs(time.conversion.factor))
+        for start, rows, block in self._source.scan(list(time.names)):
             if time.name in self._source.truths:
                 break
-            scan.add(time_of(self._plan, block, start, rows, self._place))
+            written = time.name is not None and block[time.name].dtype == object
+            scan.add(time_of(self._plan, block, start, rows, self._place), written)
         check_truth_values(self._plan, self._source.truths, self._place)
         if self._source.n == 0:
             raise self._place.error("the file has a header but no rows", remedy="Record or copy it again.")
@@ -239,6 +248,11 @@ class _Left:
     def names(self) -> tuple[str, ...]:
         """Columns of the file that are not left out."""
         return tuple(name for name in self._source.names if name not in self._dropped)
+
+    @property
+    def clues(self) -> tuple[str, ...]:
+        """What its maker is known by."""
+        return self._source.clues
 
     def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
         """First pass over the file, with the named columns only."""

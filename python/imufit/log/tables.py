@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.formats import Recording, Table
-from imufit.log.clock_text import seconds_from_cells
-from imufit.log.makers import maker_of
+from imufit.log.clock import clocks_of
+from imufit.log.makers import Maker, maker_of
 from imufit.log.size import BLOCK_ROWS, size_in_words
-from imufit.log.time_unit import time_unit
-from imufit.log.units import conversion
 from imufit.log.words import time_columns, words_of
 from imufit.printable import NAME, printable
 
@@ -54,10 +52,10 @@ class TablesSource:
         self._times: dict[int, NDArray[np.float64]] = {}
         lost: list[str] = []
         shown = [_whole(table, name) for table in tables for name in table.columns]
-        maker = maker_of(shown if self.several else list(tables[0].columns))
-        fixed = maker.units.get("t") if maker is not None else None
+        self.clues = (path.name, *recording.clues, *(shown if self.several else tables[0].columns))
+        maker = maker_of(self.clues)
         for k, table in enumerate(tables):
-            time = _time_of(table, fixed)
+            time = _time_of(table, maker)
             if self.several and time is None:
                 lost.append(table.name)
                 continue
@@ -134,20 +132,20 @@ def _whole(table: Table, name: str) -> str:
     return name if name.startswith(f"{table.name}.") else f"{table.name}.{name}"
 
 
-def _time_of(table: Table, fixed: str | None) -> tuple[str, NDArray[np.float64]] | None:
+def _time_of(table: Table, maker: Maker | None) -> tuple[str, NDArray[np.float64]] | None:
     """Column of a table's time, and its values in s; None without any."""
     if table.time is not None:
         return table.time, np.asarray(table.columns[table.time], np.float64)
     names = list(table.columns)
-    found = [(odd, unit is None, name, unit) for name, unit, odd in time_columns(map(words_of, names))]
+    found = time_columns(map(words_of, names))
     if not found and all(name == f"c{k + 1}" for k, name in enumerate(names)):
-        found = [(0, True, "c1", None)]
-    for _, _, name, stated in sorted(found, key=lambda each: each[:2]):
-        cells = table.columns[name]
-        values = seconds_from_cells(cells) if cells.dtype == object else cells
-        unit = "s" if cells.dtype == object else (stated or fixed or time_unit(values))
-        if unit is not None and np.isfinite(values).any() and bool(np.all(np.diff(values[np.isfinite(values)]) >= 0.0)):
-            return name, conversion("t", unit).apply(np.asarray(values, np.float64))
+        found = [("c1", None, 0)]
+    cells = {name: table.columns[name] for name, _, _ in found}
+    fixed, ticks = (maker.unit("t", table.name), maker.ticks) if maker is not None else (None, ())
+    for clock in clocks_of(found, cells, fixed, ticks):
+        known = clock.seconds[np.isfinite(clock.seconds)]
+        if clock.unit is not None and bool(np.all(np.diff(known) >= 0.0)):
+            return clock.column, clock.seconds
     return None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -28,6 +28,14 @@ PAUSE: Final = 3.5
 COPIED: Final = 0.5
 """Share of the rows with a repeated stamp that say the same as the row before from which on they are copies of it,
 where other rows do not so as often."""
+COUNTERS: Final = (2.0**32, 2.0**24, 2.0**16)
+"""Numbers at which counters of 32, 24 and 16 bits begin again at 0: micros() of an Arduino does after 71 minutes."""
+_USUAL_GAP: Final = 3.5
+"""Median steps up to which rows follow one another without a gap, as for `join`: a counter that began anew went on."""
+_STEPS_KNOWN: Final = 10
+"""Steps from which on their median is known."""
+_WHOLE: Final = 1e-3
+"""Rounding of a whole number of ticks up to 2^32 that was converted to seconds."""
 
 
 def over_midnight(before: float, after: float) -> bool:
@@ -41,9 +49,57 @@ def over_midnight(before: float, after: float) -> bool:
     return 0.0 <= after < before <= DAY and before - after > 0.5 * DAY
 
 
+def _period(before: float, after: float, step: float, tick: float, day: bool) -> float:
+    """Time after which a clock began anew between two rows, s; 0 where the second row does not follow the first.
+
+    Parameters
+    ----------
+    before, after : float
+        The stamps, s.
+    step : float
+        Median step, s.
+    tick : float
+        Seconds of 1 in the file.
+    day : bool
+        Whether the clock shows the time of day.
+    """
+    if day:
+        return DAY if over_midnight(before, after) else 0.0
+    if tick <= 0.0 or after < 0.0:
+        return 0.0
+    counts = before / tick, after / tick
+    if any(abs(count - round(count)) > _WHOLE for count in counts):
+        return 0.0
+    for size in COUNTERS:
+        if before < size * tick and after + size * tick - before <= _USUAL_GAP * step:
+            return size * tick
+    return 0.0
+
+
+def counted_on(counts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Count whole numbers on where a counter began again at 0; anything else comes back as it is.
+
+    Parameters
+    ----------
+    counts : (n,) array
+        Time stamps as they stand in the file.
+    """
+    steps = np.diff(counts)
+    back = np.flatnonzero(steps < 0.0)
+    ahead = steps[steps > 0.0]
+    if not back.size or ahead.size < _STEPS_KNOWN:
+        return counts
+    periods = [_period(float(counts[i]), float(counts[i + 1]), float(np.median(ahead)), 1.0, False) for i in back]
+    if not all(periods):
+        return counts
+    added = np.zeros(counts.size)
+    added[back + 1] = periods
+    return counts + np.cumsum(added)
+
+
 @dataclass(frozen=True)
 class TimeRepair:
-    """New time stamps for rows that share one, all but the first.
+    """New time stamps: on past where the clock began anew, and for rows that share one, all but the first.
 
     Parameters
     ----------
@@ -56,15 +112,24 @@ class TimeRepair:
     often : bool
         Whether so many rows share a stamp that they may be copies: seldom pairs may well hold a reading that the
         sensor has not renewed.
+    anew : (m,) int array
+        Rows at which the clock began anew, ascending.
+    periods : (m,) float array
+        What is added from each of them on, s.
     """
 
     rows: NDArray[np.int64]
     times: NDArray[np.float64]
     note: str = ""
     often: bool = False
+    anew: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    periods: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
     def apply(self, t: NDArray[np.float64], start: int) -> NDArray[np.float64]:
         """Repair the (n,) block of time stamps that begins at row `start`."""
+        if self.anew.size:
+            passed = np.searchsorted(self.anew, np.arange(start, start + t.size), side="right")
+            t = t + np.concatenate(([0.0], np.cumsum(self.periods)))[passed]
         first, last = np.searchsorted(self.rows, [start, start + t.size])
         if first == last:
             return t
@@ -80,10 +145,24 @@ class TimeScan:
     least 10, scattered over the log, and each step of the clock has as many rows as its length says, the clock is
     coarser than the sampling, and the rows of a step are spread evenly over it. Otherwise the first repeated stamp is
     an error, since it means a splice or a copied block.
+
+    A clock that begins anew is counted on: a time of day at midnight, and a counter of 16, 24 or 32 bits whose next
+    count comes after a usual step. Any other stamp that goes back is an error.
+
+    Parameters
+    ----------
+    place : Place
+        To name the file in errors.
+    tick : float
+        Seconds of 1 in the file.
     """
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: Place, tick: float = 1.0) -> None:
         self._place = place
+        self._tick = tick
+        self._day = False
+        self._anew: list[int] = []
+        self._periods: list[float] = []
         self._n = 0
         self._last: float | None = None
         self._rows: list[NDArray[np.int64]] = []
@@ -92,12 +171,23 @@ class TimeScan:
         self._steps: list[NDArray[np.float64]] = []
         self._kept = 0
 
-    def add(self, t: NDArray[np.float64]) -> None:
-        """Take the next block of time stamps, (n,) in s."""
+    def add(self, t: NDArray[np.float64], written: bool = False) -> None:
+        """Take the next block of time stamps.
+
+        Parameters
+        ----------
+        t : (n,) array
+            Time, s.
+        written : bool
+            Whether the stamps stand there as times of day or dates, so that one that goes back half a day and more
+            comes after midnight.
+        """
+        self._day = written
         if t.size == 0:
             return
         start = self._n
         self._check_finite(t, start)
+        t = self._counted_on(t, start)
         joined = t if self._last is None else np.concatenate(([self._last], t))
         offset = start - (joined.size - t.size)
         steps = np.diff(joined)
@@ -118,6 +208,26 @@ class TimeScan:
                 column="t",
                 remedy="Every row needs its time in s: fill it in or delete the row.",
             )
+
+    def _counted_on(self, t: NDArray[np.float64], start: int) -> NDArray[np.float64]:
+        """Add up what a clock that began anew has behind it."""
+        t = t + sum(self._periods)
+        before = np.concatenate(([self._last if self._last is not None else t[0]], t[:-1]))
+        for i in np.flatnonzero(t < before):
+            # what was added before counts for neither of the two
+            added = sum(self._periods)
+            known = self._steps or [np.diff(t[:i])]
+            steps = np.concatenate(known)
+            step = float(np.median(steps)) if steps.size >= _STEPS_KNOWN else 0.0
+            last = float(before[i] if i == 0 else t[i - 1]) - added
+            now = float(t[i]) - added
+            period = _period(last, now, step, self._tick, self._day)
+            if not period:
+                return t
+            t[i:] += period
+            self._anew.append(start + int(i))
+            self._periods.append(period)
+        return t
 
     def _check_forward(self, t: NDArray[np.float64], steps: NDArray[np.float64], offset: int) -> None:
         back = np.flatnonzero(steps < 0.0)
@@ -145,8 +255,14 @@ class TimeScan:
 
     def finish(self) -> TimeRepair:
         """Judge the repeated stamps once every block has been taken."""
+        anew, periods = np.array(self._anew, np.int64), np.array(self._periods)
+        went_on = ""
+        if anew.size:
+            what = "midnight" if self._day else f"{round(self._periods[0] / self._tick)} counts"
+            times = "" if anew.size == 1 else f" {anew.size} times"
+            went_on = f"{self._place.name}: the clock began anew{times}, at {what}: counted on"
         if not self._rows:
-            return TimeRepair(np.empty(0, np.int64), np.empty(0))
+            return TimeRepair(np.empty(0, np.int64), np.empty(0), went_on, anew=anew, periods=periods)
         rows = np.concatenate(self._rows)
         stamps, after = np.concatenate(self._stamps), np.concatenate(self._next)
         last = np.flatnonzero(np.diff(stamps, append=np.inf) != 0.0)
@@ -174,7 +290,9 @@ class TimeScan:
             if seldom
             else f"it goes in steps of {usual:.3g} s, over each of which its rows were spread evenly"
         )
-        return TimeRepair(rows, stamps + place / counts[of] * steps[of], note, often=not seldom)
+        note = f"{went_on}; {note.partition(': ')[2]}" if went_on else note
+        times = stamps + place / counts[of] * steps[of]
+        return TimeRepair(rows, times, note, often=not seldom, anew=anew, periods=periods)
 
     def repeated(self) -> Exception:
         """Make the error for stamps that repeat one another and are not those of a coarse clock."""

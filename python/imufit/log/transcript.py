@@ -61,6 +61,7 @@ class TranscriptSource:
         self.n = 0
         self.notes: tuple[str, ...] = ()
         self.truths: dict[str, tuple[int | None, str]] = {}
+        self.clues = (path.name, *self.names)
 
     def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
         """Count and judge all lines, and give the named columns; a record without them is left out from now on."""

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.clock_check import other_clock, turn_ratio
+from imufit.log.columns import GROUPS
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 from imufit.log.time_unit import time_unit
@@ -87,6 +89,33 @@ _KELVIN: Final = 200.0
 """The same for kelvin: no sensor beside an accelerometer works at 200 degC."""
 
 
+class OtherUnitError(InputError):
+    """Readings that are unmistakably in another unit, of one sensor or of several.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong with the first of them.
+    units : dict
+        Unit that each of these columns of the log is in.
+    place : Place
+        Names the file.
+    origin : mapping
+        Column of the file for each column of the log.
+    otherwise : str
+        What else it may be, and the mapping for it.
+    """
+
+    def __init__(
+        self, problem: str, units: Mapping[str, str], place: Place, origin: Mapping[str, str], otherwise: str = ""
+    ) -> None:
+        self.units = dict(units)
+        self.otherwise = otherwise
+        column = next(iter(units))
+        remedy = f"Use {_map(units, origin)}{otherwise}"
+        super().__init__(problem, file=place.file or "log", column=column, remedy=remedy)
+
+
 def check_units(
     t: Array,
     sensors: Mapping[str, Array | None],
@@ -129,23 +158,29 @@ def check_units(
     _check_time(t, place, origin, clock != "open")
     if acc is not None and gyr is not None:
         _check_exchange(acc, gyr, metadata.gravity, place, origin)
+    checks: list[Callable[[], list[str]]] = []
     if acc is not None:
-        notes += _check_acc(acc, ref_q, metadata, place, origin)
-    vouched = gyr is not None and _check_gyr(
-        t,
-        gyr,
-        [(v, v is mag) for v in (acc, mag) if v is not None],
-        ref_q,
-        place=place,
-        origin=origin,
-        stated=clock == "stated",
-    )
-    if clock == "a log's" and not vouched:
-        notes += _slow_clock(t, place, origin.get("t", "t"))
+        checks.append(partial(_check_acc, acc, ref_q, metadata, place, origin))
+    if gyr is not None:
+        vectors = [(v, v is mag) for v in (acc, mag) if v is not None]
+        checks.append(partial(_check_gyr, t, gyr, vectors, ref_q, place=place, origin=origin, clock=clock))
+    elif clock == "a log's":
+        checks.append(partial(_slow_clock, t, place, origin.get("t", "t")))
     if mag is not None:
-        notes += _check_mag(mag, metadata, place, origin)
+        checks.append(partial(_check_mag, mag, metadata, place, origin))
     if (temp := sensors.get("temp")) is not None:
-        notes += _check_temp(temp, place, origin)
+        checks.append(partial(_check_temp, temp, place, origin))
+    others: list[OtherUnitError] = []
+    for check in checks:
+        try:
+            notes += check()
+        except OtherUnitError as other:
+            others.append(other)
+    if others:
+        # all of it in one mapping, so that nobody is asked twice
+        units = {column: unit for other in others for column, unit in other.units.items()}
+        others_words = "".join(other.otherwise for other in others)
+        raise OtherUnitError(others[0].problem, units, place, origin, others_words)
     return notes
 
 
@@ -271,38 +306,67 @@ def _nearest(size: float, known: Sequence[tuple[float, str, str]], most: float) 
     return [unit for unit in sorted(near, key=lambda u: near[u]) if near[unit] <= min(near.values()) + _UNDECIDED]
 
 
-def _looks_like(units: Sequence[tuple[float, str, str]], si: str) -> str:
-    return f"looks like {units[0][1]}, not {si}"
+def _one_of(
+    sensor: str, seen: str, units: Sequence[tuple[float, str, str]], place: Place, origin: Mapping[str, str]
+) -> OtherUnitError:
+    """Make the error for a sensor that is in the first of these units, or else in one of the others."""
+    (_, first, unit), *others = units
+    more = "".join(f", or if it is {words}: {_map(_all_in(sensor, other), origin)}" for _, words, other in others)
+    si = {"acc": "m/s^2", "mag": "uT"}[sensor]
+    return OtherUnitError(f"{seen}, which looks like {first}, not {si}", _all_in(sensor, unit), place, origin, more)
 
 
-def _use_one(sensor: str, units: Sequence[tuple[float, str, str]], origin: Mapping[str, str]) -> str:
-    first, *others = units
-    more = "".join(f", or if it is {words}: {_map(sensor, unit, origin)}" for _, words, unit in others)
-    return f"Use {_map(sensor, first[2], origin)}{more}"
+def _all_in(sensor: str, unit: str) -> dict[str, str]:
+    return dict.fromkeys(GROUPS[sensor], unit)
+
+
+def without_gravity(acc: Array, gravity: float) -> bool:
+    """Whether gravity was taken off an accelerometer: at rest and on the whole hardly anything is left of it.
+
+    Parameters
+    ----------
+    acc : (n, 3) array
+        m/s^2.
+    gravity : float
+        m/s^2.
+    """
+    norm = np.linalg.norm(acc, axis=1)
+    norm = norm[np.isfinite(norm)]
+    overall = float(np.median(norm)) if norm.size else float("nan")
+    return rest_norm(acc, relative=False) < _NO_GRAVITY * gravity and overall < _FEW_GRAVITY * gravity
+
+
+def units_of_force(acc: Array, ref_q: Array | None = None) -> list[tuple[float, str, str]]:
+    """Find the units that readings are unmistakably in, the likeliest first; empty where they may be in m/s^2.
+
+    Parameters
+    ----------
+    acc : (n, 3) array
+        Readings said to be in m/s^2.
+    ref_q : (n, 4) array, optional
+        Reference attitude.
+    """
+    norm = _gravity_read(acc, ref_q)
+    overall = float(np.nanmedian(np.linalg.norm(acc, axis=1))) if np.isfinite(norm) else norm
+    units = _nearest(norm, ACC_UNITS, _NEAR_GRAVITY)
+    return units if units and overall < 3.0 * units[0][0] else []
 
 
 def _check_acc(
     acc: Array, ref_q: Array | None, metadata: Metadata, place: Place, origin: Mapping[str, str]
 ) -> list[str]:
-    gravity = metadata.gravity
-    norm = _gravity_read(acc, ref_q)
-    overall = float(np.nanmedian(np.linalg.norm(acc, axis=1))) if np.isfinite(norm) else norm
-    units = _nearest(norm, ACC_UNITS, _NEAR_GRAVITY)
-    if units and overall < 3.0 * units[0][0]:
+    gravity, norm = metadata.gravity, _gravity_read(acc, ref_q)
+    if units := units_of_force(acc, ref_q):
         if units[0][2] == "g" and abs(norm - 1.0) < _ONE_LENGTH and _has_one_length(acc):
             raise place.error(
                 "every reading of acc has the length 1: each was divided by its own length, and shows a direction only",
                 column="acc_x",
                 remedy="Export the readings themselves. For a filter, which takes directions too: "
-                + _map("acc", "g", origin),
+                + _map(_all_in("acc", "g"), origin),
             )
-        raise place.error(
-            f"at rest the norm of acc is {norm:.4g}, which {_looks_like(units, 'm/s^2')}",
-            column="acc_x",
-            remedy=_use_one("acc", units, origin),
-        )
-    still = rest_norm(acc, relative=False)
-    if still < _NO_GRAVITY * gravity and overall < _FEW_GRAVITY * gravity:
+        raise _one_of("acc", f"at rest the norm of acc is {norm:.4g}", units, place, origin)
+    if without_gravity(acc, gravity):
+        still = rest_norm(acc, relative=False)
         raise place.error(
             f"at rest the norm of acc is {still:.4g} m/s^2: gravity was taken off, and cannot be put back",
             column="acc_x",
@@ -322,31 +386,33 @@ def _check_gyr(
     *,
     place: Place,
     origin: Mapping[str, str],
-    stated: bool,
-) -> bool:
-    """Refuse rates in another unit, and a clock in another one; say whether what turns vouches for both."""
+    clock: Clock,
+) -> list[str]:
+    """Refuse rates in another unit, and a clock in another one; note a clock that nothing that turns vouches for."""
     ratios = [(turn_ratio(t, gyr, ref_q), "the reference attitude turns")] if ref_q is not None else []
     ratios += [(field_ratio(t, gyr, v, iron), "the field in the other sensors turns") for v, iron in vectors]
     for ratio, who in ratios:
         if 0.2 < ratio < 1.0 / _OTHER_UNIT:
-            return True
+            return []
         column = origin.get("t", "t")
-        clock = None if stated else other_clock(t, ratio, tuple(size for size, *_ in GYR_UNITS), column)
-        if clock is not None:
+        units_of_rates = tuple(size for size, *_ in GYR_UNITS)
+        other = None if clock == "stated" else other_clock(t, ratio, units_of_rates, column)
+        if other is not None:
             raise place.error(
                 f"{who} at {ratio:.3g} of the rate in gyr, with rows {float(np.median(np.diff(t))):.3g} s apart: "
-                f"{clock[0]}, not in s",
+                f"{other[0]}, not in s",
                 column="t",
-                remedy=f"Use --map {clock[1]}, or {shlex.quote(f't={column}[s]')} if it is s.",
+                remedy=f"Use --map {other[1]}, or {shlex.quote(f't={column}[s]')} if it is s.",
             )
         if ratio < _OTHER_UNIT:
             size, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
             words, unit, axes = _by_turns(t, gyr, ref_q, vectors, (size, words, unit))
             name = "" if axes == "xyz" else f", all of it gyr_{axes}'s"
-            raise place.error(
+            raise OtherUnitError(
                 f"{who} at {ratio:.3g} of the rate in gyr{name}, which looks like {words}, not rad/s",
-                column=f"gyr_{axes[0]}",
-                remedy="Use " + _map("gyr", unit, origin, axes),
+                {f"gyr_{axis}": unit for axis in axes},
+                place,
+                origin,
             )
     norm = np.linalg.norm(gyr, axis=1)
     norm = norm[np.isfinite(norm)]
@@ -355,12 +421,13 @@ def _check_gyr(
         likely = GYR_UNITS[0] if high < 4500.0 else GYR_UNITS[2]
         words, unit, axes = _by_turns(t, gyr, ref_q, vectors, likely)
         name = "gyr" if axes == "xyz" else f"gyr_{axes}"
-        raise place.error(
+        raise OtherUnitError(
             f"{name} reaches {high:.4g}, more than any sensor in rad/s: it looks like {words}",
-            column=f"gyr_{axes[0]}",
-            remedy="Use " + _map("gyr", unit, origin, axes),
+            {f"gyr_{axis}": unit for axis in axes},
+            place,
+            origin,
         )
-    return False
+    return _slow_clock(t, place, origin.get("t", "t")) if clock == "a log's" else []
 
 
 def _by_turns(
@@ -457,11 +524,7 @@ def _check_mag(mag: Array, metadata: Metadata, place: Place, origin: Mapping[str
         return [f"{place.name}: the norm of mag is {size:.4g} uT: iron beside the sensor, or is it milligauss?"]
     if found[0][2] == "mG":
         found = _milligauss_or_counts(mag[complete], size, told, found[0])
-    raise place.error(
-        f"the norm of mag is {size:.4g}, which {_looks_like(found, 'uT')}",
-        column="mag_x",
-        remedy=_use_one("mag", found, origin),
-    )
+    raise _one_of("mag", f"the norm of mag is {size:.4g}", found, place, origin)
 
 
 def _milligauss_or_counts(
@@ -475,6 +538,7 @@ def _milligauss_or_counts(
     return [unit for unit in units if unit[2] == "mG" or (whole and _EARTH[0] <= size / unit[0] <= _EARTH[1])]
 
 
-def _map(sensor: str, unit: str, origin: Mapping[str, str], axes: str = "xyz") -> str:
-    columns = [f"{sensor}_{axis}" for axis in axes]
-    return "--map " + shlex.quote(",".join(f"{column}={origin.get(column, column)}[{unit}]" for column in columns))
+def _map(units: Mapping[str, str], origin: Mapping[str, str]) -> str:
+    return "--map " + shlex.quote(
+        ",".join(f"{column}={origin.get(column, column)}[{unit}]" for column, unit in units.items())
+    )

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.log.columns import GROUPS
 from imufit.log.metadata import STANDARD_GRAVITY
+from imufit.log.unit_grammar import Reading, readings_of
 
 _G: Final = STANDARD_GRAVITY
 _DEG: Final = math.pi / 180.0
@@ -75,37 +76,13 @@ _UNITS: Final[dict[str, tuple[str, float, float]]] = {
     "cm": ("length", 1e-2, 0.0),
     "mm": ("length", 1e-3, 0.0),
 }
-_SPELLINGS: Final = {
-    "sec": "s",
-    "seconds": "s",
-    "m/s2": "m/s^2",
-    "ms^-2": "m/s^2",
-    "rads^-1": "rad/s",
-    "degs^-1": "deg/s",
-    "m/s/s": "m/s^2",
-    "m/sec^2": "m/s^2",
-    "cm/s2": "cm/s^2",
-    "Gal": "cm/s^2",
-    "gee": "g",
-    "gs": "g",
-    "dps": "deg/s",
-    "deg/sec": "deg/s",
-    "mdps": "mdeg/s",
-    "rad/sec": "rad/s",
-    "gauss": "G",
-    "Gs": "G",
-    "mgauss": "mG",
-    "milligauss": "mG",
-    "tesla": "T",
-    "microtesla": "uT",
-    "millitesla": "mT",
-    "nanotesla": "nT",
-    "C": "degC",
-    "F": "degF",
-    "degrees": "deg",
-    "radians": "rad",
+_TEMPERATURES: Final = {
+    **dict.fromkeys(("c", "celsius", "degc", "deg c", "degcelsius", "degrees celsius", "deg celsius"), "degC"),
+    **dict.fromkeys(("k", "kelvin"), "K"),
+    **dict.fromkeys(("f", "fahrenheit", "degf", "deg f", "degfahrenheit"), "degF"),
 }
-_QUANTITIES: Final = {
+"""Temperatures have an offset and stand in no product: their spellings in small letters."""
+QUANTITIES: Final = {
     "t": "time",
     **dict.fromkeys(GROUPS["acc"], "specific force"),
     **dict.fromkeys(GROUPS["gyr"], "angular rate"),
@@ -115,23 +92,56 @@ _QUANTITIES: Final = {
     **dict.fromkeys(GROUPS["ref_p"], "length"),
     "ref_angle": "angle",
 }
+"""What each column of a log measures."""
 _UNSIGNED: Final = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _NUMBER: Final = rf"[-+]?{_UNSIGNED}"
 # the sign of an exponent, as in *1e-3, begins no offset
 _WITH_OFFSET: Final = re.compile(rf"(.*?[^\s^*/(+\-]\s*)(?<![\d.][eE])([+-]\s*{_UNSIGNED})")
 
 
-def lookup(text: str) -> tuple[str, float, float] | None:
-    """Quantity, SI per unit and SI at zero of a unit; None when the text names no unit."""
-    letters: dict[str, str | int | None] = {"²": "^2", "µ": "u", "μ": "u", "°": "deg", " ": "", "·": "*"}
-    name = text.strip().translate(str.maketrans(letters))
-    name = name.replace("degree/", "deg/").replace("degrees/", "deg/").replace("**", "^")
-    for candidate in (name, _SPELLINGS.get(name, "")):
-        if candidate in _UNITS:
-            return _UNITS[candidate]
-    folded = {key for key in (*_UNITS, *_SPELLINGS) if key.lower() == name.lower()}
-    quantities = {_UNITS[_SPELLINGS.get(key, key)] for key in folded}
-    return quantities.pop() if len(quantities) == 1 else None
+def lookup(text: str, quantity: str | None = None) -> tuple[str, float, float] | None:
+    """Quantity, SI per unit and SI at zero of a unit; None when the text names no unit.
+
+    Parameters
+    ----------
+    text : str
+        Any spelling that `imufit.log.unit_grammar` reads.
+    quantity : str, optional
+        What it has to measure. Capital and small letters then count alike where nothing else fits: of an
+        accelerometer ``G`` is the standard gravity.
+    """
+    name = " ".join(text.split())
+    known = _UNITS.get(name) or _UNITS.get(_TEMPERATURES.get(name.replace("°", "deg").replace("℃", "degC").lower(), ""))
+    if known is not None and quantity in (None, known[0]):
+        return known
+    exact, folded = readings_of(name), readings_of(name, folded=True)
+    if quantity is not None:
+        fitting = [each for each in (*exact, *folded) if each.quantity == quantity]
+    else:
+        # without a quantity a text in other letters must have one meaning
+        fitting = list(exact) or (list(folded) if len(folded) == 1 else [])
+    return (fitting[0].quantity, _si_per(fitting[0]), 0.0) if fitting else None
+
+
+def written(text: str, quantity: str) -> str | None:
+    """Spell a unit as a mapping writes it; None where the text is not a unit of that quantity.
+
+    Parameters
+    ----------
+    text : str
+        Any spelling.
+    quantity : str
+        What it measures.
+    """
+    known = lookup(text, quantity)
+    if known is None:
+        return None
+    return next((name for name, unit in _UNITS.items() if unit == known), text)
+
+
+def _si_per(reading: Reading) -> float:
+    """SI units (and uT) per unit."""
+    return reading.scale * math.prod(_UNITS[name][1] ** power for name, power in reading.symbols)
 
 
 def conversion(target: str, unit: str) -> Conversion:
@@ -171,7 +181,8 @@ def _without_offset(target: str, text: str, unit: str) -> tuple[Conversion, floa
         scale, inner = 1.0 / _positive(float(found[1]), target, unit), found[2]
     elif found := re.fullmatch(rf"({_NUMBER})\s*(.+?)\s*(?:/|per)\s*(?:LSB|count|digit)", text, re.IGNORECASE):
         scale, inner = float(found[1]), found[2]
-    known = lookup(_without_parentheses(inner))
+    wanted = QUANTITIES.get(target)
+    known = lookup(inner, wanted) or lookup(inner)
     if known is None:
         raise InputError(
             f"the unit [{unit}] is not known",
@@ -180,7 +191,6 @@ def _without_offset(target: str, text: str, unit: str) -> tuple[Conversion, floa
             "[*0.0005].",
         )
     quantity, factor, offset = known
-    wanted = _QUANTITIES.get(target)
     if wanted is not None and quantity != wanted:
         raise InputError(f"[{unit}] is a unit of {quantity}, but {target} is {wanted}", column=target)
     return Conversion(factor * scale, offset), factor
@@ -190,16 +200,6 @@ def _positive(number: float, target: str, unit: str) -> float:
     if number == 0.0:
         raise InputError(f"the unit [{unit}] divides by zero", column=target)
     return number
-
-
-def without_inner(text: str) -> str:
-    """Take the parentheses out of a unit: ``m/(s^2)`` becomes ``m/s^2``."""
-    return text.replace("(", "").replace(")", "")
-
-
-def _without_parentheses(text: str) -> str:
-    text = text.strip()
-    return text[1:-1] if text.startswith("(") and text.endswith(")") else text
 
 
 def unit_in_header(name: str, target: str) -> str:
@@ -213,7 +213,7 @@ def unit_in_header(name: str, target: str) -> str:
     try:
         conversion(target, text)
     except InputError:
-        if square or lookup(_without_parentheses(text)) is not None:
+        if square or lookup(text) is not None:
             raise
         return ""
     return text

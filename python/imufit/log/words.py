@@ -1,13 +1,15 @@
-"""Names of foreign columns taken apart into words: sensor, axis, unit, and what else stands there."""
+"""Names of foreign columns taken apart into words: sensor, axis, unit, what else stands there, and what is meant."""
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from imufit.log.units import lookup, without_inner
+from imufit.log.columns import CONTRACT, GROUPS, without_unit
+from imufit.log.units import written
 
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _STUCK: Final = re.compile(r"(a|f|g|m|w|b|h|acc|accel|gyr|gyro|mag|magn|omega|raw)([xyz])")
@@ -32,8 +34,10 @@ _PAIRS: Final = {
     ("rotation", "rate"): "angularrate",
     ("magnetic", "field"): "magneticfield",
     ("magnetic", "flux"): "magneticfield",
+    ("since", "start"): "elapsed",
+    ("since", "boot"): "elapsed",
 }
-"""Two words that name a sensor together."""
+"""Two words that name a sensor or the time together."""
 COMPUTED: Final = frozenset(
     (
         "linear",
@@ -137,32 +141,10 @@ _NO_TIME: Final = frozenset(
     )
 )
 
-_TIME_UNITS: Final[dict[str, tuple[str, ...]]] = {
-    "s": ("s", "sec", "secs", "seconds"),
-    "ms": ("ms", "millis", "msec", "milliseconds"),
-    "us": ("us", "micros", "usec", "microseconds"),
-    "ns": ("ns", "nanos", "nsec", "nanoseconds"),
-}
-_UNIT_WORDS: Final[dict[str, dict[str, tuple[str, ...]]]] = {
-    "acc": {
-        "m/s^2": ("m s 2", "ms 2", "mps 2", "mss", "m s s", "si"),
-        "g": ("g", "gs"),
-        "mg": ("mg", "milli g"),
-    },
-    "gyr": {
-        "rad/s": ("rad s", "rads", "rad", "radps", "rad sec", "rad per s", "rps"),
-        "deg/s": ("dps", "deg s", "degs", "deg", "deg per s", "deg sec", "degrees", "degsec"),
-        "mdps": ("mdps",),
-    },
-    "mag": {
-        "uT": ("ut", "u t", "microtesla", "microteslas", "micro tesla"),
-        "G": ("ga", "gauss"),
-        "mG": ("mgauss", "milligauss", "mg"),
-        "nT": ("nt", "n t", "nanotesla"),
-    },
-    "t": _TIME_UNITS,
-    "temp": {"degC": ("c", "celsius", "degc", "deg c"), "K": ("k", "kelvin"), "degF": ("f", "fahrenheit")},
-}
+_LONGEST_UNIT: Final = 4
+"""Words that a unit within a name has at most, as in ``m_per_s_2``."""
+_SI: Final = {"acc": "m/s^2", "gyr": "rad/s"}
+"""What the word SI in a name means."""
 _QUANTITY: Final = {
     "acc": "specific force",
     "gyr": "angular rate",
@@ -283,15 +265,22 @@ def unit_of(group: str, rest: tuple[str, ...], bracket: str) -> tuple[str | None
     (unit or None, words)
         The words that are left.
     """
-    name = without_inner(bracket)
-    stated = lookup(name) if name else None
-    unit = name if stated is not None and stated[0] == _QUANTITY[group] else None
-    for length in (3, 2, 1):
-        tail = " ".join(rest[-length:])
-        for known, spellings in _UNIT_WORDS[group].items():
-            if len(rest) >= length and tail in spellings:
-                return unit or known, rest[:-length]
+    quantity = _QUANTITY[group]
+    unit = written(bracket, quantity) if bracket else None
+    for length in range(min(_LONGEST_UNIT, len(rest)), 0, -1):
+        stated = _unit_of_words(rest[-length:], group)
+        if stated is not None:
+            return unit or stated, rest[:-length]
     return unit, rest
+
+
+def _unit_of_words(words: tuple[str, ...], group: str) -> str | None:
+    """Find the unit that words at the end of a name spell, without blanks as a mapping writes it."""
+    quantity, text = _QUANTITY[group], "".join(words)
+    if text == "si" and group in _SI:
+        return _SI[group]
+    # gyro_rad (PX4): a gyroscope measures no angle, so that it is one a second
+    return written(text, quantity) or (written(f"{text}/s", quantity) if group == "gyr" else None)
 
 
 def strange(rest: tuple[str, ...]) -> int:
@@ -317,3 +306,49 @@ def time_columns(parsed: Iterable[Words]) -> list[tuple[str, str | None, int]]:
 
 def _names_time(words: tuple[str, ...]) -> bool:
     return bool(set(words) & TIME_WORDS or {"sample", "fine"} <= set(words)) and not set(words) & _NO_TIME
+
+
+def meant(name: str) -> str | None:
+    """Contract column that a foreign name most likely means.
+
+    Parameters
+    ----------
+    name : str
+        Column name that is not itself a contract column.
+
+    Returns
+    -------
+    str or None
+        The contract column, or None when the name does not look like one.
+    """
+    key = re.sub(r"[^a-z0-9]", "", without_unit(name).lower())
+    for column in CONTRACT:
+        if key == column.replace("_", ""):
+            return column
+    words = words_of(without_unit(name))
+    sensor = sensor_of(words.words) if words.axis and not words.index else None
+    if sensor is not None and not sensor[1]:
+        return f"{sensor[0]}_{words.axis}"
+    if not words.axis and _names_time(words.words) and set(unit_of("t", words.words, "")[1]) <= TIME_WORDS:
+        return "t"
+    return _close(name)
+
+
+def _close(name: str) -> str | None:
+    """Contract column that differs from the name by a slip of the finger; a digit is no slip, it counts sensors."""
+    if re.search(r"\d", name):
+        return None
+    grouped = [column for group in GROUPS.values() for column in group]
+    for column in difflib.get_close_matches(name.lower(), grouped, n=3, cutoff=0.8):
+        if column[-1] == name.lower()[-1]:
+            return column
+    return None
+
+
+def nearest(wanted: str, names: Iterable[str], n: int = 1) -> list[str]:
+    """Return those of the given names that are most like the wanted one, best first, at most n."""
+    names = list(names)
+    sure = [name for name in names if name not in CONTRACT and meant(name) == wanted]
+    folded = {name.lower(): name for name in names}
+    close = [folded[match] for match in difflib.get_close_matches(wanted.lower(), folded, n=n, cutoff=0.4)]
+    return list(dict.fromkeys([*sure, *close]))[:n]
