@@ -14,7 +14,7 @@ from imufit.figures import quantity
 from imufit.log import Log
 from imufit.results import Table
 from imufit.results.json_value import json_value
-from imufit.results.table import html, page
+from imufit.results.result import Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -133,8 +133,8 @@ class Channel:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Allan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Allan(Result):
     """Allan deviations of a log's sensors at rest.
 
     Parameters
@@ -200,7 +200,7 @@ class Allan:
         log : Log
             The log that was measured, or another one of the same sensor at the same settings.
         """
-        return replace(log, metadata=replace(log.metadata, noise={**log.metadata.noise, **self.sample_noise}))
+        return log.with_fields(metadata=replace(log.metadata, noise={**log.metadata.noise, **self.sample_noise}))
 
     @property
     def sentence(self) -> str:
@@ -293,11 +293,9 @@ class Allan:
 
         return allan_figure(list(self.channels.values()))
 
-    def __str__(self) -> str:
-        return page([self.sentence, *self.remarks], self.tables())
-
-    def _repr_html_(self) -> str:
-        return html([self.sentence, *self.remarks], self.tables())
+    def sentences(self) -> list[str]:
+        """Return what the result says, the answer first."""
+        return [self.sentence, *self.remarks]
 
 
 def _cell(term: Term, unit: str, kind: str) -> str:

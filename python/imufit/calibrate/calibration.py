@@ -17,7 +17,8 @@ from imufit.loop import SensorModel
 from imufit.rests.poses import Pose
 from imufit.results.json_value import json_value
 from imufit.results.parameter import by_effect, parameter_frame, parameter_table
-from imufit.results.table import Table, html, page
+from imufit.results.result import Result
+from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -212,8 +213,8 @@ class SensorCalibration:
         return f"{name}: {what} {shown[0]} before, {shown[1]} after, {left_out} (RMS)."
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, repr=False)
+class Calibration(Result):
     """A calibrated sensor.
 
     Attributes
@@ -391,11 +392,6 @@ class Calibration:
             float(self.sensors["mag"].extras["field"]) if "mag" in self.sensors else None,
         )
 
-    def _repr_html_(self) -> str:
-        return html([self.verdict], self.tables())
-
-    def __str__(self) -> str:
-        return page([self.verdict], self.tables())
-
-    def __repr__(self) -> str:
-        return f"Calibration({', '.join(f'{name} by {s.cost}' for name, s in self.sensors.items())})"
+    def sentences(self) -> list[str]:
+        """Return what the result says, the answer first."""
+        return [self.verdict]

@@ -90,7 +90,7 @@ def reference_log(
     log = read_log(path, mapping, bare=True)
     if attitude is not None:
         log = with_attitude(log, *attitude, inverse=inverse)
-    return log if frame is None else replace(log, metadata=replace(log.metadata, frame=frame))
+    return log if frame is None else log.with_fields(metadata=replace(log.metadata, frame=frame))
 
 
 def join(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joined:
@@ -138,7 +138,7 @@ def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
 
 def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     """Repeat diagnose and add until nothing is missing."""
-    from imufit.loop import ladder  # noqa: PLC0415
+    from imufit.verbs import ladder  # noqa: PLC0415
 
     return ladder(logs, model=model, progress=progress)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,7 +56,7 @@ def apply(model: EffectStack, log: LogSource) -> Log:
         mount = Rotation.from_rotvec([model.parameters[turned][axis] for axis in "xyz"])
         acc, gyr, mag = (None if x is None else np.ascontiguousarray(mount.apply(x)) for x in (acc, gyr, mag))
         notes.append(f"{turned}: readings turned into the axes of the body that the reference describes")
-    return replace(recorded, acc=acc, gyr=gyr, mag=mag, notes=(*recorded.notes, *notes))
+    return recorded.with_fields(acc=acc, gyr=gyr, mag=mag, notes=(*recorded.notes, *notes))
 
 
 def _left_alone(model: EffectStack, log: Log) -> list[str]:

@@ -11,7 +11,8 @@ import numpy as np
 from imufit.grade.mark import Answer, Marks, marked
 from imufit.grade.puzzle import Puzzle
 from imufit.grade.sets import draw
-from imufit.loop import SensorModel, ladder
+from imufit.loop import SensorModel
+from imufit.verbs import ladder
 from imufit.results import Diagnosis, Ladder
 from imufit.simulate import Simulation
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Self
 
 from imufit.log.assemble import check_truth_values, fields_of, time_of
 from imufit.log.cut import cut
@@ -16,7 +17,7 @@ from imufit.log.parquet import ROW_GROUP
 from imufit.log.place import Place
 from imufit.log.recognise import recognise
 from imufit.log.size import HELD, KEPT, NUMBER, TEXT_CELL, size_in_words
-from imufit.log.source import open_source
+from imufit.log.source import Source, open_source
 from imufit.log.tables import TablesSource
 from imufit.log.time_order import TimeRepair, TimeScan
 from imufit.log.unit_check import HEAD, Clock, check_units
@@ -40,20 +41,51 @@ class LogStream:
     """
 
     def __init__(self, path: str | Path, mapping: Mapping[str, str] | None = None, bare: bool = False) -> None:
-        self._path = Path(path)
-        self._source = open_source(self._path)
-        self._place = Place(self._path, self._source.line_of)
+        file = Path(path)
+        source = open_source(file)
+        # what says of itself that it is a log may have rows as far apart as it says
+        is_log = bool(source.embedded) or sidecar_path(file).is_file()
+        self._begin(source, file, read_metadata(file, source.embedded), "a log's" if is_log else "open", mapping, bare)
+
+    @classmethod
+    def of_source(
+        cls, source: Source, metadata: Metadata | None = None, mapping: Mapping[str, str] | None = None
+    ) -> Self:
+        """Make the log of a source that is no file.
+
+        Parameters
+        ----------
+        source : Source
+            A table in memory.
+        metadata : Metadata, optional
+            Frame, gravity and so on.
+        mapping : mapping, optional
+            Source text for target columns.
+        """
+        log = cls.__new__(cls)
+        clock: Clock = "a log's" if metadata is not None and metadata != Metadata() else "open"
+        log._begin(source, None, metadata or Metadata(), clock, mapping, bare=False)
+        return log
+
+    def _begin(
+        self,
+        source: Source,
+        path: Path | None,
+        metadata: Metadata,
+        clock: Clock,
+        mapping: Mapping[str, str] | None,
+        bare: bool,
+    ) -> None:
+        self._path, self._source, self._metadata = path, source, metadata
+        self._place = Place(path, source.line_of)
         found = recognise(self._source, mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
         self._plan = plan_columns(self._source.names, found.mapping, self._place, bare, rest=bare or not several)
         if isinstance(self._source, TablesSource):
             self._source.choose(self._plan.sources)
-        self._metadata = read_metadata(self._path, self._source.embedded)
         self._repair = self._scan()
         head = self._head()
-        # what says of itself that it is a log may have rows as far apart as it says
-        is_log = bool(self._source.embedded) or sidecar_path(self._path).is_file()
-        clock: Clock = "stated" if "t" in found.mapping else "a log's" if is_log else "open"
+        clock = "stated" if "t" in found.mapping else clock
         odd = check_units(head.t, head.sensors(), self._metadata, self._place, self._plan.origin, clock)
         self._columns = head.columns
         notes = (*self._source.notes, *found.notes, *self._plan.notes, self._repair.note, *odd)
@@ -98,8 +130,8 @@ class LogStream:
         return self._columns
 
     @property
-    def path(self) -> Path:
-        """File of the log."""
+    def path(self) -> Path | None:
+        """File of the log; None for a table in memory."""
         return self._path
 
     @property
@@ -113,7 +145,7 @@ class LogStream:
             fields = fields_of(
                 self._plan, block, start, rows, repair=self._repair, metadata=self._metadata, place=self._place
             )
-            yield Log(**fields, metadata=self._metadata, path=self._path)
+            yield Log.of_fields(**fields, metadata=self._metadata, path=self._path)
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:
         """Cut into chunks of `rows` rows with up to `margin` rows more on either side.
@@ -126,11 +158,11 @@ class LogStream:
             Rows of context on either side, fewer at the ends of the log.
         """
         for chunk in cut(self.pieces(), rows, margin):
-            yield replace(chunk, log=replace(chunk.log, notes=self._notes))
+            yield replace(chunk, log=chunk.log.with_fields(notes=self._notes))
 
     def read(self) -> Log:
         """Whole log in memory, however large it is."""
-        return replace(gathered(self.pieces(), self.n), notes=self._notes)
+        return gathered(self.pieces(), self.n).with_fields(notes=self._notes)
 
     @property
     def size(self) -> int:
@@ -165,10 +197,11 @@ class LogStream:
         share = min(held / self.size, kept / made)
         rows = int(self.n * share)
         more_words = f", or allow more with {option} {math.ceil(gigabytes / share)}" if option else ""
-        part = self._path.with_name(f"{self._path.stem}-part.parquet")
+        file = self._path or Path("log.parquet")
+        part = file.with_name(f"{file.stem}-part.parquet")
         raise self._place.error(
             f"{self.n} rows take {size_in_words(made)} of memory, and this needs all of them at once",
-            remedy=f"Take a part: imufit convert {self._path} --rows 0:{rows} -o {part}{more_words}",
+            remedy=f"Take a part: imufit convert {file} --rows 0:{rows} -o {part}{more_words}",
         )
 
     def write(self, path: str | Path) -> None:
@@ -182,7 +215,7 @@ class LogStream:
         write_rows(Path(path), self._metadata, (chunk.core.table() for chunk in self.chunks(ROW_GROUP)))
 
     def __repr__(self) -> str:
-        return f"LogStream({self._path.name}: {self.n} rows; {', '.join(self._columns)}; {self._metadata.frame})"
+        return f"LogStream({self._place.name}: {self.n} rows; {', '.join(self._columns)}; {self._metadata.frame})"
 
 
 def open_log(path: str | Path, mapping: Mapping[str, str] | None = None, stream: bool | None = None) -> Log | LogStream:

@@ -79,7 +79,7 @@ class LiveCorrection:
         }
         # Without the mean of the fitted log a temperature would count from the mean of this batch.
         temp = rest.get("temp") if self._warmth_known else None
-        log = Log(t=t, temp=temp, covariates={k: v for k, v in rest.items() if k != "temp"}, **groups)
+        log = Log.of_fields(t=t, temp=temp, covariates={k: v for k, v in rest.items() if k != "temp"}, **groups)
         corrected = self._model.apply(log)
         out = dict(batch)
         for name in groups:

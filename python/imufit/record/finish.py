@@ -212,7 +212,7 @@ def make_log(parts: Sequence[Part], file: Path, ended: str | None = None, cpu_sh
             numbers = {name: known.get(name, np.full(piece.rows.n, np.nan)) for name in names}
             t = piece.t - seen.first
             fields = group_fields(t, numbers, {}, start=0, metadata=own, place=Place())
-            yield Log(**fields, metadata=metadata).table()
+            yield Log.of_fields(**fields, metadata=metadata).table()
 
     write_rows(file, metadata, tables())
     return recording

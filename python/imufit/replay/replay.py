@@ -18,7 +18,7 @@ Rows before the start have no attitude: NaN, counted as ``not_started``.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 import numpy as np
@@ -30,6 +30,8 @@ from imufit.log import Log
 from imufit.progress import Progress, silent
 from imufit.replay.clipped import ranges
 from imufit.replay.tilt_comparison import compare_tilt, tilt_errors
+from imufit.results.result import Result
+from imufit.results.table import Table
 from imufit.results.tilt import TiltComparison
 
 if TYPE_CHECKING:
@@ -81,8 +83,8 @@ class Errors(TypedDict):
     sd_deg: float
 
 
-@dataclass(frozen=True, eq=False)
-class Replay:
+@dataclass(frozen=True, eq=False, repr=False)
+class Replay(Result):
     """Attitudes of several filters over one log of n rows.
 
     Parameters
@@ -104,6 +106,24 @@ class Replay:
     errors: dict[str, Errors | None]
     skipped: dict[str, int]
     mag_reference: Array | None = None
+
+    def sentences(self) -> list[str]:
+        """Return the best filter by its error, or what was replayed where there is no reference."""
+        ran = f"{self.log.n} rows by {', '.join(self.attitude)}"
+        total = {name: errors["total_deg"] for name, errors in self.errors.items() if errors is not None}
+        if not total:
+            return [f"{ran}; the log has no reference attitude to hold them against."]
+        best = min(total, key=lambda name: total[name])
+        return [f"{ran}: {best} comes nearest to the reference, {total[best]:.2f} deg RMS."]
+
+    def tables(self) -> tuple[Table, ...]:
+        """Error of each filter, deg RMS."""
+        rows = tuple(
+            (name, f"{errors['total_deg']:.3f}", f"{errors['heading_deg']:.3f}", f"{errors['inclination_deg']:.3f}")
+            for name, errors in self.errors.items()
+            if errors is not None
+        )
+        return (Table("Error, deg RMS", ("filter", ">total", ">heading", ">inclination"), rows),)
 
     def rotation(self, name: str) -> Rotation:
         """Attitude of one filter as n scipy rotations, body to reference frame; rows before the start are NaN.
@@ -251,7 +271,7 @@ class Replay:
 
     def to_log(self) -> Log:
         """Return the log with `columns` among its covariates."""
-        return replace(self.log, covariates={**self.log.covariates, **self.columns()})
+        return self.log.with_fields(covariates={**self.log.covariates, **self.columns()})
 
 
 def replay(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from imufit.figures import quantity
 from imufit.results import Table
 from imufit.results.json_value import json_value
-from imufit.results.table import html, page
+from imufit.results.result import Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -133,8 +133,8 @@ class Innovation:
         return {"rms_deg": self.rms_deg, "correlation": self.correlation}
 
 
-@dataclass(frozen=True, eq=False)
-class Tuning:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tuning(Result):
     """Gains of one filter tuned on one log.
 
     Parameters
@@ -306,11 +306,9 @@ class Tuning:
 
         return gain_figure(self.map, self.gains, self.rival, f"{self.metric} {self.criterion}, deg")
 
-    def __str__(self) -> str:
-        return page([self.sentence, *self.remarks], self.tables())
-
-    def _repr_html_(self) -> str:
-        return html([self.sentence, *self.remarks], self.tables())
+    def sentences(self) -> list[str]:
+        """Return what the result says, the answer first."""
+        return [self.sentence, *self.remarks]
 
 
 def _factors(limits: tuple[float, float] | None) -> str:
