@@ -6,11 +6,11 @@ stack fitted; both keep the class that they were given.
 
 from __future__ import annotations
 
-from imufit.compare import compare, compare_model, compare_two
-from imufit.diagnose.add import add
-from imufit.diagnose.diagnose import diagnose
-from imufit.fit.apply import apply
-from imufit.fit.fitted_stack import FittedStack
+from imufit.comparing import compare, compare_model, compare_two
+from imufit.diagnosing.add import add
+from imufit.diagnosing.diagnose import diagnose
+from imufit.fitting.apply import apply
+from imufit.fitting.fitted_stack import FittedStack
 from imufit.log import AnyLog, AnyLogs, Log, LogSource, log_of, logs_of_any
 from imufit.model.effect_stack import EffectStack
 from imufit.progress import Progress, silent

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from imufit.diagnose.ladder import ladder as ladder_from
+from imufit.diagnosing.ladder import ladder as ladder_from
 from imufit.errors import InputError
 from imufit.log import AnyLog, AnyLogs, Log, LogStream, log_of, logs_of_any, whole
 from imufit.loop import Fit, SensorModel
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from scipy.spatial.transform import Rotation
 
-    from imufit.allan import Allan
-    from imufit.calibrate import Calibration
+    from imufit.allan_deviation import Allan
+    from imufit.calibrating import Calibration
     from imufit.joining import Joined
-    from imufit.replay import Replay
+    from imufit.replaying import Replay
     from imufit.results import Comparison, Diagnosis, Ladder, LogInfo, ModelComparison
-    from imufit.tune import Tuning
+    from imufit.tuning import Tuning
 
 AnyModel = SensorModel | Fit | Sequence[str] | str | Path | None
 """A model, a fit, effects by their ids, the file of a model; None is the ideal sensor."""
@@ -168,18 +168,18 @@ def calibrate(
     logs : Log, str, Path, DataFrame, mapping of arrays, or a sequence of these
         Of one sensor; several add up.
     cost : str, optional
-        ``vector`` or ``magnitude``, see :func:`imufit.calibrate.calibrate`.
+        ``vector`` or ``magnitude``, see :func:`imufit.calibrating.calibrate`.
     sensors : sequence of str
         Those to be calibrated, if the logs have them.
     settings : mapping, optional
-        Criteria of a rest, see :func:`imufit.calibrate.find_poses`.
+        Criteria of a rest, see :func:`imufit.calibrating.find_poses`.
 
     Raises
     ------
     InputError
         The logs leave a calibration open; the message says what is missing.
     """
-    from imufit.calibrate import calibrate  # noqa: PLC0415  only needed here
+    from imufit.calibrating import calibrate  # noqa: PLC0415  only needed here
 
     return calibrate([_held(log) for log in logs_of_any(logs)], cost, sensors=sensors, settings=settings)
 
@@ -199,7 +199,7 @@ def replay(
     log : Log, str, Path, DataFrame or mapping of arrays
         n rows with the sensors that the filters need.
     filters : sequence of str or str, optional
-        Names out of :data:`imufit.replay.FILTERS` and ``SMOOTHERS``; None is every filter for which the log has the
+        Names out of :data:`imufit.replaying.FILTERS` and ``SMOOTHERS``; None is every filter for which the log has the
         sensors.
     settings : mapping of mappings, optional
         ``{"mahony": {"k_p": 1.0}}``.
@@ -218,7 +218,7 @@ def replay(
     InputError
         A filter or setting is unknown, or a filter lacks its sensor.
     """
-    from imufit.replay import DEFAULT_FILTERS, replay  # noqa: PLC0415  only needed here
+    from imufit.replaying import DEFAULT_FILTERS, replay  # noqa: PLC0415  only needed here
 
     held = _held(log_of(log))
     chosen = (filters,) if isinstance(filters, str) else filters
@@ -247,7 +247,7 @@ def allan(log: AnyLog, *, progress: Progress | None = None) -> Allan:
     InputError
         There is no rest that is long enough.
     """
-    from imufit.allan import allan  # noqa: PLC0415  only needed here
+    from imufit.allan_deviation import allan  # noqa: PLC0415  only needed here
 
     return allan(_held(log_of(log)), progress=progress or silent)
 
@@ -260,18 +260,18 @@ def tune(log: AnyLog, filter: str, *, progress: Progress | None = None, **option
     log : Log, str, Path, DataFrame or mapping of arrays
         With reference attitude.
     filter : str
-        Name out of :data:`imufit.replay.FILTERS`.
+        Name out of :data:`imufit.replaying.FILTERS`.
     progress : callable, optional
         Called with (trials done, trials in all, what is being done).
     **options
-        As for :func:`imufit.tune.tune`.
+        As for :func:`imufit.tuning.tune`.
 
     Raises
     ------
     InputError
         The log lacks what this takes, or a setting cannot be.
     """
-    from imufit.tune import tune  # noqa: PLC0415  only needed here
+    from imufit.tuning import tune  # noqa: PLC0415  only needed here
 
     return tune(_held(log_of(log)), filter, progress=progress or silent, **options)
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from imufit.errors import InputError
 from imufit.log.columns import GROUPS
-from imufit.log.log import Log, LogSource
+from imufit.log.log import METADATA, Log, LogSource
+from imufit.log.metadata import mapping_from_json
 from imufit.log.stream import open_log
 
 if TYPE_CHECKING:
@@ -58,7 +59,9 @@ def log_of(given: AnyLog) -> LogSource:
     if hasattr(given, "__arrow_c_stream__"):
         import pyarrow as pa  # noqa: PLC0415  heavy, and only needed here
 
-        return Log.from_dataframe(pa.table(given).to_pandas())
+        table = pa.table(given)
+        text = (table.schema.metadata or {}).get(METADATA.encode())
+        return Log.from_dataframe(table.to_pandas(), mapping_from_json(text, Path("log")) if text else {})
     raise InputError(
         f"a log cannot be made of {type(given).__name__}",
         remedy="Pass a Log, the name of a file, a table of pandas or polars, or a dict of arrays.",

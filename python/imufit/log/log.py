@@ -24,6 +24,7 @@ from imufit.log.columns import GROUPS, present
 from imufit.log.metadata import Metadata
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.size import BLOCK_ROWS
+from imufit.log.unit_check import Clock
 from imufit.log.writer import write_rows
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ Array = NDArray[np.float64]
 Text = NDArray[np.object_]
 
 _WIDTHS = {"t": 0, "acc": 3, "gyr": 3, "mag": 3, "temp": 0, "ref_q": 4, "ref_p": 3, "ref_angle": 0}
+METADATA = "imufit"
+"""Name under which the metadata stand with a table of pandas or Arrow."""
 HEAD_ROWS = 5
 """Rows that a notebook shows of a log: as many as pandas shows of a table by ``head``."""
 _SINGLE = ("temp", "ref_angle")
@@ -306,10 +309,12 @@ class Log:
         return columns
 
     def to_pandas(self) -> pd.DataFrame:
-        """All columns as a pandas table, SI units."""
+        """All columns as a pandas table, SI units; the metadata stand in its ``attrs["imufit"]``."""
         import pandas as pd  # noqa: PLC0415  heavy, and only needed here
 
-        return pd.DataFrame(self.table())
+        table = pd.DataFrame(self.table())
+        table.attrs[METADATA] = self.metadata.to_mapping()
+        return table
 
     def to_dataframe(self) -> pd.DataFrame:
         """All columns as a pandas table, under the name that every result has for it."""
@@ -324,10 +329,11 @@ class Log:
         return pl.DataFrame(self.to_arrow())
 
     def to_arrow(self) -> pa.Table:
-        """All columns as an Arrow table, SI units; numbers are not copied where Arrow can share them."""
+        """All columns as an Arrow table, SI units, the metadata in its schema as in a Parquet file."""
         import pyarrow as pa  # noqa: PLC0415  heavy, and only needed here
 
-        return pa.table({name: pa.array(column) for name, column in self.table().items()})
+        columns = {name: pa.array(column) for name, column in self.table().items()}
+        return pa.table(columns, metadata={METADATA: self.metadata.to_json()})
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """Arrow's interface for streams: ``polars.DataFrame(log)``, ``pyarrow.table(log)``, ``duckdb.from_arrow``."""
@@ -455,15 +461,19 @@ class Log:
         df : DataFrame
             Columns as in a log file.
         metadata : Metadata or mapping, optional
-            Frame, gravity and so on.
+            Frame, gravity and so on; without it what :meth:`to_pandas` left with the table.
         mapping : mapping, optional
             Source text for target columns, as for files.
         """
+        # the metadata that a table inherits were not stated of the time that it has now
+        clock: Clock = "a log's" if metadata not in (None, {}, Metadata()) else "open"
+        if metadata is None:
+            metadata = df.attrs.get(METADATA, {})
         if not isinstance(metadata, Metadata):
-            metadata = Metadata.from_mapping(metadata or {}, "log")
+            metadata = Metadata.from_mapping(metadata, "log")
         from imufit import log as logs  # noqa: PLC0415  a table is read as a file is, which is built on this class
 
-        held = logs.LogStream.of_source(logs.FrameSource(df), metadata, mapping).read()
+        held = logs.LogStream.of_source(logs.FrameSource(df), metadata, mapping, clock).read()
         return cls.of_fields(**{item.name: getattr(held, item.name) for item in fields(held)})
 
     def sensors(self) -> dict[str, Array | None]:

@@ -49,7 +49,7 @@ class LogStream:
 
     @classmethod
     def of_source(
-        cls, source: Source, metadata: Metadata | None = None, mapping: Mapping[str, str] | None = None
+        cls, source: Source, metadata: Metadata, mapping: Mapping[str, str] | None = None, clock: Clock = "open"
     ) -> Self:
         """Make the log of a source that is no file.
 
@@ -57,14 +57,15 @@ class LogStream:
         ----------
         source : Source
             A table in memory.
-        metadata : Metadata, optional
+        metadata : Metadata
             Frame, gravity and so on.
         mapping : mapping, optional
             Source text for target columns.
+        clock : "open" or "a log's"
+            Whether the source says of itself that it is a log, so that its time is in seconds.
         """
         log = cls.__new__(cls)
-        clock: Clock = "a log's" if metadata is not None and metadata != Metadata() else "open"
-        log._begin(source, None, metadata or Metadata(), clock, mapping, bare=False)
+        log._begin(source, None, metadata, clock, mapping, bare=False)
         return log
 
     def _begin(
