@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from imufit import devices as devices
     from imufit import errors as errors
     from imufit import figures as figures
+    from imufit import filters as filters
     from imufit import lab as lab
     from imufit import log as log
     from imufit import model as model
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 else:
     from importlib import import_module
 
-    _MODULES = ("devices", "errors", "figures", "lab", "log", "model", "report", "results")
+    _MODULES = ("devices", "errors", "figures", "filters", "lab", "log", "model", "report", "results")
     _HOMES = {
         "_imufit": ("__version__",),
         "errors": ("InputError",),

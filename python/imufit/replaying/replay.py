@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
+from imufit.filters import ALL, AttitudeFilter, Smoother
 from imufit.log import Log
 from imufit.progress import Progress, silent
 from imufit.replaying.clipped import ranges
@@ -329,11 +330,9 @@ def replay(
     skipped: dict[str, int] = {}
     for done, name in enumerate(names):
         progress(done, len(names), f"filter {name}")
-        options: dict[str, Any] = {**around.arguments, "settings": dict(given.get(name, {}))}
-        if name in SMOOTHERS:
-            attitude[name], reasons = _imufit.smooth(log.t, *sensors.values(), **options)
-        else:
-            attitude[name], reasons = _imufit.Filter(name, **options).run(log.t, **sensors)
+        running = _made(name, around.arguments, given.get(name, {}))
+        attitude[name] = running.run(**sensors, dt_or_t=log.t)
+        reasons = running.skipped
         errors[name] = _errors(attitude[name], log.ref_q, counted)
         skipped = {reason: max(skipped.get(reason, 0), reasons.get(reason, 0)) for reason in (*skipped, *reasons)}
     progress(len(names), len(names), "replayed")
@@ -429,6 +428,15 @@ def _choose(filters: Sequence[str] | None, sensors: Mapping[str, Array | None]) 
             raise ValueError(f"the log has {held}, from which no filter gives an attitude: record acc or gyr as well")
         return chosen
     return tuple(dict.fromkeys(filters))
+
+
+def _made(name: str, arguments: Mapping[str, Any], settings: Mapping[str, float]) -> AttitudeFilter | Smoother:
+    kinds: dict[str, type[AttitudeFilter | Smoother]] = {**ALL, Smoother.name: Smoother}
+    if name not in kinds:
+        raise ValueError(f"filter {name!r} is unknown: use one of {', '.join(kinds)}")
+    around = {**arguments, **arguments["rules"], **settings}
+    del around["rules"]
+    return kinds[name](**around)
 
 
 def _checked(settings: Settings | None) -> Settings:
