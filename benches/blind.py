@@ -16,7 +16,7 @@ import secrets
 import sys
 from pathlib import Path
 
-from imufit.grade import SETS, BlindGrade, PowerCurve, grade, power_curve
+from imufit.lab.grade import SETS, BlindGrade, PowerCurve, grade, power_curve
 from imufit.results import Table
 from marked import markdown, write_between
 

@@ -34,9 +34,9 @@ from typing import Any
 import imufit
 import numpy as np
 from imufit import InputError, Log, SensorModel, _imufit
-from imufit.compare.attitude import corrected
-from imufit.replay import SETTINGS, convert_frame
-from imufit.replay import replay as run_filters
+from imufit.comparing.attitude import corrected
+from imufit.replaying import SETTINGS, convert_frame
+from imufit.replaying import replay as run_filters
 from numpy.typing import NDArray
 from peers import MISSING, PEERS
 

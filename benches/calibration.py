@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from imufit import _imufit, read
-from imufit.calibrate import calibrate, find_poses
+from imufit.calibrating import calibrate, find_poses
 from scipy.optimize import least_squares
 
 try:

@@ -27,9 +27,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from imufit import Log, LogStream, _imufit, simulate
-from imufit.fit.passes import BLOCKS, CHANNELS, Passes, chunk_arrays
-from imufit.fit.surveyed_log import SurveyedLog
+from imufit import Log, LogStream, _imufit
+from imufit.fitting.passes import BLOCKS, CHANNELS, Passes, chunk_arrays
+from imufit.fitting.surveyed_log import SurveyedLog
+from imufit.lab import simulate
 from imufit.progress import silent
 
 AXES = range(3)

@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from filterpy.kalman import KalmanFilter
 from imufit import Log, _imufit
-from imufit.replay import Stream, replay_many
+from imufit.replaying import Stream, replay_many
 from peers import MISSING, PEERS, CLoop
 from scipy.signal import lfilter
 

@@ -31,8 +31,8 @@ from pathlib import Path
 
 import numpy as np
 from imufit import Log, SensorModel, _imufit
-from imufit.grade import draw
-from imufit.grade.wilson import interval
+from imufit.lab.grade import draw
+from imufit.lab.grade.wilson import interval
 from imufit.loop import Fit
 from marked import write_between
 

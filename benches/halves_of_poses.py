@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from confirmed import Ratio, of, ratio
 from imufit import InputError, Log, read
-from imufit.calibrate import Calibration, calibrate, find_poses
+from imufit.calibrating import Calibration, calibrate, find_poses
 from imufit.results import Parameter
 
 ENOUGH = 9

@@ -22,8 +22,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from imufit.grade.blind_grade import share
-from imufit.grade.protocol import side_by_side
+from imufit.lab.grade.blind_grade import share
+from imufit.lab.grade.protocol import side_by_side
 from imufit.results import Table
 from marked import markdown, write_between
 

@@ -16,10 +16,10 @@ from typing import Any
 import imufit
 import numpy as np
 from imufit import Log
-from imufit.compare.attitude import corrected
-from imufit.replay import estimate_mag_reference
-from imufit.replay import replay as run_filters
-from imufit.tune import tune
+from imufit.comparing.attitude import corrected
+from imufit.replaying import estimate_mag_reference
+from imufit.replaying import replay as run_filters
+from imufit.tuning import tune
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -82,7 +82,7 @@ def judged(log: Log, tuned: dict[str, float] | None = None) -> dict[str, Array]:
 
 def parts(log: Log, q: Array) -> Array:
     """Return the root mean squares of heading and inclination error, deg."""
-    errors = imufit.replay.Replay(log, {"one": q}, {}, {}).row_errors("one")
+    errors = imufit.replaying.Replay(log, {"one": q}, {}, {}).row_errors("one")
     return np.asarray(np.degrees(np.sqrt(np.nanmean(errors[:, 1:3] ** 2, axis=0))))
 
 

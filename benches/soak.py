@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 from imufit import SensorModel
-from imufit.replay import FILTERS, SMOOTHERS, Stream
+from imufit.lab.simulate import simulate
+from imufit.replaying import FILTERS, SMOOTHERS, Stream
 from imufit.results import Table
-from imufit.simulate import simulate
 from marked import markdown, write_between
 
 ROOT = Path(__file__).resolve().parents[1]

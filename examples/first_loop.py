@@ -10,7 +10,7 @@ import imufit
 if len(sys.argv) > 1:
     log = imufit.read(sys.argv[1])
 else:  # a hand-held sensor whose accelerometer sits 2 cm from where the reference says
-    log = imufit.simulate.simulate("handheld", {"acc.lever_arm": {"x": 0.02}}, duration=60.0).to_log()
+    log = imufit.simulate("handheld", {"acc.lever_arm": {"x": 0.02}}, duration=60.0).to_log()
 
 fit = imufit.SensorModel().fit(log)  # the ideal sensor: no effect, nothing to fit yet
 diagnosis = fit.diagnose()

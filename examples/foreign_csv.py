@@ -30,7 +30,7 @@ ANGLES = ("Yaw", "Pitch", "Roll")
 
 def foreign_file(path: Path) -> None:
     """Write what another logger would have written of a sensor with a gyroscope that is off by 0.3 deg/s about y."""
-    sim = imufit.simulate.simulate("turntable", {"gyr.bias": {"y": np.radians(0.3)}}, seed=2, duration=60.0)
+    sim = imufit.simulate("turntable", {"gyr.bias": {"y": np.radians(0.3)}}, seed=2, duration=60.0)
     acc, gyr = sim.acc / 9.80665, np.degrees(sim.gyr)
     yaw_pitch_roll = Rotation.from_quat(sim.ref_q[:, [1, 2, 3, 0]]).as_euler("ZYX", degrees=True)
     table = {"Time": 1000.0 * sim.t}

@@ -33,7 +33,7 @@ def recorded() -> imufit.Log:
     Nothing here uses the effect above: the fan spins up slowly, its vibration grows with the square of its speed, and
     the current is measured with noise.
     """
-    log = imufit.simulate.simulate("handheld", {"acc.bias": None}, seed=5, duration=90.0).to_log()
+    log = imufit.simulate("handheld", {"acc.bias": None}, seed=5, duration=90.0).to_log()
     switched_on = np.sin(0.9 * log.t) + np.sin(0.37 * log.t) > 0.4
     speed = np.zeros(log.n)  # over its full speed
     for i in range(1, log.n):

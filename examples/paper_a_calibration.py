@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 from imufit import Log
-from imufit.calibrate import calibrate
+from imufit.calibrating import calibrate
 
 G = 9.80665
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")

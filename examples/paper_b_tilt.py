@@ -18,8 +18,8 @@ from textwrap import fill
 import imufit
 import numpy as np
 from imufit.figures.style import BLUE, GREY, INK, VERMILION, new_figure, tidy, title
-from imufit.replay import Replay, replay
-from imufit.simulate import Noise, SensorNoise, simulate
+from imufit.lab.simulate import Noise, SensorNoise, simulate
+from imufit.replaying import Replay, replay
 
 METHODS = ("accel", "gyro", "complementary", "kalman")
 # Published, degrees: Table 3 (root mean square error) and Table 4 (standard deviation), by angle.

@@ -8,9 +8,9 @@ import numpy as np
 from imufit.cli import engine
 from imufit.cli.app import main
 from imufit.figures.style import new_figure
+from imufit.lab.simulate import Grade, ParameterGrade
 from imufit.log import Log, contents
 from imufit.results import Table
-from imufit.simulate import Grade, ParameterGrade
 from loop_results import BIAS, addition, card, comparison, diagnosis, ladder
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 from imufit import Log, SensorModel, _imufit
-from imufit.fit.analysis import Analysis
-from imufit.fit.passes import CHANNELS, Passes, chunk_arrays
+from imufit.fitting.analysis import Analysis
+from imufit.fitting.passes import CHANNELS, Passes, chunk_arrays
 from imufit.progress import silent
 from scipy.spatial.transform import Rotation
 

@@ -1,8 +1,8 @@
 """A device, a line and a disk on which everything goes wrong when told, in a time of their own.
 
-`Device` makes the bytes and knows where each frame stands among them. `World` plays them to `imufit.record.record`
-through the real transport, and notes what was read. What ought to be in a log follows from the bytes alone: a frame
-counts if all of it was read, unaltered, from a place where a frame can begin.
+`Device` makes the bytes and knows where each frame stands among them. `World` plays them to
+`imufit.devices.record.record` through the real transport, and notes what was read. What ought to be in a log follows
+from the bytes alone: a frame counts if all of it was read, unaltered, from a place where a frame can begin.
 """
 
 import errno
@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import serial
 from imufit import InputError, _imufit, read
+from imufit.devices.record import journal, part, reception, record, recorder, recover, transport
 from imufit.log import Log
-from imufit.record import journal, part, reception, record, recorder, recover, transport
 
 STEP = 0.01
 """Time between two samples, s."""

@@ -14,7 +14,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
-from imufit.simulate import simulate
+from imufit.lab.simulate import simulate
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import imufit
 import numpy as np
-from imufit.emulate import Emulator
+from imufit.devices.emulate import Emulator
+from imufit.devices.record import recover
 from imufit.errors import InputError
-from imufit.record import recover
 
 PROGRAM = (sys.executable, "-c", "import sys; from imufit.cli.app import main; sys.exit(main())")
 RATE = 500.0

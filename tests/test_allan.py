@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from cli_stand_in import run, strict_json
 from imufit import _imufit
-from imufit.allan import allan, filter_noise
+from imufit.allan_deviation import allan, filter_noise
 from imufit.errors import InputError
+from imufit.lab.simulate import Noise, SensorNoise
 from imufit.log import Log, read
-from imufit.replay import read_settings
-from imufit.simulate import Noise, SensorNoise
+from imufit.replaying import read_settings
 
 STEP = 0.01
 

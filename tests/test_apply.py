@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from engine import swaying
-from imufit import InputError, Log, SensorModel, effect, read, simulate
+from imufit import InputError, Log, SensorModel, effect, read
 from imufit.cli.app import main
+from imufit.lab import simulate
+from imufit.lab.simulate import Noise, SensorNoise
 from imufit.model.catalogue import effects
 from imufit.model.effect import forget
-from imufit.simulate import Noise, SensorNoise
 
 SILENT = SensorNoise(1e-15)
 NOISE_FREE = Noise(acc=SILENT, gyr=SILENT, mag=SILENT, temperature=0.0)

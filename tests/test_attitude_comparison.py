@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from imufit import Log, SensorModel
-from imufit.compare.attitude import attitude_comparison, corrected
-from imufit.simulate import simulate
+from imufit.comparing.attitude import attitude_comparison, corrected
+from imufit.lab.simulate import simulate
 from scipy.spatial.transform import Rotation
 
 IRON = {"mag.hard_iron": {"x": 12.0, "y": -8.0, "z": 5.0}}

@@ -7,9 +7,9 @@ import pytest
 from calibration_logs import FIELD, GRAVITY, SIDES, UP, Sensor, course, exp, joined, spread, tumbling, typical
 from cli_stand_in import strict_json
 from imufit import Log, SensorModel
-from imufit.calibrate import calibrate, find_poses
+from imufit.calibrating import calibrate, find_poses
 from imufit.errors import InputError
-from imufit.simulate import simulate
+from imufit.lab.simulate import simulate
 
 OFF = {"xy": (0, 1), "xz": (0, 2), "yx": (1, 0), "yz": (1, 2), "zx": (2, 0), "zy": (2, 1)}
 TURNED = [side for side in SIDES for _ in range(3)]

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from cli_stand_in import run, strict_json
 from imufit import InputError, read
-from imufit.calibrate import Wizard, calibrate, calibrate_live
-from imufit.calibrate.free_turning import FreeTurning
-from imufit.emulate import Emulator
-from imufit.record import record
-from imufit.simulate import simulate
+from imufit.calibrating import Wizard, calibrate
+from imufit.calibrating.free_turning import FreeTurning
+from imufit.devices.calibrate_live import calibrate_live
+from imufit.devices.emulate import Emulator
+from imufit.devices.record import record
+from imufit.lab.simulate import simulate
 from scipy.spatial.transform import Rotation
 from test_cli_errors import fails
 
@@ -180,7 +181,7 @@ def test_stopped_calibration_keeps_what_came(device, tmp_path, monkeypatch):
 
         return record(*arguments, stopped=lambda: bool(seen) or stopped(), watch=look, **settings)
 
-    monkeypatch.setattr("imufit.calibrate.live.record", stopped)
+    monkeypatch.setattr("imufit.devices.calibrate_live.record", stopped)
     with device() as emulated, pytest.raises(InputError, match=r"^stopped: sides .* missing"):
         calibrate_live(emulated.port, tmp_path / "kept.parquet")
     assert read(tmp_path / "kept.parquet").n > 0

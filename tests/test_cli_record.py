@@ -156,7 +156,7 @@ def test_a_file_that_may_not_grow_ends_the_recording_with_a_log(pty, tmp_path):
     assert "Traceback" not in err
     if part.exists():  # not even the log had room
         assert "imufit recover" in err
-        imufit.record.recover(part)
+        imufit.devices.record.recover(part)
     saved = imufit.read(log)
     assert saved.n > 100
     np.testing.assert_array_equal(saved.acc, values_of(range(saved.n))[:, :3])

@@ -6,7 +6,7 @@ from cli_stand_in import run, strict_json
 from imufit import SensorModel
 from imufit.cli.names import FILTERS
 from imufit.log import Log
-from imufit.replay import replay
+from imufit.replaying import replay
 
 METHODS = ("accel", "gyro", "complementary", "kalman")
 

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from imufit.simulate import simulate
+from imufit.lab.simulate import simulate
 
 QUIET = (0, 141)
 """Exit codes of a program whose reader went away: done before that, or ended by SIGPIPE (128 + 13)."""

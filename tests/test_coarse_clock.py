@@ -8,7 +8,7 @@ import imufit
 import numpy as np
 import pytest
 from imufit.errors import InputError
-from imufit.simulate import simulate
+from imufit.lab.simulate import simulate
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from imufit import Log, SensorModel, simulate
+from imufit import Log, SensorModel
+from imufit.lab import simulate
 from scipy.spatial.transform import Rotation
 
 STEPS = {"acc": 0.06, "gyr": 0.004, "mag": 1.5}

@@ -6,11 +6,11 @@ import pytest
 from imufit import Log
 from imufit.faults import row_faults
 from imufit.faults.units import units_of_field, wrong_units
-from imufit.fit.surveyed_log import survey
+from imufit.fitting.surveyed_log import survey
+from imufit.lab.simulate import simulate
 from imufit.log import parse_mapping
 from imufit.model.effect_stack import EffectStack
 from imufit.results import DataFault
-from imufit.simulate import simulate
 
 DEG = np.pi / 180.0
 

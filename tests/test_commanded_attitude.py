@@ -7,9 +7,9 @@ from dataclasses import replace
 import imufit
 import numpy as np
 import pytest
-from imufit.fit.commanded import CommandedAttitude
+from imufit.fitting.commanded import CommandedAttitude
+from imufit.lab.simulate import simulate
 from imufit.log import Log
-from imufit.simulate import simulate
 from scipy.spatial.transform import Rotation
 
 NOISE = np.radians(0.03)

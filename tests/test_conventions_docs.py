@@ -9,7 +9,7 @@ import imufusion
 import numpy as np
 import pytest
 import vqf
-from imufit.replay import convert_frame
+from imufit.replaying import convert_frame
 from scipy.spatial.transform import Rotation
 from test_filters import UP, G, angles, rotation_of, scalar_first
 

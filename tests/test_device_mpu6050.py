@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from imufit import InputError
-from imufit.device import mpu6050
-from imufit.replay import replay
+from imufit.devices.chips import mpu6050
+from imufit.replaying import replay
 
 COUNTS = arrays(np.int16, st.tuples(st.integers(0, 40), st.just(7)))
 SELECTIONS = st.tuples(st.integers(0, 3), st.integers(0, 3))

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from engine import swaying
-from imufit import InputError, Log, SensorModel, grade, simulate
-from imufit.simulate import OBSERVABLE, Noise, SensorNoise
+from imufit import InputError, Log, SensorModel
+from imufit.lab import grade, simulate
+from imufit.lab.simulate import OBSERVABLE, Noise, SensorNoise
 from scipy.spatial.transform import Rotation
 from test_fit import FIRST_EFFECTS
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from imufit import SensorModel, simulate
-from imufit.fit.column_noise import ColumnNoise
+from imufit import SensorModel
+from imufit.fitting.column_noise import ColumnNoise
+from imufit.lab import simulate
 
 THERMOMETER = 0.05
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from imufit import SensorModel, simulate
+from imufit import SensorModel
+from imufit.lab import simulate
 from imufit.log import Log
 
 BIAS = {"gyr.bias": {"x": 0.002, "y": -0.002, "z": 0.003}}

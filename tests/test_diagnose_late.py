@@ -1,7 +1,8 @@
 """Late or sluggish, sensor or reference: told apart where the log can, and named together where it cannot."""
 
 import pytest
-from imufit import SensorModel, simulate
+from imufit import SensorModel
+from imufit.lab import simulate
 
 
 def answered(effects, **options):

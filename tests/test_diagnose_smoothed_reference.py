@@ -5,7 +5,8 @@ from dataclasses import replace
 import imufit
 import numpy as np
 import pytest
-from imufit import SensorModel, simulate
+from imufit import SensorModel
+from imufit.lab import simulate
 from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation, Slerp
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from imufit import Log, SensorModel, ladder, simulate
-from imufit.diagnose.hops import hops
-from imufit.diagnose.tones import strongest
+from imufit import Log, SensorModel, ladder
+from imufit.diagnosing.hops import hops
+from imufit.diagnosing.tones import strongest
+from imufit.lab import simulate
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from imufit import Log, SensorModel, simulate
+from imufit import Log, SensorModel
+from imufit.lab import simulate
 
 
 def made(**size: float) -> Log:

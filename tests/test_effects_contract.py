@@ -5,10 +5,11 @@ import re
 import numpy as np
 import pytest
 from engine import analysis_of, pieces
-from imufit import InputError, SensorModel, _imufit, effect, simulate
+from imufit import InputError, SensorModel, _imufit, effect
+from imufit.lab import simulate
+from imufit.lab.simulate import Noise
 from imufit.model.catalogue import effects, find_effect
 from imufit.model.effect import forget
-from imufit.simulate import Noise
 
 BUILT_IN = [*(e.id for e in _imufit.built_in_effects()), *(f"{s}.column:motor_current" for s in ("acc", "gyr", "mag"))]
 

@@ -10,10 +10,10 @@ import pytest
 import serial
 from emulated import intact, keys, read
 from imufit import InputError, Log
-from imufit.emulate import Clock, Emulator, open_source, parse_fault
-from imufit.emulate.clock import Clock as DeviceClock
-from imufit.emulate.course import Course
-from imufit.emulate.faults import FAULTS, Fault, Schedule
+from imufit.devices.emulate import Clock, Emulator, open_source, parse_fault
+from imufit.devices.emulate.clock import Clock as DeviceClock
+from imufit.devices.emulate.course import Course
+from imufit.devices.emulate.faults import FAULTS, Fault, Schedule
 
 ENDS = ["pty", "socket://127.0.0.1:0"]
 FAST = {"speed": "max", "sent": True, "duration": 4.0}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from imufit import InputError, Log, SensorModel
 from imufit.cli.app import main
-from imufit.export import FORMS, export
+from imufit.exporting import FORMS, export
 
 SIX = {"xy": 0.01, "xz": -0.02, "yx": 0.015, "yz": 0.005, "zx": -0.01, "zy": 0.02}
 PARAMETERS = {

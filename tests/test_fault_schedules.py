@@ -14,9 +14,9 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 from imufit import Log, read
-from imufit.emulate import Emulator
-from imufit.record import recover
-from imufit.record.part import part_path, parts_of
+from imufit.devices.emulate import Emulator
+from imufit.devices.record import recover
+from imufit.devices.record.part import part_path, parts_of
 
 SHARE = st.floats(0.0, 1.0, exclude_max=True)
 
@@ -111,7 +111,7 @@ TestEverySchedule = Schedule.TestCase
 RECORD = """
 import resource, signal, sys
 from imufit import InputError
-from imufit.record import record
+from imufit.devices.record import record
 port, log, room = sys.argv[1:]
 if room != "-":
     # What the system does at the limit of a file is what it does on a full disk: it writes what fits, then refuses.

@@ -10,8 +10,8 @@ from imufit import Diagnosis, Log, SensorModel
 from imufit.cli.app import main
 from imufit.faults import row_faults
 from imufit.faults.frames import PERMUTATIONS
+from imufit.lab.simulate import FAULTS, simulate, with_fault
 from imufit.results import fault_words
-from imufit.simulate import FAULTS, simulate, with_fault
 from scipy.spatial.transform import Rotation
 
 GLOBAL = [

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from imufit.replay.figures_of_merit import figures_of_merit, noise_band
-from imufit.replay.stretches import Rest, Stretches
+from imufit.replaying.figures_of_merit import figures_of_merit, noise_band
+from imufit.replaying.stretches import Rest, Stretches
 from scipy.signal import welch
 
 DT = 0.01

@@ -9,7 +9,7 @@ from filterpy.kalman import KalmanFilter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from imufit import _imufit
-from imufit.replay import kalman_steady_state, tilt_angles
+from imufit.replaying import kalman_steady_state, tilt_angles
 from scipy.linalg import solve_discrete_are
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation

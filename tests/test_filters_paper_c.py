@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from filter_state import bias_of, own
 from imufit import _imufit
-from imufit.replay import PAPER_C_GAINS
+from imufit.replaying import PAPER_C_GAINS
 from scipy.spatial.transform import Rotation
 from test_filters import FIELD, FRAMES, UP, G, Motion, angles, rotation_of, scalar_first
 

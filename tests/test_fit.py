@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from engine import swaying
-from imufit import InputError, Log, SensorModel, ladder, simulate
-from imufit.simulate import Noise, SensorNoise
+from imufit import InputError, Log, SensorModel, ladder
+from imufit.lab import simulate
+from imufit.lab.simulate import Noise, SensorNoise
 from scipy.spatial.transform import Rotation
 
 FIRST_EFFECTS = [

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from engine import residuals, swaying
-from imufit import SensorModel, simulate
-from imufit.simulate import OBSERVABLE, Noise, SensorNoise
+from imufit import SensorModel
+from imufit.lab import simulate
+from imufit.lab.simulate import OBSERVABLE, Noise, SensorNoise
 from scipy.spatial.transform import Slerp
 
 QUIET = Noise(acc=SensorNoise(0.0), gyr=SensorNoise(0.0), mag=SensorNoise(0.0), temperature=0.0)

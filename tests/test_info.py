@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from imufit import InputError, SensorModel
 from imufit.cli.app import main
+from imufit.lab.simulate import Noise, simulate
 from imufit.log import Log, gaps
 from imufit.model.catalogue import effects
 from imufit.model.effect import forget
 from imufit.results import LogInfo
-from imufit.simulate import Noise, simulate
 from recording import recording
 
 

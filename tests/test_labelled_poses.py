@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cli_stand_in import run, strict_json
 from imufit import Log, SensorModel, ladder, read
-from imufit.calibrate import calibrate
+from imufit.calibrating import calibrate
 from imufit.errors import InputError
 from recording import recording
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from imufit import SensorModel, ladder, simulate
-from imufit.diagnose.ladder import Climb
-from imufit.diagnose.revise import revise
-from imufit.simulate import OBSERVABLE, Noise
+from imufit import SensorModel, ladder
+from imufit.diagnosing.ladder import Climb
+from imufit.diagnosing.revise import revise
+from imufit.lab import simulate
+from imufit.lab.simulate import OBSERVABLE, Noise
 from scipy.spatial.transform import Rotation
 from test_diagnose import static
 

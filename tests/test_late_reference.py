@@ -13,9 +13,9 @@ import pandas as pd
 import pytest
 from imufit import Log, SensorModel
 from imufit.cli.app import main
+from imufit.lab.simulate import simulate
 from imufit.log import LogStream, Metadata
 from imufit.results import DataFault
-from imufit.simulate import simulate
 from join_pairs import repetitive
 from recording import recording
 from scipy.spatial.transform import Rotation

@@ -4,11 +4,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from imufit import InputError, Log, SensorModel, _imufit, effect, simulate
+from imufit import InputError, Log, SensorModel, _imufit, effect
+from imufit.devices.monitor.correction import LiveCorrection
+from imufit.lab import simulate
 from imufit.log.columns import GROUPS
 from imufit.model.catalogue import find_effect
 from imufit.model.effect import forget
-from imufit.monitor.correction import LiveCorrection
 
 BUILT_IN = [*(e.id for e in _imufit.built_in_effects()), *(f"{s}.column:motor_current" for s in ("acc", "gyr", "mag"))]
 PIECE = 7

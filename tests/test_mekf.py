@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from filter_state import bias_of
 from imufit import Log, _imufit
-from imufit.replay import SETTINGS, SMOOTHERS, Replay, Stream, replay
+from imufit.replaying import SETTINGS, SMOOTHERS, Replay, Stream, replay
 from scipy.spatial.transform import Rotation
 
 G = 9.80665

@@ -11,11 +11,11 @@ import imufit
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from imufit.devices.record.arrived import Announced, Arrived
+from imufit.devices.record.part import PartFile, part_path
 from imufit.log.excerpt import MOST_ROWS, Excerpt, judged_rows
 from imufit.log.size import HELD
 from imufit.progress import silent
-from imufit.record.arrived import Announced, Arrived
-from imufit.record.part import PartFile, part_path
 from numpy.lib import format as npy
 
 LIMIT = 600.0

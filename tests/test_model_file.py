@@ -7,7 +7,7 @@ import sys
 import pytest
 from imufit import InputError, SensorModel
 from imufit.model.model_file import ModelFile
-from imufit.replay import read_settings, write_settings
+from imufit.replaying import read_settings, write_settings
 
 MODEL = {
     "gyr.bias": {"x": -0.0123, "y": 1.25e-05, "z": 0.35},

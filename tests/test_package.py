@@ -30,9 +30,9 @@ def test_import_alone_loads_no_package_of_others():
 
 def test_functions_stay_functions_when_modules_of_the_same_name_are_loaded():
     script = (
-        "import imufit.diagnose.ladder, imufit.replay.replay, imufit.model.effect, imufit.model.catalogue, imufit;"
+        "import imufit.diagnosing.ladder, imufit.replaying.replay, imufit.model.effect, imufit.model.catalogue, imufit;"
         "assert callable(imufit.ladder) and callable(imufit.effect) and callable(imufit.catalogue);"
-        "assert callable(imufit.replay.replay) and callable(imufit.simulate.simulate)"
+        "assert callable(imufit.replaying.replay) and callable(imufit.lab.simulate.simulate)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from imufit.replay import replay
+from imufit.replaying import replay
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "paper_c_hybrid.py"
 SEED = 4711

@@ -11,8 +11,8 @@ import pytest
 from imufit import InputError
 from imufit.cli.app import main
 from imufit.inspection.traces import PIXELS, Trace
+from imufit.lab.simulate import simulate
 from imufit.log import Log
-from imufit.simulate import simulate
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from recording import recording

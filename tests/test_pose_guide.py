@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from calibration_logs import SIDES, Sensor, course, exp, typical
 from imufit import _imufit
-from imufit.calibrate import PoseGuide
+from imufit.calibrating import PoseGuide
 
 SENSOR = typical(3, acc_noise=0.02)
 

@@ -6,9 +6,10 @@ import pickle
 import imufit
 import numpy as np
 import pytest
-from imufit import SensorModel, simulate
+from imufit import SensorModel
+from imufit.lab import simulate
 from imufit.log import LogStream
-from imufit.replay import FILTERS, Stream
+from imufit.replaying import FILTERS, Stream
 
 PATIENCE = 60.0
 """Time that a child has, s: it needs about two, and hung for ever."""

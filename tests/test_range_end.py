@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from imufit import SensorModel
-from imufit.fit.range_end import RangeEnd
+from imufit.fitting.range_end import RangeEnd
 from imufit.log import Log
 from scipy.spatial.transform import Rotation
 

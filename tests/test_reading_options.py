@@ -11,8 +11,8 @@ import pytest
 from imufit.cli.app import imufit as program
 from imufit.cli.app import main
 from imufit.errors import InputError
+from imufit.lab.simulate import simulate
 from imufit.log import parse_noise
-from imufit.simulate import simulate
 
 OPTIONS = {"--map", "--frame", "--noise", "--drop"}
 COMMANDS: dict[str, tuple[str, ...]] = {

@@ -9,8 +9,8 @@ import imufit
 import numpy as np
 import pytest
 from firmware_host import make
-from imufit.emulate import Emulator
-from imufit.simulate import simulate
+from imufit.devices.emulate import Emulator
+from imufit.lab.simulate import simulate
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "docs"))

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from imufit.errors import InputError
+from imufit.lab.simulate import simulate
 from imufit.log import Log, LogStream, parse_mapping, read
-from imufit.simulate import simulate
 from recording import recording
 
 STANDARD_GRAVITY = 9.80665

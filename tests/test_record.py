@@ -6,9 +6,9 @@ import time
 import imufit
 import numpy as np
 import pytest
+from imufit.devices.monitor import Monitor
+from imufit.devices.record import LiveRows, record
 from imufit.errors import InputError
-from imufit.monitor import Monitor
-from imufit.record import LiveRows, record
 from recording_device import NINE, Pty, Sender, Socket, values_of
 
 PATIENCE = 20.0
@@ -396,7 +396,7 @@ def test_force_replaces_the_log(pty, tmp_path):
 
 def test_a_disk_that_is_full_ends_the_recording_and_keeps_what_is_written(pty, tmp_path, monkeypatch):
     room = [60_000]
-    write = imufit.record.part.os.write
+    write = imufit.devices.record.part.os.write
 
     def write_some(file, data):
         if len(data) > room[0]:
@@ -407,8 +407,8 @@ def test_a_disk_that_is_full_ends_the_recording_and_keeps_what_is_written(pty, t
         room[0] -= (done := write(file, data))
         return done
 
-    monkeypatch.setattr(imufit.record.part.os, "write", write_some)
-    monkeypatch.setattr(imufit.record.journal, "EVERY", 0.0)
+    monkeypatch.setattr(imufit.devices.record.part.os, "write", write_some)
+    monkeypatch.setattr(imufit.devices.record.journal, "EVERY", 0.0)
     recorder, device = Recorder(pty.port, tmp_path / "a.parquet"), Sender()
     pty.send(device.announce())
     for k in range(100):
@@ -436,7 +436,7 @@ def test_a_log_that_cannot_be_written_leaves_the_part_and_names_the_command(pty,
         recorder.result()
     assert [file.name for file in tmp_path.iterdir()] == ["a.parquet.part"], "nothing half-made is left"
     monkeypatch.undo()
-    assert imufit.record.recover(tmp_path / "a.parquet.part").n == 30
+    assert imufit.devices.record.recover(tmp_path / "a.parquet.part").n == 30
 
 
 def test_live_rows_are_what_a_recording_has(pty):

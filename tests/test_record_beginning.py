@@ -3,11 +3,11 @@
 import imufit
 import numpy as np
 import pytest
+from imufit.devices.record import recover
+from imufit.devices.record.arrived import Chunk
+from imufit.devices.record.beginning import BeginningFile, beginning_path, read_beginning
+from imufit.devices.record.part import part_path
 from imufit.errors import InputError
-from imufit.record import recover
-from imufit.record.arrived import Chunk
-from imufit.record.beginning import BeginningFile, beginning_path, read_beginning
-from imufit.record.part import part_path
 from recording_device import Sender, values_of
 
 ABOUT = {

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from imufit.record.arrived import Announced, Arrived
-from imufit.record.clock import fit_clock, lower_hull, spread, spread_arrivals
-from imufit.record.live_clock import LiveClock
-from imufit.record.ticks import Unwrapper, guessed_unit, time_column
-from imufit.record.timing import Runs, clock_of, timed, timed_blocks
+from imufit.devices.record.arrived import Announced, Arrived
+from imufit.devices.record.clock import fit_clock, lower_hull, spread, spread_arrivals
+from imufit.devices.record.live_clock import LiveClock
+from imufit.devices.record.ticks import Unwrapper, guessed_unit, time_column
+from imufit.devices.record.timing import Runs, clock_of, timed, timed_blocks
 
 FRAMES = Announced("binary", "d", 1e-6, ("acc_x",))
 

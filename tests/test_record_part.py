@@ -11,15 +11,15 @@ import tempfile
 import threading
 from pathlib import Path
 
-import imufit.record.part
+import imufit.devices.record.part
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from imufit.devices.record import recover
+from imufit.devices.record.arrived import Announced, Arrived
+from imufit.devices.record.part import PartFile, part_path, parts_of, read_part
 from imufit.errors import InputError
-from imufit.record import recover
-from imufit.record.arrived import Announced, Arrived
-from imufit.record.part import PartFile, part_path, parts_of, read_part
 
 COLUMNS = ("acc_x", "acc_y", "acc_z", "temp")
 DEVICE = Announced("binary", "d", 1e-6, COLUMNS, (20.0, 20.0, 20.0, 0.0), (100.0,) * 4)
@@ -248,8 +248,8 @@ def test_a_full_disk_leaves_whole_batches(tmp_path, limit):
 
 def test_what_is_written_is_put_on_the_disk_each_second(tmp_path, monkeypatch):
     now, calls = [1000.0], []
-    monkeypatch.setattr(imufit.record.part.time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(imufit.record.part.os, "fsync", lambda _file: calls.append(now[0]))
+    monkeypatch.setattr(imufit.devices.record.part.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(imufit.devices.record.part.os, "fsync", lambda _file: calls.append(now[0]))
     file = PartFile(tmp_path / "a.part")
     file.begin(DEVICE, ABOUT)
     for _ in range(14):
@@ -267,7 +267,7 @@ def test_a_disk_that_stalls_keeps_nobody_waiting_and_loses_nothing(tmp_path, mon
         assert stalled.wait(30.0)
         return write(file, data)
 
-    monkeypatch.setattr(imufit.record.part.os, "write", slow)
+    monkeypatch.setattr(imufit.devices.record.part.os, "write", slow)
     file = PartFile(tmp_path / "a.part")
     file.begin(DEVICE, ABOUT)
     for k in range(10):
@@ -285,7 +285,7 @@ def test_nothing_is_written_behind_a_batch_that_failed(tmp_path, monkeypatch):
     file.begin(DEVICE, ABOUT)
     file.write(rows(0, 10), told(10))
     with monkeypatch.context() as disk:
-        disk.setattr(imufit.record.part.os, "write", lambda *_: (_ for _ in ()).throw(OSError(28, "full")))
+        disk.setattr(imufit.devices.record.part.os, "write", lambda *_: (_ for _ in ()).throw(OSError(28, "full")))
         with pytest.raises(OSError, match="full"):
             file.write(rows(10, 10), told(10))
     with pytest.raises(OSError, match="full"):
@@ -298,9 +298,9 @@ FIRST_BATCH = """
 import sys
 from pathlib import Path
 import numpy as np
-from imufit.record import record
-from imufit.record.arrived import Announced, Arrived
-from imufit.record.part import PartFile
+from imufit.devices.record import record
+from imufit.devices.record.arrived import Announced, Arrived
+from imufit.devices.record.part import PartFile
 before = set(sys.modules)
 file = PartFile(Path(sys.argv[1]))
 device = Announced("binary", "d", 1e-6, ("acc_x",))

@@ -12,9 +12,9 @@ import imufit
 import numpy as np
 import pytest
 from cli_stand_in import run
+from imufit.devices.record import Rig, TypedAngles, record, recover
+from imufit.devices.record.rig import angle_of
 from imufit.errors import InputError
-from imufit.record import Rig, TypedAngles, record, recover
-from imufit.record.rig import angle_of
 from recording_device import NINE, Pty, Sender
 
 DEG = math.pi / 180.0

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from imufit import Log, SensorModel
+from imufit.lab.simulate import simulate
 from imufit.log import Metadata
-from imufit.simulate import simulate
 from scipy.spatial.transform import Rotation
 
 ATTITUDE = 1e-3

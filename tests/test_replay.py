@@ -5,9 +5,9 @@ from dataclasses import replace as with_fields
 
 import numpy as np
 import pytest
-from imufit import replay as package
+from imufit import replaying as package
 from imufit.log import Log
-from imufit.replay import FILTERS, SETTINGS, estimate_mag_reference, replay
+from imufit.replaying import FILTERS, SETTINGS, estimate_mag_reference, replay
 from scipy.spatial.transform import Rotation, RotationSpline
 
 FIELD_ENU = np.array([3.0, 18.0, -43.0])

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from imufit import InputError, Log
-from imufit.replay import replay
-from imufit.replay.clipped import end_of_range, ranges
-from imufit.simulate import simulate
+from imufit.lab.simulate import simulate
+from imufit.replaying import replay
+from imufit.replaying.clipped import end_of_range, ranges
 
 G = 9.80665
 SEEDS = st.integers(0, 10**6)

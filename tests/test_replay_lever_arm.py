@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from imufit.log import Log
-from imufit.replay import Stream, replay
+from imufit.replaying import Stream, replay
 from scipy.spatial.transform import Rotation
 
 ARM = np.array([0.05, -0.02, -0.30])

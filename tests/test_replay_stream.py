@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from imufit import InputError, Log
-from imufit.replay import FILTERS, Stream, replay, replay_many
+from imufit.replaying import FILTERS, Stream, replay, replay_many
 from scipy.spatial.transform import Rotation
 
 G = 9.80665

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 from imufit import Log, SensorModel, ladder
-from imufit.diagnose import diagnose
+from imufit.diagnosing import diagnose
 from imufit.errors import InputError
-from imufit.simulate import Noise, simulate
+from imufit.lab.simulate import Noise, simulate
 from scipy.spatial.transform import Rotation
 
 DURATION = 80.0

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from cli_stand_in import run, strict_json
 from engine import swaying
-from imufit import Diagnosis, InputError, Log, SensorModel, simulate
+from imufit import Diagnosis, InputError, Log, SensorModel
+from imufit.lab import simulate
+from imufit.lab.simulate import Noise, SensorNoise
 from imufit.model.effect import forget
-from imufit.simulate import Noise, SensorNoise
 
 
 def handheld(effects: dict, seed: int, duration: float = 15.0, **settings) -> Log:

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from imufit.simulate import INJECTIONS, SCENARIOS, SIZES, injection, simulate
-from imufit.simulate.environment import field_vector, gravity_vector
-from imufit.simulate.noise import Noise, SensorNoise
-from imufit.simulate.sensor import Rows, Setup, readings
-from imufit.simulate.separation import Separation, near
-from imufit.simulate.study import Study
+from imufit.lab.simulate import INJECTIONS, SCENARIOS, SIZES, injection, simulate
+from imufit.lab.simulate.environment import field_vector, gravity_vector
+from imufit.lab.simulate.noise import Noise, SensorNoise
+from imufit.lab.simulate.sensor import Rows, Setup, readings
+from imufit.lab.simulate.separation import Separation, near
+from imufit.lab.simulate.study import Study
 from scipy.spatial.transform import Rotation
 
 QUIET = Noise(acc=SensorNoise(1e-300), gyr=SensorNoise(1e-300), mag=SensorNoise(1e-300), temperature=0.0)

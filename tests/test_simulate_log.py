@@ -3,15 +3,15 @@
 import json
 import time
 
-import imufit.simulate as sim
+import imufit.lab.simulate as sim
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from imufit.lab.simulate import OBSERVABLE, SCENARIOS, SIZES, Noise, SensorNoise, Truth, grade, hidden, simulate
+from imufit.lab.simulate.noise import magnetometer_rows, sampling_times
+from imufit.lab.simulate.sealed import HEADER, seal, sealed_path, unseal
 from imufit.log import Log
-from imufit.simulate import OBSERVABLE, SCENARIOS, SIZES, Noise, SensorNoise, Truth, grade, hidden, simulate
-from imufit.simulate.noise import magnetometer_rows, sampling_times
-from imufit.simulate.sealed import HEADER, seal, sealed_path, unseal
 
 COLUMNS = ("t", "acc", "gyr", "mag", "temp", "ref_q")
 

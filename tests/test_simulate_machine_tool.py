@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from imufit.simulate import Noise, SensorNoise, hidden, simulate
-from imufit.simulate.scenarios import build
+from imufit.lab.simulate import Noise, SensorNoise, hidden, simulate
+from imufit.lab.simulate.scenarios import build
 
 RATE = 180.0
 ANGLES = {"machine_at_1": 1.0, "machine_at_1.5": 1.5, "machine_at_5": 5.0, "machine_move": -5.0}

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from imufit.simulate.environment import FRAMES, GRAVITY, Temperature, field_vector, gravity_vector
-from imufit.simulate.motion import Cruise, Product, Ringing, Sinusoids, Steps, Sum
-from imufit.simulate.rig import Backlash, Flexure, Periodic
-from imufit.simulate.scenarios import SCENARIOS, build
-from imufit.simulate.truth import Kinematics, quaternion_from_matrix, rotation_from_vector
+from imufit.lab.simulate.environment import FRAMES, GRAVITY, Temperature, field_vector, gravity_vector
+from imufit.lab.simulate.motion import Cruise, Product, Ringing, Sinusoids, Steps, Sum
+from imufit.lab.simulate.rig import Backlash, Flexure, Periodic
+from imufit.lab.simulate.scenarios import SCENARIOS, build
+from imufit.lab.simulate.truth import Kinematics, quaternion_from_matrix, rotation_from_vector
 from scipy.spatial.transform import Rotation
 
 STEP = 5e-4

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from imufit.simulate import simulate
-from imufit.simulate.noise import Noise, SensorNoise
-from imufit.simulate.recorder import Recorder
-from imufit.simulate.study import Study
+from imufit.lab.simulate import simulate
+from imufit.lab.simulate.noise import Noise, SensorNoise
+from imufit.lab.simulate.recorder import Recorder
+from imufit.lab.simulate.study import Study
 from scipy.spatial.transform import Rotation
 
 QUIET = Noise(acc=SensorNoise(1e-300), gyr=SensorNoise(1e-300), mag=SensorNoise(1e-300), temperature=0.0)

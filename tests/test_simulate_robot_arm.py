@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from imufit.simulate import Noise, SensorNoise, simulate
-from imufit.simulate.robot_arm import ARM, REACH, STANDING
+from imufit.lab.simulate import Noise, SensorNoise, simulate
+from imufit.lab.simulate.robot_arm import ARM, REACH, STANDING
 from scipy.spatial.transform import Rotation
 
 RATE = 200.0

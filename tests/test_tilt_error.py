@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from imufit.log import Log
-from imufit.replay.stretches import find_stretches
-from imufit.replay.tilt_error import TiltReference, inclination_of_z
+from imufit.replaying.stretches import find_stretches
+from imufit.replaying.tilt_error import TiltReference, inclination_of_z
 from scipy.spatial.transform import Rotation
 
 AXIS = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array([0, 0, 1.0])}

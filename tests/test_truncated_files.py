@@ -18,7 +18,7 @@ import pyarrow as pa
 import pytest
 from foreign_files import WRITERS, Sound, sound, write
 from imufit.errors import InputError
-from imufit.simulate import simulate
+from imufit.lab.simulate import simulate
 from pyarrow import feather
 
 SECONDS, BYTES = 10.0, 1 << 30

@@ -8,12 +8,12 @@ import pytest
 from cli_stand_in import run, strict_json
 from imufit.cli import engine
 from imufit.errors import InputError
+from imufit.lab.simulate import simulate
 from imufit.log import Log
-from imufit.replay import FILTERS, read_settings, replay
-from imufit.simulate import simulate
-from imufit.tune import tune
-from imufit.tune.search import coarse, refine
-from imufit.tune.trials import trials
+from imufit.replaying import FILTERS, read_settings, replay
+from imufit.tuning import tune
+from imufit.tuning.search import coarse, refine
+from imufit.tuning.trials import trials
 
 BIASED = {"gyr.bias": {"x": 0.01, "y": -0.02, "z": 0.01}}
 

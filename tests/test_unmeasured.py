@@ -10,8 +10,8 @@ import pytest
 from imufit import Log
 from imufit.cli.app import main
 from imufit.errors import InputError
+from imufit.lab.simulate import simulate
 from imufit.log import LogStream
-from imufit.simulate import simulate
 
 ROW = 1234
 

@@ -15,8 +15,8 @@ import pytest
 from imufit import InputError, Log, SensorModel
 from imufit.cli.app import main
 from imufit.cli.output import Output
-from imufit.replay import write_settings
-from imufit.simulate import Truth, seal
+from imufit.lab.simulate import Truth, seal
+from imufit.replaying import write_settings
 from imufit.whole_file import whole_file, write_text
 
 MODEL = SensorModel(["gyr.bias"], {"gyr.bias": {"x": 0.01, "y": 0.02, "z": 0.03}})

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cli_stand_in import run, strict_json
-from imufit import Log, SensorModel, effect, ladder, simulate
+from imufit import Log, SensorModel, effect, ladder
 from imufit.errors import InputError
+from imufit.lab import simulate
 from imufit.model.effect import forget
 
 

@@ -49,7 +49,7 @@ SENSOR = {
 
 def ladder() -> imufit.Ladder:
     """Find five effects, each three times as strong as the noise, in two minutes on a robot arm."""
-    log = imufit.simulate.simulate("arm", dict.fromkeys(HIDDEN), size="large").to_log()
+    log = imufit.simulate("arm", dict.fromkeys(HIDDEN), size="large").to_log()
     return imufit.ladder(log)
 
 
@@ -72,8 +72,8 @@ def frames() -> "Figure":
 
 def calibration() -> "Figure":
     """Calibrate the sensor of docs/calibration.md."""
-    log = imufit.simulate.simulate("poses", SENSOR, duration=60.0, seed=1).to_log()
-    return imufit.calibrate.calibrate(log).plot(log)
+    log = imufit.simulate("poses", SENSOR, duration=60.0, seed=1).to_log()
+    return imufit.calibrating.calibrate(log).plot(log)
 
 
 def tilt(folder: Path) -> None:

@@ -1,6 +1,7 @@
 """imufit: find out which physical effect your inertial sensor model is missing, add it, and watch the error fall.
 
-Start with ``log = imufit.read("walk.parquet")`` and ``imufit.ladder(log)``.
+Start with ``imufit.ladder("walk.parquet")``. Every question is a function that takes a log, a file's name, a table of
+pandas or polars, or arrays.
 
 Names are loaded when they are first used, so that ``import imufit`` costs next to nothing.
 """
@@ -8,75 +9,51 @@ Names are loaded when they are first used, so that ``import imufit`` costs next 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from imufit import allan as allan
-    from imufit import calibrate as calibrate
-    from imufit import compare as compare
-    from imufit import device as device
-    from imufit import diagnose as diagnose
-    from imufit import emulate as emulate
+    from imufit import devices as devices
     from imufit import errors as errors
-    from imufit import export as export
-    from imufit import faults as faults
     from imufit import figures as figures
-    from imufit import fit as fit
-    from imufit import grade as grade
-    from imufit import inspection as inspection
-    from imufit import joining as joining
+    from imufit import filters as filters
+    from imufit import lab as lab
     from imufit import log as log
     from imufit import model as model
-    from imufit import monitor as monitor
-    from imufit import record as record
-    from imufit import replay, simulate
     from imufit import report as report
     from imufit import results as results
-    from imufit import tune as tune
     from imufit._imufit import __version__
     from imufit.errors import InputError
-    from imufit.inspection.info import info as info
-    from imufit.inspection.plot import plot as plot
-    from imufit.joining.join import join as join
+    from imufit.exporting import export
+    from imufit.lab.simulate import simulate
     from imufit.log import Log, LogStream, open_log, read
-    from imufit.loop import Fit, SensorModel, ladder
+    from imufit.loop import Fit, SensorModel
     from imufit.model.catalogue import catalogue, explain, load_effects
     from imufit.model.effect import Window, effect
-    from imufit.results import Addition, Comparison, Diagnosis, EffectCard, Ladder, Parameter
+    from imufit.results import Addition, Comparison, Diagnosis, EffectCard, Ladder, ModelComparison, Parameter
+    from imufit.verbs import allan, calibrate, compare, diagnose, fit, info, join, ladder, plot, replay, tune
 else:
     from importlib import import_module
 
-    _MODULES = (
-        "allan",
-        "calibrate",
-        "compare",
-        "device",
-        "diagnose",
-        "emulate",
-        "errors",
-        "export",
-        "faults",
-        "figures",
-        "fit",
-        "grade",
-        "inspection",
-        "joining",
-        "log",
-        "model",
-        "monitor",
-        "record",
-        "replay",
-        "report",
-        "results",
-        "simulate",
-        "tune",
-    )
+    _MODULES = ("devices", "errors", "figures", "filters", "lab", "log", "model", "report", "results")
     _HOMES = {
         "_imufit": ("__version__",),
         "errors": ("InputError",),
-        "inspection": ("info", "plot"),
-        "joining": ("join",),
+        "exporting": ("export",),
+        "lab.simulate": ("simulate",),
         "log": ("Log", "LogStream", "open_log", "read"),
-        "loop": ("Fit", "SensorModel", "ladder"),
+        "loop": ("Fit", "SensorModel"),
         "model": ("Window", "catalogue", "effect", "explain", "load_effects"),
-        "results": ("Addition", "Comparison", "Diagnosis", "EffectCard", "Ladder", "Parameter"),
+        "results": ("Addition", "Comparison", "Diagnosis", "EffectCard", "Ladder", "ModelComparison", "Parameter"),
+        "verbs": (
+            "allan",
+            "calibrate",
+            "compare",
+            "diagnose",
+            "fit",
+            "info",
+            "join",
+            "ladder",
+            "plot",
+            "replay",
+            "tune",
+        ),
     }
 
     def __getattr__(name: str) -> object:
@@ -105,13 +82,20 @@ __all__ = [
     "Ladder",
     "Log",
     "LogStream",
+    "ModelComparison",
     "Parameter",
     "SensorModel",
     "Window",
     "__version__",
+    "allan",
+    "calibrate",
     "catalogue",
+    "compare",
+    "diagnose",
     "effect",
     "explain",
+    "export",
+    "fit",
     "info",
     "join",
     "ladder",
@@ -121,4 +105,5 @@ __all__ = [
     "read",
     "replay",
     "simulate",
+    "tune",
 ]

@@ -1,4 +1,4 @@
-"""The loop as its users hold it: a sensor model that is fitted, compared and applied, its fit, and the ladder.
+"""The loop as its users hold it: a sensor model that is fitted, compared and applied, and its fit.
 
 The steps themselves are functions of the packages below, which know a model as a stack of effects and a fit as that
 stack fitted; both keep the class that they were given.
@@ -6,17 +6,15 @@ stack fitted; both keep the class that they were given.
 
 from __future__ import annotations
 
-from imufit.compare import compare, compare_model
-from imufit.diagnose.add import add
-from imufit.diagnose.diagnose import diagnose
-from imufit.diagnose.ladder import ladder as ladder_from
-from imufit.fit.apply import apply
-from imufit.fit.fitted_stack import FittedStack
-from imufit.log import Log, LogSource
-from imufit.log.several import Logs
+from imufit.comparing import compare, compare_model, compare_two
+from imufit.diagnosing.add import add
+from imufit.diagnosing.diagnose import diagnose
+from imufit.fitting.apply import apply
+from imufit.fitting.fitted_stack import FittedStack
+from imufit.log import AnyLog, AnyLogs, Log, LogSource, log_of, logs_of_any
 from imufit.model.effect_stack import EffectStack
 from imufit.progress import Progress, silent
-from imufit.results import Addition, Comparison, Diagnosis, Ladder
+from imufit.results import Addition, Comparison, Diagnosis, ModelComparison
 
 
 class SensorModel(EffectStack):
@@ -39,12 +37,12 @@ class SensorModel(EffectStack):
         An effect or a parameter is unknown, or an effect stands there twice.
     """
 
-    def fit(self, log: Logs, progress: Progress | None = None) -> Fit:
+    def fit(self, log: AnyLogs, progress: Progress | None = None) -> Fit:
         """Fit the parameters to a log with reference, or to several of one sensor, starting from the present values.
 
         Parameters
         ----------
-        log : Log, LogStream or a sequence of them
+        log : Log, str, Path, DataFrame, mapping of arrays, or a sequence of these
             With at least one sensor and a reference attitude. Several logs share all effects but biases and mounts.
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
@@ -59,14 +57,14 @@ class SensorModel(EffectStack):
         InputError
             The log has no usable reference, or an effect of the model cannot be tested on it.
         """
-        return Fit.of(self, log, progress)
+        return Fit.of(self, logs_of_any(log), progress)
 
-    def compare(self, log: LogSource, progress: Progress | None = None) -> Comparison:
+    def compare(self, log: AnyLog, progress: Progress | None = None) -> Comparison:
         """Say where the model fails on a log, its parameters as they are; nothing is fitted.
 
         Parameters
         ----------
-        log : Log or LogStream
+        log : Log, str, Path, DataFrame or mapping of arrays
             With reference attitude.
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
@@ -81,9 +79,9 @@ class SensorModel(EffectStack):
         InputError
             The log has no usable reference, or an effect of the model cannot be tested on it.
         """
-        return compare_model(self, log, progress or silent)
+        return compare_model(self, log_of(log), progress or silent)
 
-    def apply(self, log: LogSource) -> Log:
+    def apply(self, log: AnyLog) -> Log:
         """Correct a log's readings: take out what the model's effects added to them.
 
         No reference is needed. What effects read of the motion is taken from the corrected readings themselves: an
@@ -95,7 +93,7 @@ class SensorModel(EffectStack):
 
         Parameters
         ----------
-        log : Log or LogStream
+        log : Log, str, Path, DataFrame or mapping of arrays
             Readings as they were recorded. A stream is read into memory.
 
         Returns
@@ -109,7 +107,7 @@ class SensorModel(EffectStack):
             An effect needs a column that the log does not have, or cannot be undone: different inputs give the same
             reading, or none gives it. The effect and, where there is one, the row are named.
         """
-        return apply(self, log)
+        return apply(self, log_of(log))
 
 
 class Fit(FittedStack):
@@ -135,12 +133,12 @@ class Fit(FittedStack):
 
     model: SensorModel
 
-    def compare(self, log: LogSource | None = None, progress: Progress | None = None) -> Comparison:
+    def compare(self, log: AnyLog | None = None, progress: Progress | None = None) -> Comparison:
         """Say where the model fails on a log (default: its own, of several the worst); parameters stay as they are.
 
         Parameters
         ----------
-        log : Log or LogStream, optional
+        log : Log, str, Path, DataFrame or mapping of arrays, optional
             With reference attitude.
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
@@ -150,28 +148,28 @@ class Fit(FittedStack):
         Comparison
             Residuals by channel, against every covariate, by segment and by frequency.
         """
-        return compare(self, log, progress or silent)
+        return compare(self, None if log is None else log_of(log), progress or silent)
 
-    def diagnose(self, log: Logs | None = None, progress: Progress | None = None) -> Diagnosis:
+    def diagnose(self, log: AnyLogs | None = None, progress: Progress | None = None) -> Diagnosis:
         """Say which effect is missing from the model, judged on a log (default: its own); fitted parameters move along.
 
         Parameters
         ----------
-        log : Log, LogStream or a sequence of them, optional
+        log : Log, str, Path, DataFrame, mapping of arrays, or a sequence of these, optional
             With reference attitude.
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
         """
-        return diagnose(self.on(log, progress or silent))
+        return diagnose(self.on(_opened(log), progress or silent))
 
-    def add(self, effect: str, log: Logs | None = None, progress: Progress | None = None) -> Addition:
+    def add(self, effect: str, log: AnyLogs | None = None, progress: Progress | None = None) -> Addition:
         """Add an effect to the model and refit.
 
         Parameters
         ----------
         effect : str
             Id such as ``gyr.g_sensitivity``.
-        log : Log, LogStream or a sequence of them, optional
+        log : Log, str, Path, DataFrame, mapping of arrays, or a sequence of these, optional
             Logs to fit to; default: its own.
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
@@ -186,29 +184,25 @@ class Fit(FittedStack):
         InputError
             The effect is unknown, in the model already, or cannot be tested on this log.
         """
-        return add(self.on(log, progress or silent), effect)
+        return add(self.on(_opened(log), progress or silent), effect)
+
+    def against(self, other: Fit, progress: Progress | None = None) -> ModelComparison:
+        """Hold another model that was fitted to the same log against this one.
+
+        Parameters
+        ----------
+        other : Fit
+            The second model.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+
+        Raises
+        ------
+        InputError
+            The two were fitted to different logs.
+        """
+        return compare_two(self, other, progress or silent)
 
 
-def ladder(log: Logs, model: SensorModel | None = None, progress: Progress | None = None) -> Ladder:
-    """Repeat diagnose and add until nothing is missing, or until the log cannot tell what is.
-
-    Parameters
-    ----------
-    log : Log, LogStream or a sequence of them
-        With reference attitude, or with rests that stand in for one; several logs are of one sensor.
-    model : SensorModel, optional
-        Where to start from; default: the ideal sensor.
-    progress : callable, optional
-        Called with (rows done, rows in all, what is being done).
-
-    Returns
-    -------
-    Ladder
-        Every step with the held-out error before, expected and after, the final model and verdict.
-
-    Raises
-    ------
-    InputError
-        The log has no usable reference, or an effect of the model cannot be tested on it.
-    """
-    return ladder_from((model or SensorModel()).fit(log, progress), progress)
+def _opened(log: AnyLogs | None) -> tuple[LogSource, ...] | None:
+    return None if log is None else logs_of_any(log)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from imufit.grade.noises import NOISES
-from imufit.simulate import Noise, SensorNoise, simulate
+from imufit.lab.grade.noises import NOISES
+from imufit.lab.simulate import Noise, SensorNoise, simulate
 
 
 def test_noise_doubles_at_one_radian_a_second_and_is_plain_at_rest():

@@ -3,9 +3,9 @@
 from types import SimpleNamespace
 
 import pytest
-from imufit.grade.mark import Answer, Marks, marked
-from imufit.grade.puzzle import Puzzle
-from imufit.grade.wilson import interval
+from imufit.lab.grade.mark import Answer, Marks, marked
+from imufit.lab.grade.puzzle import Puzzle
+from imufit.lab.grade.wilson import interval
 from scipy.stats import binomtest
 
 DELAY, LAG, BIAS = "acc.delay", "acc.lowpass", "acc.bias"

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from imufit.simulate import INJECTIONS, OUTSIDE, Noise, SensorNoise, simulate
-from imufit.simulate.outside import beyond, past, play, vee
+from imufit.lab.simulate import INJECTIONS, OUTSIDE, Noise, SensorNoise, simulate
+from imufit.lab.simulate.outside import beyond, past, play, vee
 
 QUIET = Noise(acc=SensorNoise(1e-300), gyr=SensorNoise(1e-300), mag=SensorNoise(1e-300), temperature=0.0)
 COLUMNS = ("motor_current", "vbat")

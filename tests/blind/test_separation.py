@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from imufit.simulate import Line, Noise, SensorNoise
-from imufit.simulate.separation import Separation, near, whitening
-from imufit.simulate.study import Study
+from imufit.lab.simulate import Line, Noise, SensorNoise
+from imufit.lab.simulate.separation import Separation, near, whitening
+from imufit.lab.simulate.study import Study
 from scipy.signal import lfilter
 
 STEP, SHARE = 0.1, 10

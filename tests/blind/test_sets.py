@@ -9,10 +9,10 @@ import secrets
 
 import numpy as np
 import pytest
-from imufit.grade import SETS, BlindGrade, draw, grade, plan, trial
-from imufit.grade.drawing import effects
-from imufit.grade.pairs import PAIRS
-from imufit.simulate import INJECTIONS, OUTSIDE
+from imufit.lab.grade import SETS, BlindGrade, draw, grade, plan, trial
+from imufit.lab.grade.drawing import effects
+from imufit.lab.grade.pairs import PAIRS
+from imufit.lab.simulate import INJECTIONS, OUTSIDE
 
 SEED = int(os.environ.get("IMUFIT_SEED", secrets.randbelow(10**6)))
 SURE = tuple(name for name in SETS if name not in ("small", "small-realistic", "outside"))

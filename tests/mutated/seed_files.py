@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from imufit.record.arrived import Announced, Arrived
-from imufit.record.part import PartFile
+from imufit.devices.record.arrived import Announced, Arrived
+from imufit.devices.record.part import PartFile
 
 from mutated.column_mutations import Columns
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from imufit import Log, _imufit
-from imufit.calibrate import calibrate
+from imufit.calibrating import calibrate
 from imufit.errors import InputError
 
 few = settings(max_examples=60, deadline=None)

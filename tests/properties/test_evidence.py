@@ -11,11 +11,12 @@ import pytest
 from engine import NO_FILTERS, analysis_of, pieces, swaying
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from imufit import Log, _imufit, ladder, simulate
-from imufit.fit import passes
-from imufit.fit.passes import CHANNELS, chunk_arrays
+from imufit import Log, _imufit, ladder
+from imufit.fitting import passes
+from imufit.fitting.passes import CHANNELS, chunk_arrays
+from imufit.lab import simulate
+from imufit.lab.simulate import Noise
 from imufit.log.log import concatenate
-from imufit.simulate import Noise
 
 BLOCKS = 12
 FILTERS = [[0.6, -0.2, 0.1], [0.4], [], [0.3, 0.1], [0.5], [0.2], [0.7, -0.1], [], [0.3]]
@@ -165,7 +166,8 @@ def test_answers_do_not_depend_on_the_size_of_chunks(effects, monkeypatch):
 
 SCRIPT = """
 import json
-from imufit import ladder, simulate
+from imufit import ladder
+from imufit.lab import simulate
 log = simulate.simulate("arm", {"acc.bias": None, "gyr.scale": None}, 2, 40.0, size="large").to_log()
 answer = ladder(log)
 print(json.dumps([answer.to_dict(), answer.diagnosis.to_dict(), answer.comparison_end.to_dict()], sort_keys=True))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from imufit import SensorModel, read
-from imufit.calibrate import calibrate, find_poses
+from imufit.calibrating import calibrate, find_poses
 from imufit.errors import InputError
 from imufit.log import parse_mapping
 from recording import recording

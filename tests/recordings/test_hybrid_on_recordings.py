@@ -7,7 +7,7 @@ from pathlib import Path
 
 import imufit
 import pytest
-from imufit.compare.attitude import corrected
+from imufit.comparing.attitude import corrected
 from recording import recording
 
 BENCH = Path(__file__).resolve().parents[2] / "benches" / "robot_arm.py"

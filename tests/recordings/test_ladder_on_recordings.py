@@ -9,7 +9,7 @@ import imufit
 import numpy as np
 import pytest
 from imufit import Ladder, Log
-from imufit.replay import replay
+from imufit.replaying import replay
 from recording import recording
 
 BROAD = (

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import imufit
 import pytest
-from imufit.replay import replay
+from imufit.replaying import replay
 from recording import recording
 
 

@@ -4,7 +4,7 @@ import imufit
 import numpy as np
 import pytest
 from imufit import Log
-from imufit.replay import replay
+from imufit.replaying import replay
 from imufit.results import TiltComparison
 from recording import recording
 from scipy.spatial.transform import Rotation

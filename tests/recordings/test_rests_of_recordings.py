@@ -2,7 +2,7 @@
 
 import pytest
 from imufit import SensorModel, open_log, read
-from imufit.calibrate import calibrate
+from imufit.calibrating import calibrate
 from imufit.errors import InputError
 from recording import recording
 

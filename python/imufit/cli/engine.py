@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from imufit.emulate import Emulator
-    from imufit.grade import BlindGrade
+    from imufit.devices.emulate import Emulator
     from imufit.joining import Joined
+    from imufit.lab.grade import BlindGrade
+    from imufit.lab.simulate import Grade, Simulation, Truth
     from imufit.log import Contents, Log, Reading
     from imufit.log.metadata import Frame
     from imufit.results import EffectCard, Ladder, LogInfo, Recording
-    from imufit.simulate import Grade, Simulation, Truth
 
 Progress = Callable[[int, int, str], None]
 
@@ -68,7 +68,7 @@ def read_log(
 
 def calibrate(logs: Sequence[Log], cost: str | None, sensors: Sequence[str], settings: Mapping[str, float]) -> Any:
     """Calibrate a sensor from its logs; no sensors named means all."""
-    from imufit.calibrate import calibrate  # noqa: PLC0415
+    from imufit.calibrating import calibrate  # noqa: PLC0415
 
     return calibrate(list(logs), cost, sensors=sensors or ("acc", "gyr", "mag"), settings=settings)
 
@@ -77,7 +77,7 @@ def calibrate_live(
     port: str, keep: Path, mapping: Mapping[str, str] | None, *, sensors: Sequence[str], **options: Any
 ) -> tuple[Any, Log]:
     """Guide through a calibration of the device at `port`; return it and the log that was kept."""
-    from imufit.calibrate import calibrate_live  # noqa: PLC0415
+    from imufit.devices.calibrate_live import calibrate_live  # noqa: PLC0415
 
     chosen = sensors or ("acc", "gyr", "mag")
     return calibrate_live(port, keep, mapping=mapping, sensors=chosen, **options)
@@ -136,7 +136,7 @@ def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
 
 def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     """Repeat diagnose and add until nothing is missing."""
-    from imufit.loop import ladder  # noqa: PLC0415
+    from imufit.verbs import ladder  # noqa: PLC0415
 
     return ladder(logs, model=model, progress=progress)
 
@@ -176,7 +176,7 @@ def load_effects(path: Path) -> None:
 
 def filter_settings() -> Mapping[str, Mapping[str, Any]]:
     """Return the settings of each filter and of the replay's rules: default, unit, meaning by name."""
-    from imufit.replay import SETTINGS  # noqa: PLC0415
+    from imufit.replaying import SETTINGS  # noqa: PLC0415
 
     return SETTINGS
 
@@ -192,7 +192,7 @@ def replay(
         A filter lacks its sensor, or a setting cannot be.
     """
     from imufit.errors import InputError  # noqa: PLC0415
-    from imufit.replay import replay  # noqa: PLC0415
+    from imufit.replaying import replay  # noqa: PLC0415
 
     try:
         return replay(log, filters=tuple(filters), settings=settings, progress=progress)
@@ -204,14 +204,14 @@ def replay(
 
 def allan(log: Log, progress: Progress) -> Any:
     """Take the Allan deviation of each sensor over the longest rest of a log."""
-    from imufit.allan import allan  # noqa: PLC0415
+    from imufit.allan_deviation import allan  # noqa: PLC0415
 
     return allan(log, progress=progress)
 
 
 def filter_noise(found: Any) -> dict[str, dict[str, float]]:
     """Return the noise settings of the filters that follow from an Allan deviation."""
-    from imufit.allan import filter_noise  # noqa: PLC0415
+    from imufit.allan_deviation import filter_noise  # noqa: PLC0415
 
     return filter_noise(found)
 
@@ -225,7 +225,7 @@ def tune(log: Log, filter_name: str, progress: Progress, **options: Any) -> Any:
         The log lacks what this takes, or a setting cannot be.
     """
     from imufit.errors import InputError  # noqa: PLC0415
-    from imufit.tune import tune  # noqa: PLC0415
+    from imufit.tuning import tune  # noqa: PLC0415
 
     try:
         return tune(log, filter_name, progress=progress, **options)
@@ -237,7 +237,7 @@ def tune(log: Log, filter_name: str, progress: Progress, **options: Any) -> Any:
 
 def write_settings(settings: Mapping[str, Mapping[str, float]], path: Path) -> None:
     """Write settings of filters as TOML, one table a filter."""
-    from imufit.replay import write_settings  # noqa: PLC0415
+    from imufit.replaying import write_settings  # noqa: PLC0415
 
     write_settings(settings, path)
 
@@ -250,7 +250,7 @@ def read_settings(path: Path) -> dict[str, dict[str, float]]:
     InputError
         No TOML, or no table of numbers; the place is named.
     """
-    from imufit.replay import read_settings  # noqa: PLC0415
+    from imufit.replaying import read_settings  # noqa: PLC0415
 
     return read_settings(path)
 
@@ -269,7 +269,7 @@ def export(path: Path, form: str) -> str:
         The model has nothing to export, or a gain without inverse; the file is named.
     """
     from imufit.errors import InputError  # noqa: PLC0415
-    from imufit.export import export  # noqa: PLC0415
+    from imufit.exporting import export  # noqa: PLC0415
 
     model = sensor_model(path=path)
     try:
@@ -296,21 +296,21 @@ def changes(recorded: Log, corrected: Log) -> dict[str, dict[str, Any]]:
 
 def scenarios() -> dict[str, str]:
     """Return the scenarios that can be simulated, with what happens in each."""
-    from imufit.simulate.scenarios import SCENARIOS  # noqa: PLC0415
+    from imufit.lab.simulate.scenarios import SCENARIOS  # noqa: PLC0415
 
     return {name: scenario.description for name, scenario in SCENARIOS.items()}
 
 
 def injections() -> list[str]:
     """Return the effects that can be simulated."""
-    from imufit.simulate.injections import INJECTIONS  # noqa: PLC0415
+    from imufit.lab.simulate.injections import INJECTIONS  # noqa: PLC0415
 
     return list(INJECTIONS)
 
 
 def faults() -> list[str]:
     """Return the faults of the data that can be simulated."""
-    from imufit.simulate.faults import FAULTS  # noqa: PLC0415
+    from imufit.lab.simulate.faults import FAULTS  # noqa: PLC0415
 
     return list(FAULTS)
 
@@ -324,7 +324,7 @@ def with_fault(simulation: Simulation, fault: str) -> Simulation:
         The log has not the sensor that the fault needs.
     """
     from imufit.errors import InputError  # noqa: PLC0415
-    from imufit.simulate.faults import with_fault  # noqa: PLC0415
+    from imufit.lab.simulate.faults import with_fault  # noqa: PLC0415
 
     try:
         return with_fault(simulation, fault)
@@ -341,7 +341,7 @@ def simulate(scenario: str, effects: Mapping[str, Mapping[str, float] | None], *
         The scenario cannot have such an effect, or a setting cannot be.
     """
     from imufit.errors import InputError  # noqa: PLC0415
-    from imufit.simulate import simulate  # noqa: PLC0415
+    from imufit.lab.simulate import simulate  # noqa: PLC0415
 
     try:
         return simulate(scenario, effects, **settings)
@@ -352,7 +352,7 @@ def simulate(scenario: str, effects: Mapping[str, Mapping[str, float] | None], *
 def hidden(scenario: str, seed: int, **settings: Any) -> Simulation:
     """Simulate a log with an effect that the seed picks."""
     from imufit.errors import InputError  # noqa: PLC0415
-    from imufit.simulate import hidden  # noqa: PLC0415
+    from imufit.lab.simulate import hidden  # noqa: PLC0415
 
     try:
         simulation, _ = hidden(scenario, seed, **settings)
@@ -382,7 +382,7 @@ def log_of(simulation: Simulation) -> Log:
 
 def save_simulation(simulation: Simulation, path: Path) -> Path:
     """Write the log to `path` and its sealed truth beside it; return where that is."""
-    from imufit.simulate import seal  # noqa: PLC0415
+    from imufit.lab.simulate import seal  # noqa: PLC0415
 
     log_of(simulation).write(path)
     return seal(simulation.truth, path)
@@ -404,10 +404,10 @@ def emulator(
     InputError
         It cannot be emulated; the message says why.
     """
-    from imufit.emulate import Clock, Emulator, parse_fault_rate  # noqa: PLC0415
+    from imufit.devices.emulate import Clock, Emulator, parse_fault_rate  # noqa: PLC0415
     from imufit.errors import InputError  # noqa: PLC0415
+    from imufit.lab.simulate import SCENARIOS  # noqa: PLC0415
     from imufit.log import Reading  # noqa: PLC0415
-    from imufit.simulate import SCENARIOS  # noqa: PLC0415
 
     rates = dict(parse_fault_rate(text) for text in fault_rates)
     given: str | Log = source
@@ -421,7 +421,7 @@ def emulator(
 @contextmanager
 def running(device: Emulator) -> Iterator[None]:
     """Let a device run until it has sent everything or is asked to end, also where Ctrl-C is ignored at the start."""
-    from imufit.record.signals import requests_to_end  # noqa: PLC0415
+    from imufit.devices.record.signals import requests_to_end  # noqa: PLC0415
 
     with requests_to_end() as asked, device:
         yield
@@ -438,7 +438,7 @@ def unseal(path: Path) -> Truth:
         There is no sealed truth beside the log, or it is damaged.
     """
     from imufit.errors import InputError  # noqa: PLC0415
-    from imufit.simulate import unseal  # noqa: PLC0415
+    from imufit.lab.simulate import unseal  # noqa: PLC0415
 
     try:
         return unseal(path)
@@ -448,61 +448,61 @@ def unseal(path: Path) -> Truth:
 
 def grade_answer(truth: Truth, answer: Mapping[str, Any]) -> Grade:
     """Judge the JSON of `diagnose` or `ladder` against the truth."""
-    from imufit.simulate import grade  # noqa: PLC0415
+    from imufit.lab.simulate import grade  # noqa: PLC0415
 
     return grade(truth, answer)
 
 
 def blind_sets() -> Mapping[str, str]:
     """Return the sets of blind logs with what they hide."""
-    from imufit.grade import SETS  # noqa: PLC0415
+    from imufit.lab.grade import SETS  # noqa: PLC0415
 
     return {name: blind_set.title for name, blind_set in SETS.items()}
 
 
 def grade_blind(*, sets: Sequence[str], logs: int, seed: int, processes: int | None, progress: Progress) -> BlindGrade:
     """Run the blind protocol on many hidden logs."""
-    from imufit.grade import grade  # noqa: PLC0415
+    from imufit.lab.grade import grade  # noqa: PLC0415
 
     return grade(sets, logs=logs, seed=seed, processes=processes, progress=progress)
 
 
 def status_line(mapping: Sequence[str], quiet: bool, **options: Any) -> Any:
     """Return the status line of a recording; `mapping` holds texts such as ``acc_x=AccX[g]``."""
+    from imufit.devices.record.status import StatusLine  # noqa: PLC0415
     from imufit.log import parse_mapping  # noqa: PLC0415
-    from imufit.record.status import StatusLine  # noqa: PLC0415
 
     return StatusLine(parse_mapping(*mapping) or None, quiet, **options)
 
 
 def rig(axis: str, angle: str, say: Callable[[str], None]) -> Any:
     """Return a one-axis rig at an angle such as ``5deg``, whose next angles are typed into the terminal."""
-    from imufit.record import Rig, TypedAngles  # noqa: PLC0415
-    from imufit.record.rig import angle_of  # noqa: PLC0415
+    from imufit.devices.record import Rig, TypedAngles  # noqa: PLC0415
+    from imufit.devices.record.rig import angle_of  # noqa: PLC0415
 
     return Rig(axis, angle_of(angle), TypedAngles(say))  # type: ignore[arg-type]
 
 
 def record(port: str, path: Path, mapping: Sequence[str], **options: Any) -> Recording:
     """Record a device; `mapping` as for `status_line`."""
+    from imufit.devices.record import record  # noqa: PLC0415
     from imufit.log import parse_mapping  # noqa: PLC0415
-    from imufit.record import record  # noqa: PLC0415
 
     return record(port, path, mapping=parse_mapping(*mapping) or None, **options)
 
 
 def recover(file: Path, path: Path | None, **options: Any) -> Recording:
     """Make a log of what a crash left."""
-    from imufit.record import recover  # noqa: PLC0415
+    from imufit.devices.record import recover  # noqa: PLC0415
 
     return recover(file, path, **options)
 
 
 def monitor(port: str, filters: Sequence[str], mapping: Sequence[str], model: Any, **options: Any) -> Iterator[Any]:
     """Give states of a device until it is stopped; `mapping` as for `status_line`."""
+    from imufit.devices.monitor import Monitor  # noqa: PLC0415
+    from imufit.devices.record.signals import requests_to_end  # noqa: PLC0415
     from imufit.log import parse_mapping  # noqa: PLC0415
-    from imufit.monitor import Monitor  # noqa: PLC0415
-    from imufit.record.signals import requests_to_end  # noqa: PLC0415
 
     chosen = parse_mapping(*mapping) or None
     with (

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.live import Live
     from rich.table import Table
 
-    from imufit.calibrate import Stage
+    from imufit.calibrating import Stage
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
 BAR = 30

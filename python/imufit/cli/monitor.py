@@ -20,7 +20,7 @@ from imufit.printable import printable
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from imufit.monitor import MonitorState
+    from imufit.devices.monitor import MonitorState
 
 
 @click.command(short_help="Attitude of a running device by several filters at once.")

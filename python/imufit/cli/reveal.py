@@ -13,7 +13,7 @@ from imufit.cli.arguments import EXISTING, json_option
 from imufit.cli.output import Output
 
 if TYPE_CHECKING:
-    from imufit.simulate import Grade, Truth
+    from imufit.lab.simulate import Grade, Truth
 
 
 def parameter_units() -> dict[str, dict[str, str]]:

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.replay.clipped import end_of_range
+from imufit.replaying.clipped import end_of_range
 from imufit.results import fault_words
 from imufit.results.data_fault import DataFault
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class ChannelLike(Protocol):
-    """What one curve needs; `imufit.allan.Channel` has it."""
+    """What one curve needs; `imufit.allan_deviation.Channel` has it."""
 
     @property
     def name(self) -> str:

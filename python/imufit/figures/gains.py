@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class MapLike(Protocol):
-    """What the map needs; `imufit.tune.GainMap` has it."""
+    """What the map needs; `imufit.tuning.GainMap` has it."""
 
     @property
     def names(self) -> tuple[str, str]:
@@ -36,7 +36,7 @@ class MapLike(Protocol):
 
 
 class GainLike(Protocol):
-    """What one line needs; `imufit.tune.Gain` has it."""
+    """What one line needs; `imufit.tuning.Gain` has it."""
 
     @property
     def name(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from io import BytesIO
 from typing import TYPE_CHECKING
 
 from matplotlib.category import StrCategoryFormatter
@@ -54,6 +55,12 @@ class PlainFigure(Figure):
             if text not in numbers:
                 text.set_parse_math(False)
         super().draw(renderer)
+
+    def _repr_png_(self) -> bytes:
+        """Show the figure in a notebook, where only figures of pyplot show themselves."""
+        held = BytesIO()
+        self.savefig(held, format="png")
+        return held.getvalue()
 
 
 def new_figure(width: float, height: float) -> Figure:

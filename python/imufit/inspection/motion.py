@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.fit.range_end import RangeEnd
+from imufit.fitting.range_end import RangeEnd
 from imufit.log import Log, LogSource
 from imufit.log.size import BLOCK_ROWS
 from imufit.results.log_info import ClippedInfo, MotionInfo

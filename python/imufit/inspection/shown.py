@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit._imufit import Status
-from imufit.diagnose.column_noise import column_noise
-from imufit.diagnose.diagnose import POWER
+from imufit.diagnosing.column_noise import column_noise
+from imufit.diagnosing.diagnose import POWER
 from imufit.errors import InputError
-from imufit.fit.analysis import Analysis
-from imufit.fit.passes import CHANNELS
-from imufit.fit.surveyed_log import SurveyedLog
+from imufit.fitting.analysis import Analysis
+from imufit.fitting.passes import CHANNELS
+from imufit.fitting.surveyed_log import SurveyedLog
 from imufit.log import Contents, LogSource
 from imufit.log.columns import SENSOR_NAMES
 from imufit.model.catalogue import effects, find_effect

@@ -180,7 +180,7 @@ def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, 
         frame=reference.metadata.frame,
         extra={**log.metadata.extra, "lag": aligned.lag, "skew": aligned.skew, "mount": mount.tolist()},
     )
-    return Log(
+    return Log.of_fields(
         t=np.asarray(t[order]),
         acc=laid(log.acc),
         gyr=laid(log.gyr),

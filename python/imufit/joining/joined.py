@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from imufit.joining.mount import SMALL, words
 from imufit.log import Log
+from imufit.results.result import Result
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
@@ -55,8 +56,8 @@ class RateTrace:
         return -self.overlap * float(np.log(max(self.left, 1e-12)))
 
 
-@dataclass(frozen=True, eq=False)
-class Joined:
+@dataclass(frozen=True, eq=False, repr=False)
+class Joined(Result):
     """Two recordings as one log.
 
     Attributes
@@ -112,6 +113,10 @@ class Joined:
                 (f"The sensor is turned by {angle:.1f} deg besides: `ref.alignment` finds it.",) if angle > 0.05 else ()
             )
         return ("The sensor's axes are not parallel to those of the reference body: the whole turn was applied.",)
+
+    def sentences(self) -> list[str]:
+        """Return the answer and the remarks."""
+        return [self.sentence, *self.remarks]
 
     def tables(self) -> tuple[Table, ...]:
         """Lag, skew, mount and overlap."""

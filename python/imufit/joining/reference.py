@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -61,7 +60,7 @@ def with_attitude(log: Log, kind: str, columns: Sequence[str], inverse: bool = F
         q = q * CONJUGATE
     used = {name.removesuffix(_DEGREES).removesuffix(_RADIANS) for name in columns}
     covariates = {name: column for name, column in log.covariates.items() if name not in used}
-    return replace(log, ref_q=q, covariates=covariates)
+    return log.with_fields(ref_q=q, covariates=covariates)
 
 
 def _attitudes(log: Log, kind: str, columns: Sequence[str], values: Array) -> Array:

@@ -1,8 +1,10 @@
 """Log files: read, check, convert, write."""
 
 from imufit.errors import InputError
+from imufit.log.anything import AnyLog, AnyLogs, log_of, logs_of_any
 from imufit.log.contents import Contents, contents
 from imufit.log.excerpt import judged_rows
+from imufit.log.frame import FrameSource
 from imufit.log.log import Chunk, Log, LogSource, concatenate, whole
 from imufit.log.metadata import Metadata
 from imufit.log.reading import Reading, parse_noise
@@ -12,8 +14,11 @@ from imufit.log.stream import LogStream, open_log, read
 from imufit.log.units import parse_mapping
 
 __all__ = [
+    "AnyLog",
+    "AnyLogs",
     "Chunk",
     "Contents",
+    "FrameSource",
     "InputError",
     "Log",
     "LogSource",
@@ -25,6 +30,8 @@ __all__ = [
     "contents",
     "gaps",
     "judged_rows",
+    "log_of",
+    "logs_of_any",
     "open_log",
     "parse_mapping",
     "parse_noise",

@@ -1,72 +1,79 @@
-"""From a pandas table to the checked fields of a log."""
+"""A table of pandas as a source of blocks, so that it is read as a file of the same columns is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.log.assemble import check_truth_values, fields_of, time_of
-from imufit.log.foreign import plan_columns
-from imufit.log.metadata import Metadata
-from imufit.log.place import Place
-from imufit.log.time_order import TimeScan
-from imufit.log.unit_check import HEAD, Clock, check_units
-from imufit.log.unmeasured import Unmeasured
+from imufit.errors import InputError
+from imufit.log.size import BLOCK_ROWS
 
 if TYPE_CHECKING:
     import pandas as pd
 
+INDEX: Final = "time"
+"""Name of an index of dates that has none of its own: pandas keeps the time of a series there."""
 
-def fields_from_frame(df: pd.DataFrame, mapping: Mapping[str, str] | None, metadata: Metadata) -> dict[str, Any]:
-    """Check a table as if it were a file, and make the fields of a log.
+
+class FrameSource:
+    """A pandas table as a source of blocks.
+
+    An index that has a name, or that holds dates, is a column like the others.
 
     Parameters
     ----------
     df : DataFrame
         Columns as in a log file.
-    mapping : mapping or None
-        Source text for target columns.
-    metadata : Metadata
-        Frame, gravity and so on.
-
-    Returns
-    -------
-    dict
-        Fields as in `imufit.log.Log`.
     """
-    place = Place()
-    names = [str(name) for name in df.columns]
-    plan = plan_columns(names, mapping, place)
-    if df.empty:
-        raise place.error("the table has no rows")
-    block = {name: _column(df.iloc[:, names.index(name)]) for name in plan.sources}
-    truths = {name: (None, "") for name, cells in block.items() if cells.dtype == np.bool_}
-    check_truth_values(plan, truths, place)
-    block = {name: cells if cells.dtype == object else cells.astype(np.float64) for name, cells in block.items()}
-    scan = TimeScan(place, abs(plan.time.conversion.factor))
-    scan.add(time_of(plan, block, 0, len(df), place))
-    repair = scan.finish()
-    unmeasured = Unmeasured(place)
-    fields = fields_of(plan, block, 0, len(df), repair=repair, metadata=metadata, place=place, unmeasured=unmeasured)
-    unmeasured.check()
-    sensors: dict[str, NDArray[np.float64] | None] = {
-        name: fields[name][:HEAD] for name in ("acc", "gyr", "mag", "ref_q", "temp") if name in fields
-    }
-    clock: Clock = "stated" if "t" in (mapping or {}) else "a log's" if metadata != Metadata() else "open"
-    odd = check_units(fields["t"][:HEAD], sensors, metadata, place, plan.origin, clock)
-    notes = tuple(note for note in (*plan.notes, repair.note, *odd, *unmeasured.notes) if note)
-    return {**fields, "metadata": metadata, "notes": notes}
+
+    def __init__(self, df: pd.DataFrame) -> None:
+        import pandas as pd  # noqa: PLC0415  heavy, and only needed here
+
+        if isinstance(df.index, pd.DatetimeIndex | pd.TimedeltaIndex) and df.index.name is None:
+            df = df.rename_axis(INDEX)
+        if df.index.name is not None and df.index.name not in df.columns:
+            df = df.reset_index()
+        self._columns = {str(name): df.iloc[:, place] for place, name in enumerate(df.columns)}
+        if len(self._columns) < df.shape[1]:
+            names = [str(name) for name in df.columns]
+            twice = next(name for name in names if names.count(name) > 1)
+            raise InputError("the table has this column twice", file="log", column=twice, remedy="Rename one of them.")
+        self.n = len(df)
+        self.names = tuple(self._columns)
+        self.notes: tuple[str, ...] = ()
+        self.clues: tuple[str, ...] = ()
+        self.embedded: Mapping[str, Any] = {}
+        self.truths: dict[str, tuple[int | None, str]] = {
+            name: (None, "") for name, column in self._columns.items() if column.dtype == np.bool_
+        }
+        self.text = frozenset(name for name, column in self._columns.items() if _as_array(column[:0]).dtype == object)
+
+    def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
+        """Give the named columns block by block."""
+        yield from self.blocks(columns)
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
+        """Give the named columns block by block."""
+        for start in range(0, self.n, BLOCK_ROWS):
+            rows = min(BLOCK_ROWS, self.n - start)
+            yield start, rows, {name: _as_array(self._columns[name][start : start + rows]) for name in columns}
+
+    def line_of(self, row: int) -> int | None:
+        """Tables have no lines."""
 
 
-def _column(column: pd.Series[Any]) -> NDArray[Any]:
-    """Give (n,) bool for truth values, (n,) float64 for other numbers, (n,) objects for the rest; always a copy."""
+def _as_array(column: pd.Series[Any]) -> NDArray[Any]:
+    """Give (n,) float64 for numbers and for dates (s since 1970), (n,) objects for the rest; always a copy."""
     import pandas as pd  # noqa: PLC0415  heavy, and only needed here
 
-    if column.dtype == np.bool_:
-        return column.to_numpy(copy=True)
+    if pd.api.types.is_datetime64_any_dtype(column.dtype):
+        dates = pd.DatetimeIndex(column)
+        return np.asarray((dates - pd.Timestamp(0, tz=dates.tz)) / pd.Timedelta(seconds=1), dtype=np.float64)
+    if pd.api.types.is_timedelta64_dtype(column.dtype):
+        return np.asarray(pd.TimedeltaIndex(column) / pd.Timedelta(seconds=1), dtype=np.float64)
     if pd.api.types.is_numeric_dtype(column.dtype) and not pd.api.types.is_complex_dtype(column.dtype):
         return column.to_numpy(dtype=np.float64, na_value=np.nan, copy=True)
     cells = np.empty(len(column), dtype=object)

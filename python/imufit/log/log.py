@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
+from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,27 +21,36 @@ from imufit.log.arrays import (
     rotation_from_quaternions,
 )
 from imufit.log.columns import GROUPS, present
-from imufit.log.frame import fields_from_frame
 from imufit.log.metadata import Metadata
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.size import BLOCK_ROWS
+from imufit.log.unit_check import Clock
 from imufit.log.writer import write_rows
 
 if TYPE_CHECKING:
     import pandas as pd
+    import polars as pl
+    import pyarrow as pa
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Text = NDArray[np.object_]
 
 _WIDTHS = {"t": 0, "acc": 3, "gyr": 3, "mag": 3, "temp": 0, "ref_q": 4, "ref_p": 3, "ref_angle": 0}
+METADATA = "imufit"
+"""Name under which the metadata stand with a table of pandas or Arrow."""
+HEAD_ROWS = 5
+"""Rows that a notebook shows of a log: as many as pandas shows of a table by ``head``."""
 _SINGLE = ("temp", "ref_angle")
+_EMPTY: dict[str, Any] = {"covariates": {}, "labels": {}, "metadata": Metadata(), "notes": ()}
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, init=False)
 class Log:
     """A log in memory; n rows.
 
-    NaN in a sensor, `temp`, a reference or a covariate is a missing sample.
+    NaN in a sensor, `temp`, a reference or a covariate is a missing sample. Arrays are taken as SI units and checked as
+    the rows of a file are; units are not guessed at.
 
     Parameters
     ----------
@@ -50,24 +60,33 @@ class Log:
         Specific force, m/s^2; angular rate, rad/s; magnetic flux density, uT; all in the body frame.
     temp : (n,) array, optional
         Sensor temperature, degC.
-    ref_q : (n, 4) array, optional
-        Reference attitude as unit quaternions, scalar first: body vectors into the reference frame.
+    attitude : scipy.spatial.transform.Rotation or (n, 4) array, optional
+        Reference attitude, body to reference frame; an array holds quaternions, scalar first.
     ref_p : (n, 3) array, optional
         Reference position in the reference frame, m.
     ref_angle : (n,) array, optional
-        Commanded angle of a one-axis rig, rad.
-    pose : (n,) object array, optional
+        Commanded angle of a one-axis rig, rad; with the metadata `rig_axis` and no attitude it makes the attitude.
+    pose : sequence of str or None, optional
         Label of a static pose, None where there is none.
-    covariates : dict of (n,) arrays
+    covariates : mapping of (n,) arrays, optional
         Other numeric columns by name.
-    labels : dict of (n,) object arrays
+    labels : mapping of sequences of str or None, optional
         Other text columns by name, None where there is no text.
-    metadata : Metadata
+    metadata : Metadata or mapping, optional
         Frame, gravity, field, rig axis, noise.
     path : Path, optional
         File that the log was read from.
     notes : tuple of str
         What reading noticed or changed.
+    ref_q : (n, 4) array, optional
+        `attitude` under the name of its columns.
+    **more
+        Entries of the metadata: ``Log(t, gyr=gyr, frame="ENU")``.
+
+    Raises
+    ------
+    InputError
+        An array cannot be, or has a name that a log does not know.
     """
 
     t: Array
@@ -85,18 +104,79 @@ class Log:
     path: Path | None = None
     notes: tuple[str, ...] = ()
 
-    def __post_init__(self) -> None:
-        n = len(self.t)
-        for name, width in _WIDTHS.items():
-            values = getattr(self, name)
-            if values is not None:
-                shape = (n, width) if width else (n,)
-                object.__setattr__(self, name, contiguous(values, name, shape))
-        covariates = {name: contiguous(values, name, (n,)) for name, values in self.covariates.items()}
-        object.__setattr__(self, "covariates", covariates)
+    def __init__(
+        self,
+        t: ArrayLike,
+        acc: ArrayLike | None = None,
+        gyr: ArrayLike | None = None,
+        mag: ArrayLike | None = None,
+        temp: ArrayLike | None = None,
+        *,
+        attitude: Rotation | ArrayLike | None = None,
+        ref_p: ArrayLike | None = None,
+        ref_angle: ArrayLike | None = None,
+        pose: Sequence[str | None] | Text | None = None,
+        covariates: Mapping[str, ArrayLike] | None = None,
+        labels: Mapping[str, Sequence[str | None] | Text] | None = None,
+        metadata: Metadata | Mapping[str, Any] | None = None,
+        path: Path | None = None,
+        notes: Sequence[str] = (),
+        ref_q: ArrayLike | None = None,
+        **more: Any,
+    ) -> None:
+        if attitude is not None and ref_q is not None:
+            raise InputError("attitude and ref_q are both given", file="log", remedy="Give one of them: they are one.")
+        known = attitude if ref_q is None else ref_q
+        quaternions = quaternions_from_rotation(known) if isinstance(known, Rotation) else known
+        check_keywords(more)
+        given = {"acc": acc, "gyr": gyr, "mag": mag, "temp": temp}
+        given |= {"ref_q": quaternions, "ref_p": ref_p, "ref_angle": ref_angle}
+        text = {**(labels or {}), **({} if pose is None else {"pose": pose})}
+        if more or not isinstance(metadata, Metadata):
+            stated = metadata.to_mapping() if isinstance(metadata, Metadata) else dict(metadata or {})
+            metadata = Metadata.from_mapping({**stated, **more}, "log")
+        checked = fields_from_arrays(t, given, covariates or {}, text, metadata)
+        self._fill({**checked, "path": path, "notes": (*notes, *checked["notes"])})
+
+    @classmethod
+    def of_fields(cls, **values: Any) -> Self:
+        """Make a log of fields that are checked already: nothing but their shapes is looked at.
+
+        Parameters
+        ----------
+        **values
+            `t` and any other field of a log, `ref_q` for the attitude.
+        """
+        log = object.__new__(cls)
+        log._fill(values)
+        return log
+
+    def with_fields(self, **changes: Any) -> Self:
+        """Return the log with other values of some fields, which are checked already.
+
+        Parameters
+        ----------
+        **changes
+            Any field of a log.
+        """
+        return self.of_fields(**({item.name: getattr(self, item.name) for item in fields(self)} | changes))
+
+    def _fill(self, values: Mapping[str, Any]) -> None:
+        t = np.asarray(values["t"])
+        for item in fields(self):
+            value = values.get(item.name, _EMPTY.get(item.name))
+            width = _WIDTHS.get(item.name)
+            if value is not None and width is not None:
+                value = contiguous(value, item.name, (t.size, width) if width else (t.size,))
+            object.__setattr__(self, item.name, value)
+        numbers = {name: contiguous(column, name, (t.size,)) for name, column in self.covariates.items()}
+        object.__setattr__(self, "covariates", numbers)
+        object.__setattr__(self, "labels", dict(self.labels))
         for name, cells in [*self.labels.items(), *([("pose", self.pose)] if self.pose is not None else [])]:
-            if cells.shape != (n,):
-                raise InputError(f"the array has shape {cells.shape}, but ({n},) is wanted", file="log", column=name)
+            if cells.shape != (t.size,):
+                raise InputError(
+                    f"the array has shape {cells.shape}, but ({t.size},) is wanted", file="log", column=name
+                )
 
     @property
     def n(self) -> int:
@@ -125,6 +205,53 @@ class Log:
     def has_reference(self) -> NDArray[np.bool_]:
         """Rows with a reference attitude, (n,)."""
         return np.zeros(self.n, np.bool_) if self.ref_q is None else ~np.isnan(self.ref_q[:, 0])
+
+    def __len__(self) -> int:
+        return self.n
+
+    def __getitem__(self, rows: slice | NDArray[np.bool_]) -> Self:
+        """Rows by a slice, ``log[100:200]`` or ``log[::10]``, or by a mask, ``log[log.t > 5.0]``.
+
+        Parameters
+        ----------
+        rows : slice or (n,) array of bool
+            Rows in the order of time; a slice gives views on the same memory.
+
+        Raises
+        ------
+        TypeError
+            Something else is given; readings of one row are ``log.acc[5]``.
+        ValueError
+            A slice runs backwards, or a mask has another length.
+        """
+        if not isinstance(rows, slice):
+            if np.asarray(rows).dtype != np.bool_:
+                raise TypeError("a log is sliced by rows, log[100:200], or by a mask, log[log.t > 5.0]")
+            return self.select(rows)
+        if rows.step is not None and rows.step < 1:
+            raise ValueError(f"the step of a slice is {rows.step}, but time runs forwards: use a step of 1 or more")
+        return self._picked(rows)
+
+    def between(self, begin: float, end: float) -> Self:
+        """Rows with ``begin <= t < end`` as views on the same memory.
+
+        Parameters
+        ----------
+        begin, end : float
+            Time of the log, s.
+        """
+        first, last = np.searchsorted(self.t, [begin, end])
+        return self.rows(int(first), int(last))
+
+    def head(self, rows: int = 5) -> Self:
+        """First rows.
+
+        Parameters
+        ----------
+        rows : int
+            How many.
+        """
+        return self.rows(0, rows)
 
     def rows(self, start: int, stop: int) -> Self:
         """Rows ``start <= row < stop`` as views on the same memory.
@@ -155,7 +282,7 @@ class Log:
         }
         covariates = {name: values[key] for name, values in self.covariates.items()}
         labels = {name: cells[key] for name, cells in self.labels.items()}
-        return replace(self, **picked, covariates=covariates, labels=labels)
+        return self.with_fields(**picked, covariates=covariates, labels=labels)
 
     def with_reference(self, rotation: Rotation) -> Self:
         """Return the log with another reference attitude: n rotations, body to reference frame.
@@ -165,7 +292,7 @@ class Log:
         rotation : scipy.spatial.transform.Rotation
             n rotations, one for each row.
         """
-        return replace(self, ref_q=quaternions_from_rotation(rotation))
+        return self.with_fields(ref_q=quaternions_from_rotation(rotation))
 
     def table(self) -> dict[str, NDArray[Any]]:
         """All columns by name, (n,) each, in the order in which they are written."""
@@ -181,11 +308,52 @@ class Log:
         columns |= {name: getattr(self, name) for name in (*_SINGLE, "pose") if getattr(self, name) is not None}
         return columns
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """All columns as a pandas table."""
+    def to_pandas(self) -> pd.DataFrame:
+        """All columns as a pandas table, SI units; the metadata stand in its ``attrs["imufit"]``."""
         import pandas as pd  # noqa: PLC0415  heavy, and only needed here
 
-        return pd.DataFrame(self.table())
+        table = pd.DataFrame(self.table())
+        table.attrs[METADATA] = self.metadata.to_mapping()
+        return table
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """All columns as a pandas table, under the name that every result has for it."""
+        return self.to_pandas()
+
+    def to_polars(self) -> pl.DataFrame:
+        """All columns as a polars table, SI units; needs polars."""
+        try:
+            import polars as pl  # noqa: PLC0415  optional
+        except ImportError:
+            raise InputError("polars is not installed", remedy="Install it: pip install polars") from None
+        return pl.DataFrame(self.to_arrow())
+
+    def to_arrow(self) -> pa.Table:
+        """All columns as an Arrow table, SI units, the metadata in its schema as in a Parquet file."""
+        import pyarrow as pa  # noqa: PLC0415  heavy, and only needed here
+
+        columns = {name: pa.array(column) for name, column in self.table().items()}
+        return pa.table(columns, metadata={METADATA: self.metadata.to_json()})
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        """Arrow's interface for streams: ``polars.DataFrame(log)``, ``pyarrow.table(log)``, ``duckdb.from_arrow``."""
+        return self.to_arrow().__arrow_c_stream__(requested_schema)
+
+    def __dataframe__(self, nan_as_null: bool = False, allow_copy: bool = True) -> object:
+        """Interchange protocol of data frames."""
+        return self.to_arrow().__dataframe__(nan_as_null, allow_copy)
+
+    def plot(self, **options: Any) -> Figure:
+        """Draw the readings over time; the options are those of :func:`imufit.plot`.
+
+        Parameters
+        ----------
+        **options
+            ``columns``, ``show``, ``rows``, ``begin``, ``end``.
+        """
+        import imufit  # noqa: PLC0415  the figure is made by a layer above
+
+        return imufit.plot(self, **options)
 
     def write(self, path: str | Path) -> None:
         """Write the log; the suffix decides on Parquet, NPZ or CSV.
@@ -264,12 +432,20 @@ class Log:
         InputError
             An array cannot be, or has a name that a log does not know.
         """
-        given = {"acc": acc, "gyr": gyr, "mag": mag, "ref_p": ref_p, "temp": temp, "ref_angle": ref_angle}
-        ref_q = quaternions_from_rotation(reference) if isinstance(reference, Rotation) else reference
-        text = {**(labels or {}), **({} if pose is None else {"pose": pose})}
-        check_keywords(metadata)
-        meta = Metadata.from_mapping(metadata, "log")
-        return cls(**fields_from_arrays(t, {**given, "ref_q": ref_q}, covariates or {}, text, meta))
+        return cls(
+            t,
+            acc,
+            gyr,
+            mag,
+            temp,
+            attitude=reference,
+            ref_p=ref_p,
+            ref_angle=ref_angle,
+            pose=pose,
+            covariates=covariates,
+            labels=labels,
+            **metadata,
+        )
 
     @classmethod
     def from_dataframe(
@@ -285,17 +461,28 @@ class Log:
         df : DataFrame
             Columns as in a log file.
         metadata : Metadata or mapping, optional
-            Frame, gravity and so on.
+            Frame, gravity and so on; without it what :meth:`to_pandas` left with the table.
         mapping : mapping, optional
             Source text for target columns, as for files.
         """
+        # the metadata that a table inherits were not stated of the time that it has now
+        clock: Clock = "a log's" if metadata not in (None, {}, Metadata()) else "open"
+        if metadata is None:
+            metadata = df.attrs.get(METADATA, {})
         if not isinstance(metadata, Metadata):
-            metadata = Metadata.from_mapping(metadata or {}, "log")
-        return cls(**fields_from_frame(df, mapping, metadata))
+            metadata = Metadata.from_mapping(metadata, "log")
+        from imufit import log as logs  # noqa: PLC0415  a table is read as a file is, which is built on this class
+
+        held = logs.LogStream.of_source(logs.FrameSource(df), metadata, mapping, clock).read()
+        return cls.of_fields(**{item.name: getattr(held, item.name) for item in fields(held)})
 
     def sensors(self) -> dict[str, Array | None]:
         """Sensors and reference attitude by name, None where absent."""
         return {"acc": self.acc, "gyr": self.gyr, "mag": self.mag, "ref_q": self.ref_q}
+
+    def _repr_html_(self) -> str:
+        table = self.head(HEAD_ROWS).to_pandas().to_html(index=False, na_rep="", float_format="{:.6g}".format)
+        return f"<p>{escape(repr(self))}</p>{table}"
 
     def __repr__(self) -> str:
         rate = f" at {(self.n - 1) / self.duration:.4g} Hz" if self.duration > 0.0 else ""
@@ -332,6 +519,7 @@ class Chunk:
         return self.log.rows(self.begin, self.end)
 
 
+@runtime_checkable
 class LogSource(Protocol):
     """What a log in memory and a log on disk have in common."""
 
@@ -400,7 +588,7 @@ def whole(log: LogSource) -> Log:
     """
     if isinstance(log, Log):
         return log
-    return replace(gathered((chunk.core for chunk in log.chunks(BLOCK_ROWS)), log.n), notes=log.notes)
+    return gathered((chunk.core for chunk in log.chunks(BLOCK_ROWS)), log.n).with_fields(notes=log.notes)
 
 
 def gathered(pieces: Iterable[Log], n: int) -> Log:
@@ -428,7 +616,7 @@ def gathered(pieces: Iterable[Log], n: int) -> Log:
         filled += piece.n
     if first is None:
         raise ValueError("a log is joined of at least one part")
-    return replace(first, **whole)
+    return first.with_fields(**whole)
 
 
 def _arrays(log: Log) -> dict[str, Any]:

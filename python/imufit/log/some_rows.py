@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from imufit.errors import InputError
@@ -78,7 +77,7 @@ class SomeRows:
             end = chunk.start + chunk.end - chunk.begin
             while first < end:
                 low, high = max(first, chunk.start), min(stop, end)
-                yield replace(chunk.core.rows(low - chunk.start, high - chunk.start), notes=self.notes)
+                yield chunk.core.rows(low - chunk.start, high - chunk.start).with_fields(notes=self.notes)
                 if stop > end:
                     break
                 if (span := next(spans, None)) is None:

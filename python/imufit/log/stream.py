@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from numpy.typing import NDArray
 
@@ -21,7 +21,7 @@ from imufit.log.place import Place
 from imufit.log.reading import Reading
 from imufit.log.recognise import Readable, recognise
 from imufit.log.size import HELD, KEPT, NUMBER, TEXT_CELL, size_in_words
-from imufit.log.source import open_source
+from imufit.log.source import Source, open_source
 from imufit.log.tables import TablesSource
 from imufit.log.time_order import Copies, TimeRepair, TimeScan
 from imufit.log.unit_check import HEAD, Clock, check_units
@@ -57,13 +57,51 @@ class LogStream:
         noise: Mapping[str, float] | None = None,
         drop: str | Sequence[str] = (),
     ) -> None:
+        file = Path(path)
+        source = open_source(file)
+        # what says of itself that it is a log may have rows as far apart as it says
+        is_log = bool(source.embedded) or sidecar_path(file).is_file()
         reading = Reading(mapping, frame, noise or {}, (drop,) if isinstance(drop, str) else tuple(drop))
-        self._path = Path(path)
-        self._source = open_source(self._path)
-        self._place = Place(self._path, self._source.line_of)
-        names = self._source.names
+        stated = {**source.embedded, **read_sidecar(file)}
+        metadata = read_metadata(file, source.embedded)
+        self._begin(source, file, metadata, stated, "a log's" if is_log else "open", reading, bare)
+
+    @classmethod
+    def of_source(
+        cls, source: Source, metadata: Metadata, mapping: Mapping[str, str] | None = None, clock: Clock = "open"
+    ) -> Self:
+        """Make the log of a source that is no file.
+
+        Parameters
+        ----------
+        source : Source
+            A table in memory.
+        metadata : Metadata
+            Frame, gravity and so on.
+        mapping : mapping, optional
+            Source text for target columns.
+        clock : "open" or "a log's"
+            Whether the source says of itself that it is a log, so that its time is in seconds.
+        """
+        log = cls.__new__(cls)
+        log._begin(source, None, metadata, {}, clock, Reading(mapping), bare=False)
+        return log
+
+    def _begin(
+        self,
+        source: Source,
+        path: Path | None,
+        metadata: Metadata,
+        stated: Mapping[str, Any],
+        clock: Clock,
+        reading: Reading,
+        bare: bool,
+    ) -> None:
+        self._path, self._source, self._metadata = path, source, reading.metadata(metadata)
+        self._place = Place(path, source.line_of)
+        names, mapping = source.names, reading.mapping
         dropped = reading.dropped(names, [*CONTRACT, *EULER, *(mapping or {})], self._place)
-        found = recognise(_Left(self._source, dropped) if dropped else self._source, mapping, self._place)
+        found = recognise(_Left(source, dropped) if dropped else source, mapping, self._place)
         dropped = reading.dropped(names, found.mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
         self._plan = plan_columns(
@@ -77,18 +115,14 @@ class LogStream:
         )
         if isinstance(self._source, TablesSource):
             self._source.choose(self._plan.sources)
-        stated = read_metadata(self._path, self._source.embedded)
-        self._metadata = reading.metadata(stated)
         self._repair = self._scan()
         self._unmeasured = Unmeasured(self._place)
         head = self._head()
-        # what says of itself that it is a log may have rows as far apart as it says
-        is_log = bool(self._source.embedded) or sidecar_path(self._path).is_file()
-        clock: Clock = "stated" if "t" in found.mapping else "a log's" if is_log else "open"
+        clock = "stated" if "t" in found.mapping else clock
         read = {**head.sensors(), "temp": head.temp}
         odd = check_units(head.t, read, self._metadata, self._place, self._plan.origin, clock)
         self._columns = head.columns
-        told = reading.notes({**self._source.embedded, **read_sidecar(self._path)}, self._place)
+        told = reading.notes(stated, self._place)
         notes = (*self._source.notes, *found.notes, *told, *self._plan.notes, self._repair.note, *odd)
         if "ref_angle" in self._columns and "ref_qw" not in self._columns:
             notes = (*notes, f"{self._place.name}: ref_angle makes no reference without the metadata rig_axis")
@@ -141,8 +175,8 @@ class LogStream:
         return self._columns
 
     @property
-    def path(self) -> Path:
-        """File of the log."""
+    def path(self) -> Path | None:
+        """File of the log; None for a table in memory."""
         return self._path
 
     @property
@@ -163,7 +197,7 @@ class LogStream:
                 place=self._place,
                 unmeasured=self._unmeasured,
             )
-            yield Log(**fields, metadata=self._metadata, path=self._path)
+            yield Log.of_fields(**fields, metadata=self._metadata, path=self._path)
         self._unmeasured.check()
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:
@@ -177,12 +211,12 @@ class LogStream:
             Rows of context on either side, fewer at the ends of the log.
         """
         for chunk in cut(self.pieces(), rows, margin):
-            yield replace(chunk, log=replace(chunk.log, notes=self.notes))
+            yield replace(chunk, log=chunk.log.with_fields(notes=self.notes))
 
     def read(self) -> Log:
         """Whole log in memory, however large it is."""
         log = gathered(self.pieces(), self.n)
-        return replace(log, notes=self.notes)
+        return log.with_fields(notes=self.notes)
 
     @property
     def size(self) -> int:
@@ -217,10 +251,11 @@ class LogStream:
         share = min(held / self.size, kept / made)
         rows = int(self.n * share)
         more_words = f", or allow more with {option} {math.ceil(gigabytes / share)}" if option else ""
-        part = self._path.with_name(f"{self._path.stem}-part.parquet")
+        file = self._path or Path("log.parquet")
+        part = file.with_name(f"{file.stem}-part.parquet")
         raise self._place.error(
             f"{self.n} rows take {size_in_words(made)} of memory, and this needs all of them at once",
-            remedy=f"Take a part: imufit convert {self._path} --rows 0:{rows} -o {part}{more_words}",
+            remedy=f"Take a part: imufit convert {file} --rows 0:{rows} -o {part}{more_words}",
         )
 
     def write(self, path: str | Path) -> None:
@@ -234,7 +269,7 @@ class LogStream:
         write_rows(Path(path), self._metadata, (chunk.core.table() for chunk in self.chunks(ROW_GROUP)))
 
     def __repr__(self) -> str:
-        return f"LogStream({self._path.name}: {self.n} rows; {', '.join(self._columns)}; {self._metadata.frame})"
+        return f"LogStream({self._place.name}: {self.n} rows; {', '.join(self._columns)}; {self._metadata.frame})"
 
 
 class _Left:

@@ -23,9 +23,11 @@ from imufit.results.log_info import (
     SeriesInfo,
 )
 from imufit.results.log_parameters import LogParameters
+from imufit.results.model_comparison import ModelComparison
 from imufit.results.noise_part import NoisePart
 from imufit.results.parameter import Parameter
 from imufit.results.recording import Recording, RecordingClock, RecordingGap
+from imufit.results.result import Result
 from imufit.results.table import Table
 from imufit.results.tilt import Mark, TiltComparison, TiltFigures
 
@@ -49,6 +51,7 @@ __all__ = [
     "LogInfo",
     "LogParameters",
     "Mark",
+    "ModelComparison",
     "MotionInfo",
     "NoisePart",
     "Panel",
@@ -59,6 +62,7 @@ __all__ = [
     "RecordingGap",
     "ReferenceInfo",
     "RestInfo",
+    "Result",
     "Revision",
     "Rival",
     "SeriesInfo",

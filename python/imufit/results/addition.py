@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
 from imufit.results.parameter import Parameter, by_effect, by_name, parameter_frame, parameter_table, plot_parameters
-from imufit.results.table import Table, html, page
+from imufit.results.result import Result
+from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,8 +32,8 @@ def surprise(before: float, expected: float, after: float) -> str:
     )
 
 
-@dataclass(frozen=True)
-class Addition:
+@dataclass(frozen=True, repr=False)
+class Addition(Result):
     """One step of the loop.
 
     Attributes
@@ -104,8 +105,6 @@ class Addition:
         """Parameters of the new model."""
         return (parameter_table(self.parameters, "Parameters of the new model"),)
 
-    def _repr_html_(self) -> str:
-        return html([self.sentence, self.warning], self.tables())
-
-    def __str__(self) -> str:
-        return page([self.sentence, self.warning], self.tables())
+    def sentences(self) -> list[str]:
+        """Return what the result says, the answer first."""
+        return [self.sentence, self.warning]

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from imufit.figures import quantity
 from imufit.results.data_fault import DataFault, fault_table
 from imufit.results.json_value import json_fields, json_value
-from imufit.results.table import Table, html, page
+from imufit.results.result import Result
+from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -169,8 +170,8 @@ class Where:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
     """A model held against a log.
 
     Attributes
@@ -322,9 +323,3 @@ class Comparison:
         """Return the result, what it does to the attitude, faults of the data, and the notes."""
         attitude = [] if self.attitude is None else [self.attitude.sentence]
         return [self.sentence, *attitude, *map(str, self.data_faults), *self.notes]
-
-    def _repr_html_(self) -> str:
-        return html(self.sentences(), self.tables())
-
-    def __str__(self) -> str:
-        return page(self.sentences(), self.tables())

@@ -14,7 +14,8 @@ from imufit.results.judged import Judged
 from imufit.results.log_parameters import LogParameters, log_table, logs_json
 from imufit.results.noise_part import NoisePart, noise_table
 from imufit.results.parameter import Parameter, by_name, in_words
-from imufit.results.table import Table, html, page
+from imufit.results.result import Result
+from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -199,8 +200,8 @@ class Unexplained:
         return f"{self.channel} depends on {self.covariate}{shape}: {quantity.share(self.share)} of its excess"
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Result):
     """Verdict over all candidate effects.
 
     Attributes
@@ -385,9 +386,3 @@ class Diagnosis:
     def local_faults(self) -> list[str]:
         """Sentences on faults of the data beside which effects can be judged."""
         return [str(fault) for fault in self.data_faults if not fault.spoils]
-
-    def _repr_html_(self) -> str:
-        return html(self.sentences(), self.tables())
-
-    def __str__(self) -> str:
-        return page(self.sentences(), self.tables())

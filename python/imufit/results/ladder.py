@@ -13,7 +13,8 @@ from imufit.results.diagnosis import VERDICTS, Diagnosis
 from imufit.results.json_value import json_fields, json_value
 from imufit.results.log_parameters import logs_json
 from imufit.results.parameter import by_effect
-from imufit.results.table import Table, html, page
+from imufit.results.result import Result
+from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,8 +84,8 @@ class Revision:
         return f"{self.by} took the place of {self.removed}: it explains more beside the others ({errors})."
 
 
-@dataclass(frozen=True, eq=False)
-class Ladder:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ladder(Result):
     """The whole loop on one log.
 
     Attributes
@@ -210,9 +211,3 @@ class Ladder:
         without = [f"{item}. {item.sentence}" for item in self.diagnosis.without]
         faults = self.diagnosis.local_faults()
         return [verdict, *without, result, *map(str, self.revisions), attitude, *self.warnings(), experiment, *faults]
-
-    def _repr_html_(self) -> str:
-        return html(self.sentences(), self.tables())
-
-    def __str__(self) -> str:
-        return page(self.sentences(), self.tables())

@@ -13,7 +13,8 @@ from imufit.log.contents import Contents
 from imufit.printable import NAME, printable
 from imufit.results.effect_sight import EffectSight, alike, open_table, seen_table, unseen_table, weak_table
 from imufit.results.json_value import json_fields, json_value
-from imufit.results.table import Table, html, page
+from imufit.results.result import Result
+from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -322,8 +323,8 @@ class ReferenceInfo:
         }
 
 
-@dataclass(frozen=True)
-class LogInfo:
+@dataclass(frozen=True, repr=False)
+class LogInfo(Result):
     """What is in a log, and what it can show.
 
     Attributes
@@ -446,6 +447,10 @@ class LogInfo:
         said = (self.sentence, self.verdict, self.reference.sentence, self.motion.sentence, self.rests.sentence)
         return [text for text in (*said, missing) if text]
 
+    def paragraphs(self) -> list[str]:
+        """Return the sentences, which effects the log leaves alike, and the remarks."""
+        return [*self.sentences(), *self.alike(), *self.remarks()]
+
     def series_table(self) -> Table:
         """Rate, gaps and jitter of every series."""
         return Table(
@@ -502,12 +507,6 @@ class LogInfo:
         """Return what reading noticed, and what is to be said of the figures."""
         said = dict.fromkeys(note.rstrip(".") for note in (*self.contents.notes, *self.notes))
         return [f"Note: {note}." for note in said]
-
-    def _repr_html_(self) -> str:
-        return html([*self.sentences(), *self.alike(), *self.remarks()], self.tables())
-
-    def __str__(self) -> str:
-        return page([*self.sentences(), *self.alike(), *self.remarks()], self.tables())
 
 
 def _series_row(item: SeriesInfo) -> tuple[str, ...]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_fields, json_value
-from imufit.results.table import Table, html, page
+from imufit.results.result import Result
+from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,8 +72,8 @@ class RecordingClock:
         return json_fields(self)
 
 
-@dataclass(frozen=True)
-class Recording:
+@dataclass(frozen=True, repr=False)
+class Recording(Result):
     """A recording, written as a log.
 
     Attributes
@@ -188,8 +189,6 @@ class Recording:
         """Return the result, the clock, and the notes."""
         return [self.sentence, self.clock_sentence, *(f"Note: {note}." for note in self.notes)]
 
-    def _repr_html_(self) -> str:
-        return html(self.sentences(), [self.gap_table()])
-
-    def __str__(self) -> str:
-        return page(self.sentences(), [self.gap_table()])
+    def tables(self) -> list[Table]:
+        """Gaps of the recording."""
+        return [self.gap_table()]

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
-from imufit.results.table import Table, html, page
+from imufit.results.result import Result
+from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,8 +114,8 @@ _ROWS: Final = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class TiltComparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class TiltComparison(Result):
     """Several methods on one log.
 
     Attributes
@@ -239,11 +240,9 @@ class TiltComparison:
         )
         return f"{what}: {counts}"
 
-    def _repr_html_(self) -> str:
-        return html(self.notes, self.tables())
-
-    def __str__(self) -> str:
-        return page(self.notes, self.tables())
+    def sentences(self) -> list[str]:
+        """Return what the result says, the answer first."""
+        return list(self.notes)
 
 
 def _shown(figures: TiltFigures, name: str) -> str:

@@ -1,0 +1,21 @@
+"""Where a model fails: the residual by channel, covariate, segment and frequency, and a filter's attitude."""
+
+from imufit.comparing.attitude import attitude_comparison
+from imufit.comparing.compare import compare, compare_model, comparison
+from imufit.comparing.judged import judged
+from imufit.comparing.noise_budget import noise_budget
+from imufit.comparing.notes import notes
+from imufit.comparing.two_models import compare_two
+from imufit.comparing.unexplained import unexplained
+
+__all__ = [
+    "attitude_comparison",
+    "compare",
+    "compare_model",
+    "compare_two",
+    "comparison",
+    "judged",
+    "noise_budget",
+    "notes",
+    "unexplained",
+]

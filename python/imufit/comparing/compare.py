@@ -1,0 +1,219 @@
+"""Where a model fails: by channel, against every covariate, by segment, by frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit import _imufit
+from imufit.comparing.attitude import attitude_comparison
+from imufit.comparing.notes import notes
+from imufit.errors import InputError
+from imufit.fitting.analysis import Analysis
+from imufit.fitting.log_evidence import LogEvidence
+from imufit.fitting.passes import CHANNELS, UNITS
+from imufit.fitting.rest_passes import RestPasses
+from imufit.progress import Progress
+from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
+
+if TYPE_CHECKING:
+    from imufit.fitting import FittedStack
+    from imufit.log import LogSource
+    from imufit.model import EffectStack
+
+Array = NDArray[np.float64]
+
+MIN_SHARE = 0.02
+SCATTER = 4.0
+WORST_SEGMENTS = 8
+SPECTRUM_ROWS = 512
+SPECTRUM_CHUNKS = 32
+
+
+def compare(fit: FittedStack, log: LogSource | None, progress: Progress) -> Comparison:
+    """Hold a fitted model against a log (default: its own, of several the worst), the parameters as they are.
+
+    Parameters
+    ----------
+    fit : FittedStack
+        The fitted model.
+    log : Log or LogStream, optional
+        The log; None is the fit's own.
+    progress : callable
+        Called with (rows done, rows in all, what is being done).
+    """
+    if log is not None and not any(log == known for known in fit.logs):
+        return compare_model(fit.model, log, progress)
+    _refuse_rests(fit.analysis)
+    own = fit.worst if log is None else next(k for k, known in enumerate(fit.logs) if known == log)
+    found = comparison(fit.analysis, fit.estimate.step, own)
+    return _with_attitude(found, fit.model_of(own), fit.logs[own], progress)
+
+
+def compare_model(model: EffectStack, log: LogSource, progress: Progress) -> Comparison:
+    """Hold a model against a log, its parameters as they are.
+
+    Parameters
+    ----------
+    model : EffectStack
+        The model.
+    log : Log or LogStream
+        With reference attitude.
+    progress : callable
+        Called with (rows done, rows in all, what is being done).
+    """
+    analysis = Analysis.of(model, (log,), progress, keep_constants=True)
+    _refuse_rests(analysis)
+    found = comparison(analysis, analysis.estimate_unnamed().step)
+    return _with_attitude(found, model, analysis.logs[0].surveyed.log, progress)
+
+
+def _refuse_rests(analysis: Analysis) -> None:
+    """Refuse logs without a reference: every sample is needed."""
+    for each in analysis.logs:
+        if isinstance(each.passes, RestPasses):
+            raise InputError(
+                "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz), which a comparison needs",
+                file=each.surveyed.log.path,
+                remedy="Ask `imufit diagnose`, which judges the rests of such a log, or `imufit calibrate`.",
+            )
+
+
+def _with_attitude(found: Comparison, model: EffectStack, log: LogSource, progress: Progress) -> Comparison:
+    return replace(found, attitude=attitude_comparison(model, log, progress=progress))
+
+
+def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
+    """Comparison of one log with the model after a step of all parameters from where the evidence was taken.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        The evidence.
+    step : ndarray
+        (p,) step of every parameter, SI units.
+    log : int
+        Number of the log.
+    """
+    evidence = analysis.logs[log]
+    facts = evidence.facts
+    result = analysis.problem.residual(step, log)
+    floors = evidence.floors
+    edges = np.linspace(facts.t_start, facts.t_end, evidence.raw.blocks + 1)
+    channels, where, segments = [], [], []
+    spans = {}
+    stands_out: dict[str, bool] = {}
+    for item in result["channels"]:
+        name, floor = item["channel"], floors[item["index"]]
+        channels.append(
+            ChannelResidual(
+                name, item["rms"], _rounded(item["mean"], floor), floor, item["rms"] / floor, UNITS[name[:3]], item["n"]
+            )
+        )
+        excess = item["rms"] ** 2 - floor**2
+        # A mean square scatters by sqrt(2 / n): below that nothing is in excess.
+        stands_out[name] = excess > SCATTER * floor**2 * np.sqrt(2.0 / item["n"])
+        if stands_out[name] and item["mean"] ** 2 >= MIN_SHARE * excess:
+            share = min(item["mean"] ** 2 / excess, 1.0)
+            where.append(Where(name, "constant", share, facts.t_start, facts.t_end))
+        first, last = item["stretch"]
+        spans[name] = (float(edges[first]), float(edges[last]))
+        segments += [
+            (float(edges[b]), float(edges[b + 1]), name, float(rms / floor))
+            for b, rms in enumerate(item["block_rms"])
+            if np.isfinite(rms)
+        ]
+    panels = [_panel(item, floors, facts) for item in result["panels"]]
+    ratios = {channel.channel: channel.ratio for channel in channels}
+    for panel in panels:
+        if panel.share >= MIN_SHARE and stands_out[panel.channel]:
+            where.append(Where(panel.channel, panel.covariate, panel.share, *spans[panel.channel]))
+    where.sort(key=lambda w: -w.share * (ratios[w.channel] ** 2 - 1.0))
+    panels.sort(key=lambda p: -p.share * max(ratios[p.channel] ** 2 - 1.0, 1e-6))
+    segments.sort(key=lambda s: -s[3])
+    sensors = {
+        sensor: float(np.sqrt(np.mean([c.ratio**2 for c in channels if c.channel.startswith(sensor)])))
+        for sensor in facts.sensors
+    }
+    return Comparison(
+        n=facts.n,
+        duration_s=facts.t_end - facts.t_start,
+        model=analysis.model.effects,
+        channels=tuple(channels),
+        sensors=sensors,
+        attitude=None,
+        where=tuple(where),
+        panels=tuple(panels),
+        spectra=_spectra(evidence, analysis.own_step(log, step)),
+        segments=tuple(segments[:WORST_SEGMENTS]),
+        notes=notes(evidence),
+        data_faults=evidence.faults,
+    )
+
+
+def _rounded(mean: float, floor: float) -> float:
+    """Zero where a mean is nothing but rounding."""
+    return mean if abs(mean) > 1e-9 * floor else 0.0
+
+
+def _panel(item: Mapping[str, Any], floors: list[float], facts: _imufit.Facts) -> Panel:
+    name = item["channel"]
+    inner = item["edges"]
+    width = np.diff(inner)
+    first = inner[0] - (width[0] if width.size else 1.0)
+    last = inner[-1] + (width[-1] if width.size else 1.0)
+    if item["covariate"] == "t":
+        first, last = facts.t_start, facts.t_end
+    edges = np.concatenate([[first], inner, [last]])
+    return Panel(
+        channel=name,
+        covariate=item["covariate"],
+        channel_unit=UNITS[name[:3]],
+        covariate_unit=item["unit"],
+        centre=(edges[1:] + edges[:-1]) / 2,
+        mean=item["mean"],
+        band=item["band"],
+        noise_floor=floors[CHANNELS.index(name)],
+        share=item["share"],
+    )
+
+
+def _spectra(evidence: LogEvidence, step: Array) -> tuple[Spectrum, ...]:
+    """Density of the residual of each channel, averaged over stretches without a gap (Welch's method)."""
+    from scipy.signal import welch  # noqa: PLC0415  only needed here
+
+    sums: dict[int, list[Array]] = {}
+    frequency = np.empty(0)
+    facts = evidence.facts
+    rate = 1.0 / facts.dt
+    chunks = 0
+    for arrays in evidence.passes.chunks(facts.margin, "spectrum"):
+        residuals = _imufit.evaluate(evidence.raw, arrays, step)
+        t = arrays["t"][arrays["begin"] : arrays["end"]]
+        steady = np.diff(t, prepend=t[0]) < 1.75 * facts.dt
+        for index, residual in enumerate(residuals):
+            if residual is None:
+                continue
+            good = np.isfinite(residual) & steady
+            for start in range(0, len(residual) - SPECTRUM_ROWS + 1, SPECTRUM_ROWS):
+                if good[start : start + SPECTRUM_ROWS].all():
+                    piece = residual[start : start + SPECTRUM_ROWS]
+                    frequency, density = welch(piece, rate, nperseg=SPECTRUM_ROWS, detrend="constant")
+                    sums.setdefault(index, []).append(density)
+        chunks += 1
+        if chunks >= SPECTRUM_CHUNKS:
+            break
+    return tuple(
+        Spectrum(
+            CHANNELS[index],
+            f"({UNITS[CHANNELS[index][:3]]})^2/Hz",
+            frequency[1:],
+            np.mean(densities, axis=0)[1:],
+            2.0 * evidence.floors[index] ** 2 / rate,
+        )
+        for index, densities in sorted(sums.items())
+    )

@@ -1,5 +1,0 @@
-"""What sensors deliver, decoded to SI units: one module for each device, with its registers and ranges as data."""
-
-from imufit.device import mpu6050
-
-__all__ = ["mpu6050"]

@@ -1,0 +1,133 @@
+"""Effects whose columns say little of their full size: a fit of each decides among them.
+
+A late sensor and a sluggish one have the same column, and columns taken at one point say little of a delay as long as
+a turn takes, or of play in a drive.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from imufit._imufit import Problem, Status, Verdict
+from imufit.model.catalogue import find_effect
+
+if TYPE_CHECKING:
+    from imufit.fitting import FittedStack
+    from imufit.fitting.analysis import Analysis
+    from imufit.model import EffectStack
+
+LESS = 0.01
+"""Part of what the best fit takes off the square of the held-out error by which another may take off less: a late
+reference and a gyroscope that would have to be early and sluggish differ by 0.1 % where smoothing the reference's noise
+pays, a delay and a low-pass of a gyroscope by 0.3 %."""
+
+
+def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
+    """Log Bayes factors of the best candidate and others like it, from fits beside all that is there, by slot.
+
+    Candidates whose columns differ by far need no fit, unless these columns depend on a search. That of a fit that
+    leaves a higher held-out error than another one is minus infinity; rivals whose columns say all count alike.
+
+    Parameters
+    ----------
+    fit : FittedStack
+        The model.
+    result : Verdict
+        The answer of the columns alone.
+    """
+    analysis = fit.analysis
+    ids = analysis.slots
+    best = result.best
+    if best is None or not (result.rivals or _curved(analysis, best)):
+        return []
+    items = {item.slot: item for item in result.candidates}
+    alike = {second for _, second, _ in result.correlations}
+    near = {slot for slot in alike if items[slot].ln_bayes >= Problem.NEAR * items[best].ln_bayes}
+    named = {best, *result.rivals}
+    in_its_place = {*named, *near, *(slot for slot in items if ids[slot] in analysis.found)}
+    close = [
+        slot
+        for slot, item in items.items()
+        if slot in in_its_place and item.status != Status.NOT_TESTABLE and (slot in named or _curved(analysis, slot))
+    ]
+    if len(close) < 2:
+        return []
+    # What else is missing would be charged to the one that stands in for it best.
+    others = fit.model
+    for slot, item in items.items():
+        if item.status == Status.PASSED and slot not in in_its_place:
+            others = others.with_effect(ids[slot])
+    without = tried(fit, others)
+    evidence = _guarded(without, {slot: tried(fit, others.with_effect(ids[slot])) for slot in close})
+    most = max(evidence.values())
+    # Where columns say all, a fit tells by the error alone: freedom alone does not tell one cause from another.
+    equal = {slot for slot in close if np.isfinite(evidence[slot]) and not _curved(analysis, slot)}
+    return [(slot, (most if slot in equal else ln) - without.ln_evidence) for slot, ln in evidence.items()]
+
+
+def _guarded(without: Tried, fits: dict[int, Tried]) -> dict[int, float]:
+    """Return log evidences by slot, minus infinity where another fit takes off more of the error by what counts."""
+    lowest = min((each.held_out for each in fits.values() if np.isfinite(each.ln_evidence)), default=np.inf)
+    return {
+        slot: each.ln_evidence if as_low(each.held_out, lowest, without.held_out) else -np.inf
+        for slot, each in fits.items()
+    }
+
+
+def as_low(error: float, lowest: float, start: float) -> bool:
+    """Return whether a held-out error is as low as the lowest one but for what does not count.
+
+    The evidence of a large log rests on the noise at frequencies that hold little of the error; where the error is not
+    the same, it decides. Only the fall of the error is compared, since the error holds noise of the reference as well.
+
+    Parameters
+    ----------
+    error, lowest, start : float
+        The error, the lowest one, and that without what lowers it.
+    """
+    return error**2 <= lowest**2 + LESS * max(start**2 - lowest**2, 0.0)
+
+
+class Tried(NamedTuple):
+    """A stack fitted in place of another one.
+
+    Attributes
+    ----------
+    ln_evidence : float
+        Log of its marginal likelihood.
+    held_out : float
+        Its held-out error.
+    analysis : Analysis
+        Its evidence, without columns of effects that are not in it.
+    """
+
+    ln_evidence: float
+    held_out: float
+    analysis: Analysis
+
+
+def tried(fit: FittedStack, model: EffectStack) -> Tried:
+    """Fit another stack, and return its log evidence around its best parameters.
+
+    The reference may have lost fast motion or not: such a loss equals the difference, of second order, between a late
+    sensor and a sluggish one.
+
+    Parameters
+    ----------
+    fit : FittedStack
+        Where to start from.
+    model : EffectStack
+        The stack.
+    """
+    known = fit.analysis.candidates
+    lost = [key for key, effect in known.items() if effect.reference_part == "bandwidth" and key not in model.effects]
+    analysis, estimate = fit.analysis.solved_for(model, fit.own, only=lost)
+    return Tried(fit.analysis.ln_likelihood(analysis, estimate), estimate.held_out, analysis)
+
+
+def _curved(analysis: Analysis, slot: int) -> bool:
+    key = analysis.slots[slot]
+    effect = analysis.candidates.get(key) or find_effect(key)
+    return effect.strongly_curved

@@ -1,0 +1,201 @@
+"""Diagnose and add, again and again, until nothing is missing; then swap and drop what later effects made needless."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from imufit.comparing import attitude_comparison, comparison
+from imufit.diagnosing.add import add
+from imufit.diagnosing.diagnose import diagnose
+from imufit.diagnosing.revise import revise, settled
+from imufit.fitting import FittedStack
+from imufit.progress import Progress, silent
+from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
+from imufit.results.diagnosis import PASSED
+
+MAX_STEPS = 12
+MATTERS = 0.002
+"""Share of the held-out error that counts: less does not justify an effect of which no parameter is certain."""
+TOLD = 2.0
+"""Standard errors that at least one parameter of an addition must be away from zero."""
+
+
+def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
+    """Repeat diagnose and add until nothing is missing, or until the log cannot tell what is.
+
+    Parameters
+    ----------
+    start : FittedStack
+        Where to start from: of logs with reference attitude, or with rests that stand in for one.
+    progress : callable, optional
+        Called with (rows done, rows in all, what is being done).
+
+    Returns
+    -------
+    Ladder
+        Every step with the held-out error before, expected and after, the final model and verdict.
+
+    Raises
+    ------
+    InputError
+        The log has no usable reference.
+    """
+    climb = Climb(start)
+    climb.up()
+    seen: set[frozenset[str]] = set()
+    revisions: list[Revision] = []
+    while way := revise(climb.fit, [step.effect for step in climb.steps], start.ratio, seen):
+        revisions += way
+        climb = climb.again([(revision.removed, revision.by) for revision in way])
+        climb.up()
+    if unsettled := climb.unsettled():
+        climb = climb.again([(effect, None) for effect in unsettled])
+    fit, diagnosis, worst = climb.fit, climb.diagnosis, start.worst
+    whole = start.analysis.judged_by == "reference"
+    return Ladder(
+        steps=tuple(climb.steps),
+        model=fit.model.effects,
+        verdict=diagnosis.verdict,
+        ratio_start=start.ratio,
+        ratio_end=fit.ratio,
+        attitude=attitude_comparison(fit.model_of(worst), fit.logs[worst], progress=progress or silent),
+        diagnosis=diagnosis,
+        comparison_start=comparison(start.analysis, start.estimate.step, worst) if whole else None,
+        comparison_end=comparison(fit.analysis, fit.estimate.step, worst) if whole else None,
+        first=climb.first,
+        fit=fit,
+        sentence=_sentence(start.ratio, fit.ratio, climb.steps, diagnosis),
+        revisions=tuple(revisions),
+    )
+
+
+class Climb:
+    """A model on its way up, an effect at a time.
+
+    Parameters
+    ----------
+    start : FittedStack
+        Where it starts from.
+    first : Diagnosis, optional
+        What is missing there, if that is known.
+
+    Attributes
+    ----------
+    fit : FittedStack
+        The model so far.
+    steps : list of Step
+        Effects added so far.
+    diagnosis : Diagnosis
+        What is missing from it.
+    first : Diagnosis
+        What was missing at the start.
+    tied : dict
+        Rivals of each effect that was added at `ambiguous`. An effect that is found later may separate them.
+    """
+
+    def __init__(self, start: FittedStack, first: Diagnosis | None = None) -> None:
+        self.start = self.fit = start
+        self.steps: list[Step] = []
+        self.first = self.diagnosis = first or diagnose(start)
+        self.tied: dict[str, tuple[str, ...]] = {}
+
+    def up(self) -> None:
+        """Add what is missing, until nothing is or the log cannot tell what."""
+        futile: set[str] = set()
+        while len(self.steps) < MAX_STEPS:
+            effect = next_effect(self.fit, self.diagnosis, futile)
+            if effect is None:
+                break
+            expected = next(c.held_out_after for c in self.diagnosis.candidates if c.effect == effect)
+            addition = add(self.fit, effect, expected)
+            lower = addition.after < addition.before
+            if not (lower and (_told(addition) or _matters(addition))):
+                # What the evidence promised, the fit did not keep: the next one may.
+                futile.add(effect)
+                continue
+            futile.clear()
+            alike = (self.diagnosis.best, *self.diagnosis.ambiguous_with)
+            if effect in alike and len(alike) > 1:
+                self.tied[effect] = tuple(other for other in alike if other is not None and other != effect)
+            self._take(addition)
+            self.diagnosis = diagnose(self.fit)
+
+    def unsettled(self) -> list[str]:
+        """List the effects of the model that others may still stand for."""
+        return [effect for effect, rivals in self.tied.items() if not settled(self.fit, effect, rivals)]
+
+    def again(self, changes: Sequence[tuple[str, str | None]]) -> Climb:
+        """Return the same way from the same start with effects replaced by others, or left out (None)."""
+        effects = [step.effect for step in self.steps]
+        other = Climb(self.start, self.first)
+        other.tied = dict(self.tied)
+        for removed, by in changes:
+            at = effects.index(removed)
+            effects[at : at + 1] = [] if by is None else [by]
+            rivals = other.tied.pop(removed, ())
+            if rivals and by is not None:
+                other.tied[by] = tuple(rival for rival in (*rivals, removed) if rival != by)
+        for effect in effects:
+            other._take(add(other.fit, effect))
+        other.diagnosis = diagnose(other.fit)
+        return other
+
+    def _take(self, addition: Addition) -> None:
+        self.fit = addition.fit
+        step = Step(addition.effect, addition.before, addition.expected, addition.after, self.fit.training_ratio)
+        self.steps.append(step)
+
+
+def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] = ()) -> str | None:
+    """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well.
+
+    Where others do, it is what stands out whichever of them is there; where nothing does, the first of them.
+
+    Parameters
+    ----------
+    fit : FittedStack
+        The model so far.
+    diagnosis : Diagnosis
+        What was found on top of it.
+    futile : collection of str
+        Effects that were tried and did not lower the held-out error.
+    """
+    if diagnosis.verdict in ("adequate", "unknown") or diagnosis.without:
+        return None
+    if diagnosis.verdict == "ambiguous":
+        offered = (_beside_the_unsure(fit), diagnosis.best, *diagnosis.ambiguous_with)
+        return next((effect for effect in offered if effect is not None and effect not in futile), None)
+    passed = [c for c in diagnosis.candidates if c.status == PASSED and c.effect not in futile]
+    return passed[0].effect if passed else None
+
+
+def _beside_the_unsure(fit: FittedStack) -> str | None:
+    """Return what stands out once one of the effects that cannot be told apart is in the model, whichever it is."""
+    analysis = fit.analysis
+    model, candidates = list(analysis.fitted_slots), list(analysis.candidate_slots)
+    while True:
+        result = analysis.problem.diagnose(model, candidates)
+        best, rivals = result.best, result.rivals
+        if best is None or not rivals:
+            return None if best is None else analysis.slots[best]
+        model.append(best)
+        candidates = [slot for slot in candidates if slot != best and slot not in rivals]
+
+
+def _told(addition: Addition) -> bool:
+    """Return whether the fit tells any parameter of what was added from zero."""
+    return any(not abs(p.value) <= TOLD * p.standard_error for p in addition.parameters)
+
+
+def _matters(addition: Addition) -> bool:
+    """Return whether the held-out error falls by enough to count."""
+    return addition.before - addition.after >= MATTERS * addition.before
+
+
+def _sentence(start: float, end: float, steps: list[Step], diagnosis: Diagnosis) -> str:
+    if not steps:
+        return diagnosis.sentence
+    names = ", ".join(step.effect for step in steps)
+    return (
+        f"Adding {names} cut the held-out error from {start:.3f} to {end:.3f} of the noise floor. {diagnosis.sentence}"
+    )

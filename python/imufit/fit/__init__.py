@@ -1,5 +1,0 @@
-"""A stack of effects fitted to a log."""
-
-from imufit.fit.fitted_stack import FittedStack
-
-__all__ = ["FittedStack"]

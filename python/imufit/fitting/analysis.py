@@ -1,0 +1,575 @@
+"""Evidence of one log, or of several of one sensor, around one model: what every question is asked of."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit import _imufit
+from imufit.errors import InputError
+from imufit.fitting.log_evidence import LogEvidence, Values, evidence_again
+from imufit.fitting.profile import Found, search
+from imufit.fitting.rest_passes import RestPasses
+from imufit.fitting.surveyed_log import SurveyedLog, survey
+from imufit.fitting.users_effects import check_users_effects
+from imufit.log import LogSource
+from imufit.log.several import name_of
+from imufit.model.catalogue import each_log_has_its_own, effects, find_effect, unnamed_effects
+from imufit.model.effect import registered
+from imufit.model.effect_stack import EffectStack
+from imufit.progress import Progress, silent
+from imufit.results import DataFault
+
+Array = NDArray[np.float64]
+
+MAX_ITERATIONS = 6
+MAX_SEARCHES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Fitted parameters of some slots.
+
+    Attributes
+    ----------
+    values, errors : dict of int to ndarray
+        By slot: parameter values and standard errors, SI units; of an effect that each log has for itself those of
+        one log after the other.
+    step : ndarray
+        (p,) step of every parameter of the evidence.
+    held_out, training : float
+        Residual RMS over noise floor on data not used for the fit, and on all data.
+    folds : ndarray
+        (folds,) whitened sum of squares on data not used for the fit, of each part of the log that was left out.
+    """
+
+    values: dict[int, Array]
+    errors: dict[int, Array]
+    step: Array
+    held_out: float
+    training: float
+    folds: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """Evidence of one log or of several with the columns of every effect, taken around given parameter values.
+
+    Slots are effects in a fixed order: those of the model, the unnamed ones that are always fitted, the candidates.
+
+    Attributes
+    ----------
+    logs : tuple of LogEvidence
+        Evidence of each log.
+    model : EffectStack
+        The effects and the parameters that all logs share.
+    own : tuple of dict
+        For each log the parameters that it has for itself, the unnamed effects among them.
+    unnamed : tuple of str
+        Effects that are always fitted along.
+    candidates : dict of str to Effect
+        What else at least one log can tell of.
+    probes : tuple of str
+        Dependences without a name that are asked about once nothing else explains more.
+    found : dict of str to Found
+        What searches found for the candidates.
+    problem : Problem
+        All logs together.
+    """
+
+    logs: tuple[LogEvidence, ...]
+    model: EffectStack
+    own: tuple[dict[str, list[float]], ...]
+    unnamed: tuple[str, ...]
+    candidates: dict[str, _imufit.Effect]
+    probes: tuple[str, ...]
+    found: dict[str, Found]
+    problem: _imufit.Problem
+
+    @classmethod
+    def of(
+        cls, model: EffectStack, logs: Sequence[LogSource], progress: Progress, *, keep_constants: bool = False
+    ) -> Analysis:
+        """Survey logs of one sensor, find their noise and take their evidence around a model.
+
+        Parameters
+        ----------
+        model : EffectStack
+            Effects and parameters to take the evidence around.
+        logs : sequence of LogSource
+            The logs.
+        progress : callable
+            Told of the rows done.
+        keep_constants : bool
+            Temperatures and covariates count from the means that the model was fitted with, not from these logs'.
+        """
+        surveyed = survey(model, logs, progress, keep_constants=keep_constants)
+        for effect, _ in model.stack():
+            reasons = [each.refusal(effect) for each in surveyed]
+            if None not in reasons:
+                raise InputError(f"effect {effect.id} cannot be fitted: {reasons[0]}", file=surveyed[0].log.path)
+        along = {key for each in surveyed for key, effect in each.effects.items() if effect.fitted_along(each.facts)}
+        unnamed = tuple(key for key in (*effects(), *unnamed_effects()) if key in along - {*model.effects})
+        fixed = {*model.effects, *unnamed}
+        candidates = {key: each.effects[key] for each in surveyed for key in each.effects if key not in fixed}
+        for each in surveyed:
+            own_candidates = [key for key in each.effects if key not in fixed]
+            check_users_effects(each.passes, each.facts, [*model.effects, *own_candidates])
+        own = _with_own(surveyed, model, unnamed, tuple({} for _ in surveyed))
+        model = _started(surveyed, model, own)
+        fitted = [_fitted(each, model, unnamed, values) for each, values in zip(surveyed, own, strict=True)]
+        found = search(surveyed, fitted, candidates)
+        evidence = [LogEvidence.of(each, values, found) for each, values in zip(surveyed, fitted, strict=True)]
+        probes = _probes(surveyed)
+        problem = _problem(evidence, model, unnamed, [*candidates, *probes])
+        return cls(tuple(evidence), model, own, unnamed, candidates, probes, found, problem)
+
+    def around(
+        self,
+        model: EffectStack,
+        own: Sequence[Values],
+        *,
+        with_candidates: bool = True,
+        only: Collection[str] | None = None,
+        lean: bool = False,
+    ) -> Analysis:
+        """Evidence of the same logs around other parameter values or another stack of effects.
+
+        Without candidates, or with only some of them, it is quicker to take; lean, for the next iteration of a fit, it
+        does not tell the residual as it stands either, only whitened.
+        """
+        surveyed = [each.surveyed for each in self.logs]
+        fixed = {*model.effects, *self.unnamed}
+        asked = {
+            key: effect
+            for each in surveyed
+            for key, effect in each.effects.items()
+            if key not in fixed and (only is None or key in only) and with_candidates and not lean
+        }
+        starts = {
+            key: self.found[key].start for key in model.effects if key in self.found and key not in self.model.effects
+        }
+        model = model.starting_at(starts)
+        values = _with_own(surveyed, model, self.unnamed, own)
+        fitted = [_fitted(each, model, self.unnamed, at) for each, at in zip(surveyed, values, strict=True)]
+        kept = {key: self.found[key] for key in model.effects if key in self.found}
+        found = kept | search(surveyed, fitted, asked)
+        probes = () if lean else _probes(surveyed, noise_only=not with_candidates or only is not None)
+        columns = [*asked, *probes]
+        evidence = [each.around(at, columns, found, lean=lean) for each, at in zip(self.logs, fitted, strict=True)]
+        return replace(
+            self,
+            logs=tuple(evidence),
+            model=model,
+            own=values,
+            candidates=asked,
+            probes=probes,
+            found=found,
+            problem=_problem(evidence, model, self.unnamed, columns),
+        )
+
+    def ln_likelihood(self, of: Analysis, estimate: Estimate) -> float:
+        """Log of the marginal likelihood of the logs under another stack, with the noise that its own residual has.
+
+        A stack changes the noise, too: what smooths the ideal reading smooths the noise of the reference. Each of the
+        other's candidates may be there or not.
+
+        Parameters
+        ----------
+        of : Analysis
+            The other stack; its rows are counted as those of this one, since a stack may lack some at the ends.
+        estimate : Estimate
+            Its best parameters.
+        """
+        logs = [each.with_noise_after(of.own_step(k, estimate.step)) for k, each in enumerate(of.logs)]
+        problem = _problem(logs, of.model, of.unnamed, [*of.candidates, *of.probes])
+        size = sum(
+            own.ln_noise(each.counts) - own.ln_smoothing(each.counts) for own, each in zip(logs, self.logs, strict=True)
+        )
+        square = 0.5 * sum(sum(each.counts) for each in logs)
+        members = len(of.model.effects)
+        along = of.fitted_slots[members:]
+        return size + square + problem.ln_evidence(along, of.fitted_slots[:members], of.candidate_slots)
+
+    def of_logs(self, chosen: Sequence[int]) -> Analysis:
+        """Return the same evidence of some of the logs alone; effects that none of them can tell of are left out."""
+        logs = [self.logs[k] for k in chosen]
+        known = {key for each in logs for key in each.slots}
+        effects = [key for key in self.model.effects if key in known]
+        values = {key: at for key, at in self.model.parameters.items() if key in known}
+        model = type(self.model)(effects, values, constants=self.model.constants)
+        unnamed = tuple(key for key in self.unnamed if key in known)
+        candidates = {key: effect for key, effect in self.candidates.items() if key in known}
+        own = tuple(self.own[k] for k in chosen)
+        probes = tuple(key for key in self.probes if key in known)
+        problem = _problem(logs, model, unnamed, [*candidates, *probes])
+        return Analysis(tuple(logs), model, own, unnamed, candidates, probes, self.found, problem)
+
+    @property
+    def slots(self) -> list[str]:
+        """Ids of all slots: the model's effects, the unnamed ones, the candidates, the probes."""
+        return [*self.model.effects, *self.unnamed, *self.candidates, *self.probes]
+
+    @property
+    def fitted_slots(self) -> list[int]:
+        """Slots that are fitted: the model's effects and the unnamed ones."""
+        return list(range(len(self.model.effects) + len(self.unnamed)))
+
+    @property
+    def candidate_slots(self) -> list[int]:
+        """Slots of the candidates."""
+        first = len(self.fitted_slots)
+        return list(range(first, first + len(self.candidates)))
+
+    @property
+    def probe_slots(self) -> list[int]:
+        """Slots of the probes."""
+        return list(range(len(self.slots) - len(self.probes), len(self.slots)))
+
+    @property
+    def judged_by(self) -> str:
+        """What the logs are judged by: ``reference``, ``rests``, or ``reference and rests``."""
+        kinds = {"rests" if isinstance(each.passes, RestPasses) else "reference" for each in self.logs}
+        return " and ".join(sorted(kinds))
+
+    @property
+    def faults(self) -> tuple[DataFault, ...]:
+        """What is wrong with the data of the logs; of several each fault tells which of them it is in."""
+        if len(self.logs) == 1:
+            return self.logs[0].faults
+        names = [name_of(each.surveyed.log, k) for k, each in enumerate(self.logs)]
+        return tuple(
+            replace(fault, file=name) for name, each in zip(names, self.logs, strict=True) for fault in each.faults
+        )
+
+    def refusal(self, effect: _imufit.Effect) -> str | None:
+        """Return why no log can tell of an effect; None if one can."""
+        reasons = [each.surveyed.refusal(effect) for each in self.logs]
+        return None if None in reasons else reasons[0]
+
+    def having(self, effect_id: str) -> list[int]:
+        """Return the logs with parameters of an effect for themselves; the first stands for all where it is shared."""
+        known = [k for k, each in enumerate(self.logs) if effect_id in each.slots]
+        return known if each_log_has_its_own(effect_id) else known[:1]
+
+    def estimate(self) -> Estimate:
+        """Fit the model's effects (and the unnamed ones) to the evidence."""
+        return self._estimate(self.fitted_slots)
+
+    def estimate_unnamed(self) -> Estimate:
+        """Keep the model as it is and fit only what is always fitted along."""
+        return self._estimate(self.fitted_slots[len(self.model.effects) :])
+
+    def _present(self, slot: int) -> list[float]:
+        """Values that the evidence was taken around, of one log after the other where each has its own."""
+        key = self.slots[slot]
+        if each_log_has_its_own(key):
+            return [value for log in self.having(key) for value in self.own[log][key]]
+        return self.model.stack()[slot][1]
+
+    @property
+    def _held(self) -> list[int]:
+        """Slots of effects that stay at what a search found: readings jump as they change, no slope leads there."""
+        return [slot for slot, (effect, _) in enumerate(self.model.stack()) if effect.tried_at_full_size]
+
+    def _estimate(self, chosen: list[int]) -> Estimate:
+        held = [slot for slot in chosen if slot in self._held]
+        free = [slot for slot in chosen if slot not in held]
+        result = self.problem.estimate(free)
+        # What is held is not known exactly, and leaves the others as open as if it were fitted along.
+        along = self.problem.estimate(chosen) if held else result
+        errors = _by_slot(self, chosen, along["standard_error"])
+        searched = {slot: self.found.get(self.slots[slot]) for slot in held}
+        # A slope does not see the jumps that tell most of it.
+        errors |= {slot: np.array(found.spread) for slot, found in searched.items() if found}
+        steps = _by_slot(self, free, result["step"])
+        values = {slot: np.asarray(self._present(slot)) for slot in chosen}
+        values |= {slot: self._within_reach(slot, values[slot] + step) for slot, step in steps.items()}
+        return Estimate(values, errors, result["full_step"], result["held_out"], result["training"], result["folds"])
+
+    def _within_reach(self, slot: int, values: Array) -> Array:
+        """Keep what a search started (a time constant) within half and twice its present value in one step."""
+        if slot >= len(self.model.effects):
+            return values
+        effect, present = self.model.stack()[slot]
+        for k, (name, _, _) in enumerate(effect.parameters):
+            if name in effect.searched and name not in effect.only_searched:
+                low, high = sorted((0.5 * present[k], 2.0 * present[k]))
+                values[k] = min(max(values[k], low), high)
+        return values
+
+    def moved_to(self, estimate: Estimate) -> tuple[EffectStack, tuple[dict[str, list[float]], ...]]:
+        """Return the model with estimated parameters, and those that each log has for itself.
+
+        In the model, what each log has for itself stands with its mean.
+        """
+        parameters, errors = {}, {}
+        own: tuple[dict[str, list[float]], ...] = tuple({} for _ in self.logs)
+        for slot, key in enumerate(self.slots[: len(self.fitted_slots)]):
+            effect = find_effect(key)
+            own_values = effect.scope == "log"
+            logs = self.having(key) if own_values else [0]
+            values = estimate.values[slot].reshape(len(logs), -1)
+            spread = estimate.errors[slot].reshape(len(logs), -1)
+            if own_values:
+                for log, at in zip(logs, values, strict=True):
+                    own[log][key] = [float(value) for value in at]
+            if slot >= len(self.model.effects):
+                continue
+            names = [name for name, _, _ in effect.parameters]
+            mean, error = pooled(values, spread)
+            parameters[key] = dict(zip(names, map(float, mean), strict=True))
+            errors[key] = dict(zip(names, map(float, error), strict=True))
+            errors[key] |= dict.fromkeys(effect.only_searched, 0.0)
+        facts = [each.facts for each in self.logs]
+        means = {name: mean for each in reversed(facts) for name, mean in each.covariate_means.items()}
+        constants = {
+            "temperature_mean": next((each.temperature_mean for each in facts if each.has_temperature), None),
+            "covariate_means": {
+                name: mean
+                for name, mean in means.items()
+                if any(effect.centred_column == name for effect, _ in self.model.stack())
+            },
+        }
+        kept = {key: value for key, value in constants.items() if value is not None and value != {}}
+        return type(self.model)(self.model.effects, parameters, constants=kept, standard_errors=errors), own
+
+    def own_step(self, log: int, step: Array) -> Array:
+        """Return a step of all parameters as one of the parameters of one log's evidence."""
+        return step[self.problem.places(log)]
+
+    def converged(self, estimate: Estimate) -> bool:
+        """Return whether no parameter still moves by more than a tenth of its standard error."""
+        return all(
+            bool(np.all(np.abs(estimate.values[slot] - self._present(slot)) <= 0.1 * estimate.errors[slot]))
+            for slot in estimate.values
+        )
+
+    @property
+    def linear(self) -> bool:
+        """True if the reading is proportional to the fitted parameters, so that one solution is exact."""
+        if self.fitted_slots and any(isinstance(each.passes, RestPasses) for each in self.logs):
+            return False
+        stages = {effect.stage for effect, _ in self.model.stack()}
+        stages |= {find_effect(key).stage for key in self.unnamed} if "gain" in stages else set()
+        return not any(effect.nonlinear for effect, _ in self.model.stack()) and not {"input", "gain"} <= stages
+
+    def solved(self) -> tuple[Analysis, Estimate]:
+        """Evidence around the best parameters, by Gauss and Newton's iteration where the effects are not linear."""
+        best, estimate = self._iterated()
+        if best is not self:
+            best = best.around(*best.moved_to(estimate))
+            estimate = best.estimate()
+        return best, estimate
+
+    def solved_for(
+        self,
+        model: EffectStack,
+        own: Sequence[Values],
+        *,
+        with_candidates: bool = True,
+        only: Collection[str] | None = None,
+    ) -> tuple[Analysis, Estimate]:
+        """Evidence around the best parameters of another stack of effects.
+
+        Without candidates, or with only some of them, it is quicker to take, and enough to know how well that stack
+        does.
+        """
+        best, estimate = self.around(model, own, lean=True)._iterated()
+        best = best.around(*best.moved_to(estimate), with_candidates=with_candidates, only=only)
+        return best, best.estimate()
+
+    def _iterated(self) -> tuple[Analysis, Estimate]:
+        analysis, estimate = self._stepped()
+        for _ in range(MAX_SEARCHES if analysis._held else 0):
+            searched, moved = analysis._searched_again(estimate)
+            if not moved:
+                return searched, searched.estimate()
+            analysis, estimate = searched._stepped()
+        return analysis, estimate
+
+    def _searched_again(self, estimate: Estimate) -> tuple[Analysis, bool]:
+        """Search anew for what is held, beside what is fitted now; and whether it moves."""
+        model, own = self.moved_to(estimate)
+        surveyed = [each.surveyed for each in self.logs]
+        found = dict(self.found)
+        moved = {}
+        for slot in self._held:
+            effect, present = model.stack()[slot]
+            fitted = [_fitted(each, model, self.unnamed, at) for each, at in zip(surveyed, own, strict=True)]
+            others = [{key: at for key, at in values.items() if key != effect.id} for values in fitted]
+            found |= search(surveyed, others, {effect.id: effect}, {effect.id: present})
+            now = found[effect.id]
+            if np.any(np.abs(np.subtract(now.start, present)) > 0.1 * np.array(now.spread)):
+                moved[effect.id] = now.start
+        searched = replace(self, found=found)
+        if moved:
+            searched = searched.around(model.starting_at(moved), own, lean=True)
+        return searched, bool(moved)
+
+    def _stepped(self) -> tuple[Analysis, Estimate]:
+        analysis, estimate = self, self.estimate()
+        for _ in range(MAX_ITERATIONS):
+            if analysis.linear or analysis.converged(estimate):
+                break
+            analysis = analysis.around(*analysis.moved_to(estimate), lean=True)
+            estimate = analysis.estimate()
+        return analysis, estimate
+
+
+@dataclass(frozen=True, eq=False)
+class KeptAnalysis:
+    """An analysis without its evidence, as it goes into a pickle: from the logs the same evidence is taken again.
+
+    Attributes
+    ----------
+    together : tuple of LogSource
+        Logs that were surveyed together.
+    numbers : tuple of int
+        Which of them the analysis is of.
+    evidence : tuple of dict
+        What is known of each of these without another pass, see `imufit.fitting.log_evidence.evidence_again`.
+    model, own, unnamed, found
+        As those of the analysis.
+    candidates, probes : tuple of str
+        Ids.
+    users : tuple of Effect
+        Effects of the user's among the candidates.
+    """
+
+    together: tuple[LogSource, ...]
+    numbers: tuple[int, ...]
+    evidence: tuple[dict[str, Any], ...]
+    model: EffectStack
+    own: tuple[dict[str, list[float]], ...]
+    unnamed: tuple[str, ...]
+    candidates: tuple[str, ...]
+    probes: tuple[str, ...]
+    found: dict[str, Found]
+    users: tuple[_imufit.Effect, ...]
+
+    @classmethod
+    def of(cls, analysis: Analysis) -> KeptAnalysis:
+        """Keep what is needed of an analysis.
+
+        Parameters
+        ----------
+        analysis : Analysis
+            The analysis.
+        """
+        places = [each.surveyed.place for each in analysis.logs]
+        evidence = [
+            {
+                item.name: getattr(each, item.name)
+                for item in fields(each)
+                if item.name not in ("surveyed", "raw", "white")
+            }
+            | {"one": each.raw is each.white}
+            for each in analysis.logs
+        ]
+        users = tuple(effect for key, effect in analysis.candidates.items() if key in registered())
+        return cls(
+            places[0][0],
+            tuple(number for _, number in places),
+            tuple(evidence),
+            analysis.model,
+            analysis.own,
+            analysis.unnamed,
+            tuple(analysis.candidates),
+            analysis.probes,
+            analysis.found,
+            users,
+        )
+
+    def restored(self) -> Analysis:
+        """Take the evidence of the logs again.
+
+        Raises
+        ------
+        InputError
+            The file of a log cannot be read any more.
+        """
+        surveyed = survey(self.model, self.together, silent, keep_constants=False)
+        chosen = [surveyed[number] for number in self.numbers]
+        logs = [
+            evidence_again(each, _fitted(each, self.model, self.unnamed, own), like, self.found)
+            for each, own, like in zip(chosen, self.own, self.evidence, strict=True)
+        ]
+        known = {key: effect for each in chosen for key, effect in each.effects.items()}
+        candidates = {key: known[key] for key in self.candidates}
+        problem = _problem(logs, self.model, self.unnamed, [*candidates, *self.probes])
+        return Analysis(tuple(logs), self.model, self.own, self.unnamed, candidates, self.probes, self.found, problem)
+
+
+def _by_slot(analysis: Analysis, slots: Sequence[int], parameters: Array) -> dict[int, Array]:
+    """Cut numbers for the parameters of some slots, one slot after the other, into those of each."""
+    counts = [len(analysis._present(slot)) for slot in slots]
+    return dict(zip(slots, np.split(parameters, np.cumsum(counts)[:-1]), strict=True)) if slots else {}
+
+
+def pooled(values: Array, errors: Array) -> tuple[Array, Array]:
+    """Mean of values of several logs (logs, k), weighted by their errors, and its standard error."""
+    if len(values) == 1:
+        return values[0], errors[0]
+    known = np.isfinite(errors) & (errors > 0.0)
+    weights = np.where(known, 1.0 / np.where(known, errors, 1.0) ** 2, 0.0)
+    weights = np.where(known.any(axis=0), weights, 1.0)
+    sums = weights.sum(axis=0)
+    error = np.where(known.any(axis=0), 1.0 / np.sqrt(sums), np.nan)
+    return (weights * values).sum(axis=0) / sums, error
+
+
+def _with_own(
+    logs: Sequence[SurveyedLog], model: EffectStack, unnamed: Sequence[str], known: Sequence[Values]
+) -> tuple[dict[str, list[float]], ...]:
+    """Values that each log has for itself: those known, else the model's, else zero."""
+    starts = {key: values for key, values in model.parameters.items() if each_log_has_its_own(key)}
+    out = []
+    for each, values in zip(logs, known, strict=True):
+        own = {key: list(starts[key].values()) for key in starts if each.refusal(find_effect(key)) is None}
+        own |= {key: [0.0] * len(find_effect(key).parameters) for key in unnamed if key in each.effects}
+        out.append(own | {key: list(values[key]) for key in own if key in values})
+    return tuple(out)
+
+
+def _fitted(each: SurveyedLog, model: EffectStack, unnamed: Sequence[str], own: Values) -> dict[str, list[float]]:
+    """Effects that are fitted to one log, with their parameters."""
+    named = {effect.id: own.get(effect.id, values) for effect, values in model.stack() if each.refusal(effect) is None}
+    return named | {key: own[key] for key in unnamed if key in own}
+
+
+def _probes(logs: Sequence[SurveyedLog], *, noise_only: bool = False) -> tuple[str, ...]:
+    known = {key: effect for each in logs for key, effect in each.probes.items()}
+    return tuple(key for key, effect in known.items() if effect.reference_part or not noise_only)
+
+
+def _problem(
+    logs: Sequence[LogEvidence], model: EffectStack, unnamed: Sequence[str], candidates: Collection[str]
+) -> _imufit.Problem:
+    slots = {key: slot for slot, key in enumerate([*model.effects, *unnamed, *candidates])}
+    known = {key: effect for each in logs for key, effect in each.surveyed.columns.items()}
+    known |= {effect.id: effect for effect, _ in model.stack()}
+    return _imufit.Problem(
+        [
+            (each.white, each.raw, each.variance, each.loudness, each.floors, [slots[key] for key in each.slots])
+            for each in logs
+        ],
+        [known[key].scope == "log" for key in slots],
+    )
+
+
+def _started(logs: Sequence[SurveyedLog], model: EffectStack, own: Sequence[Values]) -> EffectStack:
+    """Find where to start for effects of the model that need a search and have no values yet."""
+    for effect, values in model.stack():
+        if not any(values) and any(effect.search(each.facts) for each in logs):
+            others = [
+                {key: at for key, at in _fitted(each, model, list(at_own), at_own).items() if key != effect.id}
+                for each, at_own in zip(logs, own, strict=True)
+            ]
+            found = search(logs, others, {effect.id: effect})
+            model = model.starting_at({key: item.start for key, item in found.items()})
+    return model

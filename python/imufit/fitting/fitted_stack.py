@@ -1,0 +1,220 @@
+"""A stack of effects fitted to a log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from imufit.errors import InputError
+from imufit.fitting.analysis import Analysis, Estimate, KeptAnalysis
+from imufit.log.several import Logs, logs_of, name_of
+from imufit.model.catalogue import each_log_has_its_own, find_effect
+from imufit.model.effect_stack import EffectStack
+from imufit.progress import Progress, silent
+from imufit.results import LogParameters, Parameter
+from imufit.results.log_parameters import logs_json
+from imufit.results.parameter import by_effect, parameter_frame, parameter_table, plot_parameters
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from imufit.log import LogSource
+
+
+class FittedStack:
+    """A stack of effects fitted to a log, or to several of one sensor, with the evidence for further questions.
+
+    Attributes
+    ----------
+    model : EffectStack
+        The model with its fitted parameters; what each log has for itself (its bias) stands with its mean.
+    own : tuple of dict
+        For each log the values of the effects that it has for itself, unnamed ones among them.
+    logs : tuple of LogSource
+        The logs it was fitted to.
+    ratio : float
+        Held-out residual RMS over the noise floor, all channels (1 = at the floor).
+    training_ratio : float
+        The same on the data of the fit.
+    analysis : Analysis
+        Evidence of the logs around the fitted parameters.
+    estimate : Estimate
+        Parameters, standard errors and held-out error that the evidence gives.
+    """
+
+    def __init__(self, analysis: Analysis, estimate: Estimate) -> None:
+        self._analysis: Analysis | KeptAnalysis = analysis
+        self._logs = tuple(each.surveyed.log for each in analysis.logs)
+        self.estimate = estimate
+        self.model, self.own = analysis.moved_to(estimate)
+        self.ratio = estimate.held_out
+        self.training_ratio = estimate.training
+
+    @classmethod
+    def of(cls, model: EffectStack, log: Logs, progress: Progress | None = None) -> Self:
+        """Fit a model to a log or to several of one sensor; see :meth:`imufit.SensorModel.fit`.
+
+        Parameters
+        ----------
+        model : EffectStack
+            Effects, and the values to start from.
+        log : Log, LogStream or a sequence of them
+            With reference attitude.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+        """
+        return cls(*Analysis.of(model, logs_of(log), progress or silent).solved())
+
+    def moved(self, model: EffectStack) -> Self:
+        """Fit another stack of effects to the same logs, starting from this one's values.
+
+        Parameters
+        ----------
+        model : EffectStack
+            The other stack.
+        """
+        return type(self)(*self.analysis.solved_for(model, self.own))
+
+    def of_logs(self, chosen: Sequence[int]) -> Self:
+        """Fit the same effects to some of the logs alone, from the evidence that there is.
+
+        Parameters
+        ----------
+        chosen : sequence of int
+            Numbers of the logs.
+        """
+        analysis = self.analysis.of_logs(chosen)
+        return type(self)(analysis, analysis.estimate())
+
+    @property
+    def analysis(self) -> Analysis:
+        """Evidence of the logs around the fitted parameters; a fit that was pickled takes it from its logs again."""
+        if isinstance(self._analysis, KeptAnalysis):
+            self._analysis = self._analysis.restored()
+        return self._analysis
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the evidence, which the logs give again when it is asked for."""
+        kept = self._analysis if isinstance(self._analysis, KeptAnalysis) else KeptAnalysis.of(self._analysis)
+        return {**self.__dict__, "_analysis": kept}
+
+    @property
+    def logs(self) -> tuple[LogSource, ...]:
+        """The logs."""
+        return self._logs
+
+    @property
+    def by_log(self) -> tuple[LogParameters, ...]:
+        """What each of several logs has for itself, and how far it is above its noise floor; empty for one log."""
+        if len(self.logs) == 1:
+            return ()
+        return tuple(
+            LogParameters(name_of(log, k), self._own_parameters(k), self.log_ratio(k))
+            for k, log in enumerate(self.logs)
+        )
+
+    def _own_parameters(self, log: int) -> tuple[Parameter, ...]:
+        found: list[Parameter] = []
+        for slot, key in enumerate(self.model.effects):
+            if not each_log_has_its_own(key) or log not in self.analysis.having(key):
+                continue
+            effect = find_effect(key)
+            at = self.analysis.having(key).index(log) * len(effect.parameters)
+            errors = self.estimate.errors[slot][at : at + len(effect.parameters)]
+            found += [
+                Parameter(key, name, value, float(error), unit, typical)
+                for (name, unit, typical), value, error in zip(
+                    effect.parameters, self.own[log][key], errors, strict=True
+                )
+            ]
+        return tuple(found)
+
+    @property
+    def worst(self) -> int:
+        """Number of the log that stands highest above its noise floor."""
+        return max(range(len(self.logs)), key=self.log_ratio) if len(self.logs) > 1 else 0
+
+    def log_ratio(self, log: int) -> float:
+        """Return the residual RMS of one log over its noise floor, all channels.
+
+        Parameters
+        ----------
+        log : int
+            Number of the log.
+        """
+        channels = self.analysis.problem.residual(self.estimate.step, log)["channels"]
+        floors = self.analysis.logs[log].floors
+        square = sum(item["n"] * (item["rms"] / floors[item["index"]]) ** 2 for item in channels)
+        return float(np.sqrt(square / sum(item["n"] for item in channels)))
+
+    def model_of(self, log: int) -> EffectStack:
+        """Return the model with the values that one log has for itself.
+
+        Parameters
+        ----------
+        log : int
+            Number of the log.
+        """
+        own = {key: values for key, values in self.own[log].items() if key in self.model.effects}
+        return self.model.starting_at(own)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Every parameter with its standard error, unit and typical size."""
+        return self.model.listed()
+
+    def on(self, log: Logs | None, progress: Progress) -> Self:
+        """Return this fit if `log` is what it was fitted to, else the model refitted to `log`.
+
+        Parameters
+        ----------
+        log : Log, LogStream or a sequence of them, optional
+            The logs in question; None is its own.
+        progress : callable
+            Called with (rows done, rows in all, what is being done).
+        """
+        if log is None or logs_of(log) == self.logs:
+            return self
+        return type(self).of(self.model, log, progress)
+
+    def save(self, path: str | Path) -> None:
+        """Write the fitted model as a TOML file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that exists is replaced.
+        """
+        self.model.save(path)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON of the fit: model, parameters by effect, held-out and training ratio, number of rows."""
+        return {
+            "model": list(self.model.effects),
+            "parameters": by_effect(self.parameters),
+            "ratio": self.ratio,
+            "training_ratio": self.training_ratio,
+            "n": sum(log.n for log in self.logs),
+            **logs_json(self.by_log),
+        }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per parameter."""
+        return parameter_frame(self.parameters)
+
+    def plot(self) -> Figure:
+        """Draw the parameters beside their typical sizes."""
+        if not self.parameters:
+            raise InputError("the ideal sensor has no parameters to draw", remedy="Fit at least one effect.")
+        return plot_parameters(self.parameters)
+
+    def _repr_html_(self) -> str:
+        return parameter_table(self.parameters, str(self)).html()
+
+    def __repr__(self) -> str:
+        stack = " + ".join(self.model.effects) or "the ideal sensor"
+        return f"{stack}: {self.ratio:.3f} times the noise floor (held out)"

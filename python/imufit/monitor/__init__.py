@@ -1,5 +1,0 @@
-"""Attitude of a device while it runs, by several filters at once."""
-
-from imufit.monitor.monitor import Monitor, MonitorState
-
-__all__ = ["Monitor", "MonitorState"]

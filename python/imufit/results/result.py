@@ -1,0 +1,37 @@
+"""How every result shows itself: as text, in a notebook, and in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from imufit.results.table import Table, html, page
+
+LONGEST: Final = 400
+"""Most characters of a result in one line: five lines of a terminal of 80 columns."""
+
+
+class Result:
+    """A result made of sentences and tables; its line in a shell is its first sentence."""
+
+    def sentences(self) -> Sequence[str]:
+        """Return what the result says, the answer first."""
+        raise NotImplementedError
+
+    def tables(self) -> Sequence[Table]:
+        """Every table, most important first."""
+        return ()
+
+    def paragraphs(self) -> Sequence[str]:
+        """Return the sentences that stand above the tables where the whole result is shown."""
+        return self.sentences()
+
+    def _repr_html_(self) -> str:
+        return html(self.paragraphs(), self.tables())
+
+    def __str__(self) -> str:
+        return page(self.paragraphs(), self.tables())
+
+    def __repr__(self) -> str:
+        line = next(iter(self.sentences()), "")
+        return line if len(line) <= LONGEST else f"{line[: LONGEST - 1]}…"

@@ -1,0 +1,341 @@
+"""The questions of the library as functions: each takes a log, a file's name, a table or arrays.
+
+A verb opens what it is given (:func:`imufit.log.log_of`) and asks the package that answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from imufit.diagnosing.ladder import ladder as ladder_from
+from imufit.errors import InputError
+from imufit.log import AnyLog, AnyLogs, Log, LogStream, log_of, logs_of_any, whole
+from imufit.loop import Fit, SensorModel
+from imufit.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
+    from scipy.spatial.transform import Rotation
+
+    from imufit.allan_deviation import Allan
+    from imufit.calibrating import Calibration
+    from imufit.joining import Joined
+    from imufit.replaying import Replay
+    from imufit.results import Comparison, Diagnosis, Ladder, LogInfo, ModelComparison
+    from imufit.tuning import Tuning
+
+AnyModel = SensorModel | Fit | Sequence[str] | str | Path | None
+"""A model, a fit, effects by their ids, the file of a model; None is the ideal sensor."""
+
+
+def model_of(given: AnyModel) -> SensorModel:
+    """Return the sensor model that something stands for.
+
+    Parameters
+    ----------
+    given : SensorModel, Fit, sequence of str, str, Path or None
+        A text is one effect's id, or the name of a model's file where it ends in ``.toml``.
+    """
+    if given is None:
+        return SensorModel()
+    if isinstance(given, SensorModel):
+        return given
+    if isinstance(given, Fit):
+        return given.model
+    if isinstance(given, Path) or (isinstance(given, str) and given.endswith(".toml")):
+        return SensorModel.load(given)
+    return SensorModel([given] if isinstance(given, str) else list(given))
+
+
+def fit(logs: AnyLogs, model: AnyModel = None, *, progress: Progress | None = None) -> Fit:
+    """Fit a sensor model to a log with reference, or to several logs of one sensor.
+
+    Parameters
+    ----------
+    logs : Log, str, Path, DataFrame, mapping of arrays, or a sequence of these
+        Several share all effects but biases and mounts.
+    model : SensorModel, sequence of str, str or Path, optional
+        Effects such as ``["gyr.bias", "gyr.scale"]``; without it the ideal sensor.
+    progress : callable, optional
+        Called with (rows done, rows in all, what is being done).
+
+    Returns
+    -------
+    Fit
+        Parameters with standard errors, held-out error, and the evidence for further questions.
+
+    Raises
+    ------
+    InputError
+        The log has no usable reference, or an effect of the model cannot be tested on it.
+    """
+    return model_of(model).fit(logs_of_any(logs), progress)
+
+
+def diagnose(logs: AnyLogs, model: AnyModel = None, *, progress: Progress | None = None) -> Diagnosis:
+    """Say which physical effect a sensor model is missing, judged on a log.
+
+    Parameters
+    ----------
+    logs : Log, str, Path, DataFrame, mapping of arrays, or a sequence of these
+        With reference attitude, or with rests that stand in for one; several logs are of one sensor.
+    model : SensorModel, Fit, sequence of str, str or Path, optional
+        The model that is questioned; without it the ideal sensor.
+    progress : callable, optional
+        Called with (rows done, rows in all, what is being done).
+
+    Raises
+    ------
+    InputError
+        The log has no usable reference, or an effect of the model cannot be tested on it.
+    """
+    return fit(logs, model, progress=progress).diagnose(progress=progress)
+
+
+def ladder(logs: AnyLogs, model: AnyModel = None, *, progress: Progress | None = None) -> Ladder:
+    """Repeat diagnose and add until nothing is missing, or until the log leaves open what is.
+
+    Parameters
+    ----------
+    logs : Log, str, Path, DataFrame, mapping of arrays, or a sequence of these
+        With reference attitude, or with rests that stand in for one; several logs are of one sensor.
+    model : SensorModel, Fit, sequence of str, str or Path, optional
+        Where to start from; without it the ideal sensor.
+    progress : callable, optional
+        Called with (rows done, rows in all, what is being done).
+
+    Returns
+    -------
+    Ladder
+        Every step with the held-out error before, expected and after, the final model and verdict.
+
+    Raises
+    ------
+    InputError
+        The log has no usable reference, or an effect of the model cannot be tested on it.
+    """
+    return ladder_from(fit(logs, model, progress=progress), progress)
+
+
+def compare(
+    log: AnyLog, model: AnyModel = None, other: AnyModel = None, *, progress: Progress | None = None
+) -> Comparison | ModelComparison:
+    """Say where a model fails on a log, its parameters as they are; or how two models differ on it.
+
+    Parameters
+    ----------
+    log : Log, str, Path, DataFrame or mapping of arrays
+        With reference attitude.
+    model : SensorModel, Fit, sequence of str, str or Path, optional
+        The model; without it the ideal sensor.
+    other : SensorModel, Fit, sequence of str, str or Path, optional
+        A second model. Both are then fitted to the log from where they stand.
+    progress : callable, optional
+        Called with (rows done, rows in all, what is being done).
+
+    Returns
+    -------
+    Comparison or ModelComparison
+        Residuals by channel, covariate, segment and frequency; of two models their errors, which one the log prefers
+        and in which channels they differ.
+
+    Raises
+    ------
+    InputError
+        The log has no usable reference, or an effect of a model cannot be tested on it.
+    """
+    opened = log_of(log)
+    first = model_of(model)
+    if other is None:
+        return first.compare(opened, progress)
+    return first.fit(opened, progress).against(model_of(other).fit(opened, progress))
+
+
+def calibrate(
+    logs: AnyLogs,
+    cost: str | None = None,
+    *,
+    sensors: Sequence[str] = ("acc", "gyr", "mag"),
+    settings: Mapping[str, float] | None = None,
+) -> Calibration:
+    """Calibrate a sensor from rests, turns between them, and free rotation (paper A).
+
+    Parameters
+    ----------
+    logs : Log, str, Path, DataFrame, mapping of arrays, or a sequence of these
+        Of one sensor; several add up.
+    cost : str, optional
+        ``vector`` or ``magnitude``, see :func:`imufit.calibrating.calibrate`.
+    sensors : sequence of str
+        Those to be calibrated, if the logs have them.
+    settings : mapping, optional
+        Criteria of a rest, see :func:`imufit.calibrating.find_poses`.
+
+    Raises
+    ------
+    InputError
+        The logs leave a calibration open; the message says what is missing.
+    """
+    from imufit.calibrating import calibrate  # noqa: PLC0415  only needed here
+
+    return calibrate([_held(log) for log in logs_of_any(logs)], cost, sensors=sensors, settings=settings)
+
+
+def replay(
+    log: AnyLog,
+    filters: Sequence[str] | str | None = ("gyro", "triad", "mahony"),
+    settings: Mapping[str, Mapping[str, float]] | None = None,
+    initial: ArrayLike | Rotation | str | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Replay:
+    """Attitude for every row of a log by each of several filters.
+
+    Parameters
+    ----------
+    log : Log, str, Path, DataFrame or mapping of arrays
+        n rows with the sensors that the filters need.
+    filters : sequence of str or str, optional
+        Names out of :data:`imufit.replaying.FILTERS` and ``SMOOTHERS``; None is every filter for which the log has the
+        sensors.
+    settings : mapping of mappings, optional
+        ``{"mahony": {"k_p": 1.0}}``.
+    initial : (4,) array, Rotation, "vectors" or "reference", optional
+        Attitude at the first row, scalar first, body to reference frame.
+    progress : callable, optional
+        Called with (filters done, filters in all, what is being done).
+
+    Returns
+    -------
+    Replay
+        Attitudes (n, 4), errors in deg, skipped rows.
+
+    Raises
+    ------
+    InputError
+        A filter or setting is unknown, or a filter lacks its sensor.
+    """
+    from imufit.replaying import DEFAULT_FILTERS, replay  # noqa: PLC0415  only needed here
+
+    held = _held(log_of(log))
+    chosen = (filters,) if isinstance(filters, str) else filters
+    try:
+        return replay(
+            held, DEFAULT_FILTERS if chosen == DEFAULT_FILTERS else chosen, settings, initial, progress or silent
+        )
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(str(error), file=held.path) from error
+
+
+def allan(log: AnyLog, *, progress: Progress | None = None) -> Allan:
+    """Allan deviation of each sensor over the longest rest of a log.
+
+    Parameters
+    ----------
+    log : Log, str, Path, DataFrame or mapping of arrays
+        At rest for a long time.
+    progress : callable, optional
+        Called with (steps done, steps in all, what is being done).
+
+    Raises
+    ------
+    InputError
+        There is no rest that is long enough.
+    """
+    from imufit.allan_deviation import allan  # noqa: PLC0415  only needed here
+
+    return allan(_held(log_of(log)), progress=progress or silent)
+
+
+def tune(log: AnyLog, filter: str, *, progress: Progress | None = None, **options: Any) -> Tuning:
+    """Find the gains of a filter that come nearest to the reference of a log.
+
+    Parameters
+    ----------
+    log : Log, str, Path, DataFrame or mapping of arrays
+        With reference attitude.
+    filter : str
+        Name out of :data:`imufit.replaying.FILTERS`.
+    progress : callable, optional
+        Called with (trials done, trials in all, what is being done).
+    **options
+        As for :func:`imufit.tuning.tune`.
+
+    Raises
+    ------
+    InputError
+        The log lacks what this takes, or a setting cannot be.
+    """
+    from imufit.tuning import tune  # noqa: PLC0415  only needed here
+
+    return tune(_held(log_of(log)), filter, progress=progress or silent, **options)
+
+
+def info(log: AnyLog, *, effects: bool = True, progress: Progress | None = None) -> LogInfo:
+    """Say what is in a log: rates, gaps, ranges, rests, the quality of its reference, the effects that it can show.
+
+    Parameters
+    ----------
+    log : Log, str, Path, DataFrame or mapping of arrays
+        Any log.
+    effects : bool
+        Whether to find out which effects it can show, which takes a pass over all rows.
+    progress : callable, optional
+        Called with (rows done, rows in all, what is being done).
+    """
+    from imufit.inspection import info  # noqa: PLC0415  only needed here
+
+    return info(log_of(log), effects=effects, progress=progress)
+
+
+def plot(log: AnyLog, *, progress: Progress | None = None, **options: Any) -> Figure:
+    """Draw the readings of a log over time.
+
+    Parameters
+    ----------
+    log : Log, str, Path, DataFrame or mapping of arrays
+        Any log.
+    progress : callable, optional
+        Called with (rows done, rows in all, what is being done).
+    **options
+        As for :func:`imufit.inspection.plot`: ``columns``, ``show``, ``rows``, ``begin``, ``end``.
+    """
+    from imufit.inspection import plot  # noqa: PLC0415  only needed here
+
+    return plot(log_of(log), progress=progress, **options)
+
+
+def join(log: AnyLog, reference: AnyLog, lag: float | None = None, skew: float | None = None) -> Joined:
+    """Lay a reference on another clock beside a sensor's log.
+
+    Parameters
+    ----------
+    log : Log, str, Path, DataFrame or mapping of arrays
+        The sensor.
+    reference : Log, str, Path, DataFrame or mapping of arrays
+        The reference; an attitude in columns without a declared kind is read as the sensor's rates show.
+    lag : float, optional
+        Lag of the reference, s, instead of the one that is found.
+    skew : float, optional
+        Its clock's skew, instead of the one that is found.
+
+    Raises
+    ------
+    InputError
+        The two have too little motion in common, or the lag is ambiguous.
+    """
+    from imufit.joining import join, join_as_found  # noqa: PLC0415  only needed here
+
+    other = LogStream(reference, bare=True).read() if isinstance(reference, (str, Path)) else _held(log_of(reference))
+    way = join if other.ref_q is not None else join_as_found
+    return way(_held(log_of(log)), other, lag, skew)
+
+
+def _held(log: Any) -> Log:
+    """All rows in memory."""
+    return whole(log)
