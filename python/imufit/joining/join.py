@@ -55,11 +55,11 @@ def join(log: Log, reference: Log, lag: float | None = None, skew: float | None 
     sensor, body, rows = _courses(log, reference)
     if min(float(course.t[-1] - course.t[0]) for course in (sensor, body)) < LEAST_OVERLAP:
         raise _apart(reference)
-    rates = Correlation(sensor, body)
+    rates = Correlation(sensor, body, skew)
     if lag is None:
         best, rival = _only_one(sensor, body, rates, skew, (log, reference))
     else:
-        refined = refine(sensor, body, lag, rates.at(lag).mount, skew, known=True)
+        refined = refine(sensor, body, replace(rates.at(lag), lag=lag), skew is not None, lag_known=True)
         if refined is None:
             raise _apart(reference)
         best, rival = placed(sensor, body, rates, refined), 0.0

@@ -21,7 +21,7 @@ WORSE: Final = 1.5
 """It makes the lag ambiguous unless it leaves this many times as much of the rates (square): of a motion that repeats
 itself both leave the noise, of steps that resemble one another the wrong one leaves three times as much and more."""
 SAME: Final = 0.5
-"""Two maxima of the likelihood that lead to the same lag, to this many bins, are one."""
+"""Two alignments that put one sample of the reference at the same time, to this many bins, are one."""
 LEAST_CORRELATION: Final = 0.3
 """Below this correlation of the rates the two recordings are not called one motion."""
 
@@ -98,8 +98,8 @@ def likeliest(
     near = [peak for peak in peaks if peak.gain >= RIVAL * peaks[0].gain]
     found: list[Placed] = []
     for peak in near:
-        aligned = refine(sensor, body, peak.lag, peak.mount, skew, most=most)
-        if aligned is None or any(abs(aligned.lag - other.aligned.lag) <= SAME * rates.step for other in found):
+        aligned = refine(sensor, body, peak, skew is not None, most=most)
+        if aligned is None or any(rates.meet(aligned, other.aligned, SAME) for other in found):
             continue
         found.append(placed(sensor, body, rates, aligned))
     if not found:
