@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.joining.course import Course, reference_course
+from imufit.joining.gravity import mounted
 from imufit.joining.joined import Joined
 from imufit.joining.likeliest import Placed, likeliest, placed
 from imufit.joining.mount import SMALL, nearest_square_turn, turned
@@ -64,8 +65,9 @@ def join(log: Log, reference: Log, lag: float | None = None, skew: float | None 
             raise _apart(reference)
         best, rival = placed(sensor, body, rates, refined), 0.0
     aligned, traces = best.aligned, best.traces
-    square, left = nearest_square_turn(aligned.mount)
-    mount = square if left < SMALL else aligned.mount
+    found = mounted(best.common, aligned, log, reference, rows)
+    square, left = nearest_square_turn(found.matrix)
+    mount = square if left < SMALL else found.matrix
     return Joined(
         log=_joined(log, reference, rows, aligned, mount),
         lag=aligned.lag,
@@ -73,6 +75,8 @@ def join(log: Log, reference: Log, lag: float | None = None, skew: float | None 
         skew=aligned.skew,
         skew_error=aligned.skew_error,
         mount=mount,
+        mount_error=found.error,
+        by_gravity=found.by_gravity,
         left=left,
         correlation=traces.correlation,
         overlap=traces.overlap,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.joining.mount import SMALL, words
+from imufit.joining.mount import OPEN, SMALL, words
 from imufit.log import Log
 from imufit.results.table import Table
 
@@ -70,6 +70,10 @@ class Joined:
         Rate of the reference's clock over the sensor's, less one, and the standard error.
     mount : (3, 3) array
         Turn from the reference body's axes to the sensor's that was applied.
+    mount_error : float
+        Standard error of the turn about the axis about which it is least sure, rad; infinite where nothing shows it.
+    by_gravity : bool
+        True if all motion is about one axis, so that the turn about this axis follows from gravity.
     left : float
         Angle between the turn that was found and the nearest one that maps axes on axes, rad.
     correlation : float
@@ -90,6 +94,8 @@ class Joined:
     skew: float
     skew_error: float
     mount: Array
+    mount_error: float
+    by_gravity: bool
     left: float
     correlation: float
     overlap: float
@@ -107,11 +113,27 @@ class Joined:
     def remarks(self) -> tuple[str, ...]:
         """What a reader should know besides."""
         angle = np.rad2deg(self.left)
-        if self.left < SMALL:
+        if self.mount_error > OPEN:
             return (
-                (f"The sensor is turned by {angle:.1f} deg besides: `ref.alignment` finds it.",) if angle > 0.05 else ()
+                "All motion is about one axis, and nothing shows how the sensor is turned about this axis. Its axes are "
+                "taken to be as nearly parallel to those of the reference body as the motion allows.",
             )
-        return ("The sensor's axes are not parallel to those of the reference body: the whole turn was applied.",)
+        settled = (
+            (f"All motion is about one axis. The turn about this axis follows from gravity, with frame {self.frame}.",)
+            if self.by_gravity
+            else ()
+        )
+        if self.left >= SMALL:
+            whole = "The sensor's axes are not parallel to those of the reference body: the whole turn was applied."
+            return (*settled, whole)
+        if angle > 0.05:
+            return (*settled, f"The sensor is turned by {angle:.1f} deg besides: `ref.alignment` finds it.")
+        return settled
+
+    @property
+    def frame(self) -> str:
+        """Frame of the reference."""
+        return self.log.metadata.frame
 
     def tables(self) -> tuple[Table, ...]:
         """Lag, skew, mount and overlap."""
@@ -133,6 +155,8 @@ class Joined:
             "skew": self.skew,
             "skew_error": self.skew_error,
             "mount": self.mount.tolist(),
+            "mount_error": self.mount_error if np.isfinite(self.mount_error) else None,
+            "mount_by_gravity": self.by_gravity,
             "left": self.left,
             "correlation": self.correlation,
             "overlap": self.overlap,

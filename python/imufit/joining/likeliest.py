@@ -34,11 +34,14 @@ class Placed:
     ----------
     aligned : Aligned
         Lag, skew, and the mount that makes the mean rates agree best.
+    common : CommonRates
+        The rates of both at the same times.
     traces : RateTrace
         The rates and how well they agree.
     """
 
     aligned: Aligned
+    common: CommonRates
     traces: RateTrace
 
 
@@ -173,4 +176,4 @@ def placed(sensor: Course, body: Course, rates: Correlation, aligned: Aligned) -
         correlation=common.correlation(mount),
         overlap=common.overlap,
     )
-    return Placed(replace(aligned, mount=mount), traces)
+    return Placed(replace(aligned, mount=mount), common, traces)

@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
+from imufit.log.scalar_first import quaternions_from_rotation
 
 Array = NDArray[np.float64]
 
 SMALL: Final = np.deg2rad(15.0)
 """A turn so near to one that maps axes on axes is that one and a small error of mounting: `ref.alignment` finds it."""
+OPEN: Final = 0.25
+"""Standard error from which on a turn is not known, rad: at a normal error the nearest right angles are the wrong ones
+in one case of a thousand."""
 AXES: Final = "xyz"
 
 
@@ -57,5 +61,5 @@ def turned(q: Array, mount: Array) -> Array:
     mount : (3, 3) array
         Turn from the reference body's axes to the sensor's.
     """
-    back = Rotation.from_matrix(mount.T).as_quat()[[3, 0, 1, 2]]
+    back = quaternions_from_rotation(Rotation.from_matrix(mount.T))
     return _imufit.quaternion_product(q, np.broadcast_to(back, q.shape).copy())

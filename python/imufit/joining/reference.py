@@ -15,6 +15,7 @@ from imufit import _imufit
 from imufit.errors import InputError
 from imufit.joining.course import CONJUGATE
 from imufit.log import Log
+from imufit.log.scalar_first import quaternions_from_rotation
 
 Array = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def _attitudes(log: Log, kind: str, columns: Sequence[str], values: Array) -> Ar
         return _imufit.quaternion_from_matrix_rows(values)
     axes = sequence.group(1) if sequence else kind[-1]
     angles = values if sequence else values[:, :1]
-    return np.asarray(Rotation.from_euler(axes, angles).as_quat()[:, [3, 0, 1, 2]])
+    return quaternions_from_rotation(Rotation.from_euler(axes, angles))
 
 
 def _check(right: NDArray[np.bool_], problem: str, log: Log, columns: Sequence[str]) -> None:

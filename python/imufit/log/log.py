@@ -12,17 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
-from imufit.log.arrays import (
-    check_keywords,
-    contiguous,
-    fields_from_arrays,
-    quaternions_from_rotation,
-    rotation_from_quaternions,
-)
+from imufit.log.arrays import check_keywords, contiguous, fields_from_arrays
 from imufit.log.columns import GROUPS, present
 from imufit.log.frame import fields_from_frame
 from imufit.log.metadata import Metadata
 from imufit.log.parquet import ROW_GROUP
+from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
 from imufit.log.size import BLOCK_ROWS
 from imufit.log.writer import write_rows
 
