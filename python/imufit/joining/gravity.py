@@ -81,8 +81,11 @@ def mounted(common: CommonRates, aligned: Aligned, log: Log, reference: Log, row
         return Mount(aligned.mount, np.inf)
     noise = (1.0 - max(common.correlation(aligned.mount), 0.0) ** 2) / len(common.measured)
     weight = 1.0 / (RATE_ERROR**2 + noise)
-    products = weight * common.measured.T @ common.expected / np.sqrt(
-        max(float(np.sum(common.measured**2) * np.sum(common.expected**2)), 1e-300)
+    products = (
+        weight
+        * common.measured.T
+        @ common.expected
+        / np.sqrt(max(float(np.sum(common.measured**2) * np.sum(common.expected**2)), 1e-300))
     )
     by_rates = _mount(products, weight * _second_moment(common.measured))
     if not by_rates.open:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -34,14 +35,14 @@ class Placed:
     ----------
     aligned : Aligned
         Lag, skew, and the mount that makes the mean rates agree best.
-    common : CommonRates
-        The rates of both at the same times.
+    common : CommonRates or None
+        The rates of both at the same times; None where something else was compared.
     traces : RateTrace
         The rates and how well they agree.
     """
 
     aligned: Aligned
-    common: CommonRates
+    common: CommonRates | None
     traces: RateTrace
 
 
@@ -107,8 +108,13 @@ def likeliest(
         found.append(placed(sensor, body, rates, aligned))
     if not found:
         return None
-    found.sort(key=lambda each: -each.traces.gain)
-    return Likeliest(found[0], min(found[1:], key=lambda each: each.traces.left, default=None))
+    return of_these(found)
+
+
+def of_these(found: Sequence[Placed]) -> Likeliest:
+    """Return the likeliest of some alignments, one at least, and of the others the one that leaves least."""
+    best, *others = sorted(found, key=lambda each: -each.traces.gain)
+    return Likeliest(best, min(others, key=lambda each: each.traces.left, default=None))
 
 
 @dataclass(frozen=True, eq=False)

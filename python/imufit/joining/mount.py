@@ -51,6 +51,14 @@ def words(mount: Array) -> str:
     return text if left < SMALL else f"{text} to within {np.rad2deg(left):.0f} deg"
 
 
+def axis_words(axis: Array) -> str:
+    """Say along which axis of a sensor a unit vector lies, such as ``+y``, or its components."""
+    along = int(np.argmax(np.abs(axis)))
+    if abs(axis[along]) >= np.cos(SMALL):
+        return f"{'+' if axis[along] > 0.0 else '-'}{AXES[along]}"
+    return ", ".join(f"{each:.3f}" for each in axis)
+
+
 def turned(q: Array, mount: Array) -> Array:
     """Return the attitude of the sensor, (n, 4), from that of the reference body it is mounted on.
 

@@ -163,7 +163,9 @@ def refine(
         at_middle, rate = at_middle + step[0], rate + step[1]
         linear = linear + step[2:].reshape(3, 3)
         if turn in (1, 4):
-            tame = blocks.without(_wild(sensor, reference, blocks, (at_middle, rate, (np.eye(3) + linear) @ mount, middle)))
+            tame = blocks.without(
+                _wild(sensor, reference, blocks, (at_middle, rate, (np.eye(3) + linear) @ mount, middle))
+            )
         elif turn > 5 and abs(step[0]) < 1e-6:
             break
     assert sums is not None

@@ -8,7 +8,7 @@ the reference stretched, in steps so small that the ends of the recordings stay 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -45,14 +45,14 @@ TURNS: Final = 15
 
 @dataclass(frozen=True)
 class Rates:
-    """Mean angular rates in bins.
+    """Mean angular rates, or something else that both recordings show, in bins.
 
     Attributes
     ----------
     start, step : float
         Time of the first bin's begin and width of the bins, s.
-    values : (n, 3) array
-        rad/s; zero where nothing is known.
+    values : (n, 3) or (n, 1) array
+        Rates in rad/s, or what else there is; zero where nothing is known.
     known : (n,) array of bool
         Bins without a gap.
     """
@@ -117,13 +117,15 @@ class _Lags:
     shared: Array
 
 
-class Correlation:
-    """Correlation of the rates of a sensor and a reference at every lag.
+class LagSearch:
+    """Correlation, at every lag, of something that both recordings show.
 
     Parameters
     ----------
-    sensor, reference : Course
-        Integrated rates, each on its own clock.
+    own : Rates
+        What the sensor shows.
+    stretched : callable
+        Gives what the reference shows, in bins that are longer by a skew.
     skew : float, optional
         Rate of the reference's clock over the sensor's, less one; None if it is to be looked for.
 
@@ -132,23 +134,17 @@ class Correlation:
     step : float
         Width of the bins, s.
     own, other : Rates
-        Mean rates of sensor and reference.
+        What sensor and reference show.
     skews : (k,) array
         Skews that are looked at, the smallest first.
     """
 
-    def __init__(self, sensor: Course, reference: Course, skew: float | None = 0.0) -> None:
-        self.step = bin_width(sensor, reference)
-        self.own = Rates.of(sensor, self.step)
-        edges = np.arange(sensor.t[0], sensor.t[-1], self.step)
-        fastest = np.linalg.norm(np.diff(sensor.angle_at(edges), axis=0), axis=1) / self.step
-        # Where the reference turns faster than the sensor ever does, a pose is wild.
-        self._most = FASTER * float(fastest.max()) if fastest.size else np.inf
-        self._reference = reference
-        self.other = Rates.of(reference, self.step, self._most)
-        n, m = len(self.own.values), len(self.other.values)
+    def __init__(self, own: Rates, stretched: Callable[[float], Rates], skew: float | None) -> None:
+        self.own, self.other, self.step = own, stretched(0.0), own.step
+        self._stretched = stretched
+        n, m = len(own.values), len(self.other.values)
         self._size = fft.next_fast_len(n + int(m * (1.0 + LARGEST_SKEW)) + 1, real=True)
-        values, known = self.own.values, self.own.known.astype(float)
+        values, known = own.values, own.known.astype(float)
         self._rate = fft.rfft(values.T, self._size)
         self._energy = fft.rfft(np.sum(values**2, axis=1), self._size)
         self._known = fft.rfft(known, self._size)
@@ -161,8 +157,7 @@ class Correlation:
     def _lags(self, skew: float) -> _Lags:
         """Compare at every lag with the reference stretched by a skew."""
         n, size = len(self.own.values), self._size
-        stretched = self.step / (1.0 - skew)
-        other = self.other if skew == 0.0 else Rates.of(self._reference, stretched, self._most)
+        other = self.other if skew == 0.0 else self._stretched(skew)
         m = len(other.values)
 
         def correlated(a: Array, b: Array) -> Array:
@@ -178,10 +173,10 @@ class Correlation:
             correlated(self._known, fft.rfft(squares, size)) - 1e-12 * float(squares.sum()),
         )
         common = correlated(self._known, there)
-        shared = correlated(self._rate[:, None], rate[None]).reshape(9, -1)
+        shared = correlated(self._rate[:, None], rate[None]).reshape(len(self._rate) ** 2, -1)
         least = max(LEAST_OVERLAP, LEAST_SHARE * min(self._sums[1], known.sum()) * self.step)
         usable = (common * self.step >= least) & (energy[0] > 0.0) & (energy[1] > 0.0)
-        agreed = largest_agreement(shared[:, usable])
+        agreed = largest_agreement(shared[:, usable]) if len(shared) == 9 else shared[0, usable]
         values = np.clip(agreed / np.sqrt(energy[0][usable] * energy[1][usable]), 0.0, 1.0 - 1e-9)
         gain = np.zeros(n + m - 1)
         gain[usable] = -0.5 * common[usable] * np.log1p(-(values**2)) + skew_prior(skew)
@@ -236,7 +231,29 @@ class Correlation:
             self._first(lags) - place * self.step,
             lags.skew,
             float(lags.gain[place]),
-            turn_between(lags.shared[:, place].reshape(3, 3)),
+            turn_between(lags.shared[:, place].reshape(3, 3)) if len(lags.shared) == 9 else np.eye(3),
+        )
+
+
+class Correlation(LagSearch):
+    """Correlation of the angular rates of a sensor and a reference at every lag, whatever the turn between their axes.
+
+    Parameters
+    ----------
+    sensor, reference : Course
+        Integrated rates, each on its own clock.
+    skew : float, optional
+        As for `LagSearch`.
+    """
+
+    def __init__(self, sensor: Course, reference: Course, skew: float | None = 0.0) -> None:
+        step = bin_width(sensor, reference)
+        edges = np.arange(sensor.t[0], sensor.t[-1], step)
+        fastest = np.linalg.norm(np.diff(sensor.angle_at(edges), axis=0), axis=1) / step
+        # Where the reference turns faster than the sensor ever does, a pose is wild.
+        most = FASTER * float(fastest.max()) if fastest.size else np.inf
+        super().__init__(
+            Rates.of(sensor, step), lambda stretch: Rates.of(reference, step / (1.0 - stretch), most), skew
         )
 
 
