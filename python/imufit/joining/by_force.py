@@ -8,31 +8,31 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.joining.forces import Forces
+from imufit.joining.forces import REACH, Forces
 from imufit.joining.joined import Compared, RateTrace
 from imufit.joining.likeliest import RIVAL, SAME, Likeliest, Placed, of_these
 from imufit.joining.refine import Aligned
-from imufit.joining.search import FASTER, USUAL_SKEW, Candidate, LagSearch
+from imufit.joining.search import USUAL_SKEW, Candidate, LagSearch
 
 Array = NDArray[np.float64]
 
-HALF: Final = 0.05
-"""Shortest half width of a mean force, s, as for rates: people, vehicles and robots shake slower than 10 Hz."""
-LEAST_SAMPLES: Final = 2.0
-"""Samples of the slower recording in half a width: with fewer, the position between samples is guessed."""
+WIDTH: Final = 0.05
+"""Shortest width of a mean force, s, as for rates: people, vehicles and robots shake slower than 10 Hz."""
+LEAST_SAMPLES: Final = 1.0
+"""Samples of the slower recording in a width: with fewer, the position between samples is guessed."""
 WIDTHS: Final = 6
 """Widths that are tried, each twice the one before: positions to a millimetre show the force in a tenth of a second,
 those of a satellite receiver in seconds. The likeliest lag of all widths counts."""
 LEAST_BINS: Final = 30
 """Mean forces in the shorter recording; with fewer, some lag makes any two recordings agree."""
 OVERSAMPLED: Final = 4
-"""Mean forces in half a width by which the lag is refined: neighbours share samples, so that more say nothing new."""
+"""Mean forces in a width by which the lag is refined: neighbours share samples, so that more say nothing new."""
 ROUNDS: Final = 10
 """Gauss-Newton steps at most."""
 WILD: Final = 5.0
 """Forces this many times as far off as the usual one (median) are left out."""
 BLOCK: Final = 8
-"""Half widths in a block within which errors are taken to depend on one another."""
+"""Widths in a block within which errors are taken to depend on one another."""
 
 
 def likeliest_by_force(
@@ -55,8 +55,8 @@ def likeliest_by_force(
         None where the recordings are too short, or no lag gives them forces in common.
     """
     best: tuple[LagSearch, list[Candidate]] | None = None
-    for half in _halves(sensor, reference):
-        search = _search(sensor, reference, half, skew)
+    for width in _widths(sensor, reference):
+        search = _search(sensor, reference, width, skew)
         peaks = [search.at(near.lag)] if near is not None else search.peaks()
         if peaks and (best is None or peaks[0].gain > best[1][0].gain):
             best = search, peaks
@@ -74,52 +74,47 @@ def likeliest_by_force(
     return of_these(found) if found else None
 
 
-def _halves(sensor: Forces, reference: Forces) -> list[float]:
+def _widths(sensor: Forces, reference: Forces) -> list[float]:
     times = sensor.stretches.t, reference.stretches.t
-    shortest = max(HALF, *(LEAST_SAMPLES * float(np.median(np.diff(t))) for t in times))
+    shortest = max(WIDTH, *(LEAST_SAMPLES * float(np.median(np.diff(t))) for t in times))
     length = min(float(np.ptp(t)) for t in times)
-    halves = [shortest * 2.0**k for k in range(WIDTHS)]
-    return [half for half in halves if length / half >= LEAST_BINS]
+    widths = [shortest * 2.0**k for k in range(WIDTHS)]
+    return [width for width in widths if length / width >= LEAST_BINS]
 
 
-def _search(sensor: Forces, reference: Forces, half: float, skew: float | None) -> LagSearch:
-    values, known = sensor.lengths(sensor.stretches.t, half)
-    # Where the reference pulls more than the sensor ever does, a position is wild.
-    most = FASTER * float(values[known].max()) if known.any() else np.inf
-    return LagSearch(sensor.binned(half), lambda stretch: reference.binned(half, stretch, most), skew)
+def _search(sensor: Forces, reference: Forces, width: float, skew: float | None) -> LagSearch:
+    return LagSearch(sensor.binned(width), lambda stretch: reference.binned(width, stretch), skew)
+
 
 
 def _refined(
     sensor: Forces, reference: Forces, search: LagSearch, near: Candidate, lag_known: bool, skew_known: bool
 ) -> Placed | None:
     """Refine lag and skew by least squares; the reference's length is a constant and a multiple of the sensor's."""
-    half = search.step
+    width = search.step
     start, end = float(reference.stretches.t[0]), float(reference.stretches.t[-1])
-    t = np.arange(start + half, end - half, half / OVERSAMPLED)
-    expected, there = reference.lengths(t, half)
-    # The search left out what is wild.
-    row = np.clip(((t - search.other.start) / half + 0.5).astype(int), 0, len(search.other.known) - 1)
-    there &= search.other.known[row]
+    t = np.arange(start + REACH * width, end - REACH * width, width / OVERSAMPLED)
+    expected, there = reference.lengths(t, width)
     middle = start if lag_known else 0.5 * (start + end)
     at_middle, rate = near.lag + near.skew * (middle - start), near.skew
     free = np.array([not lag_known, not skew_known, True, True])
-    shift = half / 4.0
+    shift = width / 4.0
     kept = there
     left, normal = np.zeros(0), np.eye(4)
     for turn in range(ROUNDS):
         when = t - at_middle - rate * (t - middle)
-        length, seen = sensor.lengths(when, half)
-        used = kept & seen & sensor.stretches.seen(when - half - shift, when + half + shift)
+        length, seen = sensor.lengths(when, width)
+        used = kept & seen & sensor.stretches.seen(when - REACH * width - shift, when + REACH * width + shift)
         if used.sum() < LEAST_BINS:
             return None
-        later, _ = sensor.lengths(when[used] + shift, half)
-        earlier, _ = sensor.lengths(when[used] - shift, half)
+        later, _ = sensor.lengths(when[used] + shift, width)
+        earlier, _ = sensor.lengths(when[used] - shift, width)
         slope = (later - earlier) / (2.0 * shift)
         columns = np.stack([slope, slope * (t[used] - middle), np.ones(int(used.sum())), length[used]], axis=1)
         scale = float(np.polyfit(length[used], expected[used], 1)[0])
         columns[:, :2] *= -scale
         left = expected[used] - columns[:, 2:] @ np.linalg.lstsq(columns[:, 2:], expected[used])[0]
-        normal, pull = _equations(columns, left, t[used], BLOCK * half)
+        normal, pull = _equations(columns, left, t[used], BLOCK * width)
         normal[1, 1] += 2.0 / (USUAL_SKEW**2 + rate**2)
         pull[1] -= 2.0 * rate / (USUAL_SKEW**2 + rate**2)
         step = np.zeros(4)
@@ -138,7 +133,7 @@ def _refined(
     lag = float(at_middle + rate * (start - middle))
     aligned = Aligned(lag, lag_error, float(rate), float(np.sqrt(covariance[1, 1])), np.eye(3), float("nan"), 0)
     correlation = float(np.corrcoef(length[used], expected[used])[0, 1])
-    return Placed(aligned, None, _trace(search, aligned, start, correlation, float(used.sum()) * half / OVERSAMPLED))
+    return Placed(aligned, None, _trace(search, aligned, start, correlation, float(used.sum()) * width / OVERSAMPLED))
 
 
 def _equations(columns: Array, left: Array, t: Array, block: float) -> tuple[Array, Array]:

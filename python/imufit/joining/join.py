@@ -18,7 +18,7 @@ from imufit.joining.joined import Compared, Joined, RateTrace
 from imufit.joining.likeliest import Likeliest, Placed, likeliest, placed
 from imufit.joining.mount import SMALL, nearest_square_turn, turned
 from imufit.joining.refine import Aligned, refine
-from imufit.joining.search import LEAST_OVERLAP, Candidate, Correlation
+from imufit.joining.search import FASTER, LEAST_OVERLAP, Candidate, Correlation
 from imufit.log import Log
 from imufit.log.assemble import attitude_of_rig
 from imufit.log.scalar_first import quaternions_from_rotation
@@ -148,7 +148,8 @@ def _join_positions(log: Log, reference: Log, lag: float | None, skew: float | N
     t, p, sensor = reference.t[rows], reference.ref_p[rows], sensor_forces(log)
     near = None if lag is None else Candidate(lag, skew or 0.0, 0.0, np.eye(3))
     up = vertical(reference.metadata.frame)
-    found, turned_over = (likeliest_by_force(sensor, position_forces(t, p, each), near, skew) for each in (up, -up))
+    most = FASTER * float(np.nanmax(np.linalg.norm(log.acc, axis=1)))
+    found, turned_over = (likeliest_by_force(sensor, position_forces(t, p, each, most), near, skew) for each in (up, -up))
     if turned_over is not None and (found is None or turned_over.best.traces.gain > found.best.traces.gain):
         if not (turned_over.unrelated or turned_over.ambiguous):
             raise InputError(
