@@ -71,7 +71,7 @@ def likeliest_by_force(
         placed = _refined(sensor, reference, search, start, near is not None, skew is not None)
         if placed is not None and not any(search.meet(placed.aligned, other.aligned, SAME) for other in found):
             found.append(placed)
-    return of_these(found) if found else None
+    return of_these(found, search) if found else None
 
 
 def _widths(sensor: Forces, reference: Forces) -> list[float]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from imufit.joining.course import Course
 from imufit.joining.joined import RateTrace
 from imufit.joining.refine import Aligned, refine
-from imufit.joining.search import Correlation, turn_between
+from imufit.joining.search import Correlation, LagSearch, turn_between
 
 Array = NDArray[np.float64]
 
@@ -23,8 +23,9 @@ WORSE: Final = 1.5
 itself both leave the noise, of steps that resemble one another the wrong one leaves three times as much and more."""
 SAME: Final = 0.5
 """Two alignments that put one sample of the reference at the same time, to this many bins, are one."""
-LEAST_CORRELATION: Final = 0.3
-"""Below this correlation of the rates the two recordings are not called one motion."""
+SURE: Final = 7.0
+"""Log odds from which on an alignment is believed: one in a thousand is wrong. They count against all alignments that
+were tried, of unrelated recordings, and against the second one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +57,19 @@ class Likeliest:
         The likeliest one.
     second : Placed or None
         Of the others the one that leaves least of the rates; None if no other comes near.
+    independent : float
+        Time after which the rates say something new, s.
+    tried : float
+        Number of different alignments that were looked at.
+    next_gain : float
+        Largest gain of the others, as that of the traces; 0 without any.
     """
 
     best: Placed
     second: Placed | None
+    independent: float
+    tried: float
+    next_gain: float
 
     @property
     def rival(self) -> float:
@@ -68,13 +78,16 @@ class Likeliest:
 
     @property
     def ambiguous(self) -> bool:
-        """True if two lags make the rates agree equally well."""
-        return self.rival * WORSE > 1.0
+        """True if two lags make the rates agree equally well, or nearly so for as little as there is."""
+        return self.rival * WORSE > 1.0 or self._odds(self.best.traces.gain - self.next_gain) < SURE
 
     @property
     def unrelated(self) -> bool:
-        """True if the rates have nothing in common."""
-        return self.best.traces.correlation < LEAST_CORRELATION
+        """True if one of as many unrelated alignments agrees as well."""
+        return self._odds(self.best.traces.gain) < SURE + float(np.log(self.tried))
+
+    def _odds(self, gain: float) -> float:
+        return 0.5 * gain / self.independent
 
 
 def likeliest(
@@ -108,13 +121,15 @@ def likeliest(
         found.append(placed(sensor, body, rates, aligned))
     if not found:
         return None
-    return of_these(found)
+    return of_these(found, rates)
 
 
-def of_these(found: Sequence[Placed]) -> Likeliest:
-    """Return the likeliest of some alignments, one at least, and of the others the one that leaves least."""
+def of_these(found: Sequence[Placed], search: LagSearch) -> Likeliest:
+    """Return the likeliest of some alignments, one at least, and what speaks against it."""
     best, *others = sorted(found, key=lambda each: -each.traces.gain)
-    return Likeliest(best, min(others, key=lambda each: each.traces.left, default=None))
+    second = min(others, key=lambda each: each.traces.left, default=None)
+    next_gain = max((each.traces.gain for each in others), default=0.0)
+    return Likeliest(best, second, search.independent, search.tried, next_gain)
 
 
 @dataclass(frozen=True, eq=False)

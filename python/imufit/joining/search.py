@@ -137,6 +137,8 @@ class LagSearch:
         What sensor and reference show.
     skews : (k,) array
         Skews that are looked at, the smallest first.
+    independent : float
+        Time after which the products of both say something new if the recordings are unrelated, s.
     """
 
     def __init__(self, own: Rates, stretched: Callable[[float], Rates], skew: float | None) -> None:
@@ -149,10 +151,18 @@ class LagSearch:
         self._energy = fft.rfft(np.sum(values**2, axis=1), self._size)
         self._known = fft.rfft(known, self._size)
         self._sums = float(np.sum(values**2)), float(known.sum())
+        other = fft.rfft(self.other.values.T, self._size)
+        self.independent = self.step * _independent(self._rate, other, min(n, m))
         spacing = 2.0 / max(1, min(n, m))
         number = min(int(LARGEST_SKEW / spacing), int(MOST_STRETCHED / (2 * (n + m))))
         steps = np.arange(-number, number + 1)
         self.skews = spacing * steps[np.argsort(np.abs(steps), kind="stable")] if skew is None else np.array([skew])
+
+    @property
+    def tried(self) -> float:
+        """Number of different alignments that were looked at."""
+        lags = (len(self.own.values) + len(self.other.values)) * self.step / self.independent
+        return max(lags, 1.0) * len(self.skews)
 
     def _lags(self, skew: float) -> _Lags:
         """Compare at every lag with the reference stretched by a skew."""
@@ -233,6 +243,18 @@ class LagSearch:
             float(lags.gain[place]),
             turn_between(lags.shared[:, place].reshape(3, 3)) if len(lags.shared) == 9 else np.eye(3),
         )
+
+
+def _independent(own: Array, other: Array, shorter: int) -> float:
+    """Bins after which the products of two unrelated recordings are independent (Bartlett 1935), by their transforms.
+
+    M. S. Bartlett, Some aspects of the time-correlation problem in regard to tests of significance, J. R. Stat. Soc. 98.
+    """
+    shapes = [fft.irfft(np.sum(np.abs(each) ** 2, axis=0))[:shorter] for each in (own, other)]
+    if min(float(shape[0]) for shape in shapes) <= 0.0:
+        return 1.0
+    products = shapes[0] * shapes[1] / (shapes[0][0] * shapes[1][0])
+    return max(1.0, float(2.0 * products.sum() - 1.0))
 
 
 class Correlation(LagSearch):
