@@ -86,7 +86,6 @@ def _search(sensor: Forces, reference: Forces, width: float, skew: float | None)
     return LagSearch(sensor.binned(width), lambda stretch: reference.binned(width, stretch), skew)
 
 
-
 def _refined(
     sensor: Forces, reference: Forces, search: LagSearch, near: Candidate, lag_known: bool, skew_known: bool
 ) -> Placed | None:
@@ -137,7 +136,7 @@ def _refined(
 
 
 def _equations(columns: Array, left: Array, t: Array, block: float) -> tuple[Array, Array]:
-    """Normal equations with the variance that blocks show (White 1980): errors within a block depend on one another."""
+    """Return normal equations, weighted by what blocks show (White 1980): errors within a block are not independent."""
     residual = left - columns @ np.linalg.lstsq(columns, left)[0]
     number = np.floor((t - t[0]) / block).astype(int)
     scores = np.stack([np.bincount(number, columns[:, k] * residual) for k in range(4)], axis=1)

@@ -1,8 +1,8 @@
 """The specific force of a sensor and that of a body whose positions alone are known, as lengths.
 
 The second difference of mean positions is a mean of the acceleration. The same difference of what the accelerometer
-integrates, in axes that the gyroscope keeps still, is the same mean of the specific force but for the turn of these axes.
-Its length needs neither that turn nor a mount.
+integrates, in axes that the gyroscope keeps still, is the same mean of the specific force but for the turn of these
+axes. Its length needs neither that turn nor a mount.
 """
 
 from __future__ import annotations

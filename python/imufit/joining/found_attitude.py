@@ -15,8 +15,8 @@ from imufit.joining.joined import Joined
 from imufit.joining.likeliest import WORSE
 from imufit.joining.reference import KINDS, with_attitude
 from imufit.log import Log
-from imufit.log.scalar_first import rotation_from_quaternions
 from imufit.log.columns import WHOLE_TURN
+from imufit.log.scalar_first import rotation_from_quaternions
 
 _NAMED: Final = re.compile(r"(?P<base>.*?)[._ ]?q?[._ ]?(?P<part>[wxyz])", re.IGNORECASE)
 _NUMBERED: Final = re.compile(r"(?P<base>.*?)(?:\[(?P<index>\d)\]|_?(?P<digit>\d))")

@@ -23,13 +23,13 @@ from imufit.log.scalar_first import rotation_from_quaternions
 Array = NDArray[np.float64]
 
 RATE_ERROR: Final = 0.03
-"""Standard deviation of the map of a sensor's rates, 1: scale and axes of a consumer sensor are right to some percent."""
+"""Standard deviation of the map of a sensor's rates, 1: scale and axes of a sensor are right to a few percent."""
 TILT_ERROR: Final = 0.1
 """Standard deviation of the direction of the mean specific force, rad: a frame that is not level, an offset of the
 accelerometer (0.5 m/s^2 are 0.05 rad), accelerations that do not cancel."""
 UPRIGHT: Final = 0.35
-"""Largest angle between the mean specific force and the vertical of the frame, rad: 20 degrees. Where a frame is not the
-one that was told, the angle is 90 degrees or 180."""
+"""Largest angle between the mean specific force and the vertical of the frame, rad: 20 degrees. Where a frame is not
+the one that was told, the angle is 90 degrees or 180."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Mount:
 
 
 def vertical(frame: str) -> Array:
-    """Unit vector upwards in a frame, (3,)."""
+    """Return the unit vector upwards in a frame, (3,)."""
     return np.array([0.0, 0.0, -1.0 if frame == "NED" else 1.0])
 
 

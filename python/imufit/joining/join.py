@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 TOUCHING: Final = 1e-6
 """Samples of the reference this near to a row of the sensor stand in that row, s."""
 STEADY: Final = 0.8
-"""Length of the mean specific force in a level frame over its mean length, 1, from which on it shows the vertical: of an
+"""Mean specific force in a level frame over its mean length, 1, from which on it shows the vertical: of an
 axis that is not where it was taken to be the forces of a half turn cancel to two thirds."""
 LEAST_POSITIONS: Final = 60
 """Positions with which a search by force begins: two to a mean, thirty means."""
@@ -101,7 +101,7 @@ def _join_angle(log: Log, reference: Log, lag: float | None, skew: float | None)
     found = _join_attitude(log, turning, lag, skew, by_gravity=False)
     assert found.mount is not None
     assert found.log.ref_q is not None
-    # The body of the reference turns about its x axis; the sensor, at angle 0, has the axes of the frame until levelled.
+    # The body of the reference turns about its x axis; at angle 0 the sensor has the axes of the frame until levelled.
     axis = found.mount[:, 0]
     turns = Rotation.from_matrix(found.mount) * found.log.attitude
     level = _levelling(found.log, turns)
@@ -149,16 +149,18 @@ def _join_positions(log: Log, reference: Log, lag: float | None, skew: float | N
     near = None if lag is None else Candidate(lag, skew or 0.0, 0.0, np.eye(3))
     up = vertical(reference.metadata.frame)
     most = FASTER * float(np.nanmax(np.linalg.norm(log.acc, axis=1)))
-    found, turned_over = (likeliest_by_force(sensor, position_forces(t, p, each, most), near, skew) for each in (up, -up))
-    if turned_over is not None and (found is None or turned_over.best.traces.gain > found.best.traces.gain):
-        if not (turned_over.unrelated or turned_over.ambiguous):
-            raise InputError(
-                f"the z axis of the positions points {'up' if up[2] < 0.0 else 'down'}, and frame "
-                f"{reference.metadata.frame} says otherwise",
-                file=reference.path or "reference",
-                column="ref_pz",
-                remedy=f"Name the frame: --frame {'ENU' if up[2] < 0.0 else 'NED'}.",
-            )
+    found, turned_over = (
+        likeliest_by_force(sensor, position_forces(t, p, each, most), near, skew) for each in (up, -up)
+    )
+    likelier = turned_over is not None and (found is None or turned_over.best.traces.gain > found.best.traces.gain)
+    if turned_over is not None and likelier and not (turned_over.unrelated or turned_over.ambiguous):
+        raise InputError(
+            f"the z axis of the positions points {'up' if up[2] < 0.0 else 'down'}, and frame "
+            f"{reference.metadata.frame} says otherwise",
+            file=reference.path or "reference",
+            column="ref_pz",
+            remedy=f"Name the frame: --frame {'ENU' if up[2] < 0.0 else 'NED'}.",
+        )
     best, rival = _only_one(found, (log, reference))
     return _result(_joined(log, reference, rows, best.aligned, None), best, rival)
 
@@ -219,7 +221,8 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
     if second is not None and found.ambiguous:
         raise InputError(
             f"the lag is ambiguous: {best.aligned.lag:.3f} s and {second.aligned.lag:.3f} s make "
-            f"{best.traces.compared.value} agree equally well (correlation {best.traces.correlation:.3f} and {second.traces.correlation:.3f})",
+            f"{best.traces.compared.value} agree equally well "
+            f"(correlation {best.traces.correlation:.3f} and {second.traces.correlation:.3f})",
             file=logs[0].path or "log",
             remedy="Move the sensor once as at no other time, or give the lag with --lag.",
         )
@@ -237,8 +240,8 @@ def _apart(reference: Log) -> InputError:
 def _unrelated(traces: RateTrace, log: Log, reference: Log) -> InputError:
     of = "attitude that of the body in" if traces.compared is Compared.RATES else "position in metres, in"
     return InputError(
-        f"{traces.compared.value} of the sensor and of {reference.path or 'the reference'} are not those of one motion: "
-        f"their correlation is {traces.correlation:.2f}",
+        f"{traces.compared.value} of the sensor and of {reference.path or 'the reference'} are not those of "
+        f"one motion: their correlation is {traces.correlation:.2f}",
         file=log.path or "log",
         remedy=f"Are they of the same recording, and is the {of} the reference frame?",
     )

@@ -148,8 +148,8 @@ class Joined:
             return (level if self.by_gravity else unknown,)
         if self.mount_error > OPEN:
             return (
-                "All motion is about one axis, and nothing shows how the sensor is turned about this axis. Its axes are "
-                "taken to be as nearly parallel to those of the reference body as the motion allows.",
+                "All motion is about one axis, and nothing shows how the sensor is turned about this axis. "
+                "Its axes are taken to be as nearly parallel to those of the reference body as the motion allows.",
             )
         settled = (
             (f"All motion is about one axis. The turn about this axis follows from gravity, with frame {self.frame}.",)

@@ -103,7 +103,7 @@ class _Blocks:
         return _Blocks(self.rows, self.there & ~wild)
 
     def pieces(self) -> Iterator[tuple[slice, _Blocks]]:
-        """Some blocks at a time."""
+        """Yield some blocks at a time."""
         size = max(1, MOST_AT_ONCE // self.rows.shape[1])
         for begin in range(0, len(self.rows), size):
             some = slice(begin, begin + size)

@@ -205,7 +205,7 @@ class LagSearch:
         found: list[Candidate] = []
         for each in self._all():
             places, _ = find_peaks(np.concatenate(([-1.0], each.gain, [-1.0])))
-            order = sorted(places - 1, key=lambda place: -each.gain[place])[:most]  # noqa: B023
+            order = sorted(places - 1, key=lambda place: -each.gain[place])[:most]
             found += [self._candidate(each, int(place)) for place in order if each.gain[place] > 0.0]
         found.sort(key=lambda each: -each.gain)
         apart: list[Candidate] = []
@@ -248,7 +248,8 @@ class LagSearch:
 def _independent(own: Array, other: Array, shorter: int) -> float:
     """Bins after which the products of two unrelated recordings are independent (Bartlett 1935), by their transforms.
 
-    M. S. Bartlett, Some aspects of the time-correlation problem in regard to tests of significance, J. R. Stat. Soc. 98.
+    M. S. Bartlett, Some aspects of the time-correlation problem in regard to tests of significance, Journal of the
+    Royal Statistical Society 98.
     """
     shapes = [fft.irfft(np.sum(np.abs(each) ** 2, axis=0))[:shorter] for each in (own, other)]
     if min(float(shape[0]) for shape in shapes) <= 0.0:
