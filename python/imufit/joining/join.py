@@ -21,7 +21,7 @@ from imufit.joining.refine import Aligned, refine
 from imufit.joining.search import FASTER, LEAST_OVERLAP, Candidate, Correlation
 from imufit.log import Log
 from imufit.log.assemble import attitude_of_rig
-from imufit.log.scalar_first import quaternions_from_rotation
+from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
 
 Array = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def _join_angle(log: Log, reference: Log, lag: float | None, skew: float | None)
     assert found.log.ref_q is not None
     # The body of the reference turns about its x axis; at angle 0 the sensor has the axes of the frame until levelled.
     axis = found.mount[:, 0]
-    turns = Rotation.from_matrix(found.mount) * found.log.attitude
+    turns = Rotation.from_matrix(found.mount) * rotation_from_quaternions(found.log.ref_q)
     level = _levelling(found.log, turns)
     ref_q = quaternions_from_rotation(turns if level is None else level * turns)
     ref_q[~found.log.has_reference] = np.nan
@@ -142,7 +142,7 @@ def _join_positions(log: Log, reference: Log, lag: float | None, skew: float | N
             remedy="Record the accelerometer too, or name its columns with --map.",
         )
     assert reference.ref_p is not None
-    rows = _ascending(reference, np.isfinite(reference.ref_p).all(axis=1))
+    rows = _ascending(reference, np.asarray(np.isfinite(reference.ref_p).all(axis=1)))
     if len(rows) < LEAST_POSITIONS:
         raise _apart(reference)
     t, p, sensor = reference.t[rows], reference.ref_p[rows], sensor_forces(log)

@@ -20,6 +20,7 @@ from scipy.signal import find_peaks
 from imufit.joining.course import Course
 
 Array = NDArray[np.float64]
+Transform = NDArray[np.complex128]
 
 STEP: Final = 0.05
 """Shortest bin of the mean rates, s: people, vehicles and robots turn slower than 10 Hz, vibration is faster."""
@@ -170,7 +171,7 @@ class LagSearch:
         other = self.other if skew == 0.0 else self._stretched(skew)
         m = len(other.values)
 
-        def correlated(a: Array, b: Array) -> Array:
+        def correlated(a: Transform, b: Transform) -> Array:
             """Sum over k of a[k + j] b[k], for j from -(m - 1) to n - 1, from the transforms of both."""
             product = fft.irfft(a * np.conj(b), size)
             return np.concatenate((product[..., size - m + 1 :], product[..., :n]), axis=-1)
@@ -209,9 +210,9 @@ class LagSearch:
             found += [self._candidate(each, int(place)) for place in order if each.gain[place] > 0.0]
         found.sort(key=lambda each: -each.gain)
         apart: list[Candidate] = []
-        for each in found:
-            if len(apart) < most and not any(self.meet(each, other) for other in apart):
-                apart.append(each)
+        for candidate in found:
+            if len(apart) < most and not any(self.meet(candidate, other) for other in apart):
+                apart.append(candidate)
         return apart
 
     def meet(self, one: Clocks, other: Clocks, bins: float = 2.0) -> bool:
@@ -245,7 +246,7 @@ class LagSearch:
         )
 
 
-def _independent(own: Array, other: Array, shorter: int) -> float:
+def _independent(own: Transform, other: Transform, shorter: int) -> float:
     """Bins after which the products of two unrelated recordings are independent (Bartlett 1935), by their transforms.
 
     M. S. Bartlett, Some aspects of the time-correlation problem in regard to tests of significance, Journal of the
