@@ -216,9 +216,16 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
     if found is None:
         raise _apart(logs[1])
     best, second = found.best, found.second
-    if found.unrelated:
+    if found.unrelated and best.traces.left > 0.5:
         raise _unrelated(best.traces, *logs)
-    if second is not None and found.ambiguous:
+    if second is None and found.unrelated:
+        raise InputError(
+            f"the motion that both recordings saw is too short or too uniform to tell the lag: correlation "
+            f"{best.traces.correlation:.3f} over {best.traces.overlap:.1f} s",
+            file=logs[0].path or "log",
+            remedy="Move the sensor for longer, once as at no other time, or give the lag with --lag.",
+        )
+    if second is not None and (found.ambiguous or found.unrelated):
         raise InputError(
             f"the lag is ambiguous: {best.aligned.lag:.3f} s and {second.aligned.lag:.3f} s make "
             f"{best.traces.compared.value} agree equally well "
