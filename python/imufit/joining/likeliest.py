@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from imufit.joining.course import Course
 from imufit.joining.joined import RateTrace
 from imufit.joining.refine import Aligned, refine
-from imufit.joining.search import Correlation, LagSearch, turn_between
+from imufit.joining.search import Candidate, Correlation, LagSearch, turn_between
 
 Array = NDArray[np.float64]
 
@@ -23,6 +23,8 @@ WORSE: Final = 1.5
 itself both leave the noise, of steps that resemble one another the wrong one leaves three times as much and more."""
 SAME: Final = 0.5
 """Two alignments that put one sample of the reference at the same time, to this many bins, are one."""
+FEW: Final = 100
+"""Blocks of the attitude, of 1.5 s each, by which several lags are refined before the likeliest one is by all."""
 SURE: Final = 7.0
 """Log odds from which on an alignment is believed: one in a thousand is wrong. They count against all alignments that
 were tried, of unrelated recordings, and against the second one."""
@@ -113,15 +115,23 @@ def likeliest(
     """
     peaks = rates.peaks()
     near = [peak for peak in peaks if peak.gain >= RIVAL * peaks[0].gain]
+    some = most if len(near) == 1 else min(most or FEW, FEW)
     found: list[Placed] = []
     for peak in near:
-        aligned = refine(sensor, body, peak, skew is not None, most=most)
+        aligned = refine(sensor, body, peak, skew is not None, most=some)
         if aligned is None or any(rates.meet(aligned, other.aligned, SAME) for other in found):
             continue
         found.append(placed(sensor, body, rates, aligned))
     if not found:
         return None
-    return of_these(found, rates)
+    answer = of_these(found, rates)
+    if some != most:
+        rough = answer.best.aligned
+        near_best = Candidate(rough.lag, rough.skew, 0.0, rough.mount)
+        aligned = refine(sensor, body, near_best, skew is not None, most=most)
+        if aligned is not None:
+            return replace(answer, best=placed(sensor, body, rates, aligned))
+    return answer
 
 
 def of_these(found: Sequence[Placed], search: LagSearch) -> Likeliest:
