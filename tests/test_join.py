@@ -273,3 +273,9 @@ def test_the_axis_of_an_encoder_is_found(axis: tuple[float, float, float]) -> No
         assert joined.log.ref_angle is not None
         expected = -np.interp(joined.log.t[known], t, angle)
         np.testing.assert_allclose(joined.log.ref_angle[known], expected, atol=0.01)
+
+
+def test_a_known_lag_that_leaves_nothing_in_common_is_refused() -> None:
+    one = pair(3001)
+    with pytest.raises(InputError, match="no few seconds of motion in common"):
+        imufit.join(sensor_of(one), reference_of(one), lag=one.lag + 5000.0)

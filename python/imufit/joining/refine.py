@@ -227,7 +227,7 @@ class _Errors:
 
 def _flat(values: Array, there: NDArray[np.bool_]) -> Array:
     """Lay samples and axes of (b, k, 3, c) columns in one row, zero where no sample is."""
-    return np.asarray((values * there[:, :, None, None]).reshape(len(values), -1, values.shape[-1]))
+    return np.asarray((values * there[:, :, None, None]).reshape(len(values), 3 * there.shape[1], values.shape[-1]))
 
 
 def _errors(sensor: Course, reference: Course, blocks: _Blocks, guess: _Guess) -> _Errors:
