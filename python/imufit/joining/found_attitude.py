@@ -12,7 +12,6 @@ import numpy as np
 from imufit.errors import InputError
 from imufit.joining.join import join
 from imufit.joining.joined import Joined
-from imufit.joining.likeliest import WORSE
 from imufit.joining.reference import KINDS, with_attitude
 from imufit.log import Log
 from imufit.log.columns import WHOLE_TURN
@@ -26,6 +25,9 @@ _ENCODER: Final = re.compile(r"angle|encoder|theta|joint", re.IGNORECASE)
 _UPRIGHT: Final = 0.35
 """Largest angle between the mean specific force and the vertical, rad: 20 degrees; of readings that differ by an
 exchange of axes the wrong ones are 90 degrees off, or lie anywhere."""
+_WORSE: Final = 1.5
+"""A way that leaves this many times as much of the rates (square) as the best one is another attitude: ways that are
+the same but for constant turns leave the same."""
 _MOST_WAYS: Final = 24
 """Ways that are tried at most: six bodies, each in four."""
 
@@ -107,7 +109,7 @@ def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | Non
     if not found:
         raise refused[0]
     least = min(joined.traces.left for _, joined in found)
-    alike = [each for each in found if each[1].traces.left <= WORSE * least]
+    alike = [each for each in found if each[1].traces.left <= _WORSE * least]
     upright = [each for each in alike if _off_vertical(each[1].log) < _UPRIGHT] if len(alike) > 1 else alike
     if len(upright) != 1:
         raise InputError(

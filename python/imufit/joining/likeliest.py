@@ -18,9 +18,6 @@ Array = NDArray[np.float64]
 
 RIVAL: Final = 0.3
 """A second lag with this share of the first one's log likelihood is looked at to a fraction of a sample as well."""
-WORSE: Final = 1.5
-"""It makes the lag ambiguous unless it leaves this many times as much of the rates (square): of a motion that repeats
-itself both leave the noise, of steps that resemble one another the wrong one leaves three times as much and more."""
 SAME: Final = 0.5
 """Two alignments that put one sample of the reference at the same time, to this many bins, are one."""
 FEW: Final = 100
@@ -81,7 +78,7 @@ class Likeliest:
     @property
     def ambiguous(self) -> bool:
         """True if two lags make the rates agree equally well, or nearly so for as little as there is."""
-        return self.rival * WORSE > 1.0 or self._odds(self.best.traces.gain - self.next_gain) < SURE
+        return self._odds(self.best.traces.gain - self.next_gain) < SURE
 
     @property
     def unrelated(self) -> bool:
