@@ -95,7 +95,8 @@ def join(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joi
     """Lay a reference beside a sensor's log; one without a declared attitude is read as the sensor's rates show."""
     from imufit.joining import join, join_as_found  # noqa: PLC0415
 
-    way = join if reference.ref_q is not None else join_as_found
+    declared = reference.ref_q is not None or reference.ref_angle is not None
+    way = join if declared else join_as_found
     return way(log, reference, lag, skew)
 
 

@@ -13,16 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
-from imufit.log.arrays import (
-    check_keywords,
-    contiguous,
-    fields_from_arrays,
-    quaternions_from_rotation,
-    rotation_from_quaternions,
-)
+from imufit.log.arrays import check_keywords, contiguous, fields_from_arrays
 from imufit.log.columns import GROUPS, present
 from imufit.log.metadata import Metadata
 from imufit.log.parquet import ROW_GROUP
+from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
 from imufit.log.size import BLOCK_ROWS
 from imufit.log.unit_check import Clock
 from imufit.log.writer import write_rows
