@@ -1,11 +1,12 @@
-//! A single bad rate: what its neighbours do not allow is bridged.
+//! A single bad rate: what its neighbours do not allow is bridged. A stretch of bad rates: its turn is uncertain.
 //!
 //! A rate that is far from the one before is either a motion that begins or a bad sample. The reading after it decides. Until
 //! then the rate before holds. A reading that returns more than half of the way shows a bad sample, which is left out. Any
 //! other reading confirms the rate, and the turn that was not carried out is carried out with the next step. No turn
 //! of two rows or more is lost. Whether the change was a motion or several bad samples stays open, so that the attitude is
-//! uncertain by its turn from then on: filters that keep a covariance add it. A change back within [`LONGEST`] makes
-//! bad samples of all rates between: the attitude is uncertain by the whole turn that they made.
+//! uncertain by its turn from then on: filters that keep a covariance add it. A second such change within [`LONGEST`] may be
+//! the end of bad samples: then the rates between say nothing, those at both ends are all that is known of the motion, and
+//! the attitude is uncertain by what they and the rates between disagree about.
 
 use std::f64::consts::PI;
 
@@ -20,11 +21,10 @@ const LEAST_TURN: f64 = 0.01;
 const CHANGES: f64 = 64.0;
 /// Mean square of changes before any reading, (rad/s)^2: a change of 10 rad/s is doubted then.
 const BEFORE: f64 = 1.0;
-/// Square of the largest change that enters the mean, (rad/s)^2: more than any gyro measures would only make it blind.
-const LARGEST: f64 = 1e4;
-
-/// Time within which doubted rates may return to the one before, s: bad samples of a second, as in [`crate::lost`].
+/// Time that bad rates may last, s: bad samples of a second, as in [`crate::lost`].
 const LONGEST: f64 = 1.5;
+/// Least mean square of changes, (rad/s)^2: a change that is not doubted then turns by [`LEAST_TURN`] in that time.
+const LEAST: f64 = LEAST_TURN * LEAST_TURN / (LONGEST * LONGEST) / UNUSUAL;
 
 /// What the rates so far allow, and the ones that are doubted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,65 +63,86 @@ impl Bridge {
         since: 0.0,
     };
 
-    /// Whether a change of that square, (rad/s)^2, over `dt` is one to doubt.
+    /// Whether a rate is doubted or a change stayed open.
     #[inline(always)]
-    pub fn doubts(&self, square: f64, dt: f64) -> bool {
-        square > UNUSUAL * self.usual && square * (dt * dt) > LEAST_TURN * LEAST_TURN
+    pub fn is_open(&self) -> bool {
+        self.span > 0.0 || self.since > 0.0
     }
 
-    /// Takes a change that is believed.
+    /// Square of the largest change that is not doubted, (rad/s)^2.
+    #[inline(always)]
+    pub fn allowed(&self) -> f64 {
+        UNUSUAL * self.usual
+    }
+
+    /// Takes the square of a change that is not doubted.
     #[inline(always)]
     pub fn learn(&mut self, square: f64) {
-        self.usual += (square.min(LARGEST) - self.usual) * (1.0 / CHANGES);
+        self.usual = (self.usual + (square - self.usual) * (1.0 / CHANGES)).max(LEAST);
     }
 
-    /// A rate that is not doubted, `dt` after the one before.
-    #[inline(always)]
-    pub fn follow(&mut self, rate: &Vector3<f64>, dt: f64) {
-        if self.since > 0.0 {
-            self.turned += (rate - self.from) * dt;
-            self.since = if self.since + dt > LONGEST {
-                0.0
-            } else {
-                self.since + dt
-            };
-        }
+    /// Takes time in which changes were doubted: what lasts longer than bad samples do is usual.
+    fn get_used(&mut self, time: f64) {
+        self.usual *= UNUSUAL.powf(time.min(LONGEST) / LONGEST);
     }
 
-    /// The turn of a change from `before` that a second rate confirmed, rad: as likely false as true.
-    fn unsure(&mut self, before: &Vector3<f64>, rate: &Vector3<f64>, turn: Vector3<f64>, time: f64) -> f64 {
-        let returned = 4.0 * (rate - self.from).norm_squared() < (before - self.from).norm_squared();
-        if self.since > 0.0 && returned {
+    /// A turn by `turn` more than that of the rate `from` in that time.
+    fn follow(&mut self, turn: Vector3<f64>, dt: f64) {
+        self.turned += turn;
+        self.since += dt;
+        if self.since > LONGEST {
             self.since = 0.0;
-            return (self.turned.norm() + turn.norm()).min(PI);
         }
-        (self.from, self.turned, self.since) = (*before, turn, time);
-        turn.norm().min(PI)
+    }
+
+    /// The turn that is open after a change from `before` that was not a single bad rate, rad. `turn`: what it turned by so far, more
+    /// than `before` would have, in that time.
+    fn unsure(&mut self, before: &Vector3<f64>, rate: &Vector3<f64>, turn: Vector3<f64>, time: f64) -> f64 {
+        let mut square = turn.norm_squared();
+        let mut returned = false;
+        if self.since > 0.0 {
+            // What both ends say of the motion between them: their mean, and as much uncertain as they are large.
+            let more = (rate - self.from) * (0.5 * self.since);
+            let sizes = 0.5 * (self.from.norm_squared() + rate.norm_squared());
+            square += (self.turned - more).norm_squared() + sizes * self.since * self.since;
+            returned = 4.0 * (rate - self.from).norm_squared() < (before - self.from).norm_squared();
+        }
+        (self.from, self.turned, self.since) = (*before, turn, if returned { 0.0 } else { time });
+        if square > LEAST_TURN * LEAST_TURN { square.sqrt().min(PI) } else { 0.0 }
     }
 
     /// The turn up to a reading, `dt` after the last one; `before` is the last rate that is believed. With `on` = false none is
     /// doubted.
     pub fn turn(&mut self, before: &Vector3<f64>, rate: &Vector3<f64>, dt: f64, on: bool) -> Turned {
-        let (square, span, doubted) = ((rate - before).norm_squared(), self.span, self.doubted);
+        let mean = (before + rate) * 0.5;
+        if !on {
+            return Turned::Mean(mean, 0.0);
+        }
+        let (change, span, doubted) = (rate - before, self.span, self.doubted);
+        let (square, allowed) = (change.norm_squared(), self.allowed());
         if span > 0.0 {
             (self.span, self.doubted) = (0.0, Vector3::zeros());
             let jump = doubted - before;
             if 4.0 * square < jump.norm_squared() {
-                self.learn(square);
-                return Turned::Bridged((before + rate) * 0.5);
+                return Turned::Bridged(mean);
             }
-            self.learn(jump.norm_squared());
-            self.learn((rate - doubted).norm_squared());
-            let mean = (doubted + rate) * 0.5 + jump * (0.5 * span / dt);
-            return Turned::Mean(mean, self.unsure(before, rate, jump * (span + dt), span + dt));
+            self.get_used(span + dt);
+            let made_up = (doubted + rate) * 0.5 + jump * (0.5 * span / dt);
+            return Turned::Mean(made_up, self.unsure(before, rate, jump * (span + dt), span + dt));
         }
-        if on && self.doubts(square, dt) {
+        if square <= allowed {
+            self.learn(square);
+            if self.since > 0.0 {
+                self.follow((rate - self.from) * dt, dt);
+            }
+            return Turned::Mean(mean, 0.0);
+        }
+        if square * (dt * dt) > LEAST_TURN * LEAST_TURN {
             (self.span, self.doubted) = (dt, *rate);
             return Turned::Held;
         }
-        self.learn(square);
-        self.follow(rate, dt);
-        Turned::Mean((before + rate) * 0.5, 0.0)
+        self.get_used(dt);
+        Turned::Mean(mean, self.unsure(before, rate, change * dt, dt))
     }
 }
 

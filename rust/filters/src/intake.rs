@@ -177,7 +177,7 @@ impl Intake {
             return 0;
         };
         // A sensor that has read at the last row; NaN, none yet, fails every comparison.
-        if !(started && t_acc >= last && t_gyr >= last && t_mag >= last) || self.lever.is_some() || bridge.span > 0.0 {
+        if !(started && t_acc >= last && t_gyr >= last && t_mag >= last) || self.lever.is_some() || bridge.is_open() {
             return 0;
         }
         let (rules, least_square) = (self.rules, self.least_square);
@@ -197,12 +197,13 @@ impl Intake {
             if !usable
                 || clipped(&acc, rules.acc_range)
                 || clipped(&gyr, rules.gyr_range)
-                || (rules.recovery && bridge.doubts(change, dt))
+                || (rules.recovery && change > bridge.allowed())
             {
                 break;
             }
-            bridge.learn(change);
-            bridge.follow(&gyr, dt);
+            if rules.recovery {
+                bridge.learn(change);
+            }
             let sample = Sample {
                 omega: Some(Reading {
                     value: AngularRate((omega + gyr) * 0.5),

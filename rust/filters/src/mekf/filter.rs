@@ -159,7 +159,10 @@ impl<T: Real> Mekf<T> {
     fn level(&mut self, f: &Vector3<T>) {
         let up = self.environment.up().map(T::splat);
         let innovation = Quaternion::between(&self.q.rotate(f), &up).log();
-        let (mut x, r) = (Errors::repeat(T::splat(0.0)), T::splat(FIRST_TILT));
+        // An acceleration across gravity that turns the force by an angle makes it longer by half of its square.
+        let longer = f.norm() * T::splat(1.0 / self.environment.gravity()) - T::splat(1.0);
+        let r = T::splat(FIRST_TILT) + T::splat(2.0) * longer.simd_abs();
+        let mut x = Errors::repeat(T::splat(0.0));
         for i in 0..2 {
             self.covariance
                 .measure(&mut x, i, innovation[i], r, Moves::All, always::<T>());
@@ -195,14 +198,24 @@ impl<T: Real> Mekf<T> {
         usage
     }
 
-    /// Nothing is known of a turn during a gap: the next specific force shows the vertical.
+    /// A turn of that variance, rad^2, which no rate shows: the next specific force shows the vertical. The velocity was
+    /// integrated in a wrong direction for as long as a speed lasts.
+    fn turn_unseen(&mut self, variance: f64) {
+        let fallen = self.values.speed_time * T::splat(self.environment.gravity());
+        for i in 0..3 {
+            self.covariance.add(i, T::splat(variance));
+        }
+        for at in [SPEED, SPEED + 1] {
+            self.covariance.add(at, fallen * fallen * T::splat(variance));
+        }
+        self.since_force = -1.0;
+    }
+
+    /// Nothing is known of turn and velocity after a gap.
     fn after_gap(&mut self) {
         let v = self.values;
         if self.since_force >= 0.0 {
-            for i in 0..3 {
-                self.covariance.add(i, T::splat(GAP));
-            }
-            self.since_force = -1.0;
+            self.turn_unseen(GAP);
         }
         self.velocity = [T::splat(0.0); 2];
         self.covariance.forget_velocity(v.speed * v.speed);
@@ -246,9 +259,8 @@ impl<T: Real> Filter<T> for Mekf<T> {
     fn step(&mut self, sample: &Sample) -> Usage {
         if let Some(omega) = sample.omega {
             self.turn(&omega.value.0, omega.dt);
-            for i in 0..3 {
-                self.covariance
-                    .add(i, T::splat(sample.unsure_turn * sample.unsure_turn));
+            if sample.unsure_turn > 0.0 {
+                self.turn_unseen(sample.unsure_turn * sample.unsure_turn);
             }
             if self.since_force >= 0.0 {
                 self.since_force += omega.dt;
