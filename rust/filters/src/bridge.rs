@@ -35,11 +35,13 @@ pub(crate) struct Bridge {
     pub span: f64,
     /// The doubted rate, rad/s.
     pub doubted: Vector3<f64>,
-    /// The rate before the last change that stayed open, rad/s.
+    /// The rate before the change that stayed open, rad/s.
     pub from: Vector3<f64>,
-    /// The turn since, less that of `from`, rad.
+    /// Square of the largest distance from it since, (rad/s)^2.
+    pub farthest: f64,
+    /// The turn since the last change that was doubted, less that of `from`, rad.
     pub turned: Vector3<f64>,
-    /// The time since, s; 0 where it is over.
+    /// The time since, s; 0 where none is open.
     pub since: f64,
 }
 
@@ -59,6 +61,7 @@ impl Bridge {
         span: 0.0,
         doubted: Vector3::new(0.0, 0.0, 0.0),
         from: Vector3::new(0.0, 0.0, 0.0),
+        farthest: 0.0,
         turned: Vector3::new(0.0, 0.0, 0.0),
         since: 0.0,
     };
@@ -86,29 +89,44 @@ impl Bridge {
         self.usual *= UNUSUAL.powf(time.min(LONGEST) / LONGEST);
     }
 
-    /// A turn by `turn` more than that of the rate `from` in that time.
-    fn follow(&mut self, turn: Vector3<f64>, dt: f64) {
-        self.turned += turn;
+    /// A rate that is not doubted while a change stays open. One that comes back without another such change is a motion.
+    fn follow(&mut self, rate: &Vector3<f64>, dt: f64) {
+        let away = rate - self.from;
+        self.turned += away * dt;
         self.since += dt;
-        if self.since > LONGEST {
+        if self.is_back(&away) || self.since > LONGEST {
             self.since = 0.0;
         }
     }
 
-    /// The turn that is open after a change from `before` that was not a single bad rate, rad. `turn`: what it turned by so far, more
-    /// than `before` would have, in that time.
+    /// Whether a rate that is `away` from the one before the change has made more than half of the way back.
+    fn is_back(&mut self, away: &Vector3<f64>) -> bool {
+        let square = away.norm_squared();
+        self.farthest = self.farthest.max(square.min(f64::MAX));
+        4.0 * square < self.farthest
+    }
+
+    /// The turn that is uncertain after a change from `before` that was not a single bad rate, rad. `turn`: what it turned
+    /// by so far, more than `before` would have, in that time.
     fn unsure(&mut self, before: &Vector3<f64>, rate: &Vector3<f64>, turn: Vector3<f64>, time: f64) -> f64 {
         let mut square = turn.norm_squared();
-        let mut returned = false;
         if self.since > 0.0 {
             // What both ends say of the motion between them: their mean, and as much uncertain as they are large.
             let more = (rate - self.from) * (0.5 * self.since);
             let sizes = 0.5 * (self.from.norm_squared() + rate.norm_squared());
             square += (self.turned - more).norm_squared() + sizes * self.since * self.since;
-            returned = 4.0 * (rate - self.from).norm_squared() < (before - self.from).norm_squared();
+        } else {
+            (self.from, self.farthest) = (*before, 0.0);
         }
-        (self.from, self.turned, self.since) = (*before, turn, if returned { 0.0 } else { time });
-        if square > LEAST_TURN * LEAST_TURN { square.sqrt().min(PI) } else { 0.0 }
+        self.is_back(&(before - self.from));
+        let back = self.is_back(&(rate - self.from));
+        self.turned = turn + (before - self.from) * time;
+        self.since = if back { 0.0 } else { time };
+        if square > LEAST_TURN * LEAST_TURN {
+            square.sqrt().min(PI)
+        } else {
+            0.0
+        }
     }
 
     /// The turn up to a reading, `dt` after the last one; `before` is the last rate that is believed. With `on` = false none is
@@ -133,7 +151,7 @@ impl Bridge {
         if square <= allowed {
             self.learn(square);
             if self.since > 0.0 {
-                self.follow((rate - self.from) * dt, dt);
+                self.follow(rate, dt);
             }
             return Turned::Mean(mean, 0.0);
         }

@@ -62,8 +62,19 @@ pub struct Intake {
     pub(crate) memory: Memory,
 }
 
-/// All rows of `columns` for a filter one after the other, and the attitude after each of them, `w x y z`.
-pub(crate) fn all_rows<T: Real, F: Filter<T> + Clone>(
+/// A filter that goes through the rows of a log. One that can be cloned has a loop of its own with its step inside.
+pub trait Rows<T: Real = f64>: Filter<T> {
+    /// All rows of `columns` one after the other, and the attitude after each of them, `w x y z`.
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped);
+}
+
+impl<T: Real, F: Filter<T> + Clone> Rows<T> for F {
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
+        all_rows(self, intake, columns, attitude, skipped);
+    }
+}
+
+fn all_rows<T: Real, F: Filter<T> + Clone>(
     filter: &mut F,
     intake: &mut Intake,
     columns: &Columns<'_>,

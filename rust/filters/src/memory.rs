@@ -25,7 +25,7 @@ pub(crate) struct Memory {
 
 impl Memory {
     /// Numbers of a memory that is written down.
-    pub const LENGTH: usize = 24;
+    pub const LENGTH: usize = 25;
 
     pub const EMPTY: Self = Self {
         started: false,
@@ -55,6 +55,7 @@ impl Memory {
             span,
             doubted,
             from,
+            farthest,
             turned,
             since,
         } = self.bridge;
@@ -63,7 +64,7 @@ impl Memory {
         let vectors = [self.omega, self.alpha, doubted, from, turned].map(<[f64; 3]>::from);
         let mut numbers = times
             .into_iter()
-            .chain([usual, span, since])
+            .chain([usual, span, since, farthest])
             .chain(vectors.into_iter().flatten());
         std::array::from_fn(|_| numbers.next().unwrap_or_default())
     }
@@ -71,7 +72,7 @@ impl Memory {
     /// `None` where the numbers are no memory.
     pub fn from_slice(numbers: &[f64]) -> Option<Self> {
         let (&[started, first, last, t_acc, t_gyr, t_mag], own) = numbers.split_first_chunk()?;
-        let (&[usual, span, since], vectors) = own.split_first_chunk()?;
+        let (&[usual, span, since, farthest], vectors) = own.split_first_chunk()?;
         let (vectors, rest) = vectors.as_chunks::<3>();
         let &[omega, alpha, doubted, from, turned] = vectors else {
             return None;
@@ -91,6 +92,7 @@ impl Memory {
                 span,
                 doubted: doubted.into(),
                 from: from.into(),
+                farthest,
                 turned: turned.into(),
                 since,
             },

@@ -10,10 +10,9 @@ use super::covariance::{BIAS, Covariance, Errors, Moves, SCALE, SPEED};
 use super::settings::Values;
 use crate::field::Field;
 use crate::filter::{Filter, Usage};
-use crate::intake::{Intake, all_rows};
 use crate::lost::Follows;
 use crate::rest::{Limits, Rest};
-use crate::{Columns, Environment, Sample, Skipped};
+use crate::{Environment, Sample};
 
 /// Velocity noise density at rest, m/s*sqrt(s).
 const STANDING: f64 = 0.01;
@@ -310,10 +309,6 @@ impl<T: Real> Filter<T> for Mekf<T> {
             SPEED..SCALE => v.speed,
             _ => v.scale_start,
         }));
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<T> {
