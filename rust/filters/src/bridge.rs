@@ -17,6 +17,8 @@ use nalgebra::Vector3;
 const UNUSUAL: f64 = 100.0;
 /// Least turn that is doubted, rad: half a degree, below what any filter here is asked to keep.
 const LEAST_TURN: f64 = 0.01;
+/// Least uncertainty that is told, rad: a degree, half of what bad samples may leave; a blow on the sensor makes less.
+const LEAST_UNSURE: f64 = 0.02;
 /// Changes that the mean stands for: half a second at 100 Hz, a few periods of fast motion.
 const CHANGES: f64 = 64.0;
 /// Mean square of changes before any reading, (rad/s)^2: a change of 10 rad/s is doubted then.
@@ -122,7 +124,7 @@ impl Bridge {
         let back = self.is_back(&(rate - self.from));
         self.turned = turn + (before - self.from) * time;
         self.since = if back { 0.0 } else { time };
-        if square > LEAST_TURN * LEAST_TURN {
+        if square > LEAST_UNSURE * LEAST_UNSURE {
             square.sqrt().min(PI)
         } else {
             0.0
