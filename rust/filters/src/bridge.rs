@@ -12,27 +12,22 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
-/// Square of a change over the mean square of changes that is doubted. White noise of three axes never reaches ten times its
-/// root mean square.
-const UNUSUAL: f64 = 100.0;
+use crate::usual::{LONGEST, Usual};
+
 /// Least turn that is doubted, rad: half a degree, below what any filter here is asked to keep.
 const LEAST_TURN: f64 = 0.01;
-/// Least uncertainty that is told, rad: a degree, half of what bad samples may leave; a blow on the sensor makes less.
-const LEAST_UNSURE: f64 = 0.02;
-/// Changes that the mean stands for: half a second at 100 Hz, a few periods of fast motion.
-const CHANGES: f64 = 64.0;
+/// Least uncertainty that is told, rad: the 2 degrees that bad samples may leave; a blow on the sensor makes less.
+const LEAST_UNSURE: f64 = 0.035;
 /// Mean square of changes before any reading, (rad/s)^2: a change of 10 rad/s is doubted then.
 const BEFORE: f64 = 1.0;
-/// Time that bad rates may last, s: bad samples of a second, as in [`crate::lost`].
-const LONGEST: f64 = 1.5;
-/// Least mean square of changes, (rad/s)^2: a change that is not doubted then turns by [`LEAST_TURN`] in that time.
-const LEAST: f64 = LEAST_TURN * LEAST_TURN / (LONGEST * LONGEST) / UNUSUAL;
+/// Square of the least change that is doubted, (rad/s)^2: it turns by [`LEAST_TURN`] in the time that bad rates may last.
+const LEAST: f64 = LEAST_TURN * LEAST_TURN / (LONGEST * LONGEST);
 
 /// What the rates so far allow, and the ones that are doubted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bridge {
-    /// Mean square of the change from reading to reading, (rad/s)^2.
-    pub usual: f64,
+    /// What the rate changes by from reading to reading, (rad/s)^2.
+    pub usual: Usual,
     /// Time between the doubted rate and the one before, s; 0 where none is doubted.
     pub span: f64,
     /// The doubted rate, rad/s.
@@ -59,7 +54,7 @@ pub(crate) enum Turned {
 
 impl Bridge {
     pub const NONE: Self = Self {
-        usual: BEFORE,
+        usual: Usual(BEFORE),
         span: 0.0,
         doubted: Vector3::new(0.0, 0.0, 0.0),
         from: Vector3::new(0.0, 0.0, 0.0),
@@ -74,21 +69,10 @@ impl Bridge {
         self.span > 0.0 || self.since > 0.0
     }
 
-    /// Square of the largest change that is not doubted, (rad/s)^2.
+    /// Whether a change of that square, (rad/s)^2, is one to doubt; if not, it is learned.
     #[inline(always)]
-    pub fn allowed(&self) -> f64 {
-        UNUSUAL * self.usual
-    }
-
-    /// Takes the square of a change that is not doubted.
-    #[inline(always)]
-    pub fn learn(&mut self, square: f64) {
-        self.usual = (self.usual + (square - self.usual) * (1.0 / CHANGES)).max(LEAST);
-    }
-
-    /// Takes time in which changes were doubted: what lasts longer than bad samples do is usual.
-    fn get_used(&mut self, time: f64) {
-        self.usual *= UNUSUAL.powf(time.min(LONGEST) / LONGEST);
+    pub fn doubts(&mut self, square: f64) -> bool {
+        self.usual.doubts(square, LEAST)
     }
 
     /// A rate that is not doubted while a change stays open. One that comes back without another such change is a motion.
@@ -122,7 +106,7 @@ impl Bridge {
         }
         self.is_back(&(before - self.from));
         let back = self.is_back(&(rate - self.from));
-        self.turned = turn + (before - self.from) * time;
+        self.turned = Vector3::zeros();
         self.since = if back { 0.0 } else { time };
         if square > LEAST_UNSURE * LEAST_UNSURE {
             square.sqrt().min(PI)
@@ -139,19 +123,18 @@ impl Bridge {
             return Turned::Mean(mean, 0.0);
         }
         let (change, span, doubted) = (rate - before, self.span, self.doubted);
-        let (square, allowed) = (change.norm_squared(), self.allowed());
+        let square = change.norm_squared();
         if span > 0.0 {
             (self.span, self.doubted) = (0.0, Vector3::zeros());
             let jump = doubted - before;
             if 4.0 * square < jump.norm_squared() {
                 return Turned::Bridged(mean);
             }
-            self.get_used(span + dt);
+            self.usual.get_used(span + dt);
             let made_up = (doubted + rate) * 0.5 + jump * (0.5 * span / dt);
             return Turned::Mean(made_up, self.unsure(before, rate, jump * (span + dt), span + dt));
         }
-        if square <= allowed {
-            self.learn(square);
+        if !self.doubts(square) {
             if self.since > 0.0 {
                 self.follow(rate, dt);
             }
@@ -161,7 +144,7 @@ impl Bridge {
             (self.span, self.doubted) = (dt, *rate);
             return Turned::Held;
         }
-        self.get_used(dt);
+        self.usual.get_used(dt);
         Turned::Mean(mean, self.unsure(before, rate, change * dt, dt))
     }
 }
@@ -248,6 +231,41 @@ mod tests {
         assert!((unsure(&rates)[501] - 2.0).abs() < 0.1, "{}", unsure(&rates)[501]);
         rates[400..].fill(2.0);
         assert!(unsure(&rates)[402..].iter().all(|x| *x == 0.0));
+    }
+
+    /// The root of the sum of squares: what a covariance makes of it.
+    fn whole(unsure: &[f64]) -> f64 {
+        unsure.iter().map(|x| x * x).sum::<f64>().sqrt()
+    }
+
+    #[test]
+    fn zeros_between_rates_that_differ_leave_the_motion_between_open() {
+        let mut rates = swing();
+        rates[450..540].fill(0.0);
+        let found = whole(&unsure(&rates));
+        assert!(found > 0.5 && found < 1.0, "{found}");
+    }
+
+    #[test]
+    fn a_second_of_noise_leaves_open_what_it_turned() {
+        let mut rates = swing();
+        let mut seed = 1_u32;
+        for rate in &mut rates[400..500] {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *rate = 17.0 * (f64::from(seed) / f64::from(u32::MAX) - 0.5);
+        }
+        // Independent errors of 5 rad/s: half a radian is the standard deviation of the turn.
+        assert!(whole(&unsure(&rates)) > 0.4, "{}", whole(&unsure(&rates)));
+    }
+
+    #[test]
+    fn a_blow_that_rings_down_leaves_nothing_open() {
+        let mut rates = swing();
+        for (k, rate) in rates.iter_mut().enumerate().skip(400) {
+            let time = f64::from(u32::try_from((k - 400) % 70).unwrap());
+            *rate += 0.8 * (-time / 3.0).exp() * (2.0 * time).cos();
+        }
+        assert!(whole(&unsure(&rates)) < 0.1, "{}", whole(&unsure(&rates)));
     }
 
     #[test]

@@ -208,12 +208,9 @@ impl Intake {
             if !usable
                 || clipped(&acc, rules.acc_range)
                 || clipped(&gyr, rules.gyr_range)
-                || (rules.recovery && change > bridge.allowed())
+                || (rules.recovery && bridge.doubts(change))
             {
                 break;
-            }
-            if rules.recovery {
-                bridge.learn(change);
             }
             let sample = Sample {
                 omega: Some(Reading {

@@ -45,6 +45,7 @@ pub mod start;
 pub mod steady_state;
 pub mod triad;
 pub mod trials;
+mod usual;
 pub mod vibration;
 
 pub use catalogue::{Description, FILTERS};

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::bridge::Bridge;
+use crate::usual::Usual;
 
 /// Times are NaN where there is none.
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +52,7 @@ impl Memory {
 
     pub fn to_array(self) -> [f64; Self::LENGTH] {
         let Bridge {
-            usual,
+            usual: Usual(usual),
             span,
             doubted,
             from,
@@ -88,7 +89,7 @@ impl Memory {
             omega: omega.into(),
             alpha: alpha.into(),
             bridge: Bridge {
-                usual,
+                usual: Usual(usual),
                 span,
                 doubted: doubted.into(),
                 from: from.into(),

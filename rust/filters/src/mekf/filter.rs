@@ -12,6 +12,7 @@ use crate::field::Field;
 use crate::filter::{Filter, Usage};
 use crate::lost::Follows;
 use crate::rest::{Limits, Rest};
+use crate::usual::Usual;
 use crate::{Environment, Sample};
 
 /// Velocity noise density at rest, m/s*sqrt(s).
@@ -23,6 +24,10 @@ const GAP: f64 = 1.0;
 /// Largest velocity in parts of `speed`: 7.5 m/s by default. Fast hand motion (BROAD, trial 16) reaches 12; more comes of bad
 /// readings, and nothing is learned from it.
 const FASTEST: f64 = 15.0;
+/// Mean square of the change of the specific force before any reading, (m/s^2)^2: a change of ten times gravity is doubted then.
+const FORCE_BEFORE: f64 = 100.0;
+/// Square of the least change of the specific force that is doubted, (m/s^2)^2.
+const LEAST_FORCE: f64 = 1.0;
 /// Standard deviations of the mean force's direction beyond which three windows in a row do not happen.
 const SURE: f64 = 4.0;
 /// Least angle that is lost, rad: what a wrong bias of the accelerometer (0.5 m/s^2) makes.
@@ -43,6 +48,9 @@ pub struct Mekf<T = f64> {
     pub(super) covariance: Covariance<T>,
     pub(super) rest: Rest<T>,
     pub(super) field: Field<T>,
+    /// The last specific force, body frame, m/s^2, and what it changes by, (m/s^2)^2.
+    pub(super) force: Vector3<f64>,
+    pub(super) usual: Usual,
     /// Time turned since the last specific force, s; -1 where the next one shows the vertical.
     pub(super) since_force: f64,
 }
@@ -66,6 +74,8 @@ impl<T: Real> Mekf<T> {
             covariance: Covariance::independent(&Errors::repeat(zero)),
             rest: Rest::unknown(),
             field: Field::unknown(),
+            force: Vector3::zeros(),
+            usual: Usual(FORCE_BEFORE),
             since_force: 0.0,
         };
         filter.reset(Quaternion::IDENTITY);
@@ -89,6 +99,7 @@ impl<T: Real> Mekf<T> {
         let v = self.values;
         let (lost, blind) = (self.since_force < 0.0, self.since_force - dt);
         self.since_force = 0.0;
+        let doubted = T::splat(self.change_of_force(f, dt) * (dt * dt));
         let f = f.map(T::splat);
         if lost {
             self.level(&f);
@@ -107,6 +118,7 @@ impl<T: Real> Mekf<T> {
         }
         for at in [SPEED, SPEED + 1] {
             self.covariance.add(at, v.acc_noise * v.acc_noise * time);
+            self.covariance.add(at, doubted.simd_min(longest * longest));
             if blind > 0.01 * dt {
                 let sd = self.covariance.variance(at).simd_max(T::splat(0.0)).simd_sqrt();
                 let more = sd + T::splat(self.environment.gravity() * blind);
@@ -115,6 +127,17 @@ impl<T: Real> Mekf<T> {
         }
         let r = T::splat(2.0) * v.speed * v.speed * v.speed_time / time;
         self.stop(Errors::repeat(T::splat(0.0)), r, always::<T>());
+    }
+
+    /// Square of the change from the last specific force, (m/s^2)^2, where the ones before do not allow it; 0 elsewhere.
+    fn change_of_force(&mut self, f: &Vector3<f64>, dt: f64) -> f64 {
+        let square = (f - self.force).norm_squared().min(f64::MAX);
+        self.force = *f;
+        if !self.usual.doubts(square, LEAST_FORCE) {
+            return 0.0;
+        }
+        self.usual.get_used(dt);
+        square
     }
 
     /// The velocity is zero, variance `r`; `x`: errors found before.
@@ -197,17 +220,19 @@ impl<T: Real> Mekf<T> {
         usage
     }
 
-    /// A turn of that variance, rad^2, which no rate shows: the next specific force shows the vertical. The velocity was
-    /// integrated in a wrong direction for as long as a speed lasts.
+    /// A turn of that variance, rad^2, which no rate shows. Where one specific force shows the vertical better, the next one does;
+    /// the velocity was then integrated in a wrong direction for as long as a speed lasts.
     fn turn_unseen(&mut self, variance: f64) {
-        let fallen = self.values.speed_time * T::splat(self.environment.gravity());
         for i in 0..3 {
             self.covariance.add(i, T::splat(variance));
         }
-        for at in [SPEED, SPEED + 1] {
-            self.covariance.add(at, fallen * fallen * T::splat(variance));
+        if variance > FIRST_TILT {
+            let fallen = self.values.speed_time * T::splat(self.environment.gravity());
+            for at in [SPEED, SPEED + 1] {
+                self.covariance.add(at, fallen * fallen * T::splat(variance));
+            }
+            self.since_force = -1.0;
         }
-        self.since_force = -1.0;
     }
 
     /// Nothing is known of turn and velocity after a gap.
@@ -303,6 +328,7 @@ impl<T: Real> Filter<T> for Mekf<T> {
         (self.q, self.bias) = (attitude.splat(), Vector3::repeat(zero));
         (self.velocity, self.scale) = ([zero; 2], Matrix3::repeat(zero));
         (self.rest, self.field, self.since_force) = (Rest::unknown(), Field::unknown(), -1.0);
+        (self.force, self.usual) = (Vector3::zeros(), Usual(FORCE_BEFORE));
         self.covariance = Covariance::independent(&Errors::from_fn(|i, _| match i {
             0..BIAS => v.angle_start,
             BIAS..SPEED => v.bias_start,
