@@ -12,7 +12,7 @@ use crate::field::Field;
 use crate::filter::{Filter, Usage};
 use crate::lost::Follows;
 use crate::rest::{Limits, Rest};
-use crate::usual::Usual;
+use crate::usual::{LONGEST, Usual};
 use crate::{Environment, Sample};
 
 /// Velocity noise density at rest, m/s*sqrt(s).
@@ -28,7 +28,7 @@ const FASTEST: f64 = 15.0;
 const FORCE_BEFORE: f64 = 100.0;
 /// Square of the least change of the specific force that is doubted, (m/s^2)^2.
 const LEAST_FORCE: f64 = 1.0;
-/// Standard deviations of the mean force's direction beyond which three windows in a row do not happen.
+/// Standard deviations beyond which nothing happens: of the mean force's direction in three windows in a row, of speeds.
 const SURE: f64 = 4.0;
 /// Least angle that is lost, rad: what a wrong bias of the accelerometer (0.5 m/s^2) makes.
 const LEAST_LOST: f64 = 0.05;
@@ -51,6 +51,8 @@ pub struct Mekf<T = f64> {
     /// The last specific force, body frame, m/s^2, and what it changes by, (m/s^2)^2.
     pub(super) force: Vector3<f64>,
     pub(super) usual: Usual,
+    /// Variance of the velocity by changes of the last seconds that those do not allow, (m/s)^2.
+    pub(super) doubted: f64,
     /// Time turned since the last specific force, s; -1 where the next one shows the vertical.
     pub(super) since_force: f64,
 }
@@ -76,6 +78,7 @@ impl<T: Real> Mekf<T> {
             field: Field::unknown(),
             force: Vector3::zeros(),
             usual: Usual(FORCE_BEFORE),
+            doubted: 0.0,
             since_force: 0.0,
         };
         filter.reset(Quaternion::IDENTITY);
@@ -99,7 +102,7 @@ impl<T: Real> Mekf<T> {
         let v = self.values;
         let (lost, blind) = (self.since_force < 0.0, self.since_force - dt);
         self.since_force = 0.0;
-        let doubted = T::splat(self.change_of_force(f, dt) * (dt * dt));
+        let doubted = self.doubted_speed(f, dt);
         let f = f.map(T::splat);
         if lost {
             self.level(&f);
@@ -118,7 +121,7 @@ impl<T: Real> Mekf<T> {
         }
         for at in [SPEED, SPEED + 1] {
             self.covariance.add(at, v.acc_noise * v.acc_noise * time);
-            self.covariance.add(at, doubted.simd_min(longest * longest));
+            self.covariance.add(at, doubted);
             if blind > 0.01 * dt {
                 let sd = self.covariance.variance(at).simd_max(T::splat(0.0)).simd_sqrt();
                 let more = sd + T::splat(self.environment.gravity() * blind);
@@ -129,15 +132,24 @@ impl<T: Real> Mekf<T> {
         self.stop(Errors::repeat(T::splat(0.0)), r, always::<T>());
     }
 
-    /// Square of the change from the last specific force, (m/s^2)^2, where the ones before do not allow it; 0 elsewhere.
-    fn change_of_force(&mut self, f: &Vector3<f64>, dt: f64) -> f64 {
+    /// Variance, (m/s)^2, that a change of the specific force gives the velocity where those before do not allow it. Speeds up to
+    /// [`SURE`] times those that occur hold a blow; what bad readings make is beyond.
+    fn doubted_speed(&mut self, f: &Vector3<f64>, dt: f64) -> T {
         let square = (f - self.force).norm_squared().min(f64::MAX);
         self.force = *f;
         if !self.usual.doubts(square, LEAST_FORCE) {
-            return 0.0;
+            self.doubted *= (-dt / LONGEST).exp();
+            return T::splat(0.0);
         }
         self.usual.get_used(dt);
-        square
+        let (v, variance) = (self.values, square * (dt * dt));
+        self.doubted = (self.doubted + variance).min(f64::MAX);
+        let longest = v.speed * T::splat(FASTEST);
+        let most = v.speed * T::splat(SURE);
+        let beyond = T::splat(self.doubted) - most * most;
+        beyond
+            .simd_clamp(T::splat(0.0), T::splat(variance))
+            .simd_min(longest * longest)
     }
 
     /// The velocity is zero, variance `r`; `x`: errors found before.
@@ -328,7 +340,7 @@ impl<T: Real> Filter<T> for Mekf<T> {
         (self.q, self.bias) = (attitude.splat(), Vector3::repeat(zero));
         (self.velocity, self.scale) = ([zero; 2], Matrix3::repeat(zero));
         (self.rest, self.field, self.since_force) = (Rest::unknown(), Field::unknown(), -1.0);
-        (self.force, self.usual) = (Vector3::zeros(), Usual(FORCE_BEFORE));
+        (self.force, self.usual, self.doubted) = (Vector3::zeros(), Usual(FORCE_BEFORE), 0.0);
         self.covariance = Covariance::independent(&Errors::from_fn(|i, _| match i {
             0..BIAS => v.angle_start,
             BIAS..SPEED => v.bias_start,

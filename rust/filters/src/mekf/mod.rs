@@ -16,8 +16,8 @@
 //! leaves nothing, whatever its size, so that none has to be detected and nothing is thrown away. The speeds that occur
 //! (`speed`, correlated over `speed_time`) decide how fast the tilt follows.
 //!
-//! A change of the specific force that those before it do not allow ([`crate::usual`](crate)) may be a bad reading: the
-//! velocity is uncertain by it.
+//! Changes of the specific force that those before do not allow ([`crate::usual`](crate)) may be bad readings: the velocity is
+//! uncertain by what they make beyond the speeds that occur.
 //!
 //! **Field.** It turns the heading and never roll or pitch: those rows of the gain are zero (the covariance takes
 //! account of that, Joseph form). Disturbances last, so that their variance counts over `mag_time`; it grows
