@@ -19,6 +19,7 @@
 
 pub mod accel;
 mod bridge;
+pub mod catalogue;
 pub mod columns;
 pub mod complementary;
 mod field;
@@ -32,6 +33,7 @@ mod lost;
 pub mod mahony;
 pub mod mekf;
 mod memory;
+pub mod parameter;
 pub mod quest;
 pub mod replay;
 mod rest;
@@ -43,10 +45,13 @@ pub mod start;
 pub mod steady_state;
 pub mod triad;
 pub mod trials;
+mod usual;
 pub mod vibration;
 
+pub use catalogue::{Description, FILTERS};
 pub use columns::{Columns, Row};
-pub use filter::{Description, FILTERS, Filter, Parameter};
+pub use filter::Filter;
+pub use parameter::Parameter;
 pub use replay::Replay;
 pub use rules::Rules;
 pub use sample::{AngularRate, Environment, FluxDensity, Reading, Sample, Sensor, SpecificForce};
