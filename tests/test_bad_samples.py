@@ -14,7 +14,7 @@ from recording import recording
 from scipy.spatial.transform import Rotation
 from test_mekf import moving
 
-FILTERS = ("complementary", "kalman", "mahony", "hybrid", "mekf", "smoother", "triad", "quest", "accel")
+FILTERS = ("complementary", "kalman", "mahony", "madgwick", "hybrid", "mekf", "smoother", "triad", "quest", "accel")
 WITHOUT_HEADING = ("complementary", "kalman")
 SIZES = {"gyr": (5.0, 35.0, 1000.0, 1e100), "acc": (30.0, 157.0, 1e5, 1e100), "mag": (100.0, 1e5, 1e100)}
 """rad/s, m/s^2 and uT: from what hands do over the end of a range to bytes that are none."""

@@ -4,7 +4,7 @@ use crate::intake::Rows;
 use crate::lost::Watched;
 use crate::parameter::{Parameter, fill};
 use crate::{Environment, FilterError, Sensor};
-use crate::{accel, complementary, gyro, hybrid, kalman, mahony, mekf, quest, triad};
+use crate::{accel, complementary, gyro, hybrid, kalman, madgwick, mahony, mekf, quest, triad};
 
 type Make = fn(&Environment, &[f64]) -> Box<dyn Rows>;
 
@@ -23,7 +23,7 @@ pub struct Description {
 }
 
 /// The filters there are.
-pub const FILTERS: [Description; 9] = [
+pub const FILTERS: [Description; 10] = [
     Description {
         name: "accel",
         summary: "Inclination from the specific force alone, row by row; the heading stays where it started.",
@@ -70,6 +70,13 @@ pub const FILTERS: [Description; 9] = [
         needs: &[Sensor::Gyr, Sensor::Acc],
         parameters: mahony::PARAMETERS,
         make: |environment, values| Box::new(Watched::new(environment, mahony::Mahony::new(environment, values))),
+    },
+    Description {
+        name: "madgwick",
+        summary: "Madgwick's gradient descent with the rate integrated, with or without a magnetometer.",
+        needs: &[Sensor::Gyr, Sensor::Acc],
+        parameters: madgwick::PARAMETERS,
+        make: |environment, values| Box::new(Watched::new(environment, madgwick::Madgwick::new(environment, values))),
     },
     Description {
         name: "quest",

@@ -8,6 +8,7 @@
 //! | [`kalman`] | attitude and gyro bias | paper B, the filter it cites |
 //! | [`triad`] | two vectors | paper C, Black 1964 |
 //! | [`mahony`] | nonlinear complementary filter | paper C, eqs. (5) to (7) |
+//! | [`madgwick`] | gradient descent | Madgwick, Harrison and Vaidyanathan 2011 |
 //! | [`quest`] | two weighted vectors | paper C names it; Shuster and Oh 1981 |
 //! | [`hybrid`] | TRIAD with Mahony's filter | paper C, figures 1 and 2 |
 //! | [`mekf`] | multiplicative extended Kalman filter | Markley 2003; disturbances: its own page |
@@ -30,6 +31,7 @@ pub mod intake;
 pub mod kalman;
 mod lever_arm;
 mod lost;
+pub mod madgwick;
 pub mod mahony;
 pub mod mekf;
 mod memory;
