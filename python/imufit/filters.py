@@ -291,6 +291,12 @@ class Mahony(AttitudeFilter):
     name = "mahony"
 
 
+class Madgwick(AttitudeFilter):
+    """Madgwick's gradient descent with the rate integrated, with or without a magnetometer (ICORR 2011)."""
+
+    name = "madgwick"
+
+
 class Quest(AttitudeFilter):
     """Attitude from two weighted vectors, the most probable one, row by row."""
 

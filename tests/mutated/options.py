@@ -7,7 +7,19 @@ from imufit.cli.app import imufit
 
 from mutated.hostile import NAMES, NUMBERS, TEXTS
 
-FILTERS = ("accel", "gyro", "complementary", "kalman", "triad", "quest", "mahony", "hybrid", "mekf", "smoother")
+FILTERS = (
+    "accel",
+    "gyro",
+    "complementary",
+    "kalman",
+    "triad",
+    "mahony",
+    "madgwick",
+    "quest",
+    "hybrid",
+    "mekf",
+    "smoother",
+)
 
 # fmt: off
 EFFECTS = (

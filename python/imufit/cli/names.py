@@ -8,7 +8,19 @@ from typing import Any
 
 import click
 
-FILTERS = ("accel", "gyro", "complementary", "kalman", "triad", "quest", "mahony", "hybrid", "mekf", "smoother")
+FILTERS = (
+    "accel",
+    "gyro",
+    "complementary",
+    "kalman",
+    "triad",
+    "mahony",
+    "madgwick",
+    "quest",
+    "hybrid",
+    "mekf",
+    "smoother",
+)
 FRAMES = ("NED", "ENU", "NWU")
 FORMS = {
     "c-header": "C99 header, SI units",

@@ -13,9 +13,9 @@
 use imufit_attitude::{Euler, Quaternion};
 use nalgebra::Vector3;
 
-use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::intake::{Intake, all_rows};
-use crate::{Columns, Environment, Sample, Skipped, SpecificForce};
+use crate::filter::{Filter, Usage, split_state};
+use crate::parameter::Parameter;
+use crate::{Environment, Sample, SpecificForce};
 
 /// None: the filter has no memory.
 pub const PARAMETERS: &[Parameter] = &[];
@@ -91,10 +91,6 @@ impl Filter for Accel {
     fn reset(&mut self, attitude: Quaternion) {
         self.q = attitude;
         self.yaw = Euler::from_quaternion(attitude).yaw;
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [f64], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<f64> {

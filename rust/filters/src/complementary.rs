@@ -14,10 +14,10 @@
 
 use imufit_attitude::Quaternion;
 
-use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::intake::{Intake, all_rows};
+use crate::filter::{Filter, Usage, split_state};
 use crate::lost::{Follows, LOST};
-use crate::{Columns, Environment, Sample, Skipped};
+use crate::parameter::Parameter;
+use crate::{Environment, Sample};
 
 /// Weight and the step it belongs to, or a time constant.
 pub const PARAMETERS: &[Parameter] = &[
@@ -108,10 +108,6 @@ impl Filter for Complementary {
 
     fn reset(&mut self, attitude: Quaternion) {
         self.q = attitude;
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [f64], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<f64> {

@@ -5,9 +5,9 @@
 
 use imufit_attitude::Quaternion;
 
-use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::intake::{Intake, all_rows};
-use crate::{Columns, Sample, Skipped};
+use crate::Sample;
+use crate::filter::{Filter, Usage, split_state};
+use crate::parameter::Parameter;
 
 /// None.
 pub const PARAMETERS: &[Parameter] = &[];
@@ -32,10 +32,6 @@ impl Filter for Gyro {
 
     fn reset(&mut self, attitude: Quaternion) {
         self.q = attitude;
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [f64], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<f64> {

@@ -26,14 +26,14 @@
 //! 90 degrees, left by a saturated gyro or (driven) by a gap, is below a tenth of itself `8 / (k_p min(k_1, k_2))` s
 //! after good readings return; seeded, that of a gap is gone with the first pair of readings.
 
-use imufit_attitude::{Quaternion, Real};
-use nalgebra::{SimdBool, Vector3};
+use imufit_attitude::Quaternion;
+use nalgebra::Vector3;
 
-use crate::filter::{Filter, Parameter, Usage};
-use crate::intake::{Intake, all_rows};
-use crate::lost::{Follows, Watched};
+use crate::filter::{Filter, Usage};
+use crate::lost::Follows;
 use crate::mahony::{self, Mahony, square_of_sine};
-use crate::{Columns, Environment, Sample, Skipped, triad};
+use crate::parameter::Parameter;
+use crate::{Environment, Sample, triad};
 
 /// Those of [`mahony`](crate::mahony) and the choice between the two readings.
 pub const PARAMETERS: &[Parameter] = &[
@@ -50,195 +50,136 @@ pub const PARAMETERS: &[Parameter] = &[
     },
 ];
 
-/// The filter that these settings ask for.
-pub fn make(environment: &Environment, values: &[f64]) -> Box<dyn Filter> {
-    if values.get(5).is_none_or(|driven| *driven > 0.0) {
-        Box::new(Watched::new(environment, Driven::new(environment, values)))
-    } else {
-        Box::new(Watched::new(environment, Seeded::new(environment, values)))
-    }
-}
-
-/// Mahony's filter that starts at TRIAD's attitude.
+/// Mahony's filter with TRIAD's attitude.
 #[derive(Debug, Clone)]
-pub struct Seeded<T = f64> {
+pub struct Hybrid {
     environment: Environment,
-    mahony: Mahony<T>,
-    least_square: T,
-    /// 1 until TRIAD's attitude has been taken over.
-    waiting: T,
+    up: Vector3<f64>,
+    mahony: Mahony,
+    /// k_1 / 2 and k_2 / 2.
+    half_weights: [f64; 2],
+    k_p: f64,
+    least_square: f64,
+    /// Whether TRIAD's attitude is what is measured.
+    driven: bool,
+    /// Whether the next attitude of TRIAD is taken over as it is.
+    waiting: bool,
 }
 
-impl<T: Real> Seeded<T> {
+impl Hybrid {
     /// With the values of [`PARAMETERS`] in their order.
-    pub fn new(environment: &Environment, values: &[T]) -> Self {
-        let min_angle = values.get(4).copied().unwrap_or(T::splat(PARAMETERS[4].default));
+    pub fn new(environment: &Environment, values: &[f64]) -> Self {
+        let value = |at: usize| values.get(at).copied().unwrap_or(PARAMETERS[at].default);
+        let driven = value(5) > 0.0;
         Self {
             environment: *environment,
+            up: environment.up(),
             mahony: Mahony::new(environment, values),
-            least_square: square_of_sine(min_angle),
-            waiting: T::splat(1.0),
+            half_weights: [value(0) * 0.5, value(1) * 0.5],
+            k_p: value(3),
+            least_square: square_of_sine(value(4)),
+            driven,
+            waiting: !driven,
         }
     }
-}
 
-impl<T: Real> Filter<T> for Seeded<T> {
-    #[inline]
-    fn step(&mut self, sample: &Sample) -> Usage {
-        let (zero, one) = (T::splat(0.0), T::splat(1.0));
+    /// TRIAD's attitude of a sample and whether its heading is that of the field.
+    fn measured(&self, sample: &Sample, q: Quaternion) -> Option<(Quaternion, bool)> {
+        triad::measured(sample, q, &self.environment, self.least_square)
+    }
+
+    /// Mahony's filter, put to TRIAD's attitude at the first pair of vectors and at the first one after a gap.
+    fn seeded(&mut self, sample: &Sample) -> Usage {
         // No time since the last field: it is the first one, or the first one after a gap.
-        if sample.m.is_some_and(|m| m.dt <= 0.0) {
-            self.waiting = one;
-        }
+        self.waiting |= sample.m.is_some_and(|m| m.dt <= 0.0);
         let usage = self.mahony.step(sample);
-        if sample.m.is_some()
-            && self.waiting != zero
-            && let Some((q, apart)) =
-                triad::measured(sample, self.mahony.attitude(), &self.environment, self.least_square)
+        if self.waiting
+            && sample.m.is_some()
+            && let Some((q, true)) = self.measured(sample, self.mahony.attitude())
         {
-            let now = apart & self.waiting.simd_gt(zero);
-            self.mahony.put(q.select(now, self.mahony.attitude()));
-            self.waiting = zero.select(now, self.waiting);
+            self.mahony.put(q);
+            self.waiting = false;
         }
         usage
     }
 
-    #[inline]
-    fn attitude(&self) -> Quaternion<T> {
-        self.mahony.attitude()
-    }
-
-    fn reset(&mut self, attitude: Quaternion) {
-        self.mahony.reset(attitude);
-        self.waiting = T::splat(1.0);
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
-    }
-
-    fn state(&self) -> Vec<T> {
-        let mut state = self.mahony.state();
-        state.push(self.waiting);
-        state
-    }
-
-    fn set_state(&mut self, state: &[T]) -> bool {
-        let Some((waiting, of_mahony)) = state.split_last() else {
-            return false;
-        };
-        let taken = self.mahony.set_state(of_mahony);
-        if taken {
-            self.waiting = *waiting;
-        }
-        taken
-    }
-}
-
-/// The passive filter on TRIAD's attitude.
-#[derive(Debug, Clone)]
-pub struct Driven<T = f64> {
-    environment: Environment,
-    up: Vector3<T>,
-    mahony: Mahony<T>,
-    /// k_1 / 2 and k_2 / 2.
-    half_weights: [T; 2],
-    k_p: T,
-    least_square: T,
-}
-
-impl<T: Real> Driven<T> {
-    /// With the values of [`PARAMETERS`] in their order.
-    pub fn new(environment: &Environment, values: &[T]) -> Self {
-        let value = |at: usize| values.get(at).copied().unwrap_or(T::splat(PARAMETERS[at].default));
-        let half = T::splat(0.5);
-        Self {
-            environment: *environment,
-            up: environment.up().map(T::splat),
-            mahony: Mahony::new(environment, values),
-            half_weights: [value(0) * half, value(1) * half],
-            k_p: value(3),
-            least_square: square_of_sine(value(4)),
-        }
-    }
-}
-
-impl<T: Real> Filter<T> for Driven<T> {
-    #[inline]
-    fn step(&mut self, sample: &Sample) -> Usage {
-        let (zero, one, two) = (T::splat(0.0), T::splat(1.0), T::splat(2.0));
+    /// The passive filter on TRIAD's attitude.
+    #[inline(always)]
+    fn driven(&mut self, sample: &Sample) -> Usage {
         let predicted = self.mahony.predicted(sample).kept();
-        let Some((q_y, apart)) = triad::measured(sample, predicted, &self.environment, self.least_square) else {
-            self.mahony.correct(predicted, &Vector3::repeat(zero), zero);
+        let Some((q_y, apart)) = self.measured(sample, predicted) else {
+            self.mahony.correct(predicted, &Vector3::zeros(), 0.0);
             return Usage::Full;
         };
         let off = q_y.times(predicted.inverse());
         // vex of the antisymmetric part: sin(angle) times the axis.
-        let w_n = off.vector() * (two * off.w());
-        let dt_f = sample.f.map_or(0.0, |f| f.dt);
-        let dt_m = sample.m.map_or(0.0, |m| m.dt);
-        let gain = |weight: T, dt: T| {
+        let w_n = off.vector() * (2.0 * off.w());
+        let gain = |weight: f64, dt: f64| {
             let gain = weight * dt;
-            gain * one.simd_min(one / (self.k_p * gain))
+            gain * f64::min(1.0, 1.0 / (self.k_p * gain))
         };
-        let level = gain(self.half_weights[0], T::splat(dt_f));
-        let heading = gain(self.half_weights[1], T::splat(dt_m)).select(apart, zero);
+        let level = gain(self.half_weights[0], sample.f.map_or(0.0, |f| f.dt));
+        let heading = gain(self.half_weights[1], sample.m.map_or(0.0, |m| m.dt));
+        let heading = if apart { heading } else { 0.0 };
         let vertical = self.up * self.up.dot(&w_n);
         let w_mes = predicted.rotate_back(&((w_n - vertical) * level + vertical * heading));
-        self.mahony.correct(predicted, &w_mes, zero);
-        if sample.m.is_some() && !apart.all() {
+        self.mahony.correct(predicted, &w_mes, 0.0);
+        if sample.m.is_some() && !apart {
             Usage::NoHeading
         } else {
             Usage::Full
         }
     }
+}
+
+impl Filter for Hybrid {
+    #[inline]
+    fn step(&mut self, sample: &Sample) -> Usage {
+        if self.driven {
+            self.driven(sample)
+        } else {
+            self.seeded(sample)
+        }
+    }
 
     #[inline]
-    fn attitude(&self) -> Quaternion<T> {
+    fn attitude(&self) -> Quaternion {
         self.mahony.attitude()
     }
 
     fn reset(&mut self, attitude: Quaternion) {
         self.mahony.reset(attitude);
+        self.waiting = !self.driven;
     }
 
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
+    fn state(&self) -> Vec<f64> {
+        let mut state = self.mahony.state();
+        state.push(f64::from(self.waiting));
+        state
     }
 
-    fn state(&self) -> Vec<T> {
-        self.mahony.state()
-    }
-
-    fn set_state(&mut self, state: &[T]) -> bool {
-        self.mahony.set_state(state)
-    }
-}
-
-impl<T: Real> Follows<T> for Seeded<T> {
-    fn limit(&self, time: f64, sound: &Self) -> T {
-        self.mahony.limit(time, &sound.mahony)
-    }
-
-    fn heading_limit(&self, sound: &Self) -> Option<T> {
-        self.mahony.heading_limit(&sound.mahony)
-    }
-
-    fn find(&mut self, attitude: Quaternion<T>, sound: &Self, lost: T::SimdBool) {
-        self.mahony.find(attitude, &sound.mahony, lost);
+    fn set_state(&mut self, state: &[f64]) -> bool {
+        let Some((waiting, of_mahony)) = state.split_last() else {
+            return false;
+        };
+        let taken = self.mahony.set_state(of_mahony);
+        if taken {
+            self.waiting = *waiting > 0.0;
+        }
+        taken
     }
 }
 
-impl<T: Real> Follows<T> for Driven<T> {
-    fn limit(&self, time: f64, sound: &Self) -> T {
+impl Follows<f64> for Hybrid {
+    fn limit(&self, time: f64, sound: &Self) -> f64 {
         self.mahony.limit(time, &sound.mahony)
     }
 
-    fn heading_limit(&self, sound: &Self) -> Option<T> {
+    fn heading_limit(&self, sound: &Self) -> Option<f64> {
         self.mahony.heading_limit(&sound.mahony)
     }
 
-    fn find(&mut self, attitude: Quaternion<T>, sound: &Self, lost: T::SimdBool) {
+    fn find(&mut self, attitude: Quaternion, sound: &Self, lost: bool) {
         self.mahony.find(attitude, &sound.mahony, lost);
     }
 }
@@ -274,7 +215,7 @@ mod tests {
             let environment = Environment::new(frame, 9.81, None).unwrap();
             let q = Quaternion::exp(&Vector3::new(0.4, -0.7, 1.9));
             let bias = Vector3::new(0.01, -0.02, 0.015);
-            let mut filter = make(&environment, &[1.0, 1.0, 0.2, 2.0, 0.035, driven]);
+            let mut filter = Hybrid::new(&environment, &[1.0, 1.0, 0.2, 2.0, 0.035, driven]);
             filter.reset(Quaternion::exp(&Vector3::new(0.9, 0.2, 0.5)));
             for _ in 0..60_000 {
                 filter.step(&standing(q, frame, bias, 0.01));
@@ -288,19 +229,19 @@ mod tests {
     fn seeded_takes_triads_attitude_at_the_first_pair_and_after_a_gap_and_driven_does_not() {
         let environment = Environment::new(Frame::Ned, 9.81, None).unwrap();
         let q = Quaternion::exp(&Vector3::new(0.4, -0.7, 1.9));
-        let error = |filter: &dyn Filter| (q.inverse() * filter.attitude()).angle();
+        let error = |filter: &Hybrid| (q.inverse() * filter.attitude()).angle();
         for driven in [0.0, 1.0] {
-            let mut filter = make(&environment, &[1.0, 1.0, 0.2, 2.0, 0.035, driven]);
+            let mut filter = Hybrid::new(&environment, &[1.0, 1.0, 0.2, 2.0, 0.035, driven]);
             filter.step(&standing(q, Frame::Ned, Vector3::zeros(), 0.0));
-            assert_eq!(error(filter.as_ref()) < 1e-12, driven < 0.5);
+            assert_eq!(error(&filter) < 1e-12, driven < 0.5);
             // Turned unseen; then a gap.
             let away = Quaternion::exp(&(Vector3::z() * 0.5)) * q;
             filter.reset(away);
             let seen = standing(q, Frame::Ned, Vector3::zeros(), 0.01);
             filter.step(&Sample { m: None, ..seen });
-            assert!(error(filter.as_ref()) > 0.4);
+            assert!(error(&filter) > 0.4);
             filter.step(&standing(q, Frame::Ned, Vector3::zeros(), 0.0));
-            assert_eq!(error(filter.as_ref()) < 1e-12, driven < 0.5);
+            assert_eq!(error(&filter) < 1e-12, driven < 0.5);
         }
     }
 
@@ -309,7 +250,7 @@ mod tests {
         let environment = Environment::new(Frame::Ned, 9.81, None).unwrap();
         let q = Quaternion::exp(&Vector3::new(0.1, 0.3, -0.2));
         for (k_p, dt) in [(20.0, 0.5), (1e6, 1.0), (1e200, 1e3), (0.0, 0.01)] {
-            let mut filter = make(&environment, &[1.0, 1.0, 0.0, k_p, 0.035, 1.0]);
+            let mut filter = Hybrid::new(&environment, &[1.0, 1.0, 0.0, k_p, 0.035, 1.0]);
             for _ in 0..50 {
                 filter.step(&standing(q, Frame::Ned, Vector3::zeros(), dt));
             }

@@ -62,8 +62,19 @@ pub struct Intake {
     pub(crate) memory: Memory,
 }
 
-/// All rows of `columns` for a filter one after the other, and the attitude after each of them, `w x y z`.
-pub(crate) fn all_rows<T: Real, F: Filter<T> + Clone>(
+/// A filter that goes through the rows of a log. One that can be cloned has a loop of its own with its step inside.
+pub trait Rows<T: Real = f64>: Filter<T> {
+    /// All rows of `columns` one after the other, and the attitude after each of them, `w x y z`.
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped);
+}
+
+impl<T: Real, F: Filter<T> + Clone> Rows<T> for F {
+    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
+        all_rows(self, intake, columns, attitude, skipped);
+    }
+}
+
+fn all_rows<T: Real, F: Filter<T> + Clone>(
     filter: &mut F,
     intake: &mut Intake,
     columns: &Columns<'_>,
@@ -177,7 +188,7 @@ impl Intake {
             return 0;
         };
         // A sensor that has read at the last row; NaN, none yet, fails every comparison.
-        if !(started && t_acc >= last && t_gyr >= last && t_mag >= last) || self.lever.is_some() || bridge.span > 0.0 {
+        if !(started && t_acc >= last && t_gyr >= last && t_mag >= last) || self.lever.is_some() || bridge.is_open() {
             return 0;
         }
         let (rules, least_square) = (self.rules, self.least_square);
@@ -197,12 +208,10 @@ impl Intake {
             if !usable
                 || clipped(&acc, rules.acc_range)
                 || clipped(&gyr, rules.gyr_range)
-                || (rules.recovery && bridge.doubts(change, dt))
+                || (rules.recovery && bridge.doubts(change))
             {
                 break;
             }
-            bridge.learn(change);
-            bridge.follow(&gyr, dt);
             let sample = Sample {
                 omega: Some(Reading {
                     value: AngularRate((omega + gyr) * 0.5),

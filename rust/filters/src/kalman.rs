@@ -19,12 +19,12 @@
 use imufit_attitude::Quaternion;
 use nalgebra::Vector3;
 
-use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::intake::{Intake, all_rows};
+use crate::filter::{Filter, Usage, split_state};
 use crate::lost::{Follows, LOST};
+use crate::parameter::Parameter;
 use crate::steady_state;
 use crate::vibration::Vibration;
-use crate::{Columns, Environment, Sample, Skipped};
+use crate::{Environment, Sample};
 
 /// Noise densities, so that the filter does not depend on the rate of the log, and the first uncertainties.
 pub const PARAMETERS: &[Parameter] = &[
@@ -221,10 +221,6 @@ impl Filter for Kalman {
             0.0,
             self.bias_start * self.bias_start,
         ];
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [f64], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<f64> {

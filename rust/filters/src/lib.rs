@@ -8,6 +8,7 @@
 //! | [`kalman`] | attitude and gyro bias | paper B, the filter it cites |
 //! | [`triad`] | two vectors | paper C, Black 1964 |
 //! | [`mahony`] | nonlinear complementary filter | paper C, eqs. (5) to (7) |
+//! | [`madgwick`] | gradient descent | Madgwick, Harrison and Vaidyanathan 2011 |
 //! | [`quest`] | two weighted vectors | paper C names it; Shuster and Oh 1981 |
 //! | [`hybrid`] | TRIAD with Mahony's filter | paper C, figures 1 and 2 |
 //! | [`mekf`] | multiplicative extended Kalman filter | Markley 2003; disturbances: its own page |
@@ -19,6 +20,7 @@
 
 pub mod accel;
 mod bridge;
+pub mod catalogue;
 pub mod columns;
 pub mod complementary;
 mod field;
@@ -29,9 +31,11 @@ pub mod intake;
 pub mod kalman;
 mod lever_arm;
 mod lost;
+pub mod madgwick;
 pub mod mahony;
 pub mod mekf;
 mod memory;
+pub mod parameter;
 pub mod quest;
 pub mod replay;
 mod rest;
@@ -43,10 +47,13 @@ pub mod start;
 pub mod steady_state;
 pub mod triad;
 pub mod trials;
+mod usual;
 pub mod vibration;
 
+pub use catalogue::{Description, FILTERS};
 pub use columns::{Columns, Row};
-pub use filter::{Description, FILTERS, Filter, Parameter};
+pub use filter::Filter;
+pub use parameter::Parameter;
 pub use replay::Replay;
 pub use rules::Rules;
 pub use sample::{AngularRate, Environment, FluxDensity, Reading, Sample, Sensor, SpecificForce};

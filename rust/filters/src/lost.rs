@@ -14,15 +14,15 @@
 //! 4. The attitude is turned by the least rotation that brings the mean force up, and its heading is that of the field where
 //!    one is measured. What the filter had learned (bias, scale, their certainty) is that of the end of the last window but
 //!    one that did not speak against it: the last one may hold the first bad readings.
-//! 5. One window shows that attitude coarsely. The next [`WINDOWS`] together show it three times as well: the same turn is
+//! 5. A turn that bad rates may have made, larger than the limit ([`crate::bridge`](crate)), leaves the attitude where it is and takes back what was learned.
+//! 6. One window shows that attitude coarsely. The next [`WINDOWS`] together show it three times as well: the same turn is
 //!    done by their mean, with what the filter had learned before it was lost.
 
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::{Matrix3, SimdBool, Vector3};
 
 use crate::filter::{Filter, Usage};
-use crate::intake::{Intake, all_rows};
-use crate::{Columns, Environment, Sample, Skipped};
+use crate::{Environment, Sample};
 
 /// Time over which readings are summed in the body frame, s: a turn of 2000 deg/s is 40 degrees.
 const PART: f64 = 0.02;
@@ -56,7 +56,7 @@ struct Window<T> {
     part: Vector3<f64>,
     /// Time of that part, s.
     part_time: f64,
-    /// Direction of the field times the time, body frame, and that time, s.
+    /// The field times the time in that part, body frame, uT s, and that time, s.
     field: Vector3<f64>,
     field_time: f64,
     /// Specific force over gravity times time, reference frame, s.
@@ -184,6 +184,14 @@ impl<T: Real, F: Follows<T>> Watched<F, T> {
         self.sound = [self.filter.clone(), self.filter.clone()];
     }
 
+    /// Goes on with what was learned before rates that may be bad: what they taught is none of the sensor's.
+    #[cold]
+    fn unlearn(&mut self) {
+        let zero = T::splat(0.0);
+        self.filter
+            .find(self.filter.attitude(), &self.sound[0], zero.simd_le(zero));
+    }
+
     /// Ends a part: its mean force and field go into the window.
     #[inline(never)]
     fn end_part(&mut self) {
@@ -193,8 +201,10 @@ impl<T: Real, F: Follows<T>> Watched<F, T> {
             window.force += q.rotate(&force.map(T::splat));
             window.time += window.part_time;
         }
-        if window.field_time > 0.0 && window.field.norm_squared().is_finite() {
-            window.north += q.rotate(&window.field.map(T::splat));
+        let length = window.field.norm();
+        if length > 0.0 && length.is_finite() {
+            let field = window.field * (window.field_time / length);
+            window.north += q.rotate(&field.map(T::splat));
         }
         (window.part, window.part_time) = (Vector3::zeros(), 0.0);
         (window.field, window.field_time) = (Vector3::zeros(), 0.0);
@@ -270,6 +280,9 @@ impl<T: Real, F: Follows<T>> Watched<F, T> {
 impl<T: Real, F: Follows<T>> Filter<T> for Watched<F, T> {
     #[inline(always)]
     fn step(&mut self, sample: &Sample) -> Usage {
+        if sample.unsure_turn > LOST && self.on {
+            self.unlearn();
+        }
         let usage = self.filter.step(sample);
         if !self.on {
             return usage;
@@ -277,11 +290,8 @@ impl<T: Real, F: Follows<T>> Filter<T> for Watched<F, T> {
         if let Some(m) = sample.m
             && m.dt > 0.0
         {
-            let length = m.value.0.norm();
-            if length > 0.0 {
-                self.window.field += m.value.0 * (m.dt / length);
-                self.window.field_time += m.dt;
-            }
+            self.window.field += m.value.0 * m.dt;
+            self.window.field_time += m.dt;
         }
         if let Some(f) = sample.f
             && f.dt > 0.0
@@ -311,10 +321,6 @@ impl<T: Real, F: Follows<T>> Filter<T> for Watched<F, T> {
     fn reset(&mut self, attitude: Quaternion) {
         self.filter.reset(attitude);
         self.watch();
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<T> {
@@ -351,7 +357,7 @@ mod tests {
     use imufit_attitude::{Frame, Lanes};
 
     use super::*;
-    use crate::filter::find;
+    use crate::catalogue::find;
     use crate::mahony::Mahony;
     use crate::mekf::Mekf;
     use crate::{AngularRate, FluxDensity, Reading, SpecificForce};
@@ -395,7 +401,7 @@ mod tests {
 
     fn mekf_with(settings: &[(&str, f64)]) -> Mekf {
         let description = find("mekf").unwrap();
-        let value = |p: &crate::filter::Parameter| settings.iter().find(|(name, _)| *name == p.name).map(|x| x.1);
+        let value = |p: &crate::parameter::Parameter| settings.iter().find(|(name, _)| *name == p.name).map(|x| x.1);
         let values: Vec<f64> = description
             .parameters
             .iter()

@@ -34,10 +34,10 @@
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::{SimdBool, Vector3};
 
-use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::intake::{Intake, all_rows};
+use crate::filter::{Filter, Usage, split_state};
 use crate::lost::{Follows, LOST, LOST_HEADING};
-use crate::{Columns, Environment, Sample, Skipped};
+use crate::parameter::Parameter;
+use crate::{Environment, Sample};
 
 /// The gains, named as printed, and the limit of the field.
 pub const PARAMETERS: &[Parameter] = &[
@@ -227,10 +227,6 @@ impl<T: Real> Filter<T> for Mahony<T> {
 
     fn reset(&mut self, attitude: Quaternion) {
         (self.q, self.bias) = (attitude.splat(), Vector3::repeat(T::splat(0.0)));
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<T> {

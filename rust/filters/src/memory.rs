@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::bridge::Bridge;
+use crate::usual::Usual;
 
 /// Times are NaN where there is none.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +26,7 @@ pub(crate) struct Memory {
 
 impl Memory {
     /// Numbers of a memory that is written down.
-    pub const LENGTH: usize = 24;
+    pub const LENGTH: usize = 25;
 
     pub const EMPTY: Self = Self {
         started: false,
@@ -51,10 +52,11 @@ impl Memory {
 
     pub fn to_array(self) -> [f64; Self::LENGTH] {
         let Bridge {
-            usual,
+            usual: Usual(usual),
             span,
             doubted,
             from,
+            farthest,
             turned,
             since,
         } = self.bridge;
@@ -63,7 +65,7 @@ impl Memory {
         let vectors = [self.omega, self.alpha, doubted, from, turned].map(<[f64; 3]>::from);
         let mut numbers = times
             .into_iter()
-            .chain([usual, span, since])
+            .chain([usual, span, since, farthest])
             .chain(vectors.into_iter().flatten());
         std::array::from_fn(|_| numbers.next().unwrap_or_default())
     }
@@ -71,7 +73,7 @@ impl Memory {
     /// `None` where the numbers are no memory.
     pub fn from_slice(numbers: &[f64]) -> Option<Self> {
         let (&[started, first, last, t_acc, t_gyr, t_mag], own) = numbers.split_first_chunk()?;
-        let (&[usual, span, since], vectors) = own.split_first_chunk()?;
+        let (&[usual, span, since, farthest], vectors) = own.split_first_chunk()?;
         let (vectors, rest) = vectors.as_chunks::<3>();
         let &[omega, alpha, doubted, from, turned] = vectors else {
             return None;
@@ -87,10 +89,11 @@ impl Memory {
             omega: omega.into(),
             alpha: alpha.into(),
             bridge: Bridge {
-                usual,
+                usual: Usual(usual),
                 span,
                 doubted: doubted.into(),
                 from: from.into(),
+                farthest,
                 turned: turned.into(),
                 since,
             },

@@ -27,11 +27,11 @@
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::{Matrix3, SimdBool, Vector3};
 
-use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::intake::{Intake, all_rows};
+use crate::filter::{Filter, Usage, split_state};
 use crate::mahony::square_of_sine;
+use crate::parameter::Parameter;
 use crate::triad::{attitude_from_pairs, levelled};
-use crate::{Columns, Environment, Sample, Skipped};
+use crate::{Environment, Sample};
 
 /// Weights, the field's dip, and how close to parallel is too close.
 pub const PARAMETERS: &[Parameter] = &[
@@ -206,10 +206,6 @@ impl<T: Real> Filter<T> for Quest<T> {
 
     fn reset(&mut self, attitude: Quaternion) {
         self.q = attitude.splat();
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<T> {

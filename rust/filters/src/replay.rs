@@ -5,16 +5,16 @@
 
 use imufit_attitude::Quaternion;
 
+use crate::catalogue::Description;
 use crate::columns::{Columns, Row};
-use crate::filter::{Description, Filter};
-use crate::intake::Intake;
+use crate::intake::{Intake, Rows};
 use crate::memory::Memory;
 use crate::{Environment, FilterError, Rules, Skipped, Start};
 
 /// A filter with the rules around it: the same object serves a whole log, pieces of one, and a running device.
 pub struct Replay {
     description: &'static Description,
-    filter: Box<dyn Filter>,
+    filter: Box<dyn Rows>,
     intake: Intake,
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::FilterError;
-use crate::filter::{Parameter, fill};
+use crate::parameter::{Parameter, fill};
 
 /// The settings of the rules.
 pub const PARAMETERS: &[Parameter] = &[

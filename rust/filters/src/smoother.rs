@@ -16,11 +16,13 @@
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::filter::{Description, Filter, fill, find};
-use crate::intake::Intake;
+use crate::catalogue::{Description, find};
+use crate::filter::Filter;
+use crate::intake::{Intake, Rows};
 use crate::lost::Watched;
 use crate::mekf::{Mekf, turned_back};
 use crate::memory::Memory;
+use crate::parameter::fill;
 use crate::{Columns, Environment, FilterError, Rules, Skipped, Start};
 
 /// The filter that runs both ways.

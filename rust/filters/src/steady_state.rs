@@ -11,8 +11,8 @@
 //! a quadratic equation for `1/u + u`. Nothing below divides by r, so that r = 0 (k_a = 1) is no special case.
 
 use crate::FilterError;
-use crate::filter::fill;
 use crate::kalman::{Noise, PARAMETERS};
+use crate::parameter::fill;
 
 /// The gains of a filter that has settled, and how long a disturbance lasts in it.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,10 +9,10 @@ use imufit_attitude::matrix::quaternion_of_rotation;
 use imufit_attitude::{Frame, Quaternion, Real};
 use nalgebra::{Matrix3, SimdBool, Vector3};
 
-use crate::filter::{Filter, Parameter, Usage, split_state};
-use crate::intake::{Intake, all_rows};
+use crate::filter::{Filter, Usage, split_state};
 use crate::mahony::square_of_sine;
-use crate::{Columns, Environment, FluxDensity, Sample, Skipped, SpecificForce};
+use crate::parameter::Parameter;
+use crate::{Environment, FluxDensity, Sample, SpecificForce};
 
 /// How close to parallel is too close.
 pub const PARAMETERS: &[Parameter] = &[Parameter {
@@ -137,10 +137,6 @@ impl<T: Real> Filter<T> for Triad<T> {
 
     fn reset(&mut self, attitude: Quaternion) {
         self.q = attitude.splat();
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<T> {

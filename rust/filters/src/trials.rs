@@ -13,8 +13,8 @@ use nalgebra::{Vector2, Vector3};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use crate::catalogue::Description;
 use crate::columns::{Columns, Row};
-use crate::filter::Description;
 use crate::sample::horizontal;
 use crate::{Environment, FilterError, Replay, Rules, Start};
 
@@ -251,7 +251,7 @@ mod tests {
     use imufit_attitude::{Frame, Rmse};
 
     use super::*;
-    use crate::filter::find;
+    use crate::catalogue::find;
 
     const N: usize = 6000;
 

@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::float_cmp, clippy::unwrap_used)]
 
 use imufit_attitude::Frame;
-use imufit_filters::filter::find;
+use imufit_filters::catalogue::find;
 use imufit_filters::{Columns, Environment, FILTERS, Parameter, Replay, Row, Rules, Skipped, Start, rules};
 use nalgebra::Vector3;
 use proptest::prelude::*;

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use imufit_filters::accel::tilt_rows;
-use imufit_filters::filter::{self, FILTERS, Parameter};
-use imufit_filters::{Columns, FilterError, Replay, Row, Rules, Skipped, Smoother, steady_state_gain};
+use imufit_filters::{
+    Columns, FILTERS, FilterError, Parameter, Replay, Row, Rules, Skipped, Smoother, catalogue, steady_state_gain,
+};
 use nalgebra::Vector3;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -49,7 +50,7 @@ impl PyFilter {
         let start = start_of(initial, start_time)?;
         let build = || {
             let rules = Rules::from_settings(&sorted(rules))?;
-            Replay::new(filter::find(name)?, &sorted(settings), environment, rules, start)
+            Replay::new(catalogue::find(name)?, &sorted(settings), environment, rules, start)
         };
         Ok(Self {
             replay: build().map_err(from_filters)?,

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use imufit_filters::trials::{self, Conditions, Judgement, Score};
-use imufit_filters::{Rules, filter};
+use imufit_filters::{Rules, catalogue};
 use numpy::{PyArray3, PyReadonlyArray1};
 use pyo3::prelude::*;
 
@@ -81,7 +81,7 @@ fn filter_trials<'py>(
         rules,
         start: start_of(initial, start_time)?,
     };
-    let description = filter::find(name).map_err(from_filters)?;
+    let description = catalogue::find(name).map_err(from_filters)?;
     let settings: Vec<_> = settings.into_iter().map(|each| sorted(Some(each))).collect();
     let pool = pool(py)?;
     let scored = || trials::run(description, &settings, conditions, &columns, &judgement, &pool, look);

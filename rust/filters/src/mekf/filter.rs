@@ -10,10 +10,10 @@ use super::covariance::{BIAS, Covariance, Errors, Moves, SCALE, SPEED};
 use super::settings::Values;
 use crate::field::Field;
 use crate::filter::{Filter, Usage};
-use crate::intake::{Intake, all_rows};
 use crate::lost::Follows;
 use crate::rest::{Limits, Rest};
-use crate::{Columns, Environment, Sample, Skipped};
+use crate::usual::{LONGEST, Usual};
+use crate::{Environment, Sample};
 
 /// Velocity noise density at rest, m/s*sqrt(s).
 const STANDING: f64 = 0.01;
@@ -24,7 +24,11 @@ const GAP: f64 = 1.0;
 /// Largest velocity in parts of `speed`: 7.5 m/s by default. Fast hand motion (BROAD, trial 16) reaches 12; more comes of bad
 /// readings, and nothing is learned from it.
 const FASTEST: f64 = 15.0;
-/// Standard deviations of the mean force's direction beyond which three windows in a row do not happen.
+/// Mean square of the change of the specific force before any reading, (m/s^2)^2: a change of ten times gravity is doubted then.
+const FORCE_BEFORE: f64 = 100.0;
+/// Square of the least change of the specific force that is doubted, (m/s^2)^2.
+const LEAST_FORCE: f64 = 1.0;
+/// Standard deviations beyond which nothing happens: of the mean force's direction in three windows in a row, of speeds.
 const SURE: f64 = 4.0;
 /// Least angle that is lost, rad: what a wrong bias of the accelerometer (0.5 m/s^2) makes.
 const LEAST_LOST: f64 = 0.05;
@@ -44,6 +48,11 @@ pub struct Mekf<T = f64> {
     pub(super) covariance: Covariance<T>,
     pub(super) rest: Rest<T>,
     pub(super) field: Field<T>,
+    /// The last specific force, body frame, m/s^2, and what it changes by, (m/s^2)^2.
+    pub(super) force: Vector3<f64>,
+    pub(super) usual: Usual,
+    /// Variance of the velocity by changes of the last seconds that those do not allow, (m/s)^2.
+    pub(super) doubted: f64,
     /// Time turned since the last specific force, s; -1 where the next one shows the vertical.
     pub(super) since_force: f64,
 }
@@ -67,6 +76,9 @@ impl<T: Real> Mekf<T> {
             covariance: Covariance::independent(&Errors::repeat(zero)),
             rest: Rest::unknown(),
             field: Field::unknown(),
+            force: Vector3::zeros(),
+            usual: Usual(FORCE_BEFORE),
+            doubted: 0.0,
             since_force: 0.0,
         };
         filter.reset(Quaternion::IDENTITY);
@@ -90,6 +102,7 @@ impl<T: Real> Mekf<T> {
         let v = self.values;
         let (lost, blind) = (self.since_force < 0.0, self.since_force - dt);
         self.since_force = 0.0;
+        let doubted = self.doubted_speed(f, dt);
         let f = f.map(T::splat);
         if lost {
             self.level(&f);
@@ -108,6 +121,7 @@ impl<T: Real> Mekf<T> {
         }
         for at in [SPEED, SPEED + 1] {
             self.covariance.add(at, v.acc_noise * v.acc_noise * time);
+            self.covariance.add(at, doubted);
             if blind > 0.01 * dt {
                 let sd = self.covariance.variance(at).simd_max(T::splat(0.0)).simd_sqrt();
                 let more = sd + T::splat(self.environment.gravity() * blind);
@@ -116,6 +130,26 @@ impl<T: Real> Mekf<T> {
         }
         let r = T::splat(2.0) * v.speed * v.speed * v.speed_time / time;
         self.stop(Errors::repeat(T::splat(0.0)), r, always::<T>());
+    }
+
+    /// Variance, (m/s)^2, that a change of the specific force gives the velocity where those before do not allow it. Speeds up to
+    /// [`SURE`] times those that occur hold a blow; what bad readings make is beyond.
+    fn doubted_speed(&mut self, f: &Vector3<f64>, dt: f64) -> T {
+        let square = (f - self.force).norm_squared().min(f64::MAX);
+        self.force = *f;
+        if !self.usual.doubts(square, LEAST_FORCE) {
+            self.doubted *= (-dt / LONGEST).exp();
+            return T::splat(0.0);
+        }
+        self.usual.get_used(dt);
+        let (v, variance) = (self.values, square * (dt * dt));
+        self.doubted = (self.doubted + variance).min(f64::MAX);
+        let longest = v.speed * T::splat(FASTEST);
+        let most = v.speed * T::splat(SURE);
+        let beyond = T::splat(self.doubted) - most * most;
+        beyond
+            .simd_clamp(T::splat(0.0), T::splat(variance))
+            .simd_min(longest * longest)
     }
 
     /// The velocity is zero, variance `r`; `x`: errors found before.
@@ -159,7 +193,10 @@ impl<T: Real> Mekf<T> {
     fn level(&mut self, f: &Vector3<T>) {
         let up = self.environment.up().map(T::splat);
         let innovation = Quaternion::between(&self.q.rotate(f), &up).log();
-        let (mut x, r) = (Errors::repeat(T::splat(0.0)), T::splat(FIRST_TILT));
+        // An acceleration across gravity that turns the force by an angle makes it longer by half of its square.
+        let longer = f.norm() * T::splat(1.0 / self.environment.gravity()) - T::splat(1.0);
+        let r = T::splat(FIRST_TILT) + T::splat(2.0) * longer.simd_abs();
+        let mut x = Errors::repeat(T::splat(0.0));
         for i in 0..2 {
             self.covariance
                 .measure(&mut x, i, innovation[i], r, Moves::All, always::<T>());
@@ -195,14 +232,26 @@ impl<T: Real> Mekf<T> {
         usage
     }
 
-    /// Nothing is known of a turn during a gap: the next specific force shows the vertical.
+    /// A turn of that variance, rad^2, which no rate shows. Where one specific force shows the vertical better, the next one does;
+    /// the velocity was then integrated in a wrong direction for as long as a speed lasts.
+    fn turn_unseen(&mut self, variance: f64) {
+        for i in 0..3 {
+            self.covariance.add(i, T::splat(variance));
+        }
+        if variance > FIRST_TILT {
+            let fallen = self.values.speed_time * T::splat(self.environment.gravity());
+            for at in [SPEED, SPEED + 1] {
+                self.covariance.add(at, fallen * fallen * T::splat(variance));
+            }
+            self.since_force = -1.0;
+        }
+    }
+
+    /// Nothing is known of turn and velocity after a gap.
     fn after_gap(&mut self) {
         let v = self.values;
         if self.since_force >= 0.0 {
-            for i in 0..3 {
-                self.covariance.add(i, T::splat(GAP));
-            }
-            self.since_force = -1.0;
+            self.turn_unseen(GAP);
         }
         self.velocity = [T::splat(0.0); 2];
         self.covariance.forget_velocity(v.speed * v.speed);
@@ -246,9 +295,8 @@ impl<T: Real> Filter<T> for Mekf<T> {
     fn step(&mut self, sample: &Sample) -> Usage {
         if let Some(omega) = sample.omega {
             self.turn(&omega.value.0, omega.dt);
-            for i in 0..3 {
-                self.covariance
-                    .add(i, T::splat(sample.unsure_turn * sample.unsure_turn));
+            if sample.unsure_turn > 0.0 {
+                self.turn_unseen(sample.unsure_turn * sample.unsure_turn);
             }
             if self.since_force >= 0.0 {
                 self.since_force += omega.dt;
@@ -292,16 +340,13 @@ impl<T: Real> Filter<T> for Mekf<T> {
         (self.q, self.bias) = (attitude.splat(), Vector3::repeat(zero));
         (self.velocity, self.scale) = ([zero; 2], Matrix3::repeat(zero));
         (self.rest, self.field, self.since_force) = (Rest::unknown(), Field::unknown(), -1.0);
+        (self.force, self.usual, self.doubted) = (Vector3::zeros(), Usual(FORCE_BEFORE), 0.0);
         self.covariance = Covariance::independent(&Errors::from_fn(|i, _| match i {
             0..BIAS => v.angle_start,
             BIAS..SPEED => v.bias_start,
             SPEED..SCALE => v.speed,
             _ => v.scale_start,
         }));
-    }
-
-    fn rows(&mut self, intake: &mut Intake, columns: &Columns<'_>, attitude: &mut [T], skipped: &mut Skipped) {
-        all_rows(self, intake, columns, attitude, skipped);
     }
 
     fn state(&self) -> Vec<T> {

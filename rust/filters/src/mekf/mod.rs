@@ -16,6 +16,9 @@
 //! leaves nothing, whatever its size, so that none has to be detected and nothing is thrown away. The speeds that occur
 //! (`speed`, correlated over `speed_time`) decide how fast the tilt follows.
 //!
+//! Changes of the specific force that those before do not allow ([`crate::usual`](crate)) may be bad readings: the velocity is
+//! uncertain by what they make beyond the speeds that occur.
+//!
 //! **Field.** It turns the heading and never roll or pitch: those rows of the gain are zero (the covariance takes
 //! account of that, Joseph form). Disturbances last, so that their variance counts over `mag_time`; it grows
 //! with the departure of the field's horizontal and vertical part from what they were so far ([`crate::field`]): a magnet

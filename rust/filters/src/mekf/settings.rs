@@ -2,7 +2,7 @@
 
 use imufit_attitude::Real;
 
-use crate::filter::Parameter;
+use crate::parameter::Parameter;
 
 /// Noise densities, speeds and the field's errors, so that the filter does not depend on the rate of the log.
 pub const PARAMETERS: &[Parameter] = &[

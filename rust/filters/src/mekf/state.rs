@@ -1,4 +1,4 @@
-//! The state as numbers: attitude, bias, velocity, scale column by column, the covariance's triangle, rest, field.
+//! The state as numbers: attitude, bias, velocity, scale column by column, the covariance's triangle, rest, field, force.
 
 use imufit_attitude::{Quaternion, Real};
 use nalgebra::{Matrix3, Vector3};
@@ -8,11 +8,12 @@ use super::covariance::{BIAS, SCALE, SPEED, TRIANGLE, places};
 use crate::field::Field;
 use crate::filter::split_state;
 use crate::rest::Rest;
+use crate::usual::Usual;
 
 /// Numbers before the triangle: attitude, bias, velocity, scale.
 const ESTIMATES: usize = 4 + 3 + 2 + 9;
 /// Numbers of a state beyond the attitude.
-const REST_OF_STATE: usize = ESTIMATES - 4 + TRIANGLE + 7 + 4 + 1;
+const REST_OF_STATE: usize = ESTIMATES - 4 + TRIANGLE + 7 + 4 + 1 + 5;
 
 /// The state with which a pass the other way round begins at `attitude`: bias and scale are kept with their certainty,
 /// the bias, like every rate, with its sign changed; attitude and velocity are to be found anew.
@@ -56,6 +57,12 @@ impl<T: Real> Mekf<T> {
             field.departure,
             T::splat(self.since_force),
         ]);
+        state.extend(
+            self.force
+                .iter()
+                .chain(&[self.usual.0, self.doubted])
+                .map(|x| T::splat(*x)),
+        );
         state
     }
 
@@ -82,6 +89,8 @@ impl<T: Real> Mekf<T> {
             departure: rest[at + 10],
         };
         self.since_force = rest[at + 11].extract(0);
+        let alone = |at: usize| rest[at].extract(0);
+        (self.force, self.usual, self.doubted) = (common(at + 12), Usual(alone(at + 15)), alone(at + 16));
         true
     }
 }
