@@ -138,7 +138,7 @@ impl<T: Real> Mekf<T> {
         let square = (f - self.force).norm_squared().min(f64::MAX);
         if !self.usual.doubts(square, LEAST_FORCE) {
             self.force = *f;
-            self.doubted *= (-dt / LONGEST).exp();
+            self.doubted *= (1.0 - dt * (1.0 / LONGEST)).max(0.0);
             return T::splat(0.0);
         }
         self.usual.get_used(dt);
