@@ -299,7 +299,9 @@ class Analysis:
         values = {slot: np.asarray(self._present(slot)) for slot in chosen}
         values |= {slot: self._within_reach(slot, values[slot] + step) for slot, step in steps.items()}
         values = {slot: self._allowed(slot, at) for slot, at in values.items()}
-        return Estimate(values, errors, covariance, result["full_step"], result["held_out"], result["training"], result["folds"])
+        return Estimate(
+            values, errors, covariance, result["full_step"], result["held_out"], result["training"], result["folds"]
+        )
 
     def _fixed(self, slot: int) -> NDArray[np.bool_]:
         """Return which parameters of a slot are fixed."""
@@ -333,6 +335,8 @@ class Analysis:
         In the model, what each log has for itself stands with its mean.
         """
         parameters, errors = {}, {}
+        keys, covariance = self.covariance_of(estimate)
+        sizes = dict(zip(keys, np.sqrt(np.diag(covariance)), strict=True))
         own: tuple[dict[str, list[float]], ...] = tuple({} for _ in self.logs)
         for slot, key in enumerate(self.slots[: len(self.fitted_slots)]):
             effect = find_effect(key)
@@ -346,12 +350,9 @@ class Analysis:
             if slot >= len(self.model.effects):
                 continue
             names = [name for name, _, _ in effect.parameters]
-            mean, error = pooled(values, spread)
-            mean = np.array(self.model.allowed(key, mean))
-            error = np.where(self._fixed(slot)[: len(names)], 0.0, error)
+            mean = np.array(self.model.allowed(key, pooled(values, spread)[0]))
             parameters[key] = dict(zip(names, map(float, mean), strict=True))
-            errors[key] = dict(zip(names, map(float, error), strict=True))
-            errors[key] |= dict.fromkeys(effect.only_searched, 0.0)
+            errors[key] = {name: float(sizes[f"{key}.{name}"]) for name in names}
         facts = [each.facts for each in self.logs]
         means = {name: mean for each in reversed(facts) for name, mean in each.covariate_means.items()}
         constants = {
@@ -368,6 +369,38 @@ class Analysis:
         )
         return model.of_a_fit(), own
 
+    def covariance_of(self, estimate: Estimate) -> tuple[list[str], Array]:
+        """Return the covariance of all parameters of the model, and their names ``EFFECT.PARAM`` in its order.
+
+        What each of several logs has for itself stands with its mean. Rows of parameters that are fixed or only searched
+        for are zero, those of parameters at their bounds are not numbers.
+        """
+        keys: list[str] = []
+        ends = np.cumsum([0, *(len(values) for values in estimate.values.values())])
+        first = dict(zip(estimate.values, map(int, ends[:-1]), strict=True))
+        rows: list[Array] = []
+        unknown: list[bool] = []
+        zero: list[bool] = []
+        for slot, key in enumerate(self.model.effects):
+            effect = find_effect(key)
+            names = [name for name, _, _ in effect.parameters]
+            keys += [f"{key}.{name}" for name in names]
+            errors = estimate.errors[slot].reshape(-1, len(names))
+            shares = _shares(errors)
+            unknown += [bool(np.isnan(errors[:, k]).all()) for k in range(len(names))]
+            zero += [name in effect.only_searched for name in names]
+            for k in range(len(names)):
+                row = np.zeros(ends[-1])
+                row[first[slot] + k : first[slot] + errors.size : len(names)] = shares[:, k]
+                rows.append(row)
+        means = np.array(rows).reshape(len(keys), int(ends[-1]))
+        covariance = means @ np.nan_to_num(estimate.covariance) @ means.T
+        covariance[zero, :] = 0.0
+        covariance[:, zero] = 0.0
+        covariance[unknown, :] = np.nan
+        covariance[:, unknown] = np.nan
+        return keys, covariance
+
     def own_step(self, log: int, step: Array) -> Array:
         """Return a step of all parameters as one of the parameters of one log's evidence."""
         return step[self.problem.places(log)]
@@ -375,7 +408,11 @@ class Analysis:
     def converged(self, estimate: Estimate) -> bool:
         """Return whether no parameter still moves by more than a tenth of its standard error."""
         return all(
-            bool(np.all(np.abs(estimate.values[slot] - self._present(slot)) <= 0.1 * np.nan_to_num(estimate.errors[slot])))
+            bool(
+                np.all(
+                    np.abs(estimate.values[slot] - self._present(slot)) <= 0.1 * np.nan_to_num(estimate.errors[slot])
+                )
+            )
             for slot in estimate.values
         )
 
@@ -550,12 +587,18 @@ def pooled(values: Array, errors: Array) -> tuple[Array, Array]:
     """Mean of values of several logs (logs, k), weighted by their errors, and its standard error."""
     if len(values) == 1:
         return values[0], errors[0]
+    shares = _shares(errors)
+    known = (np.isfinite(errors) & (errors > 0.0)).any(axis=0)
+    square = (np.nan_to_num(shares * errors) ** 2).sum(axis=0)
+    return (shares * values).sum(axis=0), np.where(known, np.sqrt(square), np.nan)
+
+
+def _shares(errors: Array) -> Array:
+    """Shares (logs, k) of the values of several logs in their mean, by their errors (logs, k)."""
     known = np.isfinite(errors) & (errors > 0.0)
     weights = np.where(known, 1.0 / np.where(known, errors, 1.0) ** 2, 0.0)
     weights = np.where(known.any(axis=0), weights, 1.0)
-    sums = weights.sum(axis=0)
-    error = np.where(known.any(axis=0), 1.0 / np.sqrt(sums), np.nan)
-    return (weights * values).sum(axis=0) / sums, error
+    return np.asarray(weights / weights.sum(axis=0))
 
 
 def _with_own(

@@ -318,9 +318,9 @@ class EffectStack:
         InputError
             The file cannot be written.
         """
-        ModelFile(
-            list(self.effects), self.parameters, self.constants, self.standard_errors, limits=self._limits
-        ).write(path)
+        ModelFile(list(self.effects), self.parameters, self.constants, self.standard_errors, limits=self._limits).write(
+            path
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

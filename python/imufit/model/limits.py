@@ -56,7 +56,9 @@ class Limits:
         """
         for word, bound in (("min", self.lower), ("max", self.upper)):
             if isinstance(bound, bool) or not isinstance(bound, int | float) or math.isnan(bound):
-                raise InputError(f"{key}: {word} is {bound!r}, not a number", remedy="Give a number in SI units, or None.")
+                raise InputError(
+                    f"{key}: {word} is {bound!r}, not a number", remedy="Give a number in SI units, or None."
+                )
         if not self.lower < self.upper:
             raise InputError(
                 f"{key}: min is {self.lower:g} and max is {self.upper:g}",
