@@ -40,9 +40,9 @@ class SensorModel(EffectStack):
 
     Notes
     -----
-    ``model.params["gyr.scale.z"].set(value=0.01, vary=False)`` and ``model["gyr.scale"].set(z=0.01, fixed=True)`` change
-    the model in place, as in lmfit; nothing else does. The model of a fit cannot be set, since the fit is a result: take
-    ``fit.model.copy()``.
+    ``model.params["gyr.scale.z"].set(value=0.01, vary=False)`` and ``model["gyr.scale"].set(z=0.01, fixed=True)``
+    change the model in place, as in lmfit; nothing else does. The model of a fit cannot be set, since the fit is a
+    result: take ``fit.model.copy()``.
     """
 
     def fit(self, log: AnyLogs, progress: Progress | None = None) -> Fit:

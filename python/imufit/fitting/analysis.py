@@ -315,7 +315,7 @@ class Analysis:
         if slot >= len(self.model.effects):
             return values
         count = len(self.model.limits_of(self.slots[slot]))
-        each = [self.model.allowed(self.slots[slot], at) for at in values.reshape(-1, count)]
+        each = [self.model.allowed(self.slots[slot], at.tolist()) for at in values.reshape(-1, count)]
         return np.array(each, dtype=np.float64).ravel()
 
     def _within_reach(self, slot: int, values: Array) -> Array:
@@ -350,8 +350,8 @@ class Analysis:
             if slot >= len(self.model.effects):
                 continue
             names = [name for name, _, _ in effect.parameters]
-            mean = np.array(self.model.allowed(key, pooled(values, spread)[0]))
-            parameters[key] = dict(zip(names, map(float, mean), strict=True))
+            mean = self.model.allowed(key, pooled(values, spread)[0].tolist())
+            parameters[key] = dict(zip(names, mean, strict=True))
             errors[key] = {name: float(sizes[f"{key}.{name}"]) for name in names}
         facts = [each.facts for each in self.logs]
         means = {name: mean for each in reversed(facts) for name, mean in each.covariate_means.items()}
@@ -372,8 +372,8 @@ class Analysis:
     def covariance_of(self, estimate: Estimate) -> tuple[list[str], Array]:
         """Return the covariance of all parameters of the model, and their names ``EFFECT.PARAM`` in its order.
 
-        What each of several logs has for itself stands with its mean. Rows of parameters that are fixed or only searched
-        for are zero, those of parameters at their bounds are not numbers.
+        What each of several logs has for itself stands with its mean. Rows of parameters that are fixed or only
+        searched for are zero, those of parameters at their bounds are not numbers.
         """
         keys: list[str] = []
         ends = np.cumsum([0, *(len(values) for values in estimate.values.values())])

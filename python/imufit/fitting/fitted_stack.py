@@ -197,14 +197,17 @@ class FittedStack:
     @property
     def correlation(self) -> pd.DataFrame:
         """Correlation of the fitted parameters, from -1 to 1, rows and columns as those of `covariance`."""
+        import pandas as pd  # noqa: PLC0415
+
         covariance = self.covariance
         size = np.sqrt(np.diag(covariance))
-        found = covariance / np.outer(size, size)
+        found = np.clip(covariance.to_numpy() / np.outer(size, size), -1.0, 1.0)
         # Rounding aside, every parameter is correlated with itself by 1.
-        return found.clip(-1.0, 1.0).where(~np.eye(len(size), dtype=bool), 1.0)
+        np.fill_diagonal(found, 1.0)
+        return pd.DataFrame(found, index=covariance.index, columns=covariance.columns)
 
     def residuals(self, sensor: str, log: int | str | LogSource | None = None) -> Array:
-        """Readings of one sensor minus what the fitted model makes of the reference, row by row.
+        """Return the readings of one sensor minus what the fitted model makes of the reference, row by row.
 
         Parameters
         ----------

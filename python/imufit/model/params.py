@@ -90,8 +90,7 @@ class ModelParams(Params):
         plain = super().__getitem__(key)
         return ModelParameter(**{item.name: getattr(plain, item.name) for item in fields(Parameter)}, model=self._model)
 
-    @property
-    def _by_key(self) -> dict[str, Parameter]:
+    def _known(self) -> dict[str, Parameter]:
         return {parameter.key: parameter for parameter in self._model.listed()}
 
 

@@ -23,7 +23,10 @@ class Params(Mapping[str, Parameter]):
     """
 
     def __init__(self, parameters: Iterable[Parameter]) -> None:
-        self._by_key = {parameter.key: parameter for parameter in parameters}
+        self._held = {parameter.key: parameter for parameter in parameters}
+
+    def _known(self) -> dict[str, Parameter]:
+        return self._held
 
     def __getitem__(self, key: str) -> Parameter:
         """Return one parameter.
@@ -38,17 +41,17 @@ class Params(Mapping[str, Parameter]):
         KeyError
             There is no such parameter.
         """
-        if key not in self._by_key:
-            own = [known for known in self._by_key if known.startswith(f"{key}.")]
-            known = own or list(self._by_key)
-            raise KeyError(f"there is no parameter {key!r}; there are {', '.join(known) or 'none'}")
-        return self._by_key[key]
+        known = self._known()
+        if key not in known:
+            near = [other for other in known if other.startswith(f"{key}.")] or list(known)
+            raise KeyError(f"there is no parameter {key!r}; there are {', '.join(near) or 'none'}")
+        return known[key]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._by_key)
+        return iter(self._known())
 
     def __len__(self) -> int:
-        return len(self._by_key)
+        return len(self._known())
 
     def to_dict(self) -> dict[str, dict[str, dict[str, Any]]]:
         """JSON of the parameters by effect and name."""
