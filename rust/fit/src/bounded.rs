@@ -133,7 +133,9 @@ mod tests {
     fn wide_bounds_change_nothing() {
         let equations = equations(&[1.0, -2.0, 0.5]);
         let none = DVector::zeros(3);
-        let within = equations.solve_within(&none, &bounds(&[-9.0; 3], &[9.0; 3])).expect("solved");
+        let within = equations
+            .solve_within(&none, &bounds(&[-9.0; 3], &[9.0; 3]))
+            .expect("solved");
         let plain = equations.solve(&none).expect("solved").solution;
         assert!((&within.solution - plain).amax() < 1e-12 && !within.at_bound.contains(&true));
     }
@@ -153,7 +155,10 @@ mod tests {
         }
         assert!(found.at_bound[0] || found.at_bound[1]);
         assert!(found.at_bound.iter().zip(0..4).all(|(at, j)| {
-            !at || (found.solution[j] - bounds.lower[j]).abs().min((found.solution[j] - bounds.upper[j]).abs()) == 0.0
+            !at || (found.solution[j] - bounds.lower[j])
+                .abs()
+                .min((found.solution[j] - bounds.upper[j]).abs())
+                == 0.0
         }));
     }
 

@@ -57,7 +57,6 @@ pub enum Limit {
 /// A parameter that is limited: its slot, its number among those of the effect, and its limit.
 pub type Limited = (usize, usize, Limit);
 
-
 /// Parameters that a question is about: those of the model, then the reduced ones of a candidate.
 pub struct Question {
     /// Whitened equations per block.
@@ -146,7 +145,9 @@ impl Problem {
             bounds,
         };
         if problem.bounds.any() {
-            let model: Vec<usize> = (0..problem.slots.len()).filter(|s| problem.slots[*s].in_model).collect();
+            let model: Vec<usize> = (0..problem.slots.len())
+                .filter(|s| problem.slots[*s].in_model)
+                .collect();
             let fitted = problem.fitted(&model);
             if let Some(within) = problem.step_within(&fitted) {
                 for (j, at_bound) in fitted.iter().zip(within.at_bound) {
@@ -190,7 +191,10 @@ impl Problem {
 
     /// Bounds of some parameters and of so many more without any; `None` where nothing is bounded.
     fn bounds_of(&self, parameters: &[usize], more: usize) -> Option<Bounds> {
-        let of = |all: &DVector<f64>, open: f64| all.select_rows(parameters).resize_vertically(parameters.len() + more, open);
+        let of = |all: &DVector<f64>, open: f64| {
+            all.select_rows(parameters)
+                .resize_vertically(parameters.len() + more, open)
+        };
         let bounds = Bounds {
             lower: of(&self.bounds.lower, f64::NEG_INFINITY),
             upper: of(&self.bounds.upper, f64::INFINITY),
