@@ -457,7 +457,9 @@ def rest_channels() -> list[str]: ...
 class _Estimate(TypedDict):
     parameters: list[int]
     step: _Array
-    standard_error: _Array
+    covariance: _Array
+    fitted: list[bool]
+    at_bound: list[bool]
     full_step: _Array
     held_out: float
     folds: _Array
@@ -597,6 +599,7 @@ class Problem:
             tuple[Evidence, Evidence, Sequence[float], Sequence[Sequence[float]], Sequence[float], Sequence[int]]
         ],
         own: Sequence[bool],
+        limits: Sequence[tuple[int, int, tuple[float, float] | None]] = ...,
     ) -> Problem: ...
     @property
     def blocks(self) -> int: ...

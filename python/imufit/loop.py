@@ -30,11 +30,19 @@ class SensorModel(EffectStack):
         ``temperature_mean`` (degC) and ``covariate_means`` (by name) of the log that the model was fitted on.
     standard_errors : mapping, optional
         Standard errors in the shape of `parameters`.
+    limits : mapping, optional
+        `Limits` in the shape of `parameters`, of those that are fixed or have bounds.
 
     Raises
     ------
     InputError
         An effect or a parameter is unknown, or an effect stands there twice.
+
+    Notes
+    -----
+    ``model.params["gyr.scale.z"].set(value=0.01, vary=False)`` and ``model["gyr.scale"].set(z=0.01, fixed=True)``
+    change the model in place, as in lmfit; nothing else does. The model of a fit cannot be set, since the fit is a
+    result: take ``fit.model.copy()``.
     """
 
     def fit(self, log: AnyLogs, progress: Progress | None = None) -> Fit:
@@ -129,6 +137,10 @@ class Fit(FittedStack):
         Evidence of the logs around the fitted parameters.
     estimate : Estimate
         Parameters, standard errors and held-out error that the evidence gives.
+    params : Params
+        Fitted parameters by name: ``fit.params["acc.bias.x"].value``, ``.stderr``, ``.unit``, ``.typical``.
+    covariance, correlation : DataFrame
+        Of the fitted parameters, rows and columns ``EFFECT.PARAM``.
     """
 
     model: SensorModel
@@ -149,6 +161,31 @@ class Fit(FittedStack):
             Residuals by channel, against every covariate, by segment and by frequency.
         """
         return compare(self, None if log is None else log_of(log), progress or silent)
+
+    def predict(self, log: AnyLog | None = None, progress: Progress | None = None) -> Log:
+        """Return the readings that the fitted model predicts from a log's reference.
+
+        Parameters
+        ----------
+        log : Log, str, Path, DataFrame or mapping of arrays, optional
+            With reference attitude; default: the log of the fit, if it is one. What each of several logs has for itself
+            (its bias) is its own in a log of the fit, and the mean in any other.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+
+        Returns
+        -------
+        Log
+            The same rows with predicted ``acc``, ``gyr`` and ``mag``, so that measured minus predicted is what
+            :meth:`residuals` returns and :meth:`compare` judges. NaN where nothing is judged.
+
+        Raises
+        ------
+        InputError
+            The log has no usable reference, or it is open which log is meant.
+        """
+        chosen = self.logs[self._number(None)] if log is None else log_of(log)
+        return self.predicted(chosen, progress or silent)
 
     def diagnose(self, log: AnyLogs | None = None, progress: Progress | None = None) -> Diagnosis:
         """Say which effect is missing from the model, judged on a log (default: its own); fitted parameters move along.

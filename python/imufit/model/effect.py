@@ -149,7 +149,8 @@ def effect(
     Raises
     ------
     InputError
-        The id, a parameter or the sensor cannot be.
+        The id, a parameter or the sensor cannot be, or there is an effect of that id: to define one anew, as in a
+        notebook, call :func:`imufit.forget_effect` before.
     """
     prefix = effect_id.split(".", 1)[0] if sensor is None else sensor
     if not re.fullmatch(r"[A-Za-z]\w*\.[A-Za-z]\w*", effect_id):
@@ -160,6 +161,7 @@ def effect(
         )
     if _imufit.find_effect(effect_id) is not None:
         raise InputError(f"effect {effect_id} is built in", remedy="Choose another name.")
+    _check_new(effect_id)
     units = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters, "1")
     if not units:
         raise InputError(f"effect {effect_id} has no parameter", remedy="Name at least one with its unit.")
@@ -172,6 +174,8 @@ def effect(
     sizes = dict(typical) if isinstance(typical, Mapping) else dict.fromkeys(units, typical)
 
     def decorate(function: F) -> F:
+        # A decorator may be used twice.
+        _check_new(effect_id)
         words = {
             "name": name or effect_id.split(".", 1)[1].replace("_", " "),
             "physics": explanation or (function.__doc__ or "").strip().split("\n")[0],
@@ -185,6 +189,15 @@ def effect(
         return function
 
     return decorate
+
+
+def _check_new(effect_id: str) -> None:
+    """Refuse a second effect under one id: models that name it would mean another one than before."""
+    if effect_id in _registered:
+        raise InputError(
+            f"effect {effect_id} is defined already",
+            remedy=f'Choose another name, or take the first one back: imufit.forget_effect("{effect_id}").',
+        )
 
 
 def _register(function: Function, card: tuple[Any, ...]) -> _imufit.Effect:
@@ -252,6 +265,12 @@ def registered() -> dict[str, _imufit.Effect]:
 
 
 def forget(effect_id: str) -> None:
-    """Take a user-written effect out of the catalogue again."""
+    """Take a user-written effect out of the catalogue again, so that its id can be defined anew.
+
+    Parameters
+    ----------
+    effect_id : str
+        Such as ``gyr.fan``; one that is not defined is no mistake.
+    """
     _registered.pop(effect_id, None)
     _written.pop(effect_id, None)

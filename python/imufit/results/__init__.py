@@ -26,6 +26,7 @@ from imufit.results.log_parameters import LogParameters
 from imufit.results.model_comparison import ModelComparison
 from imufit.results.noise_part import NoisePart
 from imufit.results.parameter import Parameter
+from imufit.results.params import Params
 from imufit.results.recording import Recording, RecordingClock, RecordingGap
 from imufit.results.result import Result
 from imufit.results.table import Table
@@ -57,6 +58,7 @@ __all__ = [
     "Panel",
     "Parameter",
     "ParameterSight",
+    "Params",
     "Recording",
     "RecordingClock",
     "RecordingGap",
