@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from imufit.results import Comparison, Diagnosis, Ladder, LogInfo, ModelComparison
     from imufit.tuning import Tuning
 
-AnyModel = SensorModel | Fit | Sequence[str] | str | Path | None
+AnyModel = SensorModel | Fit | Sequence[str | Function] | Function | str | Path | None
 """A model, a fit, effects by their ids, the file of a model; None is the ideal sensor."""
 
 
@@ -47,7 +47,7 @@ def model_of(given: AnyModel) -> SensorModel:
         return given.model
     if isinstance(given, Path) or (isinstance(given, str) and given.endswith(".toml")):
         return SensorModel.load(given)
-    return SensorModel([given] if isinstance(given, str) else list(given))
+    return SensorModel([given] if isinstance(given, str) or callable(given) else list(given))
 
 
 def fit(logs: AnyLogs, model: AnyModel = None, *, progress: Progress | None = None) -> Fit:

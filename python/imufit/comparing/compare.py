@@ -191,7 +191,7 @@ def _spectra(evidence: LogEvidence, step: Array) -> tuple[Spectrum, ...]:
     facts = evidence.facts
     rate = 1.0 / facts.dt
     chunks = 0
-    for arrays in evidence.passes.chunks(facts.margin, "spectrum"):
+    for arrays in evidence.passes.chunks(evidence.passes.margin(facts), "spectrum"):
         residuals = _imufit.evaluate(evidence.raw, arrays, step)
         t = arrays["t"][arrays["begin"] : arrays["end"]]
         steady = np.diff(t, prepend=t[0]) < 1.75 * facts.dt
