@@ -13,6 +13,7 @@ from imufit.diagnosing.ladder import ladder as ladder_from
 from imufit.errors import InputError
 from imufit.log import AnyLog, AnyLogs, Log, LogStream, log_of, logs_of_any, whole
 from imufit.loop import Fit, SensorModel
+from imufit.model.user_function import Function
 from imufit.progress import Progress, silent
 
 if TYPE_CHECKING:

@@ -53,8 +53,8 @@ def check_users_effects(passes: Passes, facts: _imufit.Facts, ids: Iterable[str]
             at = asked.middle()
             with asked.watched() as seen:
                 effect.check(arrays, facts, [at[name] for name in asked.parameters])
-                (window,) = seen
-            _check_function(asked, window, at, arrays["end"] - arrays["begin"])
+                window, history = seen[0]
+            _check_function(asked, window, at, history)
 
 
 def _tried(passes: Passes, facts: _imufit.Facts, memory: float) -> dict[str, Any] | None:
@@ -76,7 +76,7 @@ def _tried(passes: Passes, facts: _imufit.Facts, memory: float) -> dict[str, Any
     return best
 
 
-def _check_function(asked: UserFunction, window: Window, at: Mapping[str, float], wanted: int) -> None:
+def _check_function(asked: UserFunction, window: Window, at: Mapping[str, float], history: int) -> None:
     """Hold what a function returns against what its effect declares of it."""
     value = asked.value(window, at)
     size = float(np.nanmax(np.abs(value), initial=0.0))
@@ -110,7 +110,6 @@ def _check_function(asked: UserFunction, window: Window, at: Mapping[str, float]
                 f'Name those that it is not linear in with a range: search={{"{linear[-1]}": (low, high)}}.',
             )
     if 0.0 < asked.memory < math.inf:
-        history = len(window.t) - wanted
         begin = int(np.searchsorted(window.t, window.t[history] - asked.memory))
         short = asked.value(rows_of(window, begin, len(window.t)), at)[history - begin :]
         if differ(short, value[history:], FORGOTTEN):

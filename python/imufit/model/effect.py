@@ -17,6 +17,7 @@ from imufit import _imufit
 from imufit.errors import InputError
 from imufit.model.search_range import SearchRange
 from imufit.model.user_function import Function, UserFunction
+from imufit.model.window import TEMPERATURE
 from imufit.model.window import Window as Window
 
 SENSORS = ("acc", "gyr", "mag")
@@ -186,7 +187,8 @@ def effect(
         limits = [(ranges[key].low, ranges[key].high) if key in ranges else (-math.inf, math.inf) for key in units]
         card = (effect_id, prefix, columns, words, stage, list(needs), traits, seconds, limits if ranges else [])
         size = tuple(abs(sizes.get(key) or 1.0) for key in units)
-        asked = UserFunction(effect_id, function, names, size, ranges, seconds, axes)
+        centred = {TEMPERATURE} & set(needs)
+        asked = UserFunction(effect_id, function, names, size, ranges, seconds, axes, centred)
         _register(Written(asked, card, _running[-1] if _running else None))
         return function
 

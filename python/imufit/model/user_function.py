@@ -43,7 +43,7 @@ class UserFunction:
         How long before a row others decide what is added to it, s; infinite for the whole log before, 0 for none.
     axes : str
         Axes that a value of shape (n,) is added to.
-    centred : set of str
+    counted_from_mean : set of str
         Columns that the function has asked for less their mean.
     """
 
@@ -54,14 +54,20 @@ class UserFunction:
     searched: Mapping[str, SearchRange]
     memory: float
     axes: str
-    centred: set[str] = field(default_factory=set)
-    _watched: list[Window] = field(default_factory=list)
+    counted_from_mean: set[str] = field(default_factory=set)
+    _watched: list[tuple[Window, int]] = field(default_factory=list)
+
+    @property
+    def centred(self) -> list[str]:
+        """Columns that the function has asked for less their mean, by name."""
+        return sorted(self.counted_from_mean)
 
     def __call__(self, arrays: dict[str, Any], parameters: Sequence[float], asked: str) -> Array:
         """Columns ``(n, 3, p)`` of a model or a candidate, or the value ``(n, 3, 1)`` that is ``added``."""
         history = arrays.pop("history")
         window = self._window(arrays)
-        self._watched[:] = [window] if self._watched else []
+        if self._watched and len(window.t) > len(self._watched[0][0].t):
+            self._watched[:] = [(window, history)]
         named = dict(zip(self.parameters, map(float, parameters), strict=True))
         at = {name: self.searched[name].known(v) if name in self.searched else v for name, v in named.items()}
         out = np.empty((len(window.t) - history, 3, 1 if asked == "added" else len(at)))
@@ -78,9 +84,9 @@ class UserFunction:
         return out
 
     @contextmanager
-    def watched(self) -> Iterator[list[Window]]:
-        """Keep the last window that the function was asked about, history and all, within the context."""
-        self._watched.append(_NOTHING)
+    def watched(self) -> Iterator[list[tuple[Window, int]]]:
+        """Keep the longest window that is asked about within the context, and how many of its rows are of the past."""
+        self._watched.append((_NOTHING, 0))
         try:
             yield self._watched
         finally:
@@ -166,7 +172,7 @@ class UserFunction:
             columns = {name: _bridged(arrays["t"], values) for name, values in columns.items()}
         for values in (arrays["t"], *(arrays[name] for name in PER_ROW), *columns.values()):
             values.setflags(write=False)
-        return Window(**arrays, columns=columns, means=means, effect=self.effect, counted_from_mean=self.centred)
+        return Window(**arrays, columns=columns, means=means, effect=self.effect, counted_from_mean=self.counted_from_mean)
 
     def _parts(self, window: Window, history: int) -> Iterator[tuple[Window, int, slice]]:
         """Cut a window into parts with their past: each with its first row that is wanted, and where these rows go.
