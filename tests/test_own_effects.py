@@ -113,9 +113,7 @@ def with_hysteresis(seed, width):
 
 def near(fit, effect_id, true):
     """Fitted parameters of an effect in standard errors from the true ones."""
-    return {
-        p.name: (p.value - true[p.name]) / p.standard_error for p in fit.parameters if p.effect == effect_id
-    }
+    return {p.name: (p.value - true[p.name]) / p.standard_error for p in fit.parameters if p.effect == effect_id}
 
 
 CASES = {
@@ -149,7 +147,9 @@ def test_a_lag_of_the_rate_with_an_unknown_time_constant(user_effect):
         creep[i] = creep[i - 1] + (true.gyr[i] - creep[i - 1]) * -math.expm1(-(log.t[i] - log.t[i - 1]) / 1.5)
     log = replace(log, gyr=log.gyr + 0.01 * creep)
 
-    @user_effect("gyr.creep", parameters={"k": "1", "tau": "s"}, typical={"k": 0.01}, search={"tau": (0.1, 10.0)}, memory=20)
+    @user_effect(
+        "gyr.creep", parameters={"k": "1", "tau": "s"}, typical={"k": 0.01}, search={"tau": (0.1, 10.0)}, memory=20
+    )
     def creeps(w, k, tau):
         kept = np.exp(-w.dt / tau)
         return k * lfilter([1.0 - kept], [1.0, -kept], w.rate, axis=0)
@@ -182,8 +182,7 @@ def test_nothing_depends_on_how_the_log_is_cut(user_effect, memory):
     for size in (log.n, 997, 300, 131):
         cuts = list(range(size, log.n, size))
         parts = [
-            _imufit.evaluate(evidence, chunk, analysis.own_step(0, step))
-            for chunk in pieces(log, names, cuts, margin)
+            _imufit.evaluate(evidence, chunk, analysis.own_step(0, step)) for chunk in pieces(log, names, cuts, margin)
         ]
         joined = np.concatenate([np.stack(part[3:6], axis=1) for part in parts])
         whole = joined if whole is None else whole

@@ -18,9 +18,9 @@ from imufit.model.user_function import PER_ROW, UserFunction, rows_of
 from imufit.model.window import Window
 
 TRIED_ROWS = 512
-LATE = 2.9
-"""Where in a log an effect with memory is tried, in memories since the start: there its past is nearly twice as long as the
-one that it declares, and the two can be compared."""
+LATE = 0.9
+"""Where an effect with memory is tried, in memories after the last whole one before the middle of the log: there its past is
+nearly twice as long as the one that it declares, and the two can be compared."""
 ROUNDING = 1e-9
 """Share of a value by which two ways to work it out may differ."""
 FORGOTTEN = 0.01
@@ -59,7 +59,10 @@ def check_users_effects(passes: Passes, facts: _imufit.Facts, ids: Iterable[str]
 
 def _tried(passes: Passes, facts: _imufit.Facts, memory: float) -> dict[str, Any] | None:
     """Rows to try an effect on, with their margins; None for a log without a reference."""
-    best = None
+    best, wanted = None, facts.t_start
+    if memory > 0.0:
+        half = 0.5 * (facts.t_end - facts.t_start)
+        wanted += half if memory == math.inf else (max(2.0, half // memory) + LATE) * memory
     for chunk in passes.log.chunks(CHUNK_ROWS, passes.margin(facts)):
         arrays = chunk_arrays(chunk, passes.covariates)
         core = slice(arrays["begin"], arrays["end"])
@@ -68,8 +71,8 @@ def _tried(passes: Passes, facts: _imufit.Facts, memory: float) -> dict[str, Any
         known = arrays["begin"] + np.flatnonzero(np.isfinite(arrays["ref_q"][core, 0]))
         if not known.size:
             continue
-        late = known[arrays["t"][known] >= facts.t_start + LATE * memory] if memory < math.inf else known[:0]
-        begin = int(late[0] if late.size else known[0] if memory == 0.0 else max(known[0], known[-1] - TRIED_ROWS))
+        late = known[arrays["t"][known] >= wanted]
+        begin = int(late[0] if late.size else max(known[0], known[-1] - TRIED_ROWS))
         best = {**arrays, "begin": begin, "end": min(begin + TRIED_ROWS, arrays["end"])}
         if late.size:
             break

@@ -172,7 +172,9 @@ class UserFunction:
             columns = {name: _bridged(arrays["t"], values) for name, values in columns.items()}
         for values in (arrays["t"], *(arrays[name] for name in PER_ROW), *columns.values()):
             values.setflags(write=False)
-        return Window(**arrays, columns=columns, means=means, effect=self.effect, counted_from_mean=self.counted_from_mean)
+        return Window(
+            **arrays, columns=columns, means=means, effect=self.effect, counted_from_mean=self.counted_from_mean
+        )
 
     def _parts(self, window: Window, history: int) -> Iterator[tuple[Window, int, slice]]:
         """Cut a window into parts with their past: each with its first row that is wanted, and where these rows go.
