@@ -84,7 +84,8 @@ def test_all_that_a_user_is_given_has_the_shape_that_is_promised(log, user_effec
         seen.append(shapes == [(n, 3)] * 5 and w.temperature.shape == w.column("motor_current").shape == (n,))
         assert w.t_start <= w.t[0]
         assert w.dt == pytest.approx(np.median(np.diff(log.t)), rel=0.01)
-        assert w.rate is w.omega and w.specific_force is w.f and w.field is w.m and w.angular_acceleration is w.alpha
+        assert (w.rate is w.omega, w.specific_force is w.f, w.field is w.m) == (True, True, True)
+        assert w.angular_acceleration is w.alpha
         return k * fan(w)
 
     SensorModel(["mag.look"]).fit(log)

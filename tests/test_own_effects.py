@@ -293,7 +293,7 @@ def test_a_function_that_breaks_its_word_is_told_so(user_effect, breach):
 def test_a_function_cannot_change_its_window(user_effect):
     log = imufit.simulate("handheld", {}, seed=1, duration=20.0).to_log()
     user_effect("gyr.spoiling", parameters={"k": "1"})(spoiling)
-    with pytest.raises((InputError, ValueError), match="read-only|changes omega"):
+    with pytest.raises(InputError, match=r"gyr\.spoiling changes omega of its window"):
         SensorModel(["gyr.spoiling"]).fit(log)
 
 
@@ -334,7 +334,7 @@ def test_a_value_for_one_axis(user_effect):
 
 
 def test_a_function_that_is_not_an_effect_is_refused():
-    with pytest.raises(InputError, match="warmed is not an effect. Decorate the function"):
+    with pytest.raises(InputError, match=r"warmed is not an effect\. Decorate the function"):
         SensorModel([warmed])
 
 

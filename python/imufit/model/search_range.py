@@ -60,7 +60,7 @@ class SearchRange:
             return cls(min(numbers), max(numbers), numbers)
         if numbers[0] > numbers[1]:
             raise InputError(f"effect {effect}: search of {name} begins above its end", remedy=remedy)
-        return cls(*numbers)
+        return cls(numbers[0], numbers[1])
 
     @property
     def is_factor(self) -> bool:

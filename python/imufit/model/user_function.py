@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
@@ -101,7 +101,15 @@ class UserFunction:
             The function returned another shape.
         """
         n = len(window.t)
-        given = np.asarray(self.function(window, **at), dtype=np.float64)
+        try:
+            given = np.asarray(self.function(window, **at), dtype=np.float64)
+        except ValueError:
+            # Perhaps because the arrays are read-only.
+            if (changed := self._changed(window, at)) is None:
+                raise
+            raise InputError(
+                f"effect {self.effect} changes {changed} of its window", remedy="Let the function work on a copy."
+            ) from None
         if given.shape == (n, 3):
             return given
         if given.shape != (n,):
@@ -110,6 +118,15 @@ class UserFunction:
                 remedy=f"Return what it adds to the reading as ({n}, 3), or as ({n},) for the axes {self.axes}.",
             )
         return np.outer(given, [float(axis in self.axes) for axis in "xyz"])
+
+    def _changed(self, window: Window, at: Mapping[str, float]) -> str | None:
+        """Return the array of a window that the function changes; None if it changes none."""
+        copy = _copied(window)
+        with suppress(Exception):
+            self.function(copy, **at)
+        pairs = [(name, getattr(window, name), getattr(copy, name)) for name in ("t", *PER_ROW)]
+        pairs += [(f"column {name}", values, copy.columns[name]) for name, values in window.columns.items()]
+        return next((name for name, a, b in pairs if not np.array_equal(a, b, equal_nan=True)), None)
 
     def columns(self, window: Window, at: Mapping[str, float]) -> Array:
         """d value / d parameter, (n, 3, p): exact where the value is linear, else by central differences."""
@@ -198,6 +215,12 @@ def rows_of(window: Window, begin: int, end: int) -> Window:
     """Return some rows of a window."""
     cut = {name: getattr(window, name)[begin:end] for name in ("t", *PER_ROW)}
     return replace(window, **cut, columns={name: values[begin:end] for name, values in window.columns.items()})
+
+
+def _copied(window: Window) -> Window:
+    """Return a window whose arrays can be written to."""
+    arrays = {name: getattr(window, name).copy() for name in ("t", *PER_ROW)}
+    return replace(window, **arrays, columns={name: values.copy() for name, values in window.columns.items()})
 
 
 def _bridged(t: Array, values: Array) -> Array:
