@@ -71,7 +71,7 @@ def lagging(log: imufit.Log, case: np.ndarray) -> imufit.Log:
 
 
 def slipping(log: imufit.Log, case: np.ndarray) -> imufit.Log:
-    """A spring of 3 N/K drags the package, which friction of 3 N holds: it stays behind by up to 1 K to either side."""
+    """Drag the package by a spring of 3 N/K against a friction of 3 N: it stays behind by up to 1 K to either side."""
     package = case.copy()
     for i in range(1, log.n):
         pull = 3.0 * (case[i] - package[i - 1])

@@ -24,7 +24,8 @@ class SensorModel(EffectStack):
     Parameters
     ----------
     effects : sequence of str or callable
-        Ids such as ``gyr.bias``, or functions of effects of your own, each once. The order does not matter: effects act in the order of their physics.
+        Ids such as ``gyr.bias``, or functions of effects of your own, each once. The order does not
+        matter: effects act in the order of their physics.
     parameters : mapping of str to mapping of str to float, optional
         Values by effect and parameter, SI units; zero where not given.
     constants : mapping, optional

@@ -27,8 +27,8 @@ CHUNK_ROWS = 16384
 """Rows of a chunk: a comparison takes some 8 kB of memory for each of them."""
 SURVEY_MARGIN = 4096
 PAST = 3.0
-"""Rows of the past that a chunk carries, in median rows of the longest memory: the past begins up to two memories before
-a row, and the rest is for rows that come more often than usual."""
+"""Rows of the past that a chunk carries, in median rows of the longest memory: the past begins up to two memories
+before a row, and the rest is for rows that come more often than usual."""
 
 MASKS = ("ref_exact", "movement")
 """Columns that say how to use a row; they are no covariates."""
@@ -94,7 +94,7 @@ class Passes:
         """Attitude that the commanded angle of a rig gives, where the log's own is the same but noisier."""
 
     def margin(self, facts: _imufit.Facts) -> int:
-        """Rows that a chunk carries on each side of its core: with them every effect sees all of the past it asks for."""
+        """Rows that a chunk carries on each side of its core, so that every effect sees its past."""
         memory = max((effect.memory for effect in registered().values()), default=0.0)
         past = PAST * memory / facts.dt if facts.dt > 0.0 else 0.0
         return facts.margin + (self.log.n if not past < self.log.n else math.ceil(past))

@@ -18,8 +18,8 @@ from imufit.model.window import Window
 
 TRIED_ROWS = 512
 LATE = 0.9
-"""Where an effect with memory is tried, in memories after the last whole one before the middle of the log: there its past is
-nearly twice as long as the one that it declares, and the two can be compared."""
+"""Where an effect with memory is tried, in memories after the last whole one before the middle of the log: there its
+past is nearly twice as long as the one that it declares, and the two can be compared."""
 ROUNDING = 1e-9
 """Share of a value by which two ways to work it out may differ."""
 FORGOTTEN = 0.01

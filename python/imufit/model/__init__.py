@@ -1,7 +1,8 @@
 """Effects, and a stack of them on top of ideal readings."""
 
 from imufit.model.catalogue import catalogue, explain, find_effect, load_effects
-from imufit.model.effect import Window, effect
+from imufit.model.effect import effect
 from imufit.model.effect_stack import EffectStack
+from imufit.model.window import Window
 
 __all__ = ["EffectStack", "Window", "catalogue", "effect", "explain", "find_effect", "load_effects"]

@@ -18,7 +18,6 @@ from imufit.errors import InputError
 from imufit.model.search_range import SearchRange
 from imufit.model.user_function import Function, UserFunction
 from imufit.model.window import TEMPERATURE
-from imufit.model.window import Window as Window
 
 SENSORS = ("acc", "gyr", "mag")
 SCOPES = ("sensor", "log")

@@ -99,7 +99,7 @@ class SearchRange:
         return (max(at - step, self.low), min(at + step, self.high)) if within else (at - step, at + step)
 
     def known(self, at: float) -> float:
-        """The value itself; its middle for the zero of a parameter that has not been searched for."""
+        """Return the value itself; the middle for the zero of a parameter that has not been searched for."""
         return at if at != 0.0 or self.low <= 0.0 <= self.high else self.middle
 
     def _count(self, parameters: int) -> int:

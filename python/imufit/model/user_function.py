@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -93,7 +93,7 @@ class UserFunction:
             self._watched.clear()
 
     def value(self, window: Window, at: Mapping[str, float]) -> Array:
-        """What the effect adds to the reading, (n, 3), at parameters by name.
+        """Return what the effect adds to the reading, (n, 3), at parameters by name.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class UserFunction:
         return next((name for name, a, b in pairs if not np.array_equal(a, b, equal_nan=True)), None)
 
     def columns(self, window: Window, at: Mapping[str, float]) -> Array:
-        """d value / d parameter, (n, 3, p): exact where the value is linear, else by central differences."""
+        """Return d value / d parameter, (n, 3, p): exact where the value is linear, else by central differences."""
         still = {name: (value if name in self.searched else 0.0) for name, value in at.items()}
         out = np.zeros((len(window.t), 3, len(at)))
         for k, (name, size) in enumerate(zip(self.parameters, self.sizes, strict=True)):
@@ -205,7 +205,7 @@ class UserFunction:
             return
         stretch = np.floor((window.t[history:] - window.t_start) / self.memory)
         edges = [0, *(np.flatnonzero(np.diff(stretch)) + 1).tolist(), n - history]
-        for begin, end in zip(edges[:-1], edges[1:], strict=True):
+        for begin, end in pairwise(edges):
             past = window.t_start + (stretch[begin] - 1.0) * self.memory
             first = min(int(np.searchsorted(window.t, past)), history + begin)
             yield rows_of(window, first, history + end), history + begin - first, slice(begin, end)
