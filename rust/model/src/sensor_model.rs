@@ -131,7 +131,12 @@ impl<'a> Past<'a> {
     }
 
     /// The same as effects see rows, quantities without axes that hold noise alone.
-    fn rows<'b>(&'b mut self, facts: &'b LogFacts, sensor: Sensor, seen: &impl Fn(&Ideal) -> Option<Ideal>) -> Rows<'b> {
+    fn rows<'b>(
+        &'b mut self,
+        facts: &'b LogFacts,
+        sensor: Sensor,
+        seen: &impl Fn(&Ideal) -> Option<Ideal>,
+    ) -> Rows<'b> {
         if let Some(ideal) = seen(&self.ideal) {
             self.ideal = ideal;
         }
@@ -425,7 +430,8 @@ impl SensorModel {
                 Sensor::Gyr => &ideal.omega,
                 Sensor::Mag => &ideal.m,
             };
-            let (modelled, columns) = self.predict(rows, past.as_ref(), reading_of.clone(), ideal.detail(sensor), sensor)?;
+            let (modelled, columns) =
+                self.predict(rows, past.as_ref(), reading_of.clone(), ideal.detail(sensor), sensor)?;
             for (axis, columns) in columns.into_iter().enumerate() {
                 let residual = core
                     .clone()

@@ -129,7 +129,10 @@ impl PythonEffect {
         for (i, row) in view.outer_iter().enumerate() {
             let i = rows.history + i;
             if row.iter().any(|v| !v.is_finite()) && known(i) {
-                let problem = format!("effect {}: the value is not finite at t = {} s", self.card.id, rows.t[i]);
+                let problem = format!(
+                    "effect {}: the value is not finite at t = {} s",
+                    self.card.id, rows.t[i]
+                );
                 return Err(input_error(py, problem));
             }
         }
