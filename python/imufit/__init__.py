@@ -25,9 +25,10 @@ if TYPE_CHECKING:
     from imufit.log import Log, LogStream, open_log, read
     from imufit.loop import Fit, SensorModel
     from imufit.model.catalogue import catalogue, explain, load_effects
-    from imufit.model.effect import Window, effect
+    from imufit.model.effect import effect
     from imufit.model.effect import forget as forget_effect
     from imufit.model.limits import Limits
+    from imufit.model.window import Window
     from imufit.results import Addition, Comparison, Diagnosis, EffectCard, Ladder, ModelComparison, Parameter, Params
     from imufit.verbs import allan, calibrate, compare, diagnose, fit, info, join, ladder, plot, replay, tune
 else:

@@ -275,7 +275,11 @@ class Effect:
     @property
     def column(self) -> str | None: ...
     @property
-    def centred_column(self) -> str | None: ...
+    def centred_columns(self) -> list[str]: ...
+    @property
+    def memory(self) -> float: ...
+    @property
+    def limits(self) -> list[tuple[float, float]]: ...
     @property
     def scope(self) -> Literal["sensor", "log"]: ...
     @property
@@ -358,11 +362,13 @@ def find_effect(id: str) -> Effect | None: ...
 def python_effect(
     id: str,
     sensor: str,
-    parameters: Sequence[tuple[str, str, float | None]],
+    parameters: Sequence[tuple[str, str, float | None, str]],
     words: dict[str, str],
     stage: str,
     needs: Sequence[str],
     traits: Mapping[str, str],
+    memory: float,
+    limits: Sequence[tuple[float, float]],
     function: Callable[..., object],
 ) -> Effect: ...
 

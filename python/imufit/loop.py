@@ -13,6 +13,7 @@ from imufit.fitting.apply import apply
 from imufit.fitting.fitted_stack import FittedStack
 from imufit.log import AnyLog, AnyLogs, Log, LogSource, log_of, logs_of_any
 from imufit.model.effect_stack import EffectStack
+from imufit.model.user_function import Function
 from imufit.progress import Progress, silent
 from imufit.results import Addition, Comparison, Diagnosis, ModelComparison
 
@@ -22,8 +23,9 @@ class SensorModel(EffectStack):
 
     Parameters
     ----------
-    effects : sequence of str
-        Ids such as ``gyr.bias``, each once. The order does not matter: effects act in the order of their physics.
+    effects : sequence of str or callable
+        Ids such as ``gyr.bias``, or functions of effects of your own, each once. The order does not
+        matter: effects act in the order of their physics.
     parameters : mapping of str to mapping of str to float, optional
         Values by effect and parameter, SI units; zero where not given.
     constants : mapping, optional
@@ -199,13 +201,13 @@ class Fit(FittedStack):
         """
         return diagnose(self.on(_opened(log), progress or silent))
 
-    def add(self, effect: str, log: AnyLogs | None = None, progress: Progress | None = None) -> Addition:
+    def add(self, effect: str | Function, log: AnyLogs | None = None, progress: Progress | None = None) -> Addition:
         """Add an effect to the model and refit.
 
         Parameters
         ----------
-        effect : str
-            Id such as ``gyr.g_sensitivity``.
+        effect : str or callable
+            Id such as ``gyr.g_sensitivity``, or the function of an effect of your own.
         log : Log, str, Path, DataFrame, mapping of arrays, or a sequence of these, optional
             Logs to fit to; default: its own.
         progress : callable, optional

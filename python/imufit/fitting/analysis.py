@@ -327,6 +327,8 @@ class Analysis:
             if name in effect.searched and name not in effect.only_searched:
                 low, high = sorted((0.5 * present[k], 2.0 * present[k]))
                 values[k] = min(max(values[k], low), high)
+                if effect.limits:
+                    values[k] = min(max(values[k], effect.limits[k][0]), effect.limits[k][1])
         return values
 
     def moved_to(self, estimate: Estimate) -> tuple[EffectStack, tuple[dict[str, list[float]], ...]]:
@@ -360,7 +362,7 @@ class Analysis:
             "covariate_means": {
                 name: mean
                 for name, mean in means.items()
-                if any(effect.centred_column == name for effect, _ in self.model.stack())
+                if any(name in effect.centred_columns for effect, _ in self.model.stack())
             },
         }
         kept = {key: value for key, value in constants.items() if value is not None and value != {}}

@@ -31,7 +31,7 @@ def residual_chunks(
     label : str
         What the progress is told.
     """
-    for arrays in evidence.passes.chunks(evidence.facts.margin, label):
+    for arrays in evidence.passes.chunks(evidence.passes.margin(evidence.facts), label):
         yield arrays, _imufit.evaluate(evidence.raw, arrays, step)
 
 

@@ -10,9 +10,11 @@ from typing import Any, Self
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.model.catalogue import find_effect
+from imufit.model.effect import id_of
 from imufit.model.limits import FREE, Limits
 from imufit.model.model_file import ModelFile, is_usable, shown
 from imufit.model.params import EffectParameters, ModelParams
+from imufit.model.user_function import Function
 from imufit.results import Parameter
 
 
@@ -21,8 +23,9 @@ class EffectStack:
 
     Parameters
     ----------
-    effects : sequence of str
-        Ids such as ``gyr.bias``, each once. The order does not matter: effects act in the order of their physics.
+    effects : sequence of str or callable
+        Ids such as ``gyr.bias``, or functions of effects of your own, each once. The order does not
+        matter: effects act in the order of their physics.
     parameters : mapping of str to mapping of str to float, optional
         Values by effect and parameter, SI units; zero where not given.
     constants : mapping, optional
@@ -45,7 +48,7 @@ class EffectStack:
 
     def __init__(
         self,
-        effects: Sequence[str] = (),
+        effects: Sequence[str | Function] = (),
         parameters: Mapping[str, Mapping[str, float]] | None = None,
         *,
         constants: Mapping[str, Any] | None = None,
@@ -54,10 +57,11 @@ class EffectStack:
     ) -> None:
         if isinstance(effects, str):
             raise InputError(f"effects is the text {effects!r}", remedy=f"Pass a list: [{effects!r}].")
-        for effect_id in effects:
-            if list(effects).count(effect_id) > 1:
+        ids = [id_of(effect) for effect in effects]
+        for effect_id in ids:
+            if ids.count(effect_id) > 1:
                 raise InputError(f"effect {effect_id} stands in the model twice", remedy="Name it once.")
-        self._effects = {effect_id: find_effect(effect_id) for effect_id in effects}
+        self._effects = {effect_id: find_effect(effect_id) for effect_id in ids}
         given = parameters or {}
         for effect_id in given:
             if effect_id not in self._effects:
@@ -240,19 +244,20 @@ class EffectStack:
             )
         )
 
-    def with_effect(self, effect_id: str) -> Self:
+    def with_effect(self, effect: str | Function) -> Self:
         """Return the same model with one more effect, its parameters zero.
 
         Parameters
         ----------
-        effect_id : str
-            Id such as ``gyr.g_sensitivity``.
+        effect : str or callable
+            Id such as ``gyr.g_sensitivity``, or the function of an effect of your own.
 
         Raises
         ------
         InputError
             The effect is unknown or in the model already.
         """
+        effect_id = id_of(effect)
         if effect_id in self._effects:
             raise InputError(f"effect {effect_id} is in the model already", remedy="Nothing needs to be added.")
         return type(self)([*self.effects, effect_id], self.parameters, constants=self.constants, limits=self._limits)

@@ -141,8 +141,7 @@ class ModelFile:
         known = set(self.constants.get("covariate_means", {}))
         known |= {"temp"} if "temperature_mean" in self.constants else set()
         for effect in map(find_effect, self.effects):
-            column = effect.centred_column
-            if column is not None and column not in known:
+            for column in set(effect.centred_columns) - known:
                 raise InputError(
                     f"constants do not tell the mean of {column}, which {effect.id} counts from: is the file cut off?",
                     remedy=HOW_TO_END,
