@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Add an effect, refit, show the error before, expected and after.")
+@click.command()
 @click.argument("effect", metavar="EFFECT")
 @logs_argument
 @model_option

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Noise density, bias instability and random walk of sensors at rest.")
+@click.command()
 @log_argument
 @click.option(
     "-o",

@@ -10,31 +10,7 @@ from collections.abc import Sequence
 
 import click
 
-from imufit.cli.add import add
-from imufit.cli.allan import allan
-from imufit.cli.apply import apply
-from imufit.cli.calibrate import calibrate
-from imufit.cli.compare import compare
-from imufit.cli.convert import convert
-from imufit.cli.demo import demo
-from imufit.cli.diagnose import diagnose
-from imufit.cli.emulate import emulate
-from imufit.cli.explain import explain
-from imufit.cli.export import export
-from imufit.cli.fit import fit
-from imufit.cli.grade import grade
-from imufit.cli.info import info
-from imufit.cli.join import join
-from imufit.cli.ladder import ladder
-from imufit.cli.monitor import monitor
-from imufit.cli.names import unknown
-from imufit.cli.plot import plot
-from imufit.cli.record import record
-from imufit.cli.recover import recover
-from imufit.cli.replay import replay
-from imufit.cli.reveal import reveal
-from imufit.cli.simulate import simulate
-from imufit.cli.tune import tune
+from imufit.cli.on_demand import Commands
 from imufit.printable import MESSAGE, printable
 
 SUCCESS, INTERNAL, UNUSABLE, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 130, 141
@@ -42,22 +18,6 @@ SUCCESS, INTERNAL, UNUSABLE, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 130, 141
 DEBUG = "IMUFIT_DEBUG"
 _LONGEST_MESSAGE = 3 * MESSAGE
 """Characters: place, problem and remedy, each of which is bounded."""
-
-
-class Commands(click.Group):
-    """The commands in the order of the loop, with a guess at misspelt names."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names in the order in which they were registered."""
-        return list(self.commands)
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command, or fail with the name that was probably meant."""
-        if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
-            ctx.fail(unknown("command", args[0], self.commands))
-        return super().resolve_command(ctx, args)
 
 
 def _version(ctx: click.Context, _param: click.Parameter, wanted: bool) -> None:
@@ -80,35 +40,6 @@ def imufit(ctx: click.Context) -> None:
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
-
-
-for _command in (
-    info,
-    plot,
-    calibrate,
-    compare,
-    diagnose,
-    add,
-    ladder,
-    fit,
-    apply,
-    export,
-    explain,
-    simulate,
-    reveal,
-    grade,
-    replay,
-    tune,
-    allan,
-    convert,
-    join,
-    record,
-    monitor,
-    recover,
-    emulate,
-    demo,
-):
-    imufit.add_command(_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

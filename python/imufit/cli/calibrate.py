@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Calibrate accelerometer, gyro and magnetometer.")
+@click.command()
 @click.argument("logs", metavar="LOG...", type=LOG, nargs=-1)
 @reading_options
 @click.option(

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Where the model fails: by channel, segment and covariate.")
+@click.command()
 @log_argument
 @model_option
 @json_option

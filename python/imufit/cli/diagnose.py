@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Which effect is missing, with its expected gain.")
+@click.command()
 @logs_argument
 @model_option
 @json_option

@@ -49,7 +49,7 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
         return number
 
 
-@click.command(short_help="A device without hardware: a scenario or a log on a pty or socket.")
+@click.command()
 @click.argument("source", metavar="SCENARIO|LOG")
 @reading_options
 @click.option("--on", default="pty", show_default=True, metavar="pty|socket://127.0.0.1:PORT", help="Where it is read.")

@@ -12,7 +12,7 @@ from imufit.cli.names import check_effects
 from imufit.cli.output import Output
 
 
-@click.command(short_help="An effect's card; without EFFECT the catalogue.")
+@click.command()
 @click.argument("effect", metavar="[EFFECT]", required=False)
 @effects_from_option
 @json_option

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Fit a stack of effects.")
+@click.command()
 @logs_argument
 @click.option(
     "--effects", required=True, multiple=True, metavar="ID,ID,...", help="Effects of the model, in any order."

@@ -14,7 +14,7 @@ from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 
 
-@click.command(short_help="The blind protocol: how often the answer is right.")
+@click.command()
 @click.option(
     "--set",
     "sets",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="What is in a log: rates, gaps, rests, reference, and the effects that it can show.")
+@click.command()
 @log_argument
 @click.option("--quick", is_flag=True, help="Leave out which effects the log can show, which takes most of the time.")
 @effects_from_option

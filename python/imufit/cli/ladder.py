@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Repeat diagnose and add until nothing is missing.")
+@click.command()
 @logs_argument
 @model_option
 @model_output

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from imufit.devices.monitor import MonitorState
 
 
-@click.command(short_help="Attitude of a running device by several filters at once.")
+@click.command()
 @port_argument
 @map_option
 @click.option(
@@ -119,7 +120,7 @@ class _Lines:
         if header != self._header:
             self._header = header
             click.echo(",".join(header))
-        angles = [f"{a:.2f}" if np.isfinite(a) else "" for three in state.angles.values() for a in np.degrees(three)]
+        angles = [f"{a:.2f}" if math.isfinite(a) else "" for three in state.angles.values() for a in map(math.degrees, three)]
         click.echo(",".join([f"{state.t:.3f}", f"{state.rate_hz:.1f}", f"{state.lost}", f"{state.damaged}", *angles]))
 
 
@@ -155,11 +156,11 @@ def _table(state: MonitorState) -> Table:
     from rich.table import Table  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
-    words = [f"{state.t:.1f} s" if np.isfinite(state.t) else "waiting", f"{state.rate_hz:.0f} Hz"]
+    words = [f"{state.t:.1f} s" if math.isfinite(state.t) else "waiting", f"{state.rate_hz:.0f} Hz"]
     words += [f"lost {state.lost}", f"damaged {state.damaged}"]
     if state.unplugged:
         words.append(f"unplugged {state.unplugged}")
-    if np.isfinite(state.temp):
+    if math.isfinite(state.temp):
         words.append(f"{state.temp:.1f} degC")
     if not state.connected:
         words.insert(0, "line lost, trying again")
@@ -177,5 +178,5 @@ def _table(state: MonitorState) -> Table:
     for name in _ANGLES:
         table.add_column(f"{name}, deg", justify="right", min_width=10)
     for name, three in state.angles.items():
-        table.add_row(name, *(f"{a:.1f}" if np.isfinite(a) else "-" for a in np.degrees(three)))
+        table.add_row(name, *(f"{a:.1f}" if math.isfinite(a) else "-" for a in map(math.degrees, three)))
     return table

@@ -33,7 +33,7 @@ class ColumnNames(click.ParamType):  # type: ignore[type-arg]
         return tuple(name.strip() for name in value.split(",") if name.strip())
 
 
-@click.command(short_help="Readings, reference and rests of a log over time, as a figure.")
+@click.command()
 @log_argument
 @click.option(
     "-o",

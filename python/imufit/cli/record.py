@@ -13,7 +13,7 @@ from imufit.cli.port import duration_option, frame_option, port_argument
 from imufit.cli.reading import map_option
 
 
-@click.command(short_help="From a serial device to a log that cannot be lost.")
+@click.command()
 @port_argument
 @map_option
 @click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")

@@ -32,7 +32,7 @@ _MADE = 100
 """Bytes that a filter makes of a row: attitude, angles and errors."""
 
 
-@click.command(short_help="Attitude for every row, its error, and the methods' tilt beside each other.")
+@click.command()
 @log_argument
 @click.option(
     "--filter",

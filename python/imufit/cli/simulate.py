@@ -70,7 +70,7 @@ def chosen_effects(texts: Sequence[str]) -> dict[str, dict[str, float] | None]:
     return chosen
 
 
-@click.command(short_help="A synthetic log, on request with a hidden effect.")
+@click.command()
 @click.argument("scenario", type=Known("scenario", lambda: list(engine.scenarios())), metavar="SCENARIO")
 @click.option(
     "--effect",

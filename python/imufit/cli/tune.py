@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Gains of a filter: by its error, or without reference by its predictions.")
+@click.command()
 @log_argument
 @click.option(
     "--filter",
