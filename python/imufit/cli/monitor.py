@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from imufit.cli import engine
 from imufit.cli.arguments import EXISTING, Real, effects_from_option, json_option, keep_inputs
@@ -120,7 +119,9 @@ class _Lines:
         if header != self._header:
             self._header = header
             click.echo(",".join(header))
-        angles = [f"{a:.2f}" if math.isfinite(a) else "" for three in state.angles.values() for a in map(math.degrees, three)]
+        angles = [
+            f"{a:.2f}" if math.isfinite(a) else "" for three in state.angles.values() for a in map(math.degrees, three)
+        ]
         click.echo(",".join([f"{state.t:.3f}", f"{state.rate_hz:.1f}", f"{state.lost}", f"{state.damaged}", *angles]))
 
 

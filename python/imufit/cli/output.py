@@ -6,6 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from imufit.whole_file import whole_file, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from rich.console import Console
 
     from imufit.results import Table
 
@@ -37,6 +39,11 @@ class Output:
     """
 
     def __init__(self, json_file: Path | None = None) -> None:
+        self._json_file = json_file
+
+    @cached_property
+    def _console(self) -> Console:
+        """What prints: made when there is something to say, an input that is refused does not wait for it."""
         from rich.console import Console  # noqa: PLC0415
 
         class Piped(Console):
@@ -46,10 +53,9 @@ class Output:
                 """Hand on what rich has caught."""
                 raise BrokenPipeError
 
-        self._json_file = json_file
-        quiet = json_file is not None and str(json_file) == "-"
+        quiet = self._json_file is not None and str(self._json_file) == "-"
         width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else _WIDTH_OF_FILES
-        self._console = Piped(quiet=quiet, width=width, highlight=False, markup=False, emoji=False)
+        return Piped(quiet=quiet, width=width, highlight=False, markup=False, emoji=False)
 
     def say(self, *sentences: str, bold: bool = False) -> None:
         """Print sentences, one paragraph each."""

@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.signal import find_peaks
 
 from imufit.joining.course import Course
 
@@ -153,6 +152,8 @@ class Correlation:
 
     def peaks(self, most: int = 8) -> list[Candidate]:
         """Return the lags, `most` at most, at which the likelihood has a maximum, likeliest first."""
+        from scipy.signal import find_peaks  # noqa: PLC0415 - costs half a second that few logs need
+
         places, _ = find_peaks(np.concatenate(([-1.0], self.gain, [-1.0])))
         order = sorted(places - 1, key=lambda place: -self.gain[place])[:most]
         return [self._candidate(int(place)) for place in order if self.gain[place] > 0.0]
