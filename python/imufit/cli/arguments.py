@@ -196,6 +196,13 @@ def plot_option(command: Command) -> Command:
     )(command)
 
 
+def verbose_option(command: Command) -> Command:
+    """Add -v."""
+    return click.option("-v", "--verbose", is_flag=True, help="Show every table, not only those of the answer.")(
+        command
+    )
+
+
 def model_output(command: Command) -> Command:
     """Add -o for a model file."""
     return click.option(
