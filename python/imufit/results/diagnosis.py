@@ -31,6 +31,8 @@ VERDICTS = {
 
 PASSED = "passed"
 """Status of an effect that is there, or explains as much as one that is."""
+NEXT = 5
+"""Candidates behind those that stand out that are shown with them: the answer stays on a screen of 24 lines."""
 NOT_TESTABLE = "not testable here"
 """Status of an effect that a log cannot show."""
 
@@ -333,9 +335,23 @@ class Diagnosis(Result):
 
     def answer_table(self) -> Table:
         """Return the candidates that the answer names, or that passed the test; without rows where none did."""
-        named = {self.best, *self.ambiguous_with}
-        kept = [item for item in self.candidates if item.effect in named or item.status == PASSED]
-        return Table("Candidates that passed", _CANDIDATE, tuple(_candidate_row(item) for item in kept), blocks=True)
+        rows = tuple(_candidate_row(item) for item in self.candidates if self._stands_out(item))
+        return Table("Candidates that stand out", _CANDIDATE, rows, blocks=True)
+
+    def next_table(self, limit: int = NEXT) -> Table:
+        """Return the candidates behind those that stand out, best first, in one line each.
+
+        Parameters
+        ----------
+        limit : int
+            Rows at most.
+        """
+        others = [item for item in self.candidates if not self._stands_out(item)][:limit]
+        rows = tuple(row[:4] for row in map(_candidate_row, others))
+        return Table("Next candidates", _CANDIDATE[:4], rows)
+
+    def _stands_out(self, item: Candidate) -> bool:
+        return item.status == PASSED or item.effect in (self.best, *self.ambiguous_with)
 
     def unexplained_table(self) -> Table:
         """Dependences without a named cause."""
@@ -371,8 +387,8 @@ class Diagnosis(Result):
         )
 
     def answer_tables(self) -> tuple[Table, ...]:
-        """Candidates that passed, what no effect explains, and the logs that disagree."""
-        return self.answer_table(), self.unexplained_table(), self.disagreement_table()
+        """Return the candidates, briefly, what no effect explains, and the logs that disagree."""
+        return self.answer_table(), self.next_table(), self.unexplained_table(), self.disagreement_table()
 
     def sentences(self) -> list[str]:
         """Verdict, result, next experiment, faults of the data that only concern some rows, and notes."""
