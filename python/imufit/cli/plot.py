@@ -78,7 +78,7 @@ def plot(
     made = OutputFile(PLOT_ENDINGS).convert(f"{log.stem}.png", None, None) if output is None else output
     keep_inputs([log], [made])
     out = Output()
-    with ProgressBar() as progress:
+    with ProgressBar(counted=True) as progress:
         figure = engine.plot(
             engine.open_log(log, reading),
             progress,

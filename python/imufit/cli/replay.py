@@ -108,7 +108,7 @@ def replay(
         model = engine.sensor_model(path=model_file)
         rows = model.apply(rows)
         out.say(f"{' + '.join(model.effects) or 'No effect'} taken out.", *(f"Note: {note}." for note in rows.notes))
-    with ProgressBar() as progress:
+    with ProgressBar(counted=True) as progress:
         result = engine.replay(rows, names, progress, settings)
     compared = result.comparison(band)
     value = result.to_dict(compared)

@@ -80,7 +80,7 @@ def tune(
     keep_inputs([log], [output, json_file, plot_file])
     settings = settings_from(assignments)
     out = Output(json_file)
-    with ProgressBar() as progress:
+    with ProgressBar(counted=True) as progress:
         found = engine.tune(
             engine.read_log(log, reading),
             filter_name,
