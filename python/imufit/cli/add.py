@@ -17,7 +17,7 @@ from imufit.cli.arguments import (
     plot_option,
     title_of,
 )
-from imufit.cli.names import check_effects
+from imufit.cli.names import check_effects, complete_effect
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import logs_argument
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("effect", metavar="EFFECT")
+@click.argument("effect", metavar="EFFECT", shell_complete=complete_effect)
 @logs_argument
 @model_option
 @model_output

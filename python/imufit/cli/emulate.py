@@ -10,6 +10,7 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import NamedFile, OutputFile, Real, Whole, json_option, keep_inputs
+from imufit.cli.names import OneOf, complete_injection, complete_scenario_or_log
 from imufit.cli.output import Output
 from imufit.cli.reading import reading_options
 from imufit.cli.simulate import chosen_effects
@@ -50,7 +51,7 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
 
 
 @click.command()
-@click.argument("source", metavar="SCENARIO|LOG")
+@click.argument("source", metavar="SCENARIO|LOG", shell_complete=complete_scenario_or_log)
 @reading_options
 @click.option("--on", default="pty", show_default=True, metavar="pty|socket://127.0.0.1:PORT", help="Where it is read.")
 @click.option(
@@ -59,8 +60,8 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
     metavar="PATH",
     help="Symbolic link to the pty, which stays the same when the device is unplugged.",
 )
-@click.option("--device", type=click.Choice(DEVICES), default="floats", show_default=True, help="What it sends.")
-@click.option("--form", type=click.Choice(FORMS), default="binary", show_default=True, help="Frames or lines of text.")
+@click.option("--device", type=OneOf("device", DEVICES), default="floats", show_default=True, help="What it sends.")
+@click.option("--form", type=OneOf("form", FORMS), default="binary", show_default=True, help="Frames or lines of text.")
 @click.option("--rate", type=NumberOr("max"), metavar="HZ|max", help="Samples a second; max: what --baud carries.")
 @click.option("--duration", type=Real(min=0.0, min_open=True), metavar="S", help="Time until it ends, s.")
 @click.option("--loop", is_flag=True, help="Begin again after the last sample; for ever without --duration.")
@@ -87,6 +88,7 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
     "effects",
     multiple=True,
     metavar="ID[:NAME=VALUE,...]",
+    shell_complete=complete_injection,
     help="Effect of a scenario's sensor, SI units; without values they are drawn. Repeatable.",
 )
 @click.option("--seed", type=Whole(min=0), default=0, metavar="SEED", help="Seed of everything random.")

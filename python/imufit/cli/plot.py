@@ -10,6 +10,7 @@ import click
 from imufit.cli import engine
 from imufit.cli.arguments import PLOT_ENDINGS, OutputFile, Real, keep_inputs
 from imufit.cli.convert import RowRange
+from imufit.cli.names import OneOf
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import log_argument
@@ -51,7 +52,7 @@ class ColumnNames(click.ParamType):  # type: ignore[type-arg]
 )
 @click.option(
     "--show",
-    type=click.Choice(("readings", "reference", "both")),
+    type=OneOf("part of the figure", ("readings", "reference", "both")),
     default="both",
     show_default=True,
     help="What to draw: the readings, the reference's attitude and rates, or both.",
