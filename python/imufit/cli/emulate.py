@@ -10,6 +10,7 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import NamedFile, OutputFile, Real, Whole, json_option, keep_inputs
+from imufit.cli.life_line import LifeLine
 from imufit.cli.names import OneOf, complete_injection, complete_scenario_or_log
 from imufit.cli.output import Output
 from imufit.cli.reading import reading_options
@@ -129,7 +130,7 @@ def emulate(
         sent=sent or False,
         **options,
     )
-    with engine.running(device):
+    with LifeLine() as life, engine.running(device, life):
         # Whoever waits for the port reads one line; with the JSON on standard output it stands on standard error.
         click.echo(device.port, err=str(json_file) == "-")
         sys.stdout.flush()

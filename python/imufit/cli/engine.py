@@ -419,14 +419,18 @@ def emulator(
 
 
 @contextmanager
-def running(device: Emulator) -> Iterator[None]:
-    """Let a device run until it has sent everything or is asked to end, also where Ctrl-C is ignored at the start."""
+def running(device: Emulator, watch: Callable[[int, str], None]) -> Iterator[None]:
+    """Let a device run until it has sent everything or is asked to end, also where Ctrl-C is ignored at the start.
+
+    `watch` is told the samples so far, and whether anybody reads them.
+    """
     from imufit.devices.record.signals import requests_to_end  # noqa: PLC0415
 
     with requests_to_end() as asked, device:
         yield
         while not device.join(0.1) and not asked():
-            pass
+            told = device.summary()
+            watch(told["samples"], "nobody reads" if told["samples"] and told["unread"] == told["samples"] else "")
 
 
 def unseal(path: Path) -> Truth:
