@@ -100,5 +100,5 @@ def test_monitor_writes_readings_and_a_figure_where_there_is_no_terminal(port, t
 
 
 def test_a_recording_on_a_terminal_says_how_to_stop_it(port, tmp_path):
-    screen([*PROGRAM, "record", port, "-o", str(tmp_path / "log.parquet")], " rows", " Hz", "Ctrl-C ends it")
+    screen([*PROGRAM, "record", port, "-o", str(tmp_path / "log.parquet")], " rows", " deg", "Ctrl-C ends it")
     assert (tmp_path / "log.parquet").exists()
