@@ -92,6 +92,11 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
     shell_complete=complete_injection,
     help="Effect of a scenario's sensor, SI units; without values they are drawn. Repeatable.",
 )
+@click.option(
+    "--data-sheet",
+    is_flag=True,
+    help="Put in errors within the limits of the MPU-6050's data sheet, drawn by --seed; --effect goes before them.",
+)
 @click.option("--seed", type=Whole(min=0), default=0, metavar="SEED", help="Seed of everything random.")
 @click.option("--wait/--no-wait", default=None, help="Switch it on when somebody reads (a socket) or at once (a pty).")
 @click.option(
@@ -109,6 +114,7 @@ def emulate(
     faults: tuple[str, ...],
     fault_rates: tuple[str, ...],
     effects: tuple[str, ...],
+    data_sheet: bool,
     sent: Path | None,
     json_file: Path | None,
     **options: Any,
@@ -120,13 +126,16 @@ def emulate(
     """
     keep_inputs([Path(source)], [sent, json_file])
     out = Output(json_file)
+    chosen = chosen_effects(effects)
+    if data_sheet:
+        chosen = {**engine.data_sheet_errors(options["seed"]), **chosen}
     device = engine.emulator(
         source,
         reading,
         faults=faults,
         fault_rates=fault_rates,
         clock={"tick": tick, "drift": clock_drift, "jitter": clock_jitter, "start": clock_start},
-        effects=chosen_effects(effects),
+        effects=chosen,
         sent=sent or False,
         **options,
     )
