@@ -199,7 +199,10 @@ class Fit(FittedStack):
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
         """
-        return diagnose(self.on(_opened(log), progress or silent))
+        tell = progress or silent
+        fit = self.on(_opened(log), tell)
+        tell(0, 1, f"step 1: what is missing on top of {' + '.join(fit.model.effects) or 'the ideal sensor'}")
+        return diagnose(fit)
 
     def add(self, effect: str | Function, log: AnyLogs | None = None, progress: Progress | None = None) -> Addition:
         """Add an effect to the model and refit.
@@ -223,7 +226,10 @@ class Fit(FittedStack):
         InputError
             The effect is unknown, in the model already, or cannot be tested on this log.
         """
-        return add(self.on(_opened(log), progress or silent), effect)
+        tell = progress or silent
+        fit = self.on(_opened(log), tell)
+        tell(0, 1, f"step 1: adding {effect}")
+        return add(fit, effect)
 
     def against(self, other: Fit, progress: Progress | None = None) -> ModelComparison:
         """Hold another model that was fitted to the same log against this one.

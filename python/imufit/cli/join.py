@@ -38,7 +38,7 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
         return kind, names
 
 
-@click.command(short_help="A sensor's log and somebody else's reference, on two clocks, become one log.")
+@click.command()
 @click.argument("sensor", metavar="SENSOR", type=LOG)
 @click.argument("reference", metavar="REFERENCE", type=LOG)
 @reading_options

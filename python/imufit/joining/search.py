@@ -15,7 +15,6 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.signal import find_peaks
 
 from imufit.joining.course import Course
 
@@ -203,6 +202,8 @@ class LagSearch:
         Two of them never put the same sample of the reference beside the same one of the sensor: one of two such maxima
         is the foot of the other, seen with another skew.
         """
+        from scipy.signal import find_peaks  # noqa: PLC0415 - costs half a second that few logs need
+
         found: list[Candidate] = []
         for each in self._all():
             places, _ = find_peaks(np.concatenate(([-1.0], each.gain, [-1.0])))

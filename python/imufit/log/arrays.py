@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,9 @@ from imufit.log.place import Place
 from imufit.log.time_order import TimeScan
 from imufit.log.unmeasured import Unmeasured
 from imufit.log.words import meant
+
+if TYPE_CHECKING:
+    pass
 
 Array = NDArray[np.float64]
 

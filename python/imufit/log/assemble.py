@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from imufit.log.check import (
     check_poses,
@@ -165,6 +164,8 @@ def attitude_of_angles(
     known = np.isfinite(angles).all(axis=1)
     q = np.full((roll.size, 4), np.nan)
     if known.any():
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415 - costs a fifth of a second that many do not need
+
         q[known] = quaternions_from_rotation(Rotation.from_euler("ZYX", angles[known]))
     return q
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
 
 def rotation_from_quaternions(q: Array) -> Rotation:
     """Make rotations of (n, 4) quaternions, scalar first; rows of NaN become the identity."""
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - costs a fifth of a second that many do not need
+
     scalar_last = q[:, [1, 2, 3, 0]].copy()
     scalar_last[np.isnan(scalar_last).any(axis=1)] = [0.0, 0.0, 0.0, 1.0]
     return Rotation.from_quat(scalar_last)
