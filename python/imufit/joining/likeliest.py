@@ -83,7 +83,12 @@ class Likeliest:
     @property
     def unrelated(self) -> bool:
         """True if one of as many unrelated alignments agrees as well."""
-        return self._odds(self.best.traces.gain) < SURE + float(np.log(self.tried))
+        return self.odds < SURE + float(np.log(self.tried))
+
+    @property
+    def odds(self) -> float:
+        """Log of the likelihood ratio of "the rates are the same" over "they are unrelated"."""
+        return self._odds(self.best.traces.gain)
 
     def _odds(self, gain: float) -> float:
         return 0.5 * gain / self.independent

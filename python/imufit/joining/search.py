@@ -84,8 +84,7 @@ class Candidate:
     skew : float
         Rate of the reference's clock over the sensor's, less one.
     gain : float
-        Log of the likelihood ratio of "the rates are the same" over "they are unrelated", in units of one bin, and of
-        the skew's prior.
+        Log of the likelihood ratio of "the rates are the same" over "they are unrelated", and of the skew's prior.
     mount : (3, 3) array
         Turn from the reference body's axes to the sensor's.
     """
@@ -189,7 +188,9 @@ class LagSearch:
         agreed = largest_agreement(shared[:, usable]) if len(shared) == 9 else shared[0, usable]
         values = np.clip(agreed / np.sqrt(energy[0][usable] * energy[1][usable]), 0.0, 1.0 - 1e-9)
         gain = np.zeros(n + m - 1)
-        gain[usable] = -0.5 * common[usable] * np.log1p(-(values**2)) + skew_prior(skew)
+        # Of bins that depend on one another, as many count as are independent; only then a prior can stand beside them.
+        counted = common[usable] * self.step / self.independent
+        gain[usable] = -0.5 * counted * np.log1p(-(values**2)) + skew_prior(skew)
         return _Lags(skew, gain, shared)
 
     def at(self, lag: float) -> Candidate:
