@@ -182,6 +182,8 @@ class UserFunction:
         temperature, mean = arrays.pop("temperature"), arrays.pop("temperature_mean")
         columns, means = arrays.pop("columns"), arrays.pop("means")
         if temperature is not None:
+            # A log without a temperature has no mean; what an effect depends on is asked with made-up ones.
+            mean = mean if np.isfinite(mean) else 0.0
             columns, means = {TEMPERATURE: temperature + mean, **columns}, {TEMPERATURE: mean, **means}
         if self.memory > 0.0:
             # One gap of the reference would otherwise be carried on by whatever is summed up from the past.
