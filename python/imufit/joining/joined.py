@@ -10,17 +10,19 @@ from numpy.typing import NDArray
 
 from imufit.joining.mount import SMALL, words
 from imufit.log import Log
+from imufit.results.part import Part
+from imufit.results.plotted import Plotted
 from imufit.results.result import Result
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from imufit.figures.place import Drawing, Place
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class RateTrace:
+@dataclass(frozen=True, eq=False, repr=False)
+class RateTrace(Part):
     """Size of the mean angular rates of both recordings, without their means.
 
     Attributes
@@ -57,7 +59,7 @@ class RateTrace:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Joined(Result):
+class Joined(Plotted, Result):
     """Two recordings as one log.
 
     Attributes
@@ -146,8 +148,8 @@ class Joined(Result):
             "rows": self.log.n,
         }
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Draw the rates of both over each other, before and after."""
         from imufit.figures.joined_rates import joined_rates  # noqa: PLC0415
 
-        return joined_rates(self.traces, self.sentence)
+        return joined_rates(self.traces, self.sentence, ax)
