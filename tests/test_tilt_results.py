@@ -83,7 +83,7 @@ def lines(n: int = 40000):
 def test_long_lines_are_thinned_but_keep_their_extremes() -> None:
     t, angles = lines()
     angles["accel"][12345] = 7.0
-    (first, *_, last) = tilt_figure(t, np.sin(t), angles, angles).axes
+    (first, *_, last) = tilt_figure(t, np.sin(t), angles, angles).root.axes
     drawn = {line.get_label(): line for line in first.lines}
     x, y = drawn["accel"].get_data()
     assert len(x) < 5000
@@ -95,7 +95,7 @@ def test_long_lines_are_thinned_but_keep_their_extremes() -> None:
 
 def test_a_method_that_runs_away_leaves_the_picture_and_that_is_told() -> None:
     t, angles = lines()
-    (first, *_) = tilt_figure(t, np.sin(t), angles, angles).axes
+    (first, *_) = tilt_figure(t, np.sin(t), angles, angles).root.axes
     low, high = first.get_ylim()
     assert high < 20.0 < angles["gyro"].max()
     assert low < -1.0
@@ -106,7 +106,7 @@ def test_a_method_that_runs_away_leaves_the_picture_and_that_is_told() -> None:
 def test_the_noisiest_line_lies_beneath_and_the_reference_on_top() -> None:
     t, angles = lines(500)
     zoom = Zoom("A move", 1.0, 2.0, ((1.2, 1.5),))
-    figure = tilt_figure(t, np.sin(t), angles, angles, [zoom], angle="angle about x")
+    figure = tilt_figure(t, np.sin(t), angles, angles, [zoom], angle="angle about x").root
     first, second, _ = figure.axes
     assert first.lines[0].get_label() == "accel"
     top = max(first.lines, key=lambda line: line.get_zorder())
@@ -120,6 +120,6 @@ def test_the_noisiest_line_lies_beneath_and_the_reference_on_top() -> None:
 def test_methods_without_a_colour_of_their_own_get_different_ones() -> None:
     t, angles = lines(100)
     many = dict.fromkeys(("triad", "quest", "mahony", "hybrid", "mekf", *METHODS), angles["kalman"])
-    (first, _) = tilt_figure(t, np.sin(t), many, many).axes
+    (first, _) = tilt_figure(t, np.sin(t), many, many).root.axes
     colours = [line.get_color() for line in first.lines]
     assert len(set(colours)) == len(colours) == 10

@@ -24,6 +24,7 @@ from scipy.spatial.transform import Rotation
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.log.words import nearest
+from imufit.results.table import Table, html
 
 Array = NDArray[np.float64]
 
@@ -247,6 +248,15 @@ class AttitudeFilter:
         self._core = _imufit.Filter(self.name, **self._given)
         self._clock = _Clock()
         self.state = kept["state"]
+
+    def _repr_html_(self) -> str:
+        settings = _imufit.filter_descriptions()[self.name]["settings"]
+        values = {**{name: entry["default"] for name, entry in settings.items()}, **self._given["settings"]}
+        rows = tuple(
+            (name, f"{values[name]:g}", settings[name]["unit"], settings[name]["meaning"]) for name in settings
+        )
+        header = ("setting", ">value", "unit", "meaning")
+        return html([f"{self!r}: {_imufit.filter_descriptions()[self.name]['summary']}"], [Table("", header, rows)])
 
     def __repr__(self) -> str:
         changed = {**self._given["settings"], **self._given["rules"]}

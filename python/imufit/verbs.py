@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from imufit.diagnosing.ladder import ladder as ladder_from
 from imufit.errors import InputError
@@ -17,12 +17,14 @@ from imufit.model.user_function import Function
 from imufit.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
     from scipy.spatial.transform import Rotation
 
     from imufit.allan_deviation import Allan
     from imufit.calibrating import Calibration
+    from imufit.figures.place import Place
     from imufit.joining import Joined
     from imufit.replaying import Replay
     from imufit.results import Comparison, Diagnosis, Ladder, LogInfo, ModelComparison
@@ -294,21 +296,44 @@ def info(log: AnyLog, *, effects: bool = True, progress: Progress | None = None)
     return info(log_of(log), effects=effects, progress=progress)
 
 
-def plot(log: AnyLog, *, progress: Progress | None = None, **options: Any) -> Figure:
+@overload
+def plot(log: AnyLog, *, ax: None = None, progress: Progress | None = None, **options: Any) -> Figure: ...
+
+
+@overload
+def plot(log: AnyLog, *, ax: Place, progress: Progress | None = None, **options: Any) -> Axes | list[Axes]: ...
+
+
+def plot(
+    log: AnyLog, *, ax: Place | None = None, progress: Progress | None = None, **options: Any
+) -> Figure | Axes | list[Axes]:
     """Draw the readings of a log over time.
 
     Parameters
     ----------
     log : Log, str, Path, DataFrame or mapping of arrays
         Any log.
+    ax : Axes, sequence of Axes, Figure or SubFigure, optional
+        One Axes for each panel, or a Figure or SubFigure for all of them. One Axes in a grid gives its place to
+        several panels.
     progress : callable, optional
         Called with (rows done, rows in all, what is being done).
     **options
-        As for :func:`imufit.inspection.plot`: ``columns``, ``show``, ``rows``, ``begin``, ``end``.
-    """
-    from imufit.inspection import plot  # noqa: PLC0415  only needed here
+        As for :func:`imufit.inspection.drawing`: ``columns``, ``show``, ``rows``, ``begin``, ``end``.
 
-    return plot(log_of(log), progress=progress, **options)
+    Returns
+    -------
+    Figure, Axes or list of Axes
+        A new figure, which shows itself in a notebook; with `ax` the Axes that were drawn on.
+
+    Raises
+    ------
+    InputError
+        The log has nothing to draw, or `ax` has another number of Axes.
+    """
+    from imufit.inspection import drawing  # noqa: PLC0415  only needed here
+
+    return drawing(log_of(log), progress=progress, ax=ax, **options).result
 
 
 def join(log: AnyLog, reference: AnyLog, lag: float | None = None, skew: float | None = None) -> Joined:

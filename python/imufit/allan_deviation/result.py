@@ -14,11 +14,14 @@ from imufit.figures import quantity
 from imufit.log import Log
 from imufit.results import Table
 from imufit.results.json_value import json_value
+from imufit.results.part import Part
+from imufit.results.plotted import Plotted
 from imufit.results.result import Result
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from imufit.figures.place import Drawing, Place
 
 Array = NDArray[np.float64]
 
@@ -33,8 +36,8 @@ _LOWEST: Final = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
 """Deviation over bias instability where nothing else adds to it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Channel:
+@dataclass(frozen=True, eq=False, repr=False)
+class Channel(Part):
     """Allan deviation of one channel at k averaging times.
 
     Parameters
@@ -134,7 +137,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Allan(Result):
+class Allan(Plotted, Result):
     """Allan deviations of a log's sensors at rest.
 
     Parameters
@@ -287,11 +290,11 @@ class Allan(Result):
         ]
         return pd.concat(frames, ignore_index=True)
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Deviation over averaging time, one panel a sensor, with confidence band and fit."""
         from imufit.figures.allan import allan_figure  # noqa: PLC0415
 
-        return allan_figure(list(self.channels.values()))
+        return allan_figure(list(self.channels.values()), ax)
 
     def sentences(self) -> list[str]:
         """Return what the result says, the answer first."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,16 @@ from imufit.loop import SensorModel
 from imufit.rests.poses import Pose
 from imufit.results.json_value import json_value
 from imufit.results.parameter import by_effect, parameter_frame, parameter_table
+from imufit.results.part import Part
 from imufit.results.result import Result
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from imufit.figures.place import Place
     from imufit.log import Log
 
 Array = NDArray[np.float64]
@@ -67,8 +70,8 @@ def off_diagonal(matrix: Array) -> dict[str, float]:
     return {name: float(matrix[place]) for name, place in _OFF_DIAGONAL.items()}
 
 
-@dataclass(frozen=True)
-class SensorCalibration:
+@dataclass(frozen=True, repr=False)
+class SensorCalibration(Part):
     """The correction of one sensor, ``corrected = C K reading + b`` (paper A, eq. 2).
 
     Attributes
@@ -354,13 +357,26 @@ class Calibration(Result):
         """One row per parameter of the sensor model."""
         return parameter_frame(self.model.listed())
 
-    def plot(self, logs: Log | list[Log] | None = None) -> Figure:
+    @overload
+    def plot(self, logs: Log | list[Log] | None = None, *, ax: None = None) -> Figure: ...
+
+    @overload
+    def plot(self, logs: Log | list[Log] | None = None, *, ax: Place) -> Axes | list[Axes]: ...
+
+    def plot(self, logs: Log | list[Log] | None = None, *, ax: Place | None = None) -> Figure | Axes | list[Axes]:
         """Draw the poses: readings with the poses found, and the error of each pose before and after.
 
         Parameters
         ----------
         logs : Log or list of Log, optional
             The logs, to draw the readings too.
+        ax : Axes, sequence of Axes, Figure or SubFigure, optional
+            As for the ``plot`` of any result.
+
+        Returns
+        -------
+        Figure, Axes or list of Axes
+            A new figure, which shows itself in a notebook; with `ax` the Axes that were drawn on.
 
         Raises
         ------
@@ -390,7 +406,8 @@ class Calibration(Result):
             [] if "acc" not in self.sensors else self.sensors["acc"].residuals.tolist(),
             self.gravity,
             float(self.sensors["mag"].extras["field"]) if "mag" in self.sensors else None,
-        )
+            ax,
+        ).result
 
     def sentences(self) -> list[str]:
         """Return what the result says, the answer first."""

@@ -123,9 +123,9 @@ def info(log: Any, effects: bool, progress: Progress) -> LogInfo:
 
 def plot(log: Any, progress: Progress, **options: Any) -> Figure:
     """Return a figure of the readings of a log over time."""
-    from imufit.inspection import plot  # noqa: PLC0415
+    from imufit.inspection import drawing  # noqa: PLC0415
 
-    return plot(log, progress=progress, **options)
+    return drawing(log, progress=progress, **options).root
 
 
 def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:

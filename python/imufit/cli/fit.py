@@ -44,7 +44,7 @@ def fit(
     """Fit the parameters of the given effects to LOG, or to several LOGs of one sensor together."""
     from imufit.figures import quantity  # noqa: PLC0415
     from imufit.results.log_parameters import log_table  # noqa: PLC0415
-    from imufit.results.parameter import parameter_table, plot_parameters  # noqa: PLC0415
+    from imufit.results.parameter import drawn_parameters, parameter_table  # noqa: PLC0415
 
     keep_inputs(logs, [output, json_file, plot_file])
     names = [name.strip() for text in effects for name in text.split(",") if name.strip()]
@@ -65,4 +65,4 @@ def fit(
         out.wrote(output)
     out.json(fitted.to_dict())
     if plot_file is not None:
-        out.plot(plot_file, plot_parameters(fitted.parameters))
+        out.plot(plot_file, drawn_parameters(fitted.parameters).root)

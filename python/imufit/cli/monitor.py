@@ -117,7 +117,7 @@ def _figure(kept: list[tuple[float, dict[str, Any]]]) -> Figure:
     names = list(dict.fromkeys(name for _, angles in kept for name in angles))
     unknown = np.full(3, np.nan)
     series = {name: np.array([angles.get(name, unknown) for _, angles in kept]) for name in names}
-    return angle_panels(np.array([t for t, _ in kept]), series)
+    return angle_panels(np.array([t for t, _ in kept]), series).root
 
 
 class _Lines:

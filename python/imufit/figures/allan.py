@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.figures import quantity, style
+from imufit.figures import place, quantity, style
 from imufit.log.columns import SENSOR_NAMES
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class ChannelLike(Protocol):
@@ -46,23 +43,24 @@ class ChannelLike(Protocol):
         """(k,) deviations of the fit."""
 
 
-def allan_figure(channels: Sequence[ChannelLike]) -> Figure:
+def allan_figure(channels: Sequence[ChannelLike], ax: place.Place | None = None) -> place.Drawing:
     """Deviation with its confidence band and the fit, axes logarithmic.
 
     Parameters
     ----------
     channels : sequence of ChannelLike
         One per curve.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         One panel a sensor.
     """
     sensors = list(dict.fromkeys(channel.name.split("_")[0] for channel in channels))
-    figure = style.new_figure(max(5.2, 4.2 * len(sensors)), 3.8)
-    grid = figure.subplots(1, len(sensors), squeeze=False)[0]
-    for axes, sensor in zip(grid, sensors, strict=True):
+    drawing = place.panels(ax, (max(5.2, 4.2 * len(sensors)), 3.8), [list(range(len(sensors)))])
+    for axes, sensor in zip(drawing.axes, sensors, strict=True):
         shown = ""
         for channel in (each for each in channels if each.name.startswith(f"{sensor}_")):
             axis = channel.name.rpartition("_")[2]
@@ -80,4 +78,4 @@ def allan_figure(channels: Sequence[ChannelLike]) -> Figure:
         axes.set_xlabel("averaging time, s", fontsize=9)
         axes.set_ylabel(f"Allan deviation, {shown}", fontsize=9)
         style.tidy(axes)
-    return figure
+    return drawing

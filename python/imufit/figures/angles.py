@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.figures.style import BLUE, GREEN, GREY, INK, ORANGE, SKY, VERMILION, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from imufit.figures import place
+from imufit.figures.style import BLUE, GREEN, GREY, INK, ORANGE, SKY, VERMILION
 
 Array = NDArray[np.float64]
 
@@ -20,7 +18,7 @@ MOST_POINTS: Final = 20_000
 """Points that are drawn of a line: ten for each pixel of a figure of 2000 pixels."""
 
 
-def angle_panels(t: Array, angles: Mapping[str, Array]) -> Figure:
+def angle_panels(t: Array, angles: Mapping[str, Array], ax: place.Place | None = None) -> place.Drawing:
     """Draw a panel for each angle with a line for each filter.
 
     Parameters
@@ -29,9 +27,11 @@ def angle_panels(t: Array, angles: Mapping[str, Array]) -> Figure:
         Time, s.
     angles : mapping of (n, 3) arrays
         Roll, pitch and yaw by filter, rad.
+    ax : sequence of Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
     """
-    figure = new_figure(8.0, 6.0)
-    panels = figure.subplots(3, 1, sharex=True)
+    drawing = place.panels(ax, (8.0, 6.0), place.rows_of(3, 1), sharex=True)
+    panels = drawing.axes
     thin = slice(None, None, max(1, len(t) // MOST_POINTS))
     for k, name in enumerate(("roll", "pitch", "yaw")):
         for number, (label, values) in enumerate(angles.items()):
@@ -43,4 +43,4 @@ def angle_panels(t: Array, angles: Mapping[str, Array]) -> Figure:
         panels[k].set_ylabel(f"{name}, deg")
     panels[-1].set_xlabel("time, s")
     panels[0].legend(loc="upper right", ncols=min(len(angles), 5))
-    return figure
+    return drawing

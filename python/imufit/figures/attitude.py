@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.figures import style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from imufit.figures import place, style
 
 
 class BinsLike(Protocol):
@@ -42,7 +39,7 @@ class BinsLike(Protocol):
         """(k,) RMS error with the model applied, deg."""
 
 
-def attitude_panels(bins: Sequence[BinsLike], sentence: str) -> Figure:
+def attitude_panels(bins: Sequence[BinsLike], sentence: str, ax: place.Place | None = None) -> place.Drawing:
     """Small multiples: one row for heading and one for inclination, one column for each quantity.
 
     Parameters
@@ -51,17 +48,26 @@ def attitude_panels(bins: Sequence[BinsLike], sentence: str) -> Figure:
         In any order.
     sentence : str
         What the figure shows.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         Grey: readings as they are; blue: with the model's effects taken out.
     """
     if not bins:
-        return style.empty("There is no attitude error to show.")
+        return place.empty("There is no attitude error to show.", ax)
     parts = list(dict.fromkeys(item.part for item in bins))
     columns = list(dict.fromkeys(item.quantity for item in bins))
-    figure, grid = style.new_grid(len(parts), len(columns), 2.6, 2.4)
+    count = len(parts) * len(columns)
+    drawing = place.panels(
+        ax,
+        (2.6 * len(columns), 2.4 * len(parts)),
+        place.rows_of(count, len(columns)),
+        grid=lambda: style.new_grid(len(parts), len(columns), 2.6, 2.4),
+    )
+    grid = drawing.axes
     drawn = {(item.part, item.quantity): item for item in bins}
     changed = any(not np.array_equal(item.before, item.after, equal_nan=True) for item in bins)
     for i, part in enumerate(parts):
@@ -83,5 +89,5 @@ def attitude_panels(bins: Sequence[BinsLike], sentence: str) -> Figure:
             axes.set_ylabel(f"{part}, deg RMS", fontsize=8)
     if changed:
         grid[0].legend(frameon=False, fontsize=8)
-    figure.suptitle(sentence.split(". ", maxsplit=1)[0], x=0.01, ha="left", fontsize=11, color=style.INK)
-    return figure
+    drawing.headline(sentence.split(". ", maxsplit=1)[0])
+    return drawing

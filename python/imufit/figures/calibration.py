@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.figures.style import AXES, BLUE, GREY, INK, PALE, SKY, VERMILION, new_figure, tidy, title
+from imufit.figures.place import Drawing, Place, panels
+from imufit.figures.style import AXES, BLUE, GREY, INK, PALE, SKY, VERMILION, tidy, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Readings = tuple[Array, Array | None, Array | None]
@@ -29,7 +29,8 @@ def calibration_figure(
     residuals: Sequence[float],
     gravity: float,
     field: float | None,
-) -> Figure:
+    ax: Place | None = None,
+) -> Drawing:
     """Draw what a calibration saw and what it left.
 
     Parameters
@@ -46,31 +47,29 @@ def calibration_figure(
         m/s^2.
     field : float or None
         Length of the field, uT, where a magnetometer was calibrated.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
     """
     with_poses = [index for index, (_, acc, _) in enumerate(logs) if acc is not None][:3] if poses else []
     rows = len(with_poses) + (1 if poses else 0) + (1 if field is not None else 0)
-    figure = new_figure(10.0, 1.0 + 2.6 * max(rows, 1))
-    grid = figure.add_gridspec(max(rows, 1), 1)
-    place = 0
+    drawing = panels(ax, (10.0, 1.0 + 2.6 * max(rows, 1)), [[row] for row in range(max(rows, 1))])
+    free = iter(drawing.axes)
     for index in with_poses:
-        axes = figure.add_subplot(grid[place, 0])
         _intervals(
-            axes,
+            next(free),
             logs[index],
             [pose for pose in poses if pose[0] == index],
             f"log {index + 1}: " if len(logs) > 1 else "",
         )
-        place += 1
     if poses:
-        _errors(figure.add_subplot(grid[place, 0]), poses, residuals, gravity)
-        place += 1
+        _errors(next(free), poses, residuals, gravity)
     if field is not None:
-        _field(figure.add_subplot(grid[place, 0]), logs, corrections["mag"], field)
-    return figure
+        _field(next(free), logs, corrections["mag"], field)
+    return drawing
 
 
 def _intervals(axes: Axes, readings: Readings, poses: Sequence[PoseMark], prefix: str) -> None:

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from imufit.figures import quantity, style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from imufit.figures import place, quantity, style
 
 _COLOURS = {"passed": style.BLUE, "not significant": style.GREY, "not testable here": style.PALE}
 
@@ -25,7 +21,8 @@ def candidate_bars(
     status: Sequence[str],
     sentence: str = "",
     limit: int = 12,
-) -> Figure:
+    ax: place.Place | None = None,
+) -> place.Drawing:
     """Bars from the held-out error now to the one expected with each effect.
 
     Parameters
@@ -42,23 +39,25 @@ def candidate_bars(
         Title; without it what the best candidate promises.
     limit : int
         Draw at most so many.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         The dashed line is the error now, the solid one the noise floor.
     """
     before, after, error = (np.asarray(values, dtype=float) for values in (before, after, error))
     drawn = [index for index in range(len(effects)) if np.isfinite(before[index]) and np.isfinite(after[index])][:limit]
     if not drawn:
-        return style.empty("No effect of the catalogue can be tested in this log.")
-    figure = style.new_figure(10.0, 1.5 + 0.34 * len(drawn))
-    axes = figure.subplots()
+        return place.empty("No effect of the catalogue can be tested in this log.", ax)
+    drawing = place.panels(ax, (10.0, 1.5 + 0.34 * len(drawn)))
+    axes = drawing.axes[0]
     places = np.arange(len(drawn))
-    for place, index in zip(places, drawn, strict=True):
+    for at, index in zip(places, drawn, strict=True):
         passed = status[index] == "passed"
         axes.barh(
-            place,
+            at,
             before[index] - after[index],
             left=after[index],
             height=0.62,
@@ -66,10 +65,10 @@ def candidate_bars(
             zorder=2,
         )
         if np.isfinite(error[index]):
-            axes.errorbar(after[index], place, xerr=error[index], color=style.INK, capsize=2.5, linewidth=1.0, zorder=3)
+            axes.errorbar(after[index], at, xerr=error[index], color=style.INK, capsize=2.5, linewidth=1.0, zorder=3)
         axes.annotate(
             f"{quantity.ratio(before[index])} → {quantity.ratio(after[index])}",
-            (1.01, place),
+            (1.01, at),
             xycoords=axes.get_yaxis_transform(),
             annotation_clip=False,
             va="center",
@@ -90,7 +89,7 @@ def candidate_bars(
     best = drawn[0]
     style.title(axes, sentence or _promise(effects[best], before[best], after[best], status[best]))
     style.tidy(axes)
-    return figure
+    return drawing
 
 
 def _promise(effect: str, before: float, after: float, status: str) -> str:

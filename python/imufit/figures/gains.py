@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.figures import style
+from imufit.figures import place, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 class MapLike(Protocol):
@@ -59,7 +58,13 @@ class GainLike(Protocol):
         """(k,) values, deg."""
 
 
-def gain_figure(over: MapLike | None, gains: Sequence[GainLike], rival: tuple[str, float] | None, label: str) -> Figure:
+def gain_figure(
+    over: MapLike | None,
+    gains: Sequence[GainLike],
+    rival: tuple[str, float] | None,
+    label: str,
+    ax: place.Place | None = None,
+) -> place.Drawing:
     """Draw the map, if there is one, and the value over each gain alone.
 
     Parameters
@@ -72,27 +77,28 @@ def gain_figure(over: MapLike | None, gains: Sequence[GainLike], rival: tuple[st
         Another filter's name and value, deg.
     label : str
         What the value is.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         One or two panels.
     """
     panels = 1 if over is None else 2
-    figure = style.new_figure(5.0 * panels, 3.8)
-    grid = list(figure.subplots(1, panels, squeeze=False)[0])
+    drawing = place.panels(ax, (5.0 * panels, 3.8), [list(range(panels))])
     if over is not None:
-        _map(figure, grid[0], over, gains, rival, label)
-    _lines(grid[-1], gains, rival, label)
-    return figure
+        _map(drawing.axes[0], over, gains, rival, label)
+    _lines(drawing.axes[-1], gains, rival, label)
+    return drawing
 
 
-def _map(
-    figure: Figure, axes: Axes, over: MapLike, gains: Sequence[GainLike], rival: tuple[str, float] | None, label: str
-) -> None:
+def _map(axes: Axes, over: MapLike, gains: Sequence[GainLike], rival: tuple[str, float] | None, label: str) -> None:
     """Draw the logarithm of the value as colours, tuned gains and defaults as marks, the rival's value as a line."""
     values = np.where(np.isfinite(over.values) & (over.values > 0.0), over.values, np.nan)
     drawn = axes.pcolormesh(over.x, over.y, np.log10(values), cmap="cividis", shading="nearest", rasterized=True)
+    figure = axes.get_figure()
+    assert figure is not None
     bar = figure.colorbar(drawn, ax=axes)
     bar.ax.yaxis.set_major_formatter(lambda value, _: f"{10.0**value:.3g}")
     bar.set_label(label, fontsize=9)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.figures import style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from imufit.figures import place, style
 
 Array = NDArray[np.float64]
 
@@ -51,7 +48,7 @@ CLOSE = 10.0
 """Length of the close view, s."""
 
 
-def joined_rates(trace: TraceLike, sentence: str) -> Figure:
+def joined_rates(trace: TraceLike, sentence: str, ax: place.Place | None = None) -> place.Drawing:
     """Draw the rates on the clocks as recorded, on one clock, and ten seconds of these.
 
     Parameters
@@ -60,14 +57,16 @@ def joined_rates(trace: TraceLike, sentence: str) -> Figure:
         Rates of both.
     sentence : str
         Title of the figure.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         Three panels below one another.
     """
-    figure = style.new_figure(10.0, 6.6)
-    before, after, close = figure.subplots(3, 1)
+    drawing = place.panels(ax, (10.0, 6.6), [[0], [1], [2]])
+    before, after, close = drawing.axes
     views = (
         (
             before,
@@ -91,8 +90,8 @@ def joined_rates(trace: TraceLike, sentence: str) -> Figure:
     close.set_xlim(*_liveliest(trace))
     close.set_xlabel("time, s", fontsize=9)
     before.legend(frameon=False, fontsize=8, ncols=2, loc="upper right")
-    figure.suptitle(sentence, x=0.01, ha="left", fontsize=12, color=style.INK)
-    return figure
+    drawing.headline(sentence, 12.0)
+    return drawing
 
 
 def _liveliest(trace: TraceLike) -> tuple[float, float]:

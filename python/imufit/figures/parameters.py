@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from imufit.figures import quantity, style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from imufit.figures import place, quantity, style
 
 
 def parameter_sizes(
@@ -20,7 +16,8 @@ def parameter_sizes(
     standard_errors: ArrayLike,
     typical: ArrayLike,
     units: Sequence[str],
-) -> Figure:
+    ax: place.Place | None = None,
+) -> place.Drawing:
     """Each parameter over its typical size, with a 95 % interval.
 
     Parameters
@@ -33,21 +30,23 @@ def parameter_sizes(
         (k,) typical sizes, same units; rows with NaN are not drawn.
     units : sequence of str
         (k,) SI units.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         Within the shaded band a parameter is of ordinary size.
     """
     values, errors, typical = (np.asarray(part, dtype=float) for part in (values, standard_errors, typical))
     usable = np.isfinite(values) & np.isfinite(typical) & (typical != 0.0)
     drawn = [index for index in range(len(labels)) if usable[index]]
     if not drawn:
-        return style.empty("No typical size is known for these parameters.")
+        return place.empty("No typical size is known for these parameters.", ax)
     scaled = values[drawn] / np.abs(typical[drawn])
     margin = np.nan_to_num(1.96 * errors[drawn] / np.abs(typical[drawn]))
-    figure = style.new_figure(10.0, 1.5 + 0.32 * len(drawn))
-    axes = figure.subplots()
+    drawing = place.panels(ax, (10.0, 1.5 + 0.32 * len(drawn)))
+    axes = drawing.axes[0]
     places = np.arange(len(drawn))
     axes.axvspan(-1.0, 1.0, color=style.PALE, zorder=0)
     axes.axvline(0.0, color=style.GREY, linewidth=0.8)
@@ -63,10 +62,10 @@ def parameter_sizes(
         axes.set_xlim(-1.6 * reach, 1.6 * reach)
     else:
         axes.set_xlim(-1.1 * max(reach, 1.2), 1.1 * max(reach, 1.2))
-    for place, index in zip(places, drawn, strict=True):
+    for at, index in zip(places, drawn, strict=True):
         axes.annotate(
             quantity.with_error(values[index], errors[index], units[index]),
-            (1.01, place),
+            (1.01, at),
             xycoords=axes.get_yaxis_transform(),
             va="center",
             fontsize=9,
@@ -84,4 +83,4 @@ def parameter_sizes(
         sentence = f"{labels[largest]} is {quantity.number(float(np.abs(scaled).max()), 2)} times its typical size"
     style.title(axes, sentence)
     style.tidy(axes)
-    return figure
+    return drawing

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from imufit.figures import style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from imufit.figures import place, style
 
 FloatArray = NDArray[np.float64]
 
 
-def power(sizes: ArrayLike, curves: Mapping[str, Mapping[str, FloatArray]]) -> Figure:
+def power(
+    sizes: ArrayLike, curves: Mapping[str, Mapping[str, FloatArray]], ax: place.Place | None = None
+) -> place.Drawing:
     """Draw how often an effect is named, against its size.
 
     Parameters
@@ -26,15 +24,17 @@ def power(sizes: ArrayLike, curves: Mapping[str, Mapping[str, FloatArray]]) -> F
     curves : mapping
         For each kind of noise ``named`` (alone or among rivals) and ``alone``: (k, 3) share, lower and upper end of
         its 95 % interval.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         Full lines: named, alone or among rivals, with the interval as a band. Dashed: named alone.
     """
     sizes = np.asarray(sizes, dtype=float)
-    figure = style.new_figure(7.6, 4.4)
-    axes = figure.subplots()
+    drawing = place.panels(ax, (7.6, 4.4))
+    axes = drawing.axes[0]
     for (name, curve), colour in zip(curves.items(), (style.BLUE, style.VERMILION), strict=False):
         share, low, high = 100.0 * np.asarray(curve["named"]).T
         axes.fill_between(sizes, low, high, color=colour, alpha=0.15, linewidth=0)
@@ -48,5 +48,5 @@ def power(sizes: ArrayLike, curves: Mapping[str, Mapping[str, FloatArray]]) -> F
     axes.set_xlabel("root mean square of the hidden effect over the noise of its sensor", fontsize=9)
     axes.set_ylabel("share of logs, %", fontsize=9)
     axes.axhline(95.0, color=style.GREY, linewidth=0.8, zorder=0)
-    figure.legend(frameon=False, fontsize=9, loc="outside lower center", ncols=2)
-    return figure
+    drawing.legend(loc="outside lower center", ncols=2)
+    return drawing

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.figures import style
+from imufit.figures import place, style
 from imufit.printable import NAME, printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -53,8 +52,12 @@ class PanelLines:
 
 
 def readings_figure(
-    panels: Sequence[PanelLines], rests: Sequence[tuple[float, float]], extent: tuple[float, float], name: str
-) -> Figure:
+    panels: Sequence[PanelLines],
+    rests: Sequence[tuple[float, float]],
+    extent: tuple[float, float],
+    name: str,
+    ax: place.Place | None = None,
+) -> place.Drawing:
     """Draw readings over time.
 
     Parameters
@@ -67,24 +70,27 @@ def readings_figure(
         Begin and end of the time axis, s.
     name : str
         Title.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         Panels below one another with one axis of time.
     """
-    figure = style.new_figure(10.0, 0.9 + 1.9 * len(panels))
-    grid = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, panel in zip(grid, panels, strict=True):
+    size = 10.0, 0.9 + 1.9 * len(panels)
+    drawing = place.panels(ax, size, [[k] for k in range(len(panels))], sharex=True)
+    for axes, panel in zip(drawing.axes, panels, strict=True):
         _panel(axes, panel)
         for begin, end in rests:
             axes.axvspan(begin, end, color=style.PALE, alpha=0.6, linewidth=0.0, zorder=0)
-    grid[-1].set_xlabel("time, s", fontsize=9)
+    drawing.axes[-1].set_xlabel("time, s", fontsize=9)
     if extent[1] > extent[0]:
-        grid[-1].set_xlim(*extent)
+        for axes in drawing.axes:
+            axes.set_xlim(*extent)
     shaded = "; rests are shaded" if rests else ""
-    figure.suptitle(f"{printable(name, NAME)}{shaded}", x=0.01, ha="left", fontsize=11, color=style.INK)
-    return figure
+    drawing.headline(f"{printable(name, NAME)}{shaded}")
+    return drawing
 
 
 def _panel(axes: Axes, panel: PanelLines) -> None:

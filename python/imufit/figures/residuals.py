@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.figures import quantity, style
+from imufit.figures import place, quantity, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,7 +60,9 @@ def worst_first(panels: Sequence[PanelLike]) -> list[PanelLike]:
     return sorted(panels, key=lambda panel: -panel.share if np.isfinite(panel.share) else np.inf)
 
 
-def residual_panels(panels: Sequence[PanelLike], limit: int = 12, columns: int = 4) -> Figure:
+def residual_panels(
+    panels: Sequence[PanelLike], limit: int = 12, columns: int = 4, ax: place.Place | None = None
+) -> place.Drawing:
     """Small multiples of the residual against the covariates.
 
     Parameters
@@ -71,22 +73,29 @@ def residual_panels(panels: Sequence[PanelLike], limit: int = 12, columns: int =
         Draw at most so many, worst first.
     columns : int
         Panels side by side.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         One small axes per pair; the grey band is plus and minus the noise of one sample.
     """
     chosen = worst_first(panels)[:limit]
     if not chosen:
-        return style.empty("There is no residual to show against a covariate.")
+        return place.empty("There is no residual to show against a covariate.", ax)
     columns = min(columns, len(chosen))
     rows = -(-len(chosen) // columns)
-    figure, grid = style.new_grid(rows, columns, max(4.2, 10.4 * columns / 4) / columns, 2.45)
-    for axes, panel in zip(grid, chosen, strict=False):
+
+    def grid() -> tuple[Figure, list[Axes]]:
+        figure, made = style.new_grid(rows, columns, max(4.2, 10.4 * columns / 4) / columns, 2.45)
+        for axes in made[len(chosen) :]:
+            axes.set_visible(False)
+        return figure, made
+
+    drawing = place.panels(ax, (10.4, 2.45 * rows), place.rows_of(len(chosen), columns), grid=grid)
+    for axes, panel in zip(drawing.axes, chosen, strict=True):
         _panel(axes, panel)
-    for axes in grid[len(chosen) :]:
-        axes.set_visible(False)
     worst = chosen[0]
     if np.isfinite(worst.share) and worst.share >= 0.05:
         sentence = (
@@ -96,8 +105,8 @@ def residual_panels(panels: Sequence[PanelLike], limit: int = 12, columns: int =
     else:
         sentence = "No covariate explains a visible part of the residual"
     if columns > 1:
-        figure.suptitle(sentence, x=0.01, ha="left", fontsize=12, color=style.INK)
-    return figure
+        drawing.headline(sentence, 12.0)
+    return drawing
 
 
 def _claim(panel: PanelLike) -> str:

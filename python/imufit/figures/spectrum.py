@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.figures import quantity, style
+from imufit.figures import place, quantity, style
 from imufit.log.columns import SENSOR_NAMES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 class SpectrumLike(Protocol):
@@ -36,28 +35,29 @@ class SpectrumLike(Protocol):
         """Density of the noise floor, same unit."""
 
 
-def residual_spectra(spectra: Sequence[SpectrumLike]) -> Figure:
+def residual_spectra(spectra: Sequence[SpectrumLike], ax: place.Place | None = None) -> place.Drawing:
     """Density of each channel's residual over that of its noise floor.
 
     Parameters
     ----------
     spectra : sequence of SpectrumLike
         One per channel.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         Both axes logarithmic; 1 is the noise floor.
     """
     sensors = list(dict.fromkeys(spectrum.channel.split("_")[0] for spectrum in spectra))
     if not sensors:
-        return style.empty("The log is too short for a spectrum of the residual.")
-    figure = style.new_figure(max(5.2, 4.2 * len(sensors)), 3.4)
-    grid = figure.subplots(1, len(sensors), squeeze=False, sharey=True)[0]
-    for axes, sensor in zip(grid, sensors, strict=True):
+        return place.empty("The log is too short for a spectrum of the residual.", ax)
+    drawing = place.panels(ax, (max(5.2, 4.2 * len(sensors)), 3.4), [list(range(len(sensors)))], sharey=True)
+    for axes, sensor in zip(drawing.axes, sensors, strict=True):
         _sensor(axes, sensor, [spectrum for spectrum in spectra if spectrum.channel.split("_")[0] == sensor])
-    grid[0].set_ylabel("residual density over noise floor", fontsize=9)
-    return figure
+    drawing.axes[0].set_ylabel("residual density over noise floor", fontsize=9)
+    return drawing
 
 
 def _sensor(axes: Axes, sensor: str, spectra: Sequence[SpectrumLike]) -> None:

@@ -126,10 +126,3 @@ def tidy(axes: Axes) -> None:
 def title(axes: Axes, sentence: str, size: float = 11.0) -> None:
     """Put a sentence above the axes, flush left."""
     axes.set_title(sentence, loc="left", fontsize=size, color=INK)
-
-
-def empty(sentence: str) -> Figure:
-    """Figure that says in words why there is nothing to draw."""
-    figure = new_figure(8.0, 1.2)
-    figure.text(0.5, 0.5, sentence, ha="center", va="center", fontsize=11, color=INK)
-    return figure

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.figures import quantity, style
+from imufit.figures import place, quantity, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -55,7 +54,8 @@ def tilt_figure(
     angle: str = "angle",
     error: str = "Error: estimate less reference",
     whole: Zoom | None = None,
-) -> Figure:
+    ax: place.Place | None = None,
+) -> place.Drawing:
     """Draw what each method makes of the tilt.
 
     Parameters
@@ -76,26 +76,28 @@ def tilt_figure(
         What the error is, for its title.
     whole : Zoom, optional
         What stands in the first panel instead of the whole log.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
     """
     rows = 3 if zooms else 2
-    figure = style.new_figure(10.0, 0.6 + 2.5 * rows)
-    grid = figure.add_gridspec(rows, max(1, len(zooms)))
+    below = [[1 + k for k in range(len(zooms))]] if zooms else []
+    columns = max(1, len(zooms))
+    mosaic = [[0] * columns, *below, [1 + len(zooms)] * columns]
+    drawing = place.panels(ax, (10.0, 0.6 + 2.5 * rows), mosaic)
     colours = _colours(angles)
 
     lines = {**angles, "reference": reference}
-    first = figure.add_subplot(grid[0, :])
+    first, last = drawing.axes[0], drawing.axes[-1]
     _zoomed(first, t, lines, colours, whole or Zoom("The whole log", float(t[0]), float(t[-1])))
     first.set_ylabel(f"{angle}, deg", fontsize=9)
-    for place, zoom in enumerate(zooms):
-        axes = figure.add_subplot(grid[1, place])
+    for axes, zoom in zip(drawing.axes[1:-1], zooms, strict=True):
         _zoomed(axes, t, lines, colours, zoom)
-        if place == 0:
+        if zoom is zooms[0]:
             axes.set_ylabel(f"{angle}, deg", fontsize=9)
-    last = figure.add_subplot(grid[-1, :])
     last.axhline(0.0, color=style.INK, linewidth=1.0, linestyle="--", zorder=4)
     _lines(last, t, errors, colours)
     style.title(last, error)
@@ -104,10 +106,10 @@ def tilt_figure(
     named = dict(zip(*reversed(first.get_legend_handles_labels()), strict=True))
     labels = list(lines)
     handles = [named[name] for name in labels]
-    legend = figure.legend(handles, labels, loc="outside upper right", ncols=len(labels), frameon=False, fontsize=9)
+    legend = drawing.legend(handles, labels, loc="outside upper right", ncols=len(labels))
     for line in legend.get_lines():
         line.set_linewidth(2.2)
-    return figure
+    return drawing
 
 
 def _zoomed(axes: Axes, t: Array, lines: Mapping[str, Array], colours: Mapping[str, str], zoom: Zoom) -> None:
@@ -151,10 +153,10 @@ def _lines(axes: Axes, t: Array, lines: Mapping[str, Array], colours: Mapping[st
         and (np.nanmax(values) > limits[1] or np.nanmin(values) < limits[0])
         and _outside(values, limits) > 0.001
     ]
-    for place, text in enumerate(gone):
+    for line, text in enumerate(gone):
         axes.text(
             0.99,
-            0.03 + 0.09 * place,
+            0.03 + 0.09 * line,
             text,
             transform=axes.transAxes,
             ha="right",

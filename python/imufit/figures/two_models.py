@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from imufit.figures import style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from imufit.figures import place, style
 
 
-def residuals_of_two(rows: Sequence[tuple[str, float, float]], first: str, second: str) -> Figure:
+def residuals_of_two(
+    rows: Sequence[tuple[str, float, float]], first: str, second: str, ax: place.Place | None = None
+) -> place.Drawing:
     """Draw the residual of each channel with two models as pairs of points on a line.
 
     Parameters
@@ -22,16 +20,18 @@ def residuals_of_two(rows: Sequence[tuple[str, float, float]], first: str, secon
         Channel, and residual RMS over noise floor with the first and with the second model.
     first, second : str
         Names of the models; empty is the ideal sensor.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         Logarithmic where the residuals span more than a decade.
     """
     if not rows:
-        return style.empty("The two models have no channel in common.")
-    figure = style.new_figure(8.0, 1.6 + 0.35 * len(rows))
-    axes = figure.subplots()
+        return place.empty("The two models have no channel in common.", ax)
+    drawing = place.panels(ax, (8.0, 1.6 + 0.35 * len(rows)))
+    axes = drawing.axes[0]
     places = np.arange(len(rows))
     before = np.array([row[1] for row in rows])
     after = np.array([row[2] for row in rows])
@@ -47,4 +47,4 @@ def residuals_of_two(rows: Sequence[tuple[str, float, float]], first: str, secon
     axes.legend(loc="lower right", fontsize=9)
     style.title(axes, "Residual with either model")
     style.tidy(axes)
-    return figure
+    return drawing

@@ -9,11 +9,10 @@ import numpy as np
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
-from imufit.figures import quantity, style
+from imufit.figures import place, quantity, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
 _LOGARITHMIC_ABOVE = 8.0
@@ -27,7 +26,8 @@ def waterfall(
     after: ArrayLike,
     training: ArrayLike,
     start: float,
-) -> Figure:
+    ax: place.Place | None = None,
+) -> place.Drawing:
     """Held-out error before and after each added effect.
 
     Parameters
@@ -39,18 +39,20 @@ def waterfall(
         training data after it.
     start : float
         Residual over noise floor of the first model.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Returns
     -------
-    Figure
+    Drawing
         The axis is logarithmic where the whole fall is large.
     """
     before, expected, after, training = (np.asarray(part, dtype=float) for part in (before, expected, after, training))
     count = len(effects)
     end = float(after[-1]) if count else start
     places = np.arange(count + 1)
-    figure = style.new_figure(min(max(7.0, 2.6 + 1.15 * count), 13.0), 4.6)
-    axes = figure.subplots()
+    drawing = place.panels(ax, (min(max(7.0, 2.6 + 1.15 * count), 13.0), 4.6))
+    axes = drawing.axes[0]
     everything = np.concatenate([[start, 1.0], before, after, expected, training])
     everything = everything[np.isfinite(everything) & (everything > 0.0)]
     logarithmic = start / max(float(everything.min()), 1e-9) > _LOGARITHMIC_ABOVE
@@ -75,8 +77,8 @@ def waterfall(
                 zorder=2,
             )
         levels = np.concatenate([[start], after])
-        for place in range(count):
-            axes.plot([place + 0.31, place + 0.69], [levels[place]] * 2, color=style.GREY, linewidth=0.9, zorder=1)
+        for step in range(count):
+            axes.plot([step + 0.31, step + 0.69], [levels[step]] * 2, color=style.GREY, linewidth=0.9, zorder=1)
         axes.plot(
             places[1:],
             expected,
@@ -113,7 +115,7 @@ def waterfall(
     edge = 0.6 if count else 1.6
     axes.set_xlim(-edge, count + edge)
     axes.set_ylabel("held-out error over noise floor", fontsize=9)
-    figure.legend(frameon=False, fontsize=9, loc="outside lower center", ncols=3)
+    drawing.legend(loc="outside lower center", ncols=3)
     if count:
         effect_word = "effect takes" if count == 1 else "effects take"
         sentence = (
@@ -124,15 +126,15 @@ def waterfall(
         sentence = f"No effect was added: the held-out error stays at {quantity.ratio(start)} times the noise floor"
     style.title(axes, sentence, 12.0)
     style.tidy(axes)
-    return figure
+    return drawing
 
 
 def _values(axes: Axes, places: NDArray[np.integer], upper: FloatArray, lower: FloatArray) -> None:
     """Write each level above its bar."""
-    for place, high, low in zip(places, upper, lower, strict=True):
+    for at, high, low in zip(places, upper, lower, strict=True):
         axes.annotate(
-            f"→ {quantity.ratio(float(low))}" if place else quantity.ratio(float(low)),
-            (place, max(high, low)),
+            f"→ {quantity.ratio(float(low))}" if at else quantity.ratio(float(low)),
+            (at, max(high, low)),
             xytext=(0, 4),
             textcoords="offset points",
             ha="center",

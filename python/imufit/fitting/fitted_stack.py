@@ -20,18 +20,21 @@ from imufit.model.effect_stack import EffectStack
 from imufit.progress import Progress, silent
 from imufit.results import LogParameters, Parameter, Params
 from imufit.results.log_parameters import logs_json
-from imufit.results.parameter import by_effect, parameter_frame, parameter_table, plot_parameters
+from imufit.results.parameter import by_effect, drawn_parameters, parameter_frame, parameter_table
+from imufit.results.plotted import Plotted
+from imufit.results.result import Result
+from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
+    from imufit.figures.place import Drawing, Place
     from imufit.log import Log, LogSource
 
 Array = NDArray[np.float64]
 
 
-class FittedStack:
+class FittedStack(Plotted, Result):
     """A stack of effects fitted to a log, or to several of one sensor, with the evidence for further questions.
 
     Attributes
@@ -319,15 +322,20 @@ class FittedStack:
         """One row per parameter."""
         return parameter_frame(self.parameters)
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Draw the parameters beside their typical sizes."""
         if not self.parameters:
             raise InputError("the ideal sensor has no parameters to draw", remedy="Fit at least one effect.")
-        return plot_parameters(self.parameters)
+        return drawn_parameters(self.parameters, ax)
 
-    def _repr_html_(self) -> str:
-        return parameter_table(self.parameters, str(self)).html()
-
-    def __repr__(self) -> str:
+    def sentences(self) -> list[str]:
+        """Return what the fit says: its effects, and how far its residual is above the noise floor."""
         stack = " + ".join(self.model.effects) or "the ideal sensor"
-        return f"{stack}: {self.ratio:.3f} times the noise floor (held out)"
+        return [f"{stack}: {self.ratio:.3f} times the noise floor (held out)"]
+
+    def tables(self) -> tuple[Table, ...]:
+        """Return the parameters."""
+        return (parameter_table(self.parameters),)
+
+    def __str__(self) -> str:
+        return self.sentences()[0]

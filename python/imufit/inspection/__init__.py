@@ -1,6 +1,6 @@
 """What is in a log and what it can show, in words and as a figure."""
 
 from imufit.inspection.info import info
-from imufit.inspection.plot import plot
+from imufit.inspection.plot import drawing
 
-__all__ = ["info", "plot"]
+__all__ = ["drawing", "info"]

@@ -23,7 +23,7 @@ from imufit.log.words import nearest
 from imufit.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from imufit.figures.place import Drawing, Place
 
 Array = NDArray[np.float64]
 Show = Literal["readings", "reference", "both"]
@@ -35,7 +35,7 @@ UNITS: Final = {"acc": ("m/s²", 1.0), "gyr": ("deg/s", 180.0 / np.pi), "mag": (
 """Unit of a panel, and the factor that leads there from SI."""
 
 
-def plot(
+def drawing(
     log: LogSource,
     *,
     columns: Sequence[str] = (),
@@ -44,7 +44,8 @@ def plot(
     begin: float | None = None,
     end: float | None = None,
     progress: Progress | None = None,
-) -> Figure:
+    ax: Place | None = None,
+) -> Drawing:
     """Draw the readings of a log over time.
 
     A panel for each sensor that is there; the attitude of the reference as roll, pitch and yaw, and the rates that
@@ -65,10 +66,13 @@ def plot(
         Only this stretch of time, s.
     progress : callable, optional
         Called with (rows done, rows in all, what is being done).
+    ax : Axes, sequence of Axes, Figure or SubFigure, optional
+        Where to draw: one Axes for one panel; of several panels one Axes each, or a Figure or SubFigure for all of
+        them. One Axes in a grid gives its place to several panels.
 
     Returns
     -------
-    matplotlib.figure.Figure
+    Drawing
 
     Raises
     ------
@@ -94,7 +98,7 @@ def plot(
     spans = rests_of(part).spans if judged_rows(part) is part else ()
     rests = [(max(a, low), min(b, high)) for a, b in spans if a < high and b > low]
     name = "log" if log.path is None else log.path.name
-    return readings_figure(panels, rests, (low, high), name)
+    return readings_figure(panels, rests, (low, high), name, ax)
 
 
 def _extent(log: LogSource, begin: float | None, end: float | None) -> tuple[float, float]:

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from imufit.joining.mount import OPEN, SMALL, axis_words, words
 from imufit.log import Log
+from imufit.results.part import Part
+from imufit.results.plotted import Plotted
 from imufit.results.result import Result
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from imufit.figures.place import Drawing, Place
 
 Array = NDArray[np.float64]
 
@@ -27,8 +29,8 @@ class Compared(Enum):
     FORCES = "the lengths of the specific force"
 
 
-@dataclass(frozen=True, eq=False)
-class RateTrace:
+@dataclass(frozen=True, eq=False, repr=False)
+class RateTrace(Part):
     """Size of what was compared of both recordings: mean angular rates without their means, or specific force.
 
     Attributes
@@ -78,7 +80,7 @@ class RateTrace:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Joined(Result):
+class Joined(Plotted, Result):
     """Two recordings as one log.
 
     Attributes
@@ -213,8 +215,8 @@ class Joined(Result):
             "rows": self.log.n,
         }
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Draw the rates of both over each other, before and after."""
         from imufit.figures.joined_rates import joined_rates  # noqa: PLC0415
 
-        return joined_rates(self.traces, self.sentence)
+        return joined_rates(self.traces, self.sentence, ax)

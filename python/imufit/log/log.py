@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any, Final, Protocol, Self, overload, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,12 +20,14 @@ from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_qua
 from imufit.log.size import BLOCK_ROWS
 from imufit.log.unit_check import Clock
 from imufit.log.writer import write_rows
+from imufit.printable import NAME, printable
 
 if TYPE_CHECKING:
     import pandas as pd
     import polars as pl
     import pyarrow as pa
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
     from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
@@ -35,6 +37,10 @@ _WIDTHS = {"t": 0, "acc": 3, "gyr": 3, "mag": 3, "temp": 0, "ref_q": 4, "ref_p":
 METADATA = "imufit"
 """Name under which the metadata stand with a table of pandas or Arrow."""
 HEAD_ROWS = 5
+HEAD_COLUMNS: Final = 20
+"""Columns of the table in a notebook: the names of the contract's columns of one log, seldom more."""
+LINE: Final = 200
+"""Characters of the columns that are named in one line of a shell."""
 """Rows that a notebook shows of a log: as many as pandas shows of a table by ``head``."""
 _SINGLE = ("temp", "ref_angle")
 _EMPTY: dict[str, Any] = {"covariates": {}, "labels": {}, "metadata": Metadata(), "notes": ()}
@@ -338,17 +344,27 @@ class Log:
         """Interchange protocol of data frames."""
         return self.to_arrow().__dataframe__(nan_as_null, allow_copy)
 
-    def plot(self, **options: Any) -> Figure:
+    @overload
+    def plot(self, ax: None = None, **options: Any) -> Figure: ...
+
+    @overload
+    def plot(self, ax: Axes | Sequence[Axes] | Figure | SubFigure, **options: Any) -> Axes | list[Axes]: ...
+
+    def plot(
+        self, ax: Axes | Sequence[Axes] | Figure | SubFigure | None = None, **options: Any
+    ) -> Figure | Axes | list[Axes]:
         """Draw the readings over time; the options are those of :func:`imufit.plot`.
 
         Parameters
         ----------
+        ax : Axes, sequence of Axes, Figure or SubFigure, optional
+            One Axes for each panel, or a Figure or SubFigure for all of them.
         **options
             ``columns``, ``show``, ``rows``, ``begin``, ``end``.
         """
         import imufit  # noqa: PLC0415  the figure is made by a layer above
 
-        return imufit.plot(self, **options)
+        return imufit.plot(self, ax=ax, **options)
 
     def write(self, path: str | Path) -> None:
         """Write the log; the suffix decides on Parquet, NPZ or CSV.
@@ -476,17 +492,30 @@ class Log:
         return {"acc": self.acc, "gyr": self.gyr, "mag": self.mag, "ref_q": self.ref_q}
 
     def _repr_html_(self) -> str:
-        table = self.head(HEAD_ROWS).to_pandas().to_html(index=False, na_rep="", float_format="{:.6g}".format)
-        return f"<p>{escape(repr(self))}</p>{table}"
+        return self.table_html(repr(self))
+
+    def table_html(self, sentence: str) -> str:
+        """Return a sentence and the first rows as HTML.
+
+        Parameters
+        ----------
+        sentence : str
+            What stands above the rows.
+        """
+        head = self.head(HEAD_ROWS).to_pandas()
+        head.columns = [printable(str(name), NAME) for name in head.columns]
+        table = head.to_html(index=False, na_rep="", float_format="{:.6g}".format, max_cols=HEAD_COLUMNS)
+        return f"<p>{escape(sentence)}</p>{table}"
 
     def __repr__(self) -> str:
         rate = f" at {(self.n - 1) / self.duration:.4g} Hz" if self.duration > 0.0 else ""
         held = [name for name in (*GROUPS, *_SINGLE, "pose") if getattr(self, name) is not None]
-        more = [*self.covariates, *self.labels]
+        more = [printable(", ".join([*self.covariates, *self.labels]), LINE)]
         parts = [f"{self.n} rows, {self.duration:.4g} s{rate}", ", ".join(held), self.metadata.frame]
-        if more:
-            parts.insert(2, "and " + ", ".join(more))
-        return f"Log({f'{self.path.name}: ' if self.path else ''}{'; '.join(part for part in parts if part)})"
+        if more[0]:
+            parts.insert(2, f"and {more[0]}")
+        name = f"{printable(self.path.name, NAME)}: " if self.path else ""
+        return f"Log({name}{'; '.join(part for part in parts if part)})"
 
 
 @dataclass(frozen=True)

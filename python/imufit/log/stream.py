@@ -14,7 +14,7 @@ from imufit.log.assemble import check_truth_values, fields_of, time_of
 from imufit.log.columns import CONTRACT, EULER
 from imufit.log.cut import cut
 from imufit.log.foreign import plan_columns
-from imufit.log.log import Chunk, Log, concatenate, gathered
+from imufit.log.log import HEAD_ROWS, LINE, Chunk, Log, concatenate, gathered
 from imufit.log.metadata import Frame, Metadata, read_metadata, read_sidecar, sidecar_path
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.place import Place
@@ -27,6 +27,7 @@ from imufit.log.time_order import Copies, TimeRepair, TimeScan
 from imufit.log.unit_check import HEAD, Clock, check_units
 from imufit.log.unmeasured import Unmeasured
 from imufit.log.writer import write_rows
+from imufit.printable import NAME, printable
 
 
 class LogStream:
@@ -268,8 +269,12 @@ class LogStream:
         """
         write_rows(Path(path), self._metadata, (chunk.core.table() for chunk in self.chunks(ROW_GROUP)))
 
+    def _repr_html_(self) -> str:
+        return next(iter(self.chunks(HEAD_ROWS))).core.table_html(repr(self))
+
     def __repr__(self) -> str:
-        return f"LogStream({self._place.name}: {self.n} rows; {', '.join(self._columns)}; {self._metadata.frame})"
+        names = printable(", ".join(self._columns), LINE)
+        return f"LogStream({printable(self._place.name, NAME)}: {self.n} rows; {names}; {self._metadata.frame})"
 
 
 class _Left:

@@ -6,11 +6,16 @@ import difflib
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.model.effect import registered, run_effects
-from imufit.results import EffectCard
+from imufit.printable import NAME, printable
+from imufit.results import EffectCard, Result, Table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COLUMN = ".column:"
 
@@ -91,9 +96,33 @@ def card_of(effect: _imufit.Effect) -> EffectCard:
     )
 
 
-def catalogue() -> list[EffectCard]:
+class Catalogue(Result, list[EffectCard]):
+    """A list of cards that shows itself as a table."""
+
+    def sentences(self) -> list[str]:
+        """Return how many effects there are, and where more is told."""
+        return [f"{len(self)} effects; imufit.explain(id) tells more of each."]
+
+    def tables(self) -> list[Table]:
+        """Return a row for each effect."""
+        rows = tuple((printable(card.id, NAME), printable(card.name, NAME), card.typical_sizes) for card in self)
+        return [Table("", ("effect", "name", "typical size"), rows)]
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
+        """JSON of every card by its id."""
+        return {card.id: card.to_dict() for card in self}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per effect."""
+        import pandas as pd  # noqa: PLC0415  heavy, and only needed here
+
+        columns = ["id", "sensor", "name", "physics", "formula", "signature", "mistaken_for", "confirm"]
+        return pd.DataFrame([[getattr(card, name) for name in columns] for card in self], columns=columns)
+
+
+def catalogue() -> Catalogue:
     """Cards of all effects that do not depend on a log's own columns."""
-    return [card_of(effect) for effect in effects().values()]
+    return Catalogue(card_of(effect) for effect in effects().values())
 
 
 def explain(effect_id: str) -> EffectCard:

@@ -16,6 +16,9 @@ from imufit.model.model_file import ModelFile, is_usable, shown
 from imufit.model.params import EffectParameters, ModelParams
 from imufit.model.user_function import Function
 from imufit.results import Parameter
+from imufit.results.parameter import parameter_table
+from imufit.results.result import LONGEST, shortened
+from imufit.results.table import html
 
 
 class EffectStack:
@@ -356,8 +359,11 @@ class EffectStack:
             raise InputError(error.problem, file=path, remedy=error.remedy) from None
         return model
 
+    def _repr_html_(self) -> str:
+        return html([repr(self)], [parameter_table(self.listed())])
+
     def __repr__(self) -> str:
-        return f"{type(self).__name__}([{', '.join(map(repr, self.effects))}])"
+        return shortened(f"{type(self).__name__}([{', '.join(map(repr, self.effects))}])", LONGEST)
 
 
 def _values(effect: _imufit.Effect, given: Mapping[str, float]) -> list[float]:

@@ -32,13 +32,15 @@ from imufit.progress import Progress, silent
 from imufit.replaying.angle_table import angle_table
 from imufit.replaying.clipped import ranges
 from imufit.replaying.tilt_comparison import compare_tilt, tilt_errors
+from imufit.results.plotted import Plotted
 from imufit.results.result import Result
 from imufit.results.table import Table
 from imufit.results.tilt import TiltComparison
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from imufit.figures.place import Drawing, Place
 
 Array = NDArray[np.float64]
 Settings = Mapping[str, Mapping[str, float]]
@@ -86,7 +88,7 @@ class Errors(TypedDict):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Replay(Result):
+class Replay(Plotted, Result):
     """Attitudes of several filters over one log of n rows.
 
     Parameters
@@ -231,7 +233,7 @@ class Replay(Result):
         """
         return compare_tilt(self.log, self.attitude, _NEEDS, counted_rows(self.log), band_deg)
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Tilt of all filters over time with the reference, and its error: paper B's Figures 3 to 5.
 
         Panels for the whole log, the first move and the strongest vibration, as far as the log holds them. Without a
@@ -245,10 +247,10 @@ class Replay(Result):
         if self.log.ref_q is None:
             from imufit.figures.angles import angle_panels  # noqa: PLC0415
 
-            return angle_panels(self.log.t, {name: self.euler(name) for name in self.attitude})
+            return angle_panels(self.log.t, {name: self.euler(name) for name in self.attitude}, ax)
         from imufit.replaying.tilt_figure import tilt_figure_of  # noqa: PLC0415
 
-        return tilt_figure_of(self.log, self.attitude, _NEEDS)
+        return tilt_figure_of(self.log, self.attitude, _NEEDS, ax)
 
     def to_dict(self, comparison: TiltComparison | None = None) -> dict[str, Any]:
         """Return what goes into JSON: n, skipped, errors (deg) and figures of the tilt per filter, ranks.

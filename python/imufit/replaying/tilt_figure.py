@@ -16,7 +16,7 @@ from imufit.replaying.tilt_comparison import tilt_errors
 from imufit.replaying.tilt_error import inclination_of_z
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from imufit.figures.place import Drawing, Place
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,9 @@ _IN_MOTION = 10.0
 _OVERVIEW = 60.0
 
 
-def tilt_figure_of(log: Log, attitude: Mapping[str, Array], needs: Mapping[str, Sequence[str]]) -> Figure:
+def tilt_figure_of(
+    log: Log, attitude: Mapping[str, Array], needs: Mapping[str, Sequence[str]], ax: Place | None = None
+) -> Drawing:
     """Draw the tilt of each method beside the reference, and without one the inclination of body z alone.
 
     Parameters
@@ -37,6 +39,8 @@ def tilt_figure_of(log: Log, attitude: Mapping[str, Array], needs: Mapping[str, 
         Per method, scalar first; NaN before the start.
     needs : mapping
         Sensors that each method uses.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
 
     Raises
     ------
@@ -66,7 +70,7 @@ def tilt_figure_of(log: Log, attitude: Mapping[str, Array], needs: Mapping[str, 
         whole = Zoom(f"The first {_OVERVIEW:g} s", float(log.t[0]), float(log.t[0]) + _OVERVIEW)
     error = "Error of the inclination" if reference.kind == "inclination" else "Error: estimate less reference"
     zooms = _zooms(log, stretches, true)
-    return tilt_figure(log.t, true, angles, deviations, zooms, angle=what, error=error, whole=whole)
+    return tilt_figure(log.t, true, angles, deviations, zooms, angle=what, error=error, whole=whole, ax=ax)
 
 
 def _zooms(log: Log, stretches: Stretches, true: Array) -> list[Zoom]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -10,12 +11,14 @@ from markupsafe import Markup
 
 from imufit.figures import quantity
 from imufit.report.inline_svg import inline_svg
-from imufit.results.comparison import plot_panels
+from imufit.results.comparison import MOST_PANELS, Panel, drawn_panels
 from imufit.results.diagnosis import VERDICTS
 from imufit.results.parameter import in_lines, parameter_table
 
 if TYPE_CHECKING:
-    from imufit.results import Addition, Candidate, Comparison, Diagnosis, Ladder, Panel
+    from matplotlib.figure import Figure
+
+    from imufit.results import Addition, Candidate, Comparison, Diagnosis, Ladder
 
 _COVARIATES = 6
 _PANELS_AT_FIRST = 8
@@ -57,7 +60,7 @@ def page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals.update(q=quantity, svg=inline_svg, in_lines=in_lines, plot_panels=plot_panels)
+    environment.globals.update(q=quantity, svg=inline_svg, in_lines=in_lines, plot_panels=_panels)
     by_covariate = _by_covariate(comparison)
     last = ladder.diagnosis if ladder is not None else diagnosis
     return environment.get_template("page.html.j2").render(
@@ -130,6 +133,11 @@ def _typical(candidate: Candidate) -> Markup:
     return Markup.escape(", ".join(sizes) or "-")
 
 
+def _panels(panels: Sequence[Panel], limit: int = MOST_PANELS) -> Figure:
+    """Return the figure of the worst panels."""
+    return drawn_panels(panels, limit=limit).root
+
+
 def _faults(comparison: Comparison | None, diagnosis: Diagnosis | None) -> dict[str, Any] | None:
     """Return table and sentences of the faults of the data."""
     from imufit.results.data_fault import fault_table  # noqa: PLC0415
@@ -147,9 +155,9 @@ def _fitted(ladder: Ladder | None, addition: Addition | None) -> dict[str, Any] 
         parameters = tuple(getattr(ladder.fit, "parameters", ()) or ()) if ladder is not None else ()
     if not parameters:
         return None
-    from imufit.results.parameter import plot_parameters  # noqa: PLC0415
+    from imufit.results.parameter import drawn_parameters  # noqa: PLC0415
 
-    return {"table": parameter_table(parameters), "figure": plot_parameters(parameters)}
+    return {"table": parameter_table(parameters), "figure": drawn_parameters(parameters).root}
 
 
 def _next_step(diagnosis: Diagnosis | None, ladder: Ladder | None) -> str:

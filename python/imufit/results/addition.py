@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
-from imufit.results.parameter import Parameter, by_effect, by_name, parameter_frame, parameter_table, plot_parameters
+from imufit.results.parameter import Parameter, by_effect, by_name, drawn_parameters, parameter_frame, parameter_table
+from imufit.results.plotted import Plotted
 from imufit.results.result import Result
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from imufit.figures.place import Drawing, Place
 
 SURPRISE = 0.2
 
@@ -33,7 +35,7 @@ def surprise(before: float, expected: float, after: float) -> str:
 
 
 @dataclass(frozen=True, repr=False)
-class Addition(Result):
+class Addition(Plotted, Result):
     """One step of the loop.
 
     Attributes
@@ -97,9 +99,9 @@ class Addition(Result):
         """One row per parameter, SI units."""
         return parameter_frame(self.parameters)
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Fitted parameters beside their typical sizes."""
-        return plot_parameters(self.parameters)
+        return drawn_parameters(self.parameters, ax)
 
     def tables(self) -> tuple[Table, ...]:
         """Parameters of the new model."""

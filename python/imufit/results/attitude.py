@@ -7,17 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
+from imufit.results.part import Part
+from imufit.results.plotted import Plotted
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+    from imufit.figures.place import Drawing, Place
 
 PARTS = ("total", "heading", "inclination")
 
 
-@dataclass(frozen=True)
-class AttitudeDependence:
+@dataclass(frozen=True, repr=False)
+class AttitudeDependence(Part):
     """How one part of the error goes with one quantity.
 
     Attributes
@@ -39,8 +42,8 @@ class AttitudeDependence:
     error: float
 
 
-@dataclass(frozen=True, eq=False)
-class AttitudeBins:
+@dataclass(frozen=True, eq=False, repr=False)
+class AttitudeBins(Part):
     """RMS error against one quantity.
 
     Attributes
@@ -65,8 +68,8 @@ class AttitudeBins:
     after: NDArray[Any]
 
 
-@dataclass(frozen=True, eq=False)
-class AttitudeComparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class AttitudeComparison(Plotted, Part):
     """What a model is worth to an attitude filter, and what limits the filter then.
 
     Attributes
@@ -121,8 +124,8 @@ class AttitudeComparison:
             f"Attitude error of {self.filter}, RMSE", ("", ">as it is", ">model applied", "goes with"), tuple(rows)
         )
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Error against rate, acceleration, field disturbance and time."""
         from imufit.figures.attitude import attitude_panels  # noqa: PLC0415
 
-        return attitude_panels(self.bins, self.sentence)
+        return attitude_panels(self.bins, self.sentence, ax)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,21 +12,25 @@ from numpy.typing import NDArray
 from imufit.figures import quantity
 from imufit.results.data_fault import DataFault, fault_table
 from imufit.results.json_value import json_fields, json_value
+from imufit.results.part import Part
+from imufit.results.plotted import Plotted
 from imufit.results.result import Result
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from imufit.figures.place import Drawing, Place
     from imufit.results.attitude import AttitudeComparison
 
 MAIN_CAUSES = 5
 """Covariates that stand under the answer: as many as channels of two sensors can have on one screen of 24 lines."""
 
 
-@dataclass(frozen=True)
-class ChannelResidual:
+@dataclass(frozen=True, repr=False)
+class ChannelResidual(Part):
     """Residual (measured - modelled) of one channel over the whole log.
 
     Attributes
@@ -57,8 +61,8 @@ class ChannelResidual:
         return {name: json_value(getattr(self, name)) for name in names}
 
 
-@dataclass(frozen=True, eq=False)
-class Panel:
+@dataclass(frozen=True, eq=False, repr=False)
+class Panel(Plotted, Part):
     """Binned residual of one channel against one covariate.
 
     Attributes
@@ -93,20 +97,24 @@ class Panel:
 
         return pd.DataFrame({"centre": self.centre, "mean": self.mean, "band": self.band})
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Draw this panel alone."""
-        return plot_panels((self,))
+        return drawn_panels((self,), ax)
 
 
-def plot_panels(panels: Sequence[Panel], limit: int = 12) -> Figure:
+MOST_PANELS: Final = 12
+"""Panels of a figure: three rows of four fill a screen."""
+
+
+def drawn_panels(panels: Sequence[Panel], ax: Place | None = None, limit: int = MOST_PANELS) -> Drawing:
     """Draw the worst panels side by side."""
     from imufit.figures.residuals import residual_panels  # noqa: PLC0415
 
-    return residual_panels(panels, limit=limit)
+    return residual_panels(panels, limit=limit, ax=ax)
 
 
-@dataclass(frozen=True, eq=False)
-class Spectrum:
+@dataclass(frozen=True, eq=False, repr=False)
+class Spectrum(Plotted, Part):
     """Density of one channel's residual.
 
     Attributes
@@ -135,15 +143,15 @@ class Spectrum:
 
         return pd.DataFrame({"frequency": self.frequency, "density": self.density})
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Draw this spectrum alone."""
         from imufit.figures.spectrum import residual_spectra  # noqa: PLC0415
 
-        return residual_spectra([self])
+        return residual_spectra([self], ax)
 
 
-@dataclass(frozen=True)
-class Where:
+@dataclass(frozen=True, repr=False)
+class Where(Part):
     """A covariate that explains part of a channel's excess.
 
     Attributes
@@ -174,7 +182,7 @@ class Where:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Result):
+class Comparison(Plotted, Result):
     """A model held against a log.
 
     Attributes
@@ -263,15 +271,27 @@ class Comparison(Result):
         columns = ["channel", "rms", "mean", "noise_floor", "ratio", "unit", "n"]
         return pd.DataFrame([[getattr(item, name) for name in columns] for item in self.channels], columns=columns)
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Residual against the covariates, worst first."""
-        return plot_panels(self.panels)
+        return drawn_panels(self.panels, ax)
 
-    def plot_spectra(self) -> Figure:
-        """Spectrum of the residual over its noise floor."""
+    @overload
+    def plot_spectra(self, ax: None = None) -> Figure: ...
+
+    @overload
+    def plot_spectra(self, ax: Place) -> Axes | list[Axes]: ...
+
+    def plot_spectra(self, ax: Place | None = None) -> Figure | Axes | list[Axes]:
+        """Draw the spectrum of the residual over its noise floor, a panel for each sensor.
+
+        Parameters
+        ----------
+        ax : Axes, sequence of Axes, Figure or SubFigure, optional
+            As for `plot`.
+        """
         from imufit.figures.spectrum import residual_spectra  # noqa: PLC0415
 
-        return residual_spectra(self.spectra)
+        return residual_spectra(self.spectra, ax).result
 
     def channel_table(self) -> Table:
         """Residual by channel in shown units."""

@@ -9,11 +9,12 @@ from typing import Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
+from imufit.results.part import Part
 from imufit.results.table import Table
 
 
-@dataclass(frozen=True)
-class DataFault:
+@dataclass(frozen=True, repr=False)
+class DataFault(Part):
     """Something wrong with the data that is no effect of the sensor.
 
     Attributes

@@ -14,12 +14,15 @@ from imufit.results.judged import Judged
 from imufit.results.log_parameters import LogParameters, log_table, logs_json
 from imufit.results.noise_part import NoisePart, noise_table
 from imufit.results.parameter import Parameter, by_name, in_words
+from imufit.results.part import Part
+from imufit.results.plotted import Plotted
 from imufit.results.result import Result
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from imufit.figures.place import Drawing, Place
 
 VERDICTS = {
     "adequate": "Nothing that this log can show is missing.",
@@ -37,8 +40,8 @@ NOT_TESTABLE = "not testable here"
 """Status of an effect that a log cannot show."""
 
 
-@dataclass(frozen=True)
-class Rival:
+@dataclass(frozen=True, repr=False)
+class Rival(Part):
     """An effect that looks much the same in this log.
 
     Attributes
@@ -60,8 +63,8 @@ class Rival:
         return f"{self.effect} ({quantity.number(self.correlation, 2)})"
 
 
-@dataclass(frozen=True)
-class Candidate:
+@dataclass(frozen=True, repr=False)
+class Candidate(Part):
     """One effect and what adding it would bring.
 
     Attributes
@@ -170,8 +173,8 @@ class Candidate:
         )
 
 
-@dataclass(frozen=True)
-class Unexplained:
+@dataclass(frozen=True, repr=False)
+class Unexplained(Part):
     """A dependence that no named effect explains.
 
     Attributes
@@ -203,7 +206,7 @@ class Unexplained:
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosis(Result):
+class Diagnosis(Plotted, Result):
     """Verdict over all candidate effects.
 
     Attributes
@@ -305,7 +308,7 @@ class Diagnosis(Result):
         ]
         return pd.DataFrame([[getattr(item, name) for name in columns] for item in self.candidates], columns=columns)
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Draw the expected held-out error of the ranked candidates."""
         from imufit.figures.candidates import candidate_bars  # noqa: PLC0415
 
@@ -320,6 +323,7 @@ class Diagnosis(Result):
             error=[item.drop_error for item in self.candidates],
             status=[item.status for item in self.candidates],
             sentence=titles.get(self.verdict, ""),
+            ax=ax,
         )
 
     def candidate_table(self, limit: int = 10) -> Table:

@@ -9,11 +9,12 @@ from typing import Any
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
 from imufit.results.parameter import Parameter, by_name, in_words
+from imufit.results.part import Part
 from imufit.results.table import Table
 
 
-@dataclass(frozen=True)
-class Disagreement:
+@dataclass(frozen=True, repr=False)
+class Disagreement(Part):
     """A log that has another value of an effect than the others.
 
     Attributes
@@ -66,8 +67,8 @@ class Disagreement:
         )
 
 
-@dataclass(frozen=True)
-class Without:
+@dataclass(frozen=True, repr=False)
+class Without(Part):
     """The answer of some of the logs.
 
     Attributes

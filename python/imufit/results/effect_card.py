@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import textwrap
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
+from imufit.results.result import Result
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True)
-class EffectCard:
+@dataclass(frozen=True, repr=False)
+class EffectCard(Result):
     """Description of one effect of the catalogue.
 
     Attributes
@@ -86,13 +86,17 @@ class EffectCard:
         """Lay the card out as a table of two columns."""
         return Table(f"{self.id}: {self.name}", ("", ""), self.lines())
 
-    def _repr_html_(self) -> str:
-        left = 'style="text-align:left"'
-        rows = "".join(
-            f"<tr><th {left}>{escape(heading)}</th><td {left}>{escape(text)}</td></tr>"
-            for heading, text in self.lines()
-        )
-        return f"<p><b>{escape(self.id)}: {escape(self.name)}</b></p><table>{rows}</table>"
+    def sentences(self) -> list[str]:
+        """Return the name of the effect and its cause."""
+        return [f"{self.id}: {self.name}, {self.physics}"]
+
+    def paragraphs(self) -> list[str]:
+        """Return nothing: the table says everything."""
+        return []
+
+    def tables(self) -> list[Table]:
+        """Return the card."""
+        return [self.table()]
 
     def __str__(self) -> str:
         paragraphs = (

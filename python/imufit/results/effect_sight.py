@@ -9,14 +9,15 @@ from typing import Any, Final
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
+from imufit.results.part import Part
 from imufit.results.table import Table
 
 NEARLY: Final = 1.05
 """Sizes within this factor are told as one: two digits are shown."""
 
 
-@dataclass(frozen=True)
-class ParameterSight:
+@dataclass(frozen=True, repr=False)
+class ParameterSight(Part):
     """How well a log determines one parameter of an effect.
 
     Attributes
@@ -53,8 +54,8 @@ class ParameterSight:
         }
 
 
-@dataclass(frozen=True)
-class EffectSight:
+@dataclass(frozen=True, repr=False)
+class EffectSight(Part):
     """Whether a log can show one effect.
 
     Attributes

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from imufit.results.part import Part
 
-@dataclass(frozen=True)
-class Judged:
+
+@dataclass(frozen=True, repr=False)
+class Judged(Part):
     """One sensor of the logs.
 
     Attributes

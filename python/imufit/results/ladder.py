@@ -13,18 +13,20 @@ from imufit.results.diagnosis import VERDICTS, Diagnosis
 from imufit.results.json_value import json_fields, json_value
 from imufit.results.log_parameters import logs_json
 from imufit.results.parameter import by_effect, parameter_table
+from imufit.results.part import Part
+from imufit.results.plotted import Plotted
 from imufit.results.result import Result
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
+    from imufit.figures.place import Drawing, Place
     from imufit.results.attitude import AttitudeComparison
 
 
-@dataclass(frozen=True)
-class Step:
+@dataclass(frozen=True, repr=False)
+class Step(Part):
     """One effect added.
 
     Attributes
@@ -54,8 +56,8 @@ class Step:
         )
 
 
-@dataclass(frozen=True)
-class Revision:
+@dataclass(frozen=True, repr=False)
+class Revision(Part):
     """An effect taken out again, because later ones made it needless or another does better in its place.
 
     Attributes
@@ -85,7 +87,7 @@ class Revision:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ladder(Result):
+class Ladder(Plotted, Result):
     """The whole loop on one log.
 
     Attributes
@@ -155,7 +157,7 @@ class Ladder(Result):
         columns = ["effect", "before", "expected", "after", "training"]
         return pd.DataFrame([[getattr(item, name) for name in columns] for item in self.steps], columns=columns)
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Waterfall of the held-out error."""
         from imufit.figures.waterfall import waterfall  # noqa: PLC0415
 
@@ -166,6 +168,7 @@ class Ladder(Result):
             after=[step.after for step in self.steps],
             training=[step.training for step in self.steps],
             start=self.ratio_start,
+            ax=ax,
         )
 
     def step_table(self) -> Table:

@@ -13,6 +13,7 @@ from imufit.log.contents import Contents
 from imufit.printable import NAME, printable
 from imufit.results.effect_sight import EffectSight, alike, open_table, seen_table, unseen_table, weak_table
 from imufit.results.json_value import json_fields, json_value
+from imufit.results.part import Part
 from imufit.results.result import Result
 from imufit.results.table import Table
 
@@ -39,8 +40,8 @@ NO_NOISE: Final = 1e-6
 """Noise, rad and m, below which a reference was computed, not measured: an interferometer reads micrometres."""
 
 
-@dataclass(frozen=True)
-class LogGap:
+@dataclass(frozen=True, repr=False)
+class LogGap(Part):
     """A stretch without samples.
 
     Attributes
@@ -62,8 +63,8 @@ class LogGap:
         return {**json_fields(self), "length_s": self.length}
 
 
-@dataclass(frozen=True)
-class SeriesInfo:
+@dataclass(frozen=True, repr=False)
+class SeriesInfo(Part):
     """The samples of one sensor, of one part of the reference, or all rows.
 
     Attributes
@@ -118,8 +119,8 @@ class SeriesInfo:
         }
 
 
-@dataclass(frozen=True)
-class ClippedInfo:
+@dataclass(frozen=True, repr=False)
+class ClippedInfo(Part):
     """Readings of one axis at the end of its range.
 
     Attributes
@@ -141,8 +142,8 @@ class ClippedInfo:
         return json_fields(self)
 
 
-@dataclass(frozen=True)
-class MotionInfo:
+@dataclass(frozen=True, repr=False)
+class MotionInfo(Part):
     """How much a log turns and moves.
 
     Attributes
@@ -183,8 +184,8 @@ def _in_degrees(rate: float) -> str:
     return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.1f}" if abs(value) >= 1.0 else f"{value:.2g}"
 
 
-@dataclass(frozen=True)
-class RestInfo:
+@dataclass(frozen=True, repr=False)
+class RestInfo(Part):
     """Where a log rests.
 
     Attributes
@@ -235,8 +236,8 @@ class RestInfo:
         }
 
 
-@dataclass(frozen=True)
-class ReferenceInfo:
+@dataclass(frozen=True, repr=False)
+class ReferenceInfo(Part):
     """What the readings of a log can be held against.
 
     Attributes

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from imufit.results.parameter import Parameter, by_effect
+from imufit.results.part import Part
 from imufit.results.table import Table
 
 
-@dataclass(frozen=True)
-class LogParameters:
+@dataclass(frozen=True, repr=False)
+class LogParameters(Part):
     """What one of several logs has for itself.
 
     Attributes

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 from imufit.figures import quantity
 from imufit.results.comparison import Comparison
 from imufit.results.json_value import json_value
+from imufit.results.plotted import Plotted
 from imufit.results.result import Result
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from imufit.figures.place import Drawing, Place
 
 DECISIVE: Final = 5.0
 """Natural logarithm of the Bayes factor from which on one model is preferred: odds of 150 to 1, "very strong" in R.
@@ -21,7 +23,7 @@ Kass and A. Raftery, "Bayes Factors", J. Am. Stat. Assoc. 90 (1995), p. 777."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModelComparison(Result):
+class ModelComparison(Plotted, Result):
     """Two models fitted to the same log.
 
     Attributes
@@ -85,13 +87,13 @@ class ModelComparison(Result):
         both = [(item.channel, item.rms, after[item.channel], item.unit) for item in self.first.channels]
         return sorted(both, key=lambda row: row[2] / row[1] if row[1] else 1.0)
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Residual of each channel with either model."""
         from imufit.figures.two_models import residuals_of_two  # noqa: PLC0415
 
         floors = {item.channel: item.noise_floor for item in self.first.channels}
         rows = [(name, a / floors[name], b / floors[name]) for name, a, b, _ in self._channels()]
-        return residuals_of_two(rows, " + ".join(self.first.model), " + ".join(self.second.model))
+        return residuals_of_two(rows, " + ".join(self.first.model), " + ".join(self.second.model), ax)
 
     def tables(self) -> tuple[Table, ...]:
         """Where the two differ."""

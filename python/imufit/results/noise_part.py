@@ -8,11 +8,12 @@ from typing import Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_fields
+from imufit.results.part import Part
 from imufit.results.table import Table
 
 
-@dataclass(frozen=True)
-class NoisePart:
+@dataclass(frozen=True, repr=False)
+class NoisePart(Part):
     """A component of the noise of one channel.
 
     Attributes

@@ -9,19 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
+from imufit.results.part import Part
+from imufit.results.plotted import Plotted
 from imufit.results.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from imufit.figures.place import Drawing, Place
 
 
 UNTOLD = 10.0
 """A parameter whose standard error is this many typical sizes is one that the log says nothing about."""
 
 
-@dataclass(frozen=True)
-class Parameter:
+@dataclass(frozen=True, repr=False)
+class Parameter(Plotted, Part):
     """One parameter of one effect.
 
     Attributes
@@ -113,12 +116,15 @@ class Parameter:
         """One row."""
         return parameter_frame((self,))
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Value beside the typical size."""
-        return plot_parameters((self,))
+        return drawn_parameters((self,), ax)
 
     def _repr_html_(self) -> str:
         return parameter_table((self,)).html()
+
+    def __repr__(self) -> str:
+        return f"Parameter({self})"
 
     def __str__(self) -> str:
         return f"{self.effect} {self.name} = {self.shown}"
@@ -180,8 +186,8 @@ def parameter_frame(parameters: Iterable[Parameter]) -> pd.DataFrame:
     return pd.DataFrame([[getattr(item, name) for name in columns] for item in parameters], columns=columns)
 
 
-def plot_parameters(parameters: Sequence[Parameter]) -> Figure:
-    """Figure of the parameters over their typical sizes."""
+def drawn_parameters(parameters: Sequence[Parameter], ax: Place | None = None) -> Drawing:
+    """Draw the parameters over their typical sizes."""
     from imufit.figures.parameters import parameter_sizes  # noqa: PLC0415
 
     return parameter_sizes(
@@ -190,4 +196,5 @@ def plot_parameters(parameters: Sequence[Parameter]) -> Figure:
         [item.standard_error for item in parameters],
         [math.nan if item.typical is None else item.typical for item in parameters],
         [item.unit for item in parameters],
+        ax,
     )

@@ -6,14 +6,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from imufit.errors import InputError
-from imufit.results.parameter import Parameter, by_effect, parameter_frame, parameter_table, plot_parameters
+from imufit.results.parameter import Parameter, by_effect, drawn_parameters, parameter_frame, parameter_table
+from imufit.results.plotted import Plotted
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from imufit.figures.place import Drawing, Place
 
 
-class Params(Mapping[str, Parameter]):
+class Params(Plotted, Mapping[str, Parameter]):
     """Parameters by ``EFFECT.PARAM``, such as ``params["acc.bias.x"]``, in the order of the model.
 
     Parameters
@@ -65,11 +67,11 @@ class Params(Mapping[str, Parameter]):
         """Values by ``EFFECT.PARAM``, SI units."""
         return {key: parameter.value for key, parameter in self.items()}
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Draw the parameters beside their typical sizes."""
         if not self:
             raise InputError("there are no parameters to draw", remedy="Take a model with at least one effect.")
-        return plot_parameters(tuple(self.values()))
+        return drawn_parameters(tuple(self.values()), ax)
 
     def _repr_html_(self) -> str:
         return parameter_table(self.values()).html()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_fields, json_value
+from imufit.results.part import Part
 from imufit.results.result import Result
 from imufit.results.table import Table
 
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True)
-class RecordingGap:
+@dataclass(frozen=True, repr=False)
+class RecordingGap(Part):
     """A stretch of a recording in which rows are missing.
 
     Attributes
@@ -39,8 +40,8 @@ class RecordingGap:
         return json_fields(self)
 
 
-@dataclass(frozen=True)
-class RecordingClock:
+@dataclass(frozen=True, repr=False)
+class RecordingClock(Part):
     """How the time of a recording was told.
 
     Attributes

@@ -37,5 +37,17 @@ class Result:
         return page(self.paragraphs(), self.tables())
 
     def __repr__(self) -> str:
-        line = next(iter(self.sentences()), "")
-        return line if len(line) <= LONGEST else f"{line[: LONGEST - 1]}…"
+        return shortened(next(iter(self.sentences()), "") or type(self).__name__, LONGEST)
+
+
+def shortened(line: str, most: int) -> str:
+    """Return a line, cut at its end where it has more characters than `most`.
+
+    Parameters
+    ----------
+    line : str
+        Text.
+    most : int
+        Characters.
+    """
+    return line if len(line) <= most else f"{line[: most - 1]}…"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
+from imufit.results.part import Part
 from imufit.results.result import Result
 from imufit.results.table import Table
 
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True)
-class TiltFigures:
+@dataclass(frozen=True, repr=False)
+class TiltFigures(Part):
     """Figures of merit of one method; None where the log cannot tell.
 
     Attributes
@@ -62,8 +63,8 @@ class TiltFigures:
         return {item.name: json_value(getattr(self, item.name)) for item in fields(self)}
 
 
-@dataclass(frozen=True)
-class Mark:
+@dataclass(frozen=True, repr=False)
+class Mark(Part):
     """Place of one method in one quantity.
 
     Attributes
@@ -79,8 +80,8 @@ class Mark:
     word: str
 
 
-@dataclass(frozen=True)
-class _Ranked:
+@dataclass(frozen=True, repr=False)
+class _Ranked(Part):
     """What is ranked, from which number, and below which difference two methods tie whatever their ratio."""
 
     title: str

@@ -11,17 +11,20 @@ from numpy.typing import NDArray
 from imufit.figures import quantity
 from imufit.results import Table
 from imufit.results.json_value import json_value
+from imufit.results.part import Part
+from imufit.results.plotted import Plotted
 from imufit.results.result import Result
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from imufit.figures.place import Drawing, Place
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Gain:
+@dataclass(frozen=True, eq=False, repr=False)
+class Gain(Part):
     """One tuned gain, and how much it matters: values with it alone changed by a factor.
 
     Parameters
@@ -69,8 +72,8 @@ class Gain:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class GainMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class GainMap(Part):
     """The value over two gains, the others at their tuned values.
 
     Parameters
@@ -113,8 +116,8 @@ class GainMap:
         return Table("Value over two gains, deg", header, rows)
 
 
-@dataclass(frozen=True)
-class Innovation:
+@dataclass(frozen=True, repr=False)
+class Innovation(Part):
     """What a filter is surprised by at each row: the angle between measured and foreseen vertical.
 
     Parameters
@@ -134,7 +137,7 @@ class Innovation:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Tuning(Result):
+class Tuning(Plotted, Result):
     """Gains of one filter tuned on one log.
 
     Parameters
@@ -300,11 +303,11 @@ class Tuning(Result):
         ]
         return pd.concat(frames, ignore_index=True)
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Map over two gains, and the value over each gain alone with the rival's error."""
         from imufit.figures.gains import gain_figure  # noqa: PLC0415
 
-        return gain_figure(self.map, self.gains, self.rival, f"{self.metric} {self.criterion}, deg")
+        return gain_figure(self.map, self.gains, self.rival, f"{self.metric} {self.criterion}, deg", ax)
 
     def sentences(self) -> list[str]:
         """Return what the result says, the answer first."""

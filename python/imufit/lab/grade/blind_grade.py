@@ -12,14 +12,15 @@ from imufit.lab.grade.sets import SETS
 from imufit.lab.grade.trial import Trial
 from imufit.lab.grade.wilson import interval
 from imufit.results import Table
+from imufit.results.part import Part
 
 MARKS = ("named", "wrong", "missed", "alarm", "single", "needless", "covariate")
 WITHIN = 0.10
 """Share of itself by which an expected drop may differ from the realised one to count as foretold."""
 
 
-@dataclass(frozen=True)
-class BlindGrade:
+@dataclass(frozen=True, repr=False)
+class BlindGrade(Part):
     """Marks of many blind logs.
 
     Attributes

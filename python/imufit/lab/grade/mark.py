@@ -7,12 +7,13 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from imufit.lab.grade.puzzle import Puzzle
+from imufit.results.part import Part
 
 CERTAIN, SILENT = "missing", ("adequate", "unknown")
 
 
-@dataclass(frozen=True)
-class Answer:
+@dataclass(frozen=True, repr=False)
+class Answer(Part):
     """What the ladder said of a log.
 
     Attributes
@@ -39,8 +40,8 @@ class Answer:
     unexplained: tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True)
-class Marks:
+@dataclass(frozen=True, repr=False)
+class Marks(Part):
     """Marks of one answer; None where the question does not ask for it.
 
     Attributes

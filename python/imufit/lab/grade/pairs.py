@@ -14,6 +14,7 @@ from imufit.lab.grade.one import hidden_in
 from imufit.lab.grade.puzzle import Puzzle
 from imufit.lab.simulate import Line, Mixture
 from imufit.lab.simulate.environment import Temperature, covariate, stream
+from imufit.results.part import Part
 
 DURATION = 120.0
 ATTEMPTS = 24
@@ -22,8 +23,8 @@ Place = tuple[tuple[str, ...], Options]
 """Motions to choose from, and the further options of such a log."""
 
 
-@dataclass(frozen=True)
-class Pair:
+@dataclass(frozen=True, repr=False)
+class Pair(Part):
     """Two effects, where they are the same, and where they are not.
 
     Attributes

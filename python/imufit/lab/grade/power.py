@@ -16,9 +16,11 @@ from imufit.lab.simulate import simulate
 from imufit.lab.simulate.environment import stream
 from imufit.loop import SensorModel
 from imufit.progress import Progress
+from imufit.results.part import Part
+from imufit.results.plotted import Plotted
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from imufit.figures.place import Drawing, Place
 
 POWER_SIZES = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
 """Root mean square of the hidden effect over the white noise of its sensor."""
@@ -27,8 +29,8 @@ STRIDE = 17
 """From one seed to the next that many effects are passed over, so that a few of them are of all kinds."""
 
 
-@dataclass(frozen=True)
-class PowerPoint:
+@dataclass(frozen=True, repr=False)
+class PowerPoint(Part):
     """What one diagnosis said of an effect of one size.
 
     Attributes
@@ -52,8 +54,8 @@ class PowerPoint:
     wrong: bool
 
 
-@dataclass(frozen=True)
-class PowerCurve:
+@dataclass(frozen=True, repr=False)
+class PowerCurve(Plotted, Part):
     """Diagnoses of the same effects at growing sizes.
 
     Attributes
@@ -105,7 +107,7 @@ class PowerCurve:
             "points": [asdict(point) for point in self.points],
         }
 
-    def plot(self) -> Figure:
+    def _drawn(self, ax: Place | None) -> Drawing:
         """Share named over the size, with 95 % intervals."""
         from imufit.figures.power import power  # noqa: PLC0415
 
@@ -117,7 +119,7 @@ class PowerCurve:
                     for key in ("named", "alone")
                 }
         sizes = np.array(sorted({point.size for point in self.points}))
-        return power(sizes, curves)
+        return power(sizes, curves, ax)
 
 
 def power_curve(

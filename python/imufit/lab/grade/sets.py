@@ -14,10 +14,11 @@ from imufit.lab.grade.outside import outside
 from imufit.lab.grade.pairs import confounded, separated
 from imufit.lab.grade.puzzle import Puzzle
 from imufit.lab.grade.two import two
+from imufit.results.part import Part
 
 
-@dataclass(frozen=True)
-class BlindSet:
+@dataclass(frozen=True, repr=False)
+class BlindSet(Part):
     """A kind of blind logs.
 
     Attributes

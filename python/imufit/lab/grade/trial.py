@@ -14,11 +14,12 @@ from imufit.lab.grade.sets import draw
 from imufit.lab.simulate import Simulation
 from imufit.loop import SensorModel
 from imufit.results import Diagnosis, Ladder
+from imufit.results.part import Part
 from imufit.verbs import ladder
 
 
-@dataclass(frozen=True)
-class Trial:
+@dataclass(frozen=True, repr=False)
+class Trial(Part):
     """One blind log, answered and marked.
 
     Attributes

@@ -22,7 +22,7 @@ from imufit.lab.simulate.truth import Trajectory, quaternion_from_matrix
 from imufit.log import Log
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Simulation:
     """A simulated log with what is known of it.
 
@@ -72,6 +72,12 @@ class Simulation:
             covariates=self.covariates,
             **self.metadata,
         )
+
+    def _repr_html_(self) -> str:
+        return self.to_log().table_html(repr(self))
+
+    def __repr__(self) -> str:
+        return f"Simulation({len(self.t)} rows of {self.truth.scenario}; to_log() is its log, truth what was put in)"
 
 
 def simulate(
