@@ -159,13 +159,13 @@ class Trials:
         """Errors (trials, 3) of a filter with its defaults."""
         return np.array(self.each(name, partial(judge, settings={}, parameters={}, name=name)))
 
-    def low_passed(self, name: str) -> dict[float, float]:
-        """Mean total error of a filter, deg, by the time constant of the low pass in an almost inertial frame; 0: none."""
-        found = {0.0: float(self.judged(name)[:, 0].mean())}
+    def low_passed(self, name: str) -> Array:
+        """Total errors (1 + low passes, trials) of a filter, deg: without one, then for each of ALMOST_INERTIAL."""
+        found = [self.judged(name)[:, 0]]
         for tau in ALMOST_INERTIAL:
             each = self.each(f"{name}, low pass of {tau:g} s", partial(judge_low_passed, tau=tau, name=name))
-            found[tau] = float(np.mean([total for total, _, _ in each]))
-        return found
+            found.append(np.array(each)[:, 0])
+        return np.array(found)
 
     def tuned(self, name: str) -> Array:
         """Errors (trials, 3) with the candidate that is best on the other trials."""
@@ -174,9 +174,7 @@ class Trials:
         task = partial(judge, parameters={}, name=name)
         found = self.each(f"{name}, settings", task, self.paths * len(CANDIDATES), settings)
         every = np.array(found).reshape(len(CANDIDATES), n, len(PARTS))
-        total = every[:, :, 0]
-        best = np.argmin(total.sum(axis=1, keepdims=True) - total, axis=0)
-        return every[best, np.arange(n)]
+        return every[_best_on_the_others(every[:, :, 0]), np.arange(n)]
 
     def models(self) -> list[Parameters]:
         """For each trial the model that the others give."""
@@ -192,6 +190,11 @@ class Trials:
         """Errors (trials, 3) of a filter with its defaults over corrected readings."""
         settings: list[dict[str, float]] = [{}] * len(self.paths)
         return np.array(self.each(f"{name}, model", partial(judge, name=name), self.paths, settings, models))
+
+
+def _best_on_the_others(total: Array) -> NDArray[np.intp]:
+    """For each trial the candidate with the least sum over all trials but that one, from errors (candidates, trials)."""
+    return np.argmin(total.sum(axis=1, keepdims=True) - total, axis=0)
 
 
 def _majority(found: Sequence[Sequence[str]]) -> tuple[str, ...]:
@@ -237,12 +240,16 @@ def printed(paths: Sequence[Path], found: dict[str, Array]) -> None:
         print(f"{path.stem:44s}" + "".join(f"{each[k, 0]:7.2f}" for each in found.values()))
 
 
-def sentence(name: str, found: dict[float, float], trials: int) -> str:
-    """Say what the low pass in an almost inertial frame does to a filter."""
-    each = ", ".join(f"{error:.2f} deg with {tau:g} s" for tau, error in found.items() if tau)
+def sentence(name: str, found: Array) -> str:
+    """Say what the low pass in an almost inertial frame does to a filter, from the errors (1 + low passes, trials)."""
+    without, *with_it = found.mean(axis=1)
+    each = ", ".join(f"{error:.2f} deg with {tau:g} s" for tau, error in zip(ALMOST_INERTIAL, with_it, strict=True))
+    n = found.shape[1]
+    chosen = found[_best_on_the_others(found), np.arange(n)].mean() if n > 1 else np.nan
     return (
         f"A low pass of the specific force in an almost inertial frame (vqf's way) before `{name}` changes the mean total "
-        f"error over {trials} trials from {found[0.0]:.2f} deg to {each}."
+        f"error over {n} trials from {without:.2f} deg to {each}; with the time constant, or none, chosen for each trial "
+        f"on the others the error is {chosen:.2f} deg."
     )
 
 
@@ -261,7 +268,7 @@ def main() -> None:
         print(line, file=sys.stderr)
     trials, models = Trials(paths), list[Parameters]()
     if given.almost_inertial:
-        print(sentence(given.almost_inertial, trials.low_passed(given.almost_inertial), len(paths)))
+        print(sentence(given.almost_inertial, trials.low_passed(given.almost_inertial)))
         return
     peers = [name for name, peer in PEERS.items() if peer.frame is not None and name not in LEFT_OUT]
     found = {name: trials.judged(name) for name in (*OURS, *peers)}
