@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-RULES = 24
+RULES = 25
 """Numbers of the rules."""
 
 

@@ -95,7 +95,8 @@ class Numpy:
             seen = self.q.apply(f)
             across = np.cross(seen, [0.0, 0.0, 1.0])
             angle = np.arctan2(np.linalg.norm(across), seen[2])
-            self.measured(eye[:2], (across / np.linalg.norm(across) * angle)[:2], 0.01 * np.eye(2))
+            spread = 0.01 + 2 * abs(np.linalg.norm(f) / G - 1)
+            self.measured(eye[:2], (across / np.linalg.norm(across) * angle)[:2], spread * np.eye(2))
             self.lost = False
         force = self.q.apply(f)
         self.v = self.v + force[:2] * dt

@@ -48,7 +48,7 @@ pub struct Mekf<T = f64> {
     pub(super) covariance: Covariance<T>,
     pub(super) rest: Rest<T>,
     pub(super) field: Field<T>,
-    /// The last specific force, body frame, m/s^2, and what it changes by, (m/s^2)^2.
+    /// The last specific force that is not doubted, body frame, m/s^2, and what it changes by, (m/s^2)^2.
     pub(super) force: Vector3<f64>,
     pub(super) usual: Usual,
     /// Variance of the velocity by changes of the last seconds that those do not allow, (m/s)^2.
@@ -136,9 +136,9 @@ impl<T: Real> Mekf<T> {
     /// [`SURE`] times those that occur hold a blow; what bad readings make is beyond.
     fn doubted_speed(&mut self, f: &Vector3<f64>, dt: f64) -> T {
         let square = (f - self.force).norm_squared().min(f64::MAX);
-        self.force = *f;
         if !self.usual.doubts(square, LEAST_FORCE) {
-            self.doubted *= (-dt / LONGEST).exp();
+            self.force = *f;
+            self.doubted *= (1.0 - dt * (1.0 / LONGEST)).max(0.0);
             return T::splat(0.0);
         }
         self.usual.get_used(dt);
@@ -255,7 +255,7 @@ impl<T: Real> Mekf<T> {
         }
         self.velocity = [T::splat(0.0); 2];
         self.covariance.forget_velocity(v.speed * v.speed);
-        self.rest = Rest::unknown();
+        (self.rest, self.usual) = (Rest::unknown(), Usual(FORCE_BEFORE));
     }
 }
 
