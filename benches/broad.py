@@ -38,8 +38,8 @@ from imufit.comparing.attitude import corrected
 from imufit.replaying import SETTINGS, convert_frame
 from imufit.replaying import replay as run_filters
 from numpy.typing import NDArray
-from scipy.signal import butter, lfilter, lfilter_zi
 from peers import MISSING, PEERS
+from scipy.signal import butter, lfilter, lfilter_zi
 
 Array = NDArray[np.float64]
 Parameters = dict[str, dict[str, float]]
@@ -193,7 +193,7 @@ class Trials:
 
 
 def _best_on_the_others(total: Array) -> NDArray[np.intp]:
-    """For each trial the candidate with the least sum over all trials but that one, from errors (candidates, trials)."""
+    """Return for each trial the candidate with the least sum over the other trials, from errors (candidates, trials)."""
     return np.argmin(total.sum(axis=1, keepdims=True) - total, axis=0)
 
 
@@ -247,9 +247,9 @@ def sentence(name: str, found: Array) -> str:
     n = found.shape[1]
     chosen = found[_best_on_the_others(found), np.arange(n)].mean() if n > 1 else np.nan
     return (
-        f"A low pass of the specific force in an almost inertial frame (vqf's way) before `{name}` changes the mean total "
-        f"error over {n} trials from {without:.2f} deg to {each}; with the time constant, or none, chosen for each trial "
-        f"on the others the error is {chosen:.2f} deg."
+        f"A low pass of the specific force in an almost inertial frame (vqf's way) before `{name}` changes the mean "
+        f"total error over {n} trials from {without:.2f} deg to {each}; with the time constant, or none, chosen for each "
+        f"trial on the others the error is {chosen:.2f} deg."
     )
 
 
