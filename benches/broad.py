@@ -193,7 +193,7 @@ class Trials:
 
 
 def _best_on_the_others(total: Array) -> NDArray[np.intp]:
-    """Return for each trial the candidate with the least sum over the other trials, from errors (candidates, trials)."""
+    """Return for each trial the candidate with the least sum over the others, from errors (candidates, trials)."""
     return np.argmin(total.sum(axis=1, keepdims=True) - total, axis=0)
 
 
@@ -248,8 +248,8 @@ def sentence(name: str, found: Array) -> str:
     chosen = found[_best_on_the_others(found), np.arange(n)].mean() if n > 1 else np.nan
     return (
         f"A low pass of the specific force in an almost inertial frame (vqf's way) before `{name}` changes the mean "
-        f"total error over {n} trials from {without:.2f} deg to {each}; with the time constant, or none, chosen for each "
-        f"trial on the others the error is {chosen:.2f} deg."
+        f"total error over {n} trials from {without:.2f} deg to {each}; with the time constant, or none, chosen for "
+        f"each trial on the others the error is {chosen:.2f} deg."
     )
 
 
