@@ -4,7 +4,7 @@ import ast
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 
 import imufit
 import pytest
@@ -38,9 +38,12 @@ def test_functions_stay_functions_when_modules_of_the_same_name_are_loaded():
     assert done.returncode == 0, done.stderr
 
 
-def test_replay_and_simulate_are_modules():
-    assert isinstance(imufit.replay, ModuleType)
-    assert isinstance(imufit.simulate, ModuleType)
+def test_every_question_is_a_function():
+    questions = ["calibrate", "compare", "diagnose", "export", "fit", "ladder", "replay", "simulate"]
+    questions += ["allan", "info", "join", "plot", "tune"]
+    assert all(isinstance(getattr(imufit, name), FunctionType) for name in questions)
+    assert isinstance(imufit.lab.grade, ModuleType)
+    assert isinstance(imufit.devices.record, ModuleType)
 
 
 def test_unknown_name_is_an_attribute_error():

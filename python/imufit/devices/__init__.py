@@ -2,3 +2,23 @@
 
 Nothing in the library's core uses this room.
 """
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from imufit.devices import calibrate_live as calibrate_live
+    from imufit.devices import chips as chips
+    from imufit.devices import emulate as emulate
+    from imufit.devices import monitor as monitor
+    from imufit.devices import record as record
+else:
+    from importlib import import_module
+
+    def __getattr__(name: str) -> object:
+        """Load a package of this room on first use (PEP 562)."""
+        if name in __all__:
+            return import_module(f"{__name__}.{name}")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+__all__ = ["calibrate_live", "chips", "emulate", "monitor", "record"]

@@ -41,6 +41,8 @@ class Window:
         Their means over the log of the fit, ``temp`` (degC) among them.
     effect : str
         Id of the effect that asks.
+    counted_from_mean : set of str
+        Columns that were asked for less their mean.
     """
 
     t: Array
