@@ -226,20 +226,6 @@ def test_positions_without_an_attitude_are_joined_by_the_length_of_the_specific_
     assert "--frame ENU" in str(refused.value)
 
 
-@pytest.mark.parametrize("seed", [53013, 53021])
-def test_positions_of_a_walk_are_not_called_upside_down(seed: int) -> None:
-    one = pair(seed)
-    assert one.motion == "walk"
-    reference = replace(reference_of(one), ref_q=None)
-    try:
-        found = imufit.join(sensor_of(one), reference).lag
-    except InputError as error:
-        assert "the lag is ambiguous" in str(error)  # noqa: PT017  a walk may be refused, not explained wrongly
-    else:
-        assert found == pytest.approx(one.lag, abs=0.02)
-    assert imufit.join(sensor_of(one), reference, lag=one.lag).correlation > 0.9
-
-
 def test_positions_of_another_motion_are_refused() -> None:
     one, other = pair(41004), pair(41010)
     with pytest.raises(InputError, match=r"ambiguous|not those of one motion|in common|says otherwise"):

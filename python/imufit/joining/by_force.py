@@ -22,7 +22,7 @@ LEAST_SAMPLES: Final = 1.0
 """Samples of the slower recording in a width: with fewer, the position between samples is guessed."""
 WIDTHS: Final = 6
 """Widths that are tried, each twice the one before: positions to a millimetre show the force in a tenth of a second,
-those of a satellite receiver in seconds. The width counts that leaves least to noise."""
+those of a satellite receiver in seconds. The likeliest lag of all widths counts."""
 LEAST_BINS: Final = 30
 """Mean forces in the shorter recording; with fewer, some lag makes any two recordings agree."""
 OVERSAMPLED: Final = 4
@@ -54,21 +54,21 @@ def likeliest_by_force(
     Likeliest or None
         None where the recordings are too short, or no lag gives them forces in common.
     """
-    known = near is not None, skew is not None
-    best: tuple[float, LagSearch, list[Candidate]] | None = None
+    best: tuple[LagSearch, list[Candidate]] | None = None
     for width in _widths(sensor, reference):
         search = _search(sensor, reference, width, skew)
-        peaks = [replace(search.at(near.lag), lag=near.lag)] if near is not None else search.peaks()
-        # The noise of a position is new in every bin, however long the motion resembles itself.
-        fit = peaks[0].gain * search.independent / search.step if peaks else 0.0
-        if peaks and (best is None or fit > best[0]):
-            best = fit, search, peaks
+        peaks = [search.at(near.lag)] if near is not None else search.peaks()
+        if peaks and (best is None or peaks[0].gain > best[1][0].gain):
+            best = search, peaks
     if best is None:
         return None
-    _, search, peaks = best
+    search, peaks = best
     found: list[Placed] = []
     for peak in peaks:
-        placed = _refined(sensor, reference, search, peak, known) if peak.gain >= RIVAL * peaks[0].gain else None
+        if peak.gain < RIVAL * peaks[0].gain:
+            continue
+        start = replace(peak, lag=near.lag) if near is not None else peak
+        placed = _refined(sensor, reference, search, start, near is not None, skew is not None)
         if placed is not None and not any(search.meet(placed.aligned, other.aligned, SAME) for other in found):
             found.append(placed)
     return of_these(found, search) if found else None
@@ -87,10 +87,10 @@ def _search(sensor: Forces, reference: Forces, width: float, skew: float | None)
 
 
 def _refined(
-    sensor: Forces, reference: Forces, search: LagSearch, near: Candidate, known: tuple[bool, bool]
+    sensor: Forces, reference: Forces, search: LagSearch, near: Candidate, lag_known: bool, skew_known: bool
 ) -> Placed | None:
     """Refine lag and skew by least squares; the reference's length is a constant and a multiple of the sensor's."""
-    (lag_known, skew_known), width = known, search.step
+    width = search.step
     start, end = float(reference.stretches.t[0]), float(reference.stretches.t[-1])
     t = np.arange(start + REACH * width, end - REACH * width, width / OVERSAMPLED)
     expected, there = reference.lengths(t, width)

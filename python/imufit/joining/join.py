@@ -15,7 +15,7 @@ from imufit.joining.course import Course, Stretches, reference_course
 from imufit.joining.forces import position_forces, sensor_forces
 from imufit.joining.gravity import mounted, vertical
 from imufit.joining.joined import Compared, Joined, RateTrace
-from imufit.joining.likeliest import SURE, Likeliest, Placed, likeliest, placed
+from imufit.joining.likeliest import Likeliest, Placed, likeliest, placed
 from imufit.joining.mount import SMALL, nearest_square_turn, turned
 from imufit.joining.refine import Aligned, refine
 from imufit.joining.search import FASTER, LEAST_OVERLAP, Candidate, Correlation
@@ -149,25 +149,20 @@ def _join_positions(log: Log, reference: Log, lag: float | None, skew: float | N
     near = None if lag is None else Candidate(lag, skew or 0.0, 0.0, np.eye(3))
     up = vertical(reference.metadata.frame)
     most = FASTER * float(np.nanmax(np.linalg.norm(log.acc, axis=1)))
-    as_told = likeliest_by_force(sensor, position_forces(t, p, up, most), near, skew)
-    if lag is not None and as_told is not None:
-        return _result(_joined(log, reference, rows, as_told.best.aligned, None), as_told.best, 0.0)
-    turned_over = likeliest_by_force(sensor, position_forces(t, p, -up, most), near, skew)
-    logs = (log, reference)
-    if turned_over is None or (as_told is not None and as_told.odds - turned_over.odds >= SURE):
-        best, rival = _only_one(as_told, logs)
-        return _result(_joined(log, reference, rows, best.aligned, None), best, rival)
-    other, _ = _only_one(turned_over, logs)
-    if as_told is not None and turned_over.odds - as_told.odds < SURE:
-        # A body that rises and falls as a wave does the same half a wave later, upside down.
-        raise _ambiguous(as_told.best, other, log)
-    raise InputError(
-        f"the z axis of the positions points {'up' if up[2] < 0.0 else 'down'}, and frame "
-        f"{reference.metadata.frame} says otherwise",
-        file=reference.path or "reference",
-        column="ref_pz",
-        remedy=f"Name the frame: --frame {'ENU' if up[2] < 0.0 else 'NED'}.",
+    found, turned_over = (
+        likeliest_by_force(sensor, position_forces(t, p, each, most), near, skew) for each in (up, -up)
     )
+    likelier = turned_over is not None and (found is None or turned_over.best.traces.gain > found.best.traces.gain)
+    if turned_over is not None and likelier and not (turned_over.unrelated or turned_over.ambiguous):
+        raise InputError(
+            f"the z axis of the positions points {'up' if up[2] < 0.0 else 'down'}, and frame "
+            f"{reference.metadata.frame} says otherwise",
+            file=reference.path or "reference",
+            column="ref_pz",
+            remedy=f"Name the frame: --frame {'ENU' if up[2] < 0.0 else 'NED'}.",
+        )
+    best, rival = _only_one(found, (log, reference))
+    return _result(_joined(log, reference, rows, best.aligned, None), best, rival)
 
 
 def _result(log: Log, best: Placed, rival: float) -> Joined:
@@ -231,7 +226,13 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
             remedy="Move the sensor for longer, once as at no other time, or give the lag with --lag.",
         )
     if second is not None and (found.ambiguous or found.unrelated):
-        raise _ambiguous(best, second, logs[0])
+        raise InputError(
+            f"the lag is ambiguous: {best.aligned.lag:.3f} s and {second.aligned.lag:.3f} s make "
+            f"{best.traces.compared.value} agree equally well "
+            f"(correlation {best.traces.correlation:.3f} and {second.traces.correlation:.3f})",
+            file=logs[0].path or "log",
+            remedy="Move the sensor once as at no other time, or give the lag with --lag.",
+        )
     return best, found.rival
 
 
@@ -240,16 +241,6 @@ def _apart(reference: Log) -> InputError:
         "the recordings have no few seconds of motion in common that no gap interrupts",
         file=reference.path or "reference",
         remedy="Record sensor and reference at the same time, and turn the sensor.",
-    )
-
-
-def _ambiguous(best: Placed, second: Placed, log: Log) -> InputError:
-    return InputError(
-        f"the lag is ambiguous: {best.aligned.lag:.3f} s and {second.aligned.lag:.3f} s make "
-        f"{best.traces.compared.value} agree equally well "
-        f"(correlation {best.traces.correlation:.3f} and {second.traces.correlation:.3f})",
-        file=log.path or "log",
-        remedy="Move the sensor once as at no other time, or give the lag with --lag.",
     )
 
 

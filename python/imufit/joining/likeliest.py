@@ -83,12 +83,7 @@ class Likeliest:
     @property
     def unrelated(self) -> bool:
         """True if one of as many unrelated alignments agrees as well."""
-        return self.odds < SURE + float(np.log(self.tried))
-
-    @property
-    def odds(self) -> float:
-        """Log of the likelihood ratio of "the rates are the same" over "they are unrelated"."""
-        return self._odds(self.best.traces.gain)
+        return self._odds(self.best.traces.gain) < SURE + float(np.log(self.tried))
 
     def _odds(self, gain: float) -> float:
         return 0.5 * gain / self.independent
