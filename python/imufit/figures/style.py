@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from matplotlib.category import StrCategoryFormatter
 from matplotlib.figure import Figure
@@ -26,6 +26,9 @@ GREEN = "#009E73"
 GREY = "#8C8C8C"
 PALE = "#E6E6E6"
 INK = "#222222"
+
+PALETTE: Final = 128
+"""Colours of a picture in a notebook: enough for ten colours with smooth edges, at a third of the bytes."""
 
 AXES = {"x": BLUE, "y": VERMILION, "z": GREEN}
 LINES = {"x": "-", "y": "--", "z": "-."}
@@ -58,9 +61,16 @@ class PlainFigure(Figure):
 
     def _repr_png_(self) -> bytes:
         """Show the figure in a notebook, where only figures of pyplot show themselves."""
-        held = BytesIO()
+        from PIL import Image  # noqa: PLC0415  comes with matplotlib, and is only needed here
+
+        held, small = BytesIO(), BytesIO()
         self.savefig(held, format="png")
-        return held.getvalue()
+        Image.open(held).convert("RGB").quantize(PALETTE, dither=Image.Dither.NONE).save(small, "png", optimize=True)
+        return small.getvalue()
+
+    def _repr_mimebundle_(self, **_: object) -> dict[str, bytes]:
+        """Show the same picture where pyplot would draw every Figure in its own, larger way."""
+        return {"image/png": self._repr_png_()}
 
 
 def new_figure(width: float, height: float) -> Figure:
