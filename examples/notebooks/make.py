@@ -92,7 +92,11 @@ def run(made: NotebookNode) -> NotebookNode:
         environment = {**os.environ, "IPYTHONDIR": own, "JUPYTER_CONFIG_DIR": own, "COLUMNS": "100"}
         environment.pop("MPLBACKEND", None)
         client = NotebookClient(
-            made, timeout=LONGEST, kernel_name="python3", record_timing=False, resources={"metadata": {"path": EXAMPLES}}
+            made,
+            timeout=LONGEST,
+            kernel_name="python3",
+            record_timing=False,
+            resources={"metadata": {"path": EXAMPLES}},
         )
         client.execute(env=environment)
     made["metadata"] = METADATA

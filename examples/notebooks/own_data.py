@@ -68,7 +68,8 @@ ladder.fit.plot()
 # The gyroscope's bias about y comes out as it was put in. The model corrects any log of this sensor:
 # %%
 corrected = ladder.fit.model.apply(log)
-print("mean of gyr_y at the start, deg/s:", *(f"{np.degrees(each.gyr[:100, 1].mean()):.2f}" for each in (log, corrected)))
+for name, each in {"as it is": log, "corrected": corrected}.items():
+    print(f"mean of gyr_y in the first second, {name}: {np.degrees(each.gyr[:100, 1].mean()):.2f} deg/s")
 # %% [markdown]
 # And goes where the sensor is read, here as an Arduino sketch:
 # %%

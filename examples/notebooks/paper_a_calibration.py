@@ -12,7 +12,7 @@
 # %%
 import imufit
 import numpy as np
-from paper_a_calibration import G, NOISE, correction, errors, parameters, run, simulate, table_3
+from paper_a_calibration import NOISE, G, correction, errors, parameters, run, simulate, table_3
 
 signs = (1, 1, -1, 1, 1, -1)
 noise = next(iter(NOISE.values()))
@@ -53,8 +53,10 @@ import itertools
 
 choices = list(itertools.product((1, -1), repeat=6))[::2][:30]
 scaled = np.array([errors(each, run(each, noise, k)[2]) for k, each in enumerate(choices)])
-print(f"{100 * np.mean(np.abs(scaled) < 2.0):.0f} % within two standard errors; the largest error is "
-      f"{np.abs(scaled).max():.1f} standard errors")
+print(
+    f"{100 * np.mean(np.abs(scaled) < 2.0):.0f} % within two standard errors; the largest error is "
+    f"{np.abs(scaled).max():.1f} standard errors"
+)
 # %%
 import matplotlib.pyplot as plt
 
@@ -64,4 +66,5 @@ x = np.linspace(-3.5, 3.5, 200)
 axes.plot(x, np.exp(-0.5 * x**2) / np.sqrt(2 * np.pi), color="#222222", label="normal distribution")
 axes.set_xlabel("error over its standard error")
 axes.set_ylabel("density")
-axes.legend(frameon=False);
+axes.legend(frameon=False)
+plt.show()

@@ -9,9 +9,18 @@
 # errors.
 # %%
 import imufit
-import numpy as np
-from paper_b_tilt import METHODS, RMSE, SD, blow, by_four_methods, errors_at_rest, move, rmse_and_sd, small_tilts
-from paper_b_tilt import standing, sweep
+from paper_b_tilt import (
+    METHODS,
+    RMSE,
+    SD,
+    blow,
+    errors_at_rest,
+    move,
+    rmse_and_sd,
+    small_tilts,
+    standing,
+    sweep,
+)
 
 log = standing(1.5, seed=1)
 log

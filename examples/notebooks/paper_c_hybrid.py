@@ -9,9 +9,8 @@
 # The paper shows two figures and no numbers. Here the experiment is simulated and measured.
 # %%
 import imufit
-import numpy as np
 import pandas as pd
-from paper_c_hybrid import COLUMNS, SETS, WHOLE, dynamics_figure, measured, redrawn, swung, tuning
+from paper_c_hybrid import COLUMNS, SETS, dynamics_figure, measured, redrawn, swung, tuning
 
 log = swung(1)
 log
