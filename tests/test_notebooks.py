@@ -17,8 +17,8 @@ SIX = {"first_loop", "own_data", "own_effect", "paper_a_calibration", "paper_b_t
 MOST = {"first_loop": 300_000}
 """Bytes that a notebook may have; the others as below."""
 USUAL = 400_000
-PICTURE = 130_000
-"""Bytes of a picture: five panels of dense lines have 115 000."""
+PICTURE = 100_000
+"""Bytes of a picture."""
 TAGS = re.compile(r"<[^>]*>")
 FOREIGN = re.compile(r"/home/|/root/|/tmp/|/work/|/usr/|site-packages|Traceback|Warning|0x[0-9a-f]{6}")
 

@@ -76,5 +76,5 @@ figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6), layout="constraine
 ladder.plot(ax=left)
 addition.plot(ax=right)
 left.set_title("Held-out error")
-right.set_title("Lever arm, m")
+right.set_title("Lever arm")
 plt.show()

@@ -21,7 +21,7 @@ from own_effect import recorded
 
 # %%
 log = recorded()
-log.plot(columns=["fan_current"])
+log.plot(columns=["fan_current"], end=40.0)
 # %% [markdown]
 # ## Without the effect
 #
