@@ -116,7 +116,7 @@ def test_a_catalogue_is_a_list_that_prints_as_a_table():
 @pytest.fixture
 def grid():
     """Return a function that makes Axes of pyplot, which are closed after the test."""
-    yield lambda *shape: plt.subplots(*shape)
+    yield plt.subplots
     plt.close("all")
 
 
