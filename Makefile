@@ -69,6 +69,7 @@ lint: $(STAMP) ## Formatting, clippy, ruff, mypy, stubs, import layers
 docs: $(STAMP) ## Refresh what the documents take from the code: effects, pictures, pasted output
 	$(BIN)/python docs/make_effects.py
 	$(BIN)/python docs/pictures/make.py
+	$(BIN)/python examples/notebooks/make.py
 	$(BIN)/python docs/blocks.py --write README.md docs/logs.md docs/own_effect.md docs/calibration.md docs/replay.md docs/tuning.md docs/tilt.md docs/hybrid.md
 
 wheel: $(DEPENDENCIES) ## One abi3 wheel in dist/

@@ -24,6 +24,7 @@ from imufit.lab.simulate import Noise, simulate
 from imufit.lab.simulate.robot_arm import ARM, STANDING
 from imufit.replaying import PAPER_C_GAINS
 from imufit.replaying import replay as run_filters
+from imufit.tuning import Tuning
 from scipy.spatial.transform import Rotation
 
 RATE, DURATION = 100.0, 60.0
@@ -137,10 +138,10 @@ def first_attitude(log: imufit.Log) -> np.ndarray:
 
 
 @cache
-def tuning() -> imufit.tuning.Tuning:
+def tuning() -> Tuning:
     """Tune the driven hybrid on a swing that nothing is judged on."""
     log = simulate("arm_swing", {**LOW_PASS, **GYRO_BIAS}, TUNED_ON, DURATION, 0.5 * RATE).to_log()
-    return imufit.tuning.tune(log, "hybrid", gains=("k_p", "k_i"))
+    return imufit.tune(log, "hybrid", gains=("k_p", "k_i"))
 
 
 FILTERS = {

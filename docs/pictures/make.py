@@ -73,7 +73,7 @@ def frames() -> "Figure":
 def calibration() -> "Figure":
     """Calibrate the sensor of docs/calibration.md."""
     log = imufit.simulate("poses", SENSOR, duration=60.0, seed=1).to_log()
-    return imufit.calibrating.calibrate(log).plot(log)
+    return imufit.calibrate(log).plot(log)
 
 
 def tilt(folder: Path) -> None:

@@ -112,7 +112,7 @@ def _intervals(axes: Axes, readings: Readings, poses: Sequence[PoseMark], prefix
     axes.set_ylabel("specific force (m/s²)")
     left_out = len(poses) - count
     text = f"{prefix}{count} poses found" + (f", {left_out} left out (×)" if left_out else "")
-    axes.set_title(text, loc="left", fontsize=11, color=INK, pad=14)
+    title(axes, text, pad=14)
 
 
 def _last(values: Array) -> float:

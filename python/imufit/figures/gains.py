@@ -42,6 +42,10 @@ class GainLike(Protocol):
         """The gain."""
 
     @property
+    def unit(self) -> str:
+        """Its unit, ``1`` for a number."""
+
+    @property
     def default(self) -> float:
         """Its default."""
 
@@ -112,11 +116,15 @@ def _map(axes: Axes, over: MapLike, gains: Sequence[GainLike], rival: tuple[str,
         axes.contour(over.x, over.y, np.nan_to_num(values, nan=1e9), levels=[rival[1]], colors="white")
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlabel(over.names[0], fontsize=9)
-    axes.set_ylabel(over.names[1], fontsize=9)
+    axes.set_xlabel(_with_unit(a), fontsize=9)
+    axes.set_ylabel(_with_unit(b), fontsize=9)
     axes.legend(frameon=True, fontsize=8, loc="best")
     style.title(axes, "Over two gains, the others as tuned", 9.5)
     style.tidy(axes)
+
+
+def _with_unit(gain: GainLike) -> str:
+    return gain.name if gain.unit == "1" else f"{gain.name}, {gain.unit}"
 
 
 def _lines(axes: Axes, gains: Sequence[GainLike], rival: tuple[str, float] | None, label: str) -> None:

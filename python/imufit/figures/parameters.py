@@ -15,7 +15,8 @@ def parameter_sizes(
     values: ArrayLike,
     standard_errors: ArrayLike,
     typical: ArrayLike,
-    units: Sequence[str],
+    shown: Sequence[str],
+    told: Sequence[bool],
     ax: place.Place | None = None,
 ) -> place.Drawing:
     """Each parameter over its typical size, with a 95 % interval.
@@ -25,11 +26,13 @@ def parameter_sizes(
     labels : sequence of str
         Names, e.g. ``gyr.bias x``.
     values, standard_errors : array_like
-        (k,) SI units as in `units`.
+        (k,) SI units.
     typical : array_like
         (k,) typical sizes, same units; rows with NaN are not drawn.
-    units : sequence of str
-        (k,) SI units.
+    shown : sequence of str
+        (k,) values with their errors, as a person reads them.
+    told : sequence of bool
+        (k,) whether the log tells the value; of others only the words are shown.
     ax : Axes, Figure or SubFigure, optional
         Where to draw, see :mod:`imufit.figures.place`.
 
@@ -50,13 +53,14 @@ def parameter_sizes(
     places = np.arange(len(drawn))
     axes.axvspan(-1.0, 1.0, color=style.PALE, zorder=0)
     axes.axvline(0.0, color=style.GREY, linewidth=0.8)
-    ordinary = np.abs(scaled) <= 3.0
-    for chosen, colour in ((ordinary, style.BLUE), (~ordinary, style.VERMILION)):
+    seen = np.array([told[index] for index in drawn])
+    ordinary = (np.abs(scaled) <= 3.0) | ~seen
+    for chosen, colour in ((ordinary & seen, style.BLUE), (~ordinary, style.VERMILION)):
         if chosen.any():
             axes.errorbar(
                 scaled[chosen], places[chosen], xerr=margin[chosen], fmt="o", markersize=5, color=colour, capsize=3
             )
-    reach = float(np.max(np.abs(scaled) + margin))
+    reach = float(np.max((np.abs(scaled) + margin)[seen], initial=0.0))
     if reach > 12.0:
         axes.set_xscale("symlog", linthresh=1.0)
         axes.set_xlim(-1.6 * reach, 1.6 * reach)
@@ -64,7 +68,7 @@ def parameter_sizes(
         axes.set_xlim(-1.1 * max(reach, 1.2), 1.1 * max(reach, 1.2))
     for at, index in zip(places, drawn, strict=True):
         axes.annotate(
-            quantity.with_error(values[index], errors[index], units[index]),
+            shown[index],
             (1.01, at),
             xycoords=axes.get_yaxis_transform(),
             va="center",
@@ -79,8 +83,10 @@ def parameter_sizes(
     if count == 0:
         sentence = "Every parameter is of a plausible size"
     else:
-        largest = drawn[int(np.abs(scaled).argmax())]
-        sentence = f"{labels[largest]} is {quantity.number(float(np.abs(scaled).max()), 2)} times its typical size"
+        largest = drawn[int((np.abs(scaled) * seen).argmax())]
+        sentence = (
+            f"{labels[largest]} is {quantity.number(float((np.abs(scaled) * seen).max()), 2)} times its typical size"
+        )
     style.title(axes, sentence)
     style.tidy(axes)
     return drawing

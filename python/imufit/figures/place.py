@@ -95,7 +95,7 @@ class Drawing:
         given: dict[str, Any] = dict(zip(("handles", "labels"), named, strict=False))
         if self.whole is not None:
             return self.whole.legend(**given, loc=loc, ncols=ncols, frameon=False, fontsize=9)
-        return self.axes[0].legend(**given, loc="best", frameon=False, fontsize=8)
+        return self.axes[0].legend(**given, loc="best", framealpha=0.85, edgecolor="none", fontsize=8)
 
 
 def panels(

@@ -145,6 +145,6 @@ def _panel(axes: Axes, panel: PanelLike) -> None:
             color="#555555",
         )
     # From the edge of its cell on, where there is room; a height that is given need not be searched for.
-    axes.set_title(_claim(panel), loc="left", fontsize=8.5, color=style.INK, x=-0.38, y=1.03)
+    style.title(axes, _claim(panel), 8.5, x=-0.38, y=1.03)
     axes.set_xlabel(f"{panel.covariate}, {x_unit}" if x_unit else panel.covariate, fontsize=8)
     axes.set_ylabel(f"residual, {y_unit}", fontsize=8)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+import textwrap
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
 from matplotlib.category import StrCategoryFormatter
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -26,6 +28,11 @@ GREEN = "#009E73"
 GREY = "#8C8C8C"
 PALE = "#E6E6E6"
 INK = "#222222"
+
+LETTER: Final = 0.55
+"""Mean width of a letter of matplotlib's font over its size, measured over the titles of all figures."""
+PALETTE: Final = 256
+"""Colours of a picture in a notebook: as many as one byte tells, at a third of the bytes of all colours."""
 
 AXES = {"x": BLUE, "y": VERMILION, "z": GREEN}
 LINES = {"x": "-", "y": "--", "z": "-."}
@@ -58,9 +65,24 @@ class PlainFigure(Figure):
 
     def _repr_png_(self) -> bytes:
         """Show the figure in a notebook, where only figures of pyplot show themselves."""
-        held = BytesIO()
+        from PIL import Image  # noqa: PLC0415  comes with matplotlib, and is only needed here
+        from scipy.spatial import cKDTree  # noqa: PLC0415
+
+        held, small = BytesIO(), BytesIO()
         self.savefig(held, format="png")
-        return held.getvalue()
+        drawn = np.asarray(Image.open(held).convert("RGB"))
+        colours, place, count = np.unique(drawn.reshape(-1, 3), axis=0, return_inverse=True, return_counts=True)
+        # The most frequent colours stay as they are: means of colours would tint white and thin lines.
+        kept = np.argsort(-count, kind="stable")[:PALETTE]
+        nearest = np.asarray(cKDTree(colours[kept]).query(colours)[1])
+        picture = Image.fromarray(nearest[place.ravel()].reshape(drawn.shape[:2]).astype(np.uint8))
+        picture.putpalette(colours[kept].ravel().tolist())
+        picture.save(small, "png", optimize=True)
+        return small.getvalue()
+
+    def _repr_mimebundle_(self, **_: object) -> dict[str, bytes]:
+        """Show the same picture where pyplot would draw every Figure in its own, larger way."""
+        return {"image/png": self._repr_png_()}
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -123,6 +145,27 @@ def tidy(axes: Axes) -> None:
     axes.tick_params(colors=INK, labelsize=9)
 
 
-def title(axes: Axes, sentence: str, size: float = 11.0) -> None:
-    """Put a sentence above the axes, flush left."""
-    axes.set_title(sentence, loc="left", fontsize=size, color=INK)
+def title(axes: Axes, sentence: str, size: float = 11.0, **options: Any) -> None:
+    """Put a sentence above the axes, flush left.
+
+    On a figure of the user it is broken to the width of the axes, and ``axes.set_title`` replaces it.
+
+    Parameters
+    ----------
+    axes : Axes
+        Below the sentence.
+    sentence : str
+        The words.
+    size : float
+        Of the letters, points.
+    **options
+        Of ``set_title``, where the figure is of this package.
+    """
+    if isinstance(axes.get_figure(root=True), PlainFigure):
+        axes.set_title(sentence, loc="left", fontsize=size, color=INK, **options)
+        return
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    width = 72.0 * axes.get_window_extent().width / figure.dpi
+    broken = textwrap.fill(sentence, max(20, int(width / (LETTER * size))))
+    axes.set_title(broken, fontsize=min(size, 10.0), color=INK)

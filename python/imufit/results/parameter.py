@@ -195,6 +195,7 @@ def drawn_parameters(parameters: Sequence[Parameter], ax: Place | None = None) -
         [item.value for item in parameters],
         [item.standard_error for item in parameters],
         [math.nan if item.typical is None else item.typical for item in parameters],
-        [item.unit for item in parameters],
+        [item.shown for item in parameters],
+        [item.told for item in parameters],
         ax,
     )

@@ -1,0 +1,58 @@
+# %% [markdown]
+# # An effect of your own
+#
+# The catalogue holds the effects that inertial sensors usually have. Your rig may have one that nobody else has. It
+# takes about ten lines, and it is fitted, ranked and explained like the built-in ones.
+#
+# The story here: a cooling fan stands beside the sensor. Its vibration shifts the zero of the gyroscope's z axis, and
+# the log holds the current of the fan.
+# %%
+from dataclasses import replace
+
+import imufit
+import numpy as np
+
+# %% [markdown]
+# ## A recording
+#
+# Nothing in this simulation uses the effect that is written below.
+# %% [source]
+from own_effect import recorded
+
+# %%
+log = recorded()
+log.plot(columns=["fan_current"], end=40.0)
+# %% [markdown]
+# ## Without the effect
+#
+# The loop sees that something is missing. A straight line in the column `fan_current` helps, and that is a hint and not
+# an explanation.
+# %%
+before = imufit.diagnose(log)
+print(before.sentence)
+# %% [markdown]
+# ## The effect
+#
+# An effect returns the derivative of the reading with respect to each of its parameters. Here the reading grows in
+# proportion to the current, along z alone. The words stand on its card.
+# %% [source]
+from own_effect import fan
+
+# %%
+imufit.explain("gyr.fan")
+# %% [markdown]
+# `needs` names the columns without which the effect cannot be tested; `typical` is its usual size in the unit of the
+# parameter, which tells the loop what is plausible.
+#
+# ## With the effect
+# %%
+after = imufit.diagnose(log)
+after.plot()
+# %%
+ladder = imufit.ladder(log)
+ladder
+# %%
+ladder.fit.plot()
+# %% [markdown]
+# The command line runs the same lines: `imufit diagnose fan.parquet --effects-from own_effect.py`. See
+# `docs/own_effect.md` for effects with several parameters and for effects that are not linear.
