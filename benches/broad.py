@@ -38,8 +38,8 @@ from imufit.comparing.attitude import corrected
 from imufit.replaying import SETTINGS, convert_frame
 from imufit.replaying import replay as run_filters
 from numpy.typing import NDArray
-from scipy.signal import butter, lfilter, lfilter_zi
 from peers import MISSING, PEERS
+from scipy.signal import butter, lfilter, lfilter_zi
 
 Array = NDArray[np.float64]
 Parameters = dict[str, dict[str, float]]
@@ -160,7 +160,7 @@ class Trials:
         return np.array(self.each(name, partial(judge, settings={}, parameters={}, name=name)))
 
     def low_passed(self, name: str) -> Array:
-        """Total errors (1 + low passes, trials) of a filter, deg: without one, then for each of ALMOST_INERTIAL."""
+        """Total errors (1 + low passes, trials) of a filter, deg: without one, then each of ALMOST_INERTIAL."""
         found = [self.judged(name)[:, 0]]
         for tau in ALMOST_INERTIAL:
             each = self.each(f"{name}, low pass of {tau:g} s", partial(judge_low_passed, tau=tau, name=name))
@@ -193,7 +193,7 @@ class Trials:
 
 
 def _best_on_the_others(total: Array) -> NDArray[np.intp]:
-    """For each trial the candidate with the least sum over all trials but that one, from errors (candidates, trials)."""
+    """For each trial the candidate with the least sum over the others, from errors (candidates, trials)."""
     return np.argmin(total.sum(axis=1, keepdims=True) - total, axis=0)
 
 
@@ -247,9 +247,9 @@ def sentence(name: str, found: Array) -> str:
     n = found.shape[1]
     chosen = found[_best_on_the_others(found), np.arange(n)].mean() if n > 1 else np.nan
     return (
-        f"A low pass of the specific force in an almost inertial frame (vqf's way) before `{name}` changes the mean total "
-        f"error over {n} trials from {without:.2f} deg to {each}; with the time constant, or none, chosen for each trial "
-        f"on the others the error is {chosen:.2f} deg."
+        f"A low pass of the specific force in an almost inertial frame (vqf's way) before `{name}` changes the mean "
+        f"total error over {n} trials from {without:.2f} deg to {each}; with the time constant, or none, chosen for "
+        f"each trial on the others the error is {chosen:.2f} deg."
     )
 
 

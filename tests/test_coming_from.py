@@ -33,8 +33,8 @@ APART = {
     "align_vectors, weights": 1e-6,
     "from_rotvec": 1e-6,
 }
-"""Largest angle, deg, as in the tables: rounding (1e-11 found); the order of turn and correction (0.18 and 0.09 found) and
-single precision (0.01 found); filters of other equations (2.6 and 0.7 found)."""
+"""Largest angle, deg, as in the tables: rounding (1e-11 found); the order of turn and correction (0.18 and 0.09 found)
+and single precision (0.01 found); filters of other equations (2.6 and 0.7 found)."""
 SETTLED = 300
 """Rows, 3 s, after which filters of different equations are compared."""
 
