@@ -18,7 +18,15 @@ help: ## Show this list
 
 build: $(STAMP) ## Make .venv and build the package into it
 
-demo: $(STAMP) ## The whole loop on a log with a hidden effect; report in demo/
+# The demonstration needs what a user needs; the development tools come with the first target that uses them.
+USED := $(VENV)/.used
+
+$(USED): $(DEPENDENCIES) $(SOURCES)
+	@echo 'make: builds the Rust core and installs imufit without development tools into $(VENV) (some minutes)'
+	. $(BIN)/activate && PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --quiet
+	touch $@
+
+demo: $(USED) ## The whole loop on a log with a hidden effect; report in demo/
 	$(BIN)/imufit demo -o demo
 
 test: test-rust test-python ## Rust and Python tests
@@ -81,5 +89,6 @@ $(DEPENDENCIES): pyproject.toml
 	touch $@
 
 $(STAMP): $(DEPENDENCIES) $(SOURCES)
+	@echo 'make: builds the Rust core and installs imufit with its development tools into $(VENV) (some minutes)'
 	. $(BIN)/activate && PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --extras dev --quiet
-	touch $@
+	touch $@ $(USED)

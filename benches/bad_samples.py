@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from imufit.replay import replay
+from imufit.replaying import replay
 from imufit.results import Table
 from marked import markdown, write_between
 

@@ -17,14 +17,15 @@ import numpy as np
     "gyr.fan",
     parameters={"z": "rad/s/A"},
     typical=0.01,
+    axes="z",
     needs=["fan_current"],
     explanation="vibration of the fan, whose current tells how hard it runs, is rectified by gyro z",
     mistaken_for="gyr.bias_temperature, since the fan starts when it gets warm",
     confirm="let the sensor lie still and switch the fan on and off",
 )
-def fan(w: imufit.Window) -> np.ndarray:
-    """Return d reading / d parameter: (n, 3), rad/s per unit of z."""
-    return np.outer(w.column("fan_current"), [0.0, 0.0, 1.0])
+def fan(w: imufit.Window, z: float) -> np.ndarray:
+    """Return what the fan adds to gyro z: (n,), rad/s."""
+    return z * w.column("fan_current")
 
 
 def recorded() -> imufit.Log:

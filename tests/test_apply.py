@@ -136,9 +136,9 @@ def test_a_lever_arm_does_not_make_a_noisy_log_noisier():
 @pytest.mark.parametrize("stage", ["offset", "gain", "input"])
 def test_a_users_effect_is_undone_like_a_built_in_one(user_effect, stage):
     @user_effect("gyr.fan", parameters={"a": "1", "b": "1/(rad/s)"}, stage=stage)
-    def fan(w):
+    def fan(w, a, b):
         own = 0.1 * w.omega**2 if stage == "offset" else 0.1 * w.x**2
-        return np.stack([w.column("motor_current")[:, None] * np.ones(3) + 0.01 * w.f, own], axis=2)
+        return a * (w.column("motor_current")[:, None] + 0.01 * w.f) + b * own
 
     truth = simulated({})
     a, b = 0.02, 0.3
@@ -238,8 +238,8 @@ def test_what_cannot_be_undone_is_refused_by_name(wrong, gone, problem):
 
 def test_a_users_effect_without_its_temperature_is_refused(user_effect):
     @user_effect("acc.warm", parameters={"k": "m/s^2/K"})
-    def warm(w):
-        return w.temperature[:, None] * np.ones(3)
+    def warm(w, k):
+        return k * w.temperature
 
     model = SensorModel(["acc.warm"], {"acc.warm": {"k": 0.1}})
     with pytest.raises(InputError, match=r"acc\.warm cannot be undone: the log has no column temp"):
@@ -248,8 +248,8 @@ def test_a_users_effect_without_its_temperature_is_refused(user_effect):
 
 def test_a_reading_that_nothing_gives_is_refused_with_its_row(user_effect):
     @user_effect("acc.bent", parameters={"k": "1/(m/s^2)"}, stage="gain")
-    def bent(w):
-        return w.x**2
+    def bent(w, k):
+        return k * w.x**2
 
     log = simulated({})
     log.acc[77, 2] = -100.0
@@ -259,7 +259,7 @@ def test_a_reading_that_nothing_gives_is_refused_with_its_row(user_effect):
 
 def test_a_users_exception_comes_out_as_it_went_in(user_effect):
     @user_effect("acc.bad", parameters={"k": "1"})
-    def bad(w):
+    def bad(w, k):
         raise RuntimeError("by hand")
 
     with pytest.raises(RuntimeError, match="by hand"):

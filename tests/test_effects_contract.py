@@ -47,6 +47,11 @@ def fan(w):
     return np.repeat((np.sin(3.0 * w.t) ** 2)[:, None], 3, axis=1)
 
 
+def times_k(function):
+    """A function of the window as the value of an effect that is proportional to k."""
+    return lambda w, k: k * function(w)
+
+
 @pytest.mark.parametrize("effect_id", BUILT_IN)
 def test_every_built_in_effect_keeps_the_contract(checked, effect_id):
     parameters = find_effect(effect_id).parameters
@@ -58,13 +63,12 @@ def test_every_built_in_effect_keeps_the_contract(checked, effect_id):
 @pytest.mark.parametrize("stage", ["offset", "gain", "input"])
 def test_a_users_effect_keeps_the_contract(checked, user_effect, stage):
     @user_effect("gyr.fan", parameters={"k": "rad/s"}, stage=stage)
-    def one(w):
-        return fan(w) * (w.x if stage != "offset" else 1.0)
+    def one(w, k):
+        return k * fan(w) * (w.x if stage != "offset" else 1.0)
 
     @user_effect("acc.two", parameters={"a": "1", "b": "1"}, stage=stage)
-    def two(w):
-        current = w.column("motor_current")[:, None]
-        return np.stack([np.broadcast_to(current, w.f.shape), w.alpha], axis=2)
+    def two(w, a, b):
+        return a * w.column("motor_current")[:, None] + b * w.alpha
 
     checked("gyr.fan", [0.3])
     checked("acc.two", [0.3, -0.1])
@@ -74,12 +78,15 @@ def test_all_that_a_user_is_given_has_the_shape_that_is_promised(log, user_effec
     seen = []
 
     @user_effect("mag.look", parameters={"k": "uT"})
-    def look(w):
+    def look(w, k):
         n = w.t.size
         shapes = [a.shape for a in (w.omega, w.alpha, w.f, w.m, w.x)]
         seen.append(shapes == [(n, 3)] * 5 and w.temperature.shape == w.column("motor_current").shape == (n,))
         assert w.t_start <= w.t[0]
-        return fan(w)
+        assert w.dt == pytest.approx(np.median(np.diff(log.t)), rel=0.01)
+        assert (w.rate is w.omega, w.specific_force is w.f, w.field is w.m) == (True, True, True)
+        assert w.angular_acceleration is w.alpha
+        return k * fan(w)
 
     SensorModel(["mag.look"]).fit(log)
     assert len(seen) > 2
@@ -94,20 +101,20 @@ def broken(user_effect, name):
         "counts from the window": lambda w: fan(w) * (w.t - w.t[0])[:, None],
         "running sum": lambda w: np.cumsum(fan(w), axis=0),
         "too few rows": lambda w: fan(w)[:-1],
-        "one axis": lambda w: fan(w)[:, 0],
-        "one parameter too many": lambda w: np.stack([fan(w), fan(w)], axis=2),
+        "two axes": lambda w: fan(w)[:, :2],
+        "columns": lambda w: np.stack([fan(w), fan(w)], axis=2),
     }
-    user_effect("gyr.broken", parameters={"k": "rad/s"})(functions[name])
+    user_effect("gyr.broken", parameters={"k": "rad/s"})(times_k(functions[name]))
 
 
 CONTRACT = {
-    "not finite": r"gyr\.broken.*column k is not finite",
+    "not finite": r"gyr\.broken.*value is not finite",
     "mean of the window": r"gyr\.broken.*column k depends on where the rows are cut",
     "counts from the window": r"gyr\.broken.*column k depends on where the rows are cut",
     "running sum": r"gyr\.broken.*column k depends on where the rows are cut",
     "too few rows": r"gyr\.broken returned shape \(\d+, 3\) for \d+ rows\. Return .* \(\d+, 3\)",
-    "one axis": r"gyr\.broken returned shape \(\d+,\) for \d+ rows",
-    "one parameter too many": r"gyr\.broken returned shape \(\d+, 3, 2\) for \d+ rows",
+    "two axes": r"gyr\.broken returned shape \(\d+, 2\) for \d+ rows",
+    "columns": r"gyr\.broken returned shape \(\d+, 3, 2\) for \d+ rows",
 }
 
 
@@ -158,8 +165,8 @@ def test_a_trait_that_the_columns_deny_is_refused(checked, user_effect, lie):
     names = ["x", "y", "z"] if "affine" in traits else ["k"]
 
     @user_effect("gyr.lie", parameters=names, **traits)
-    def columns(w):
-        return function(w) if len(names) == 1 else np.einsum("ni,ij->nij", function(w), np.eye(3))
+    def value(w, **at):
+        return function(w) * np.array(list(at.values()))
 
     with pytest.raises(ValueError, match=problem):
         checked("gyr.lie", [0.1] * len(names))
@@ -167,10 +174,8 @@ def test_a_trait_that_the_columns_deny_is_refused(checked, user_effect, lie):
 
 def test_a_trait_that_the_columns_bear_out_is_kept(checked, user_effect):
     @user_effect("gyr.gain", parameters=["xy", "zx"], stage="gain", affine="matrix", reach="row")
-    def gain(w):
-        columns = np.zeros((w.t.size, 3, 2))
-        columns[:, 0, 0], columns[:, 2, 1] = w.x[:, 1], w.x[:, 0]
-        return columns
+    def gain(w, xy, zx):
+        return np.stack([xy * w.x[:, 1], 0.0 * w.x[:, 1], zx * w.x[:, 0]], axis=1)
 
     checked("gyr.gain", [0.1, -0.2])
     assert (find_effect("gyr.gain").affine, find_effect("gyr.gain").reach) == ("matrix", "row")
@@ -202,10 +207,10 @@ class OwnError(RuntimeError):
 )
 def test_a_users_exception_comes_out_as_it_went_in(log, user_effect, raised):
     @user_effect("gyr.fan", parameters={"k": "rad/s"})
-    def fails(w):
+    def fails(w, k):
         if w.t[-1] > 1.0:
             raise raised
-        return fan(w)
+        return k * fan(w)
 
     with pytest.raises(type(raised), match=re.escape(str(raised))) as caught:
         SensorModel(["gyr.fan"]).fit(log)
@@ -214,7 +219,7 @@ def test_a_users_exception_comes_out_as_it_went_in(log, user_effect, raised):
 
 def test_the_exception_of_one_fit_is_not_shown_for_another(log, user_effect):
     @user_effect("gyr.fan", parameters={"k": "rad/s"})
-    def fails(w):
+    def fails(w, k):
         raise OwnError("the fan was off")
 
     with pytest.raises(OwnError):
@@ -227,17 +232,17 @@ def test_the_exception_of_one_fit_is_not_shown_for_another(log, user_effect):
 
 def test_a_missing_column_is_named(log, user_effect):
     @user_effect("gyr.fan", parameters={"k": "rad/s"})
-    def fails(w):
-        return fan(w) * w.column("fan_speed")[:, None]
+    def fails(w, k):
+        return k * w.column("fan_speed")
 
-    with pytest.raises(KeyError, match="no column fan_speed; it has motor_current"):
+    with pytest.raises(InputError, match=r"gyr\.fan.*no column fan_speed; it has temp, motor_current"):
         SensorModel(["gyr.fan"]).fit(log)
 
 
 def test_an_effect_that_needs_a_column_is_not_offered_without_it(log, user_effect):
     @user_effect("gyr.fan", parameters={"k": "rad/s"}, needs=["fan_speed"])
-    def needs(w):
-        return fan(w) * w.column("fan_speed")[:, None]
+    def needs(w, k):
+        return k * w.column("fan_speed")
 
     fit = SensorModel().fit(log)
     assert "gyr.fan" not in {c.effect for c in fit.diagnose().candidates}
@@ -272,8 +277,8 @@ def test_a_users_effect_is_found_when_it_is_the_hidden_one(user_effect):
     log, k = hidden_fan(lambda current: np.sin(4.0 * current))
 
     @user_effect("gyr.fan", parameters={"k": "rad/s"}, explanation="the fan shakes the board")
-    def own(w):
-        return np.sin(4.0 * w.column("motor_current"))[:, None] * np.array([1.0, -0.5, 0.2])
+    def own(w, k):
+        return np.outer(np.sin(4.0 * w.column("motor_current")), k * np.array([1.0, -0.5, 0.2]))
 
     answer = SensorModel().fit(log).diagnose()
     assert (answer.verdict, answer.best) == ("missing", "gyr.fan")
@@ -296,8 +301,8 @@ def test_two_names_for_the_same_physics_are_both_named(user_effect):
     log, _ = hidden_fan(lambda current: current)
 
     @user_effect("gyr.fan", parameters={"k": "rad/s/A"})
-    def own(w):
-        return w.column("motor_current")[:, None] * np.array([1.0, -0.5, 0.2])
+    def own(w, k):
+        return np.outer(w.column("motor_current"), k * np.array([1.0, -0.5, 0.2]))
 
     answer = SensorModel(["gyr.bias"]).fit(log).diagnose()
     assert answer.verdict == "ambiguous"

@@ -13,6 +13,7 @@ SHOWS = {
     "first_loop.py": ("acc.lever_arm is missing", "Nothing that this log can show is missing"),
     "foreign_csv.py": ("+ gyr.bias", "s at 100 Hz; acc, gyr, ref_q, temp; NED"),
     "paper_a_calibration.py": ("published as 0.995", "of the twelve parameters within 2 standard errors"),
+    "own_effect_with_memory.py": ("missing gyr.die", "missing gyr.sticking", "-> 1.00"),
     "own_effect.py": ("gyr.fan is missing", "+ acc.bias"),
 }
 ON_A_PAGE = {"paper_b_tilt.py": "docs/tilt.md", "paper_c_hybrid.py": "docs/hybrid.md"}

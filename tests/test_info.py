@@ -225,8 +225,8 @@ def test_sensors_in_rows_of_their_own_keep_their_rates() -> None:
 
 def test_a_user_effect_is_answered_like_the_others(handheld: Log, users: None) -> None:
     @imufit.effect("gyr.motor_square", parameters={"z": "rad/s/A^2"}, typical=0.01, needs=["motor_current"])
-    def square(w: imufit.Window) -> np.ndarray:
-        return np.outer(w.column("motor_current") ** 2, [0.0, 0.0, 1.0])
+    def square(w: imufit.Window, z: float) -> np.ndarray:
+        return np.outer(w.column("motor_current") ** 2, [0.0, 0.0, z])
 
     assert imufit.info(handheld).effect("gyr.motor_square").shown == "yes"
     item = imufit.info(replace(handheld, covariates={})).effect("gyr.motor_square")

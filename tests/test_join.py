@@ -187,3 +187,109 @@ def test_columns_of_an_attitude_are_read_as_the_rates_show(kind: str) -> None:
     declared = imufit.join(log, Log(t=t, ref_q=q))
     assert found.lag == pytest.approx(declared.lag, abs=1e-6)
     assert ("reference to body" in found.log.notes[-1]) == (kind == "inverse")
+
+
+def middle_error(one: Pair, ref_t: np.ndarray, skew: float, joined: imufit.joining.Joined) -> float:
+    """Error of the lag in the middle of what both saw, s."""
+    late = ref_t[0] - one.lag
+    length = (ref_t[-1] - ref_t[0]) * (1.0 - skew)
+    middle = 0.5 * (max(one.t[0], late) + min(one.t[-1], late + length)) - late
+    return float(joined.lag + joined.skew * middle - one.lag - skew * middle)
+
+
+@pytest.mark.parametrize(("seed", "fast"), [(3001, 0.008), (3006, -0.009), (3010, 0.003)])
+def test_clocks_that_are_a_percent_apart_are_joined(seed: int, fast: float) -> None:
+    one = pair(seed)
+    ref_t = one.ref_t[0] + (one.ref_t - one.ref_t[0]) * (1.0 + fast)
+    skew = 1.0 - (1.0 - one.skew) / (1.0 + fast)
+    joined = imufit.join(sensor_of(one), replace(reference_of(one), t=ref_t))
+    assert abs(middle_error(one, ref_t, skew, joined)) < tolerance(one) + 3.0 * joined.lag_error
+    assert joined.skew == pytest.approx(skew, abs=5e-4)
+
+
+@pytest.mark.parametrize("seed", [41004, 41010, 41015])
+def test_positions_without_an_attitude_are_joined_by_the_length_of_the_specific_force(seed: int) -> None:
+    one = pair(seed)
+    reference = replace(reference_of(one), ref_q=None)
+    joined = imufit.join(sensor_of(one), reference)
+    assert abs(middle_error(one, one.ref_t, one.skew, joined)) < tolerance(one) + 3.0 * joined.lag_error
+    assert joined.mount is None
+    assert joined.log.ref_q is None
+    assert joined.log.ref_p is not None
+    assert joined.to_dict()["compared"] == "forces"
+    exact = joined.log.covariates["ref_exact"] == 1.0
+    assert np.isfinite(joined.log.ref_p[exact]).all()
+    # The vertical of positions cannot be the other way round.
+    upside_down = replace(reference, metadata=replace(reference.metadata, frame="NED"))
+    with pytest.raises(InputError, match="the z axis of the positions points up") as refused:
+        imufit.join(sensor_of(one), upside_down)
+    assert "--frame ENU" in str(refused.value)
+
+
+@pytest.mark.parametrize("seed", [53013, 53021])
+def test_positions_of_a_walk_are_not_called_upside_down(seed: int) -> None:
+    one = pair(seed)
+    assert one.motion == "walk"
+    reference = replace(reference_of(one), ref_q=None)
+    try:
+        found = imufit.join(sensor_of(one), reference).lag
+    except InputError as error:
+        assert "the lag is ambiguous" in str(error)  # noqa: PT017  a walk may be refused, not explained wrongly
+    else:
+        assert found == pytest.approx(one.lag, abs=0.02)
+    assert imufit.join(sensor_of(one), reference, lag=one.lag).correlation > 0.9
+
+
+def test_positions_of_another_motion_are_refused() -> None:
+    one, other = pair(41004), pair(41010)
+    with pytest.raises(InputError, match=r"ambiguous|not those of one motion|in common|says otherwise"):
+        imufit.join(sensor_of(one), replace(reference_of(other), ref_q=None))
+
+
+@pytest.mark.parametrize("seed", [31000, 31025])
+def test_gravity_settles_a_mount_of_which_the_rates_show_one_axis(seed: int) -> None:
+    one = pair(seed)
+    assert one.motion == "tilt"
+    joined = imufit.join(sensor_of(one), reference_of(one))
+    assert joined.by_gravity
+    assert joined.mount is not None
+    assert (Rotation.from_matrix(joined.mount.T) * one.mount).magnitude() < np.deg2rad(15.0)
+    bare = imufit.join(Log(t=one.t, gyr=one.gyr), reference_of(one))
+    assert not bare.by_gravity
+    assert "nothing shows how the sensor is turned" in bare.remarks[0]
+
+
+@pytest.mark.parametrize("axis", [(0.0, -1.0, 0.0), (0.6, 0.0, 0.8)])
+def test_the_axis_of_an_encoder_is_found(axis: tuple[float, float, float]) -> None:
+    rng = np.random.default_rng(7)
+    t = np.arange(0.0, 60.0, 0.01)
+    targets = np.repeat(rng.uniform(-1.5, 1.5, 40), 150)[: len(t)]
+    angle = np.convolve(np.pad(targets, 50, mode="edge"), np.hanning(101) / np.hanning(101).sum(), "valid")
+    upright = Rotation.from_euler("xyz", [0.3, -0.4, 1.0])
+    attitude = upright * Rotation.from_rotvec(np.outer(angle, axis))
+    gyr = np.outer(np.gradient(angle, t), axis) + rng.normal(0.0, 0.003, (len(t), 3))
+    acc = attitude.apply([0.0, 0.0, 9.80665], inverse=True) + rng.normal(0.0, 0.03, (len(t), 3))
+    reference = Log(t=t[500:5500] + 12.5, covariates={"encoder": np.rad2deg(angle[500:5500])})
+    reference = replace(reference, metadata=replace(reference.metadata, frame="ENU"))
+    joined = join_as_found(Log(t=t, acc=acc, gyr=gyr), reference, None, None)
+    assert joined.lag == pytest.approx(12.5, abs=0.002)
+    assert joined.axis is not None
+    np.testing.assert_allclose(joined.axis, axis, atol=0.01)
+    known = joined.log.has_reference
+    assert joined.log.ref_q is not None
+    assert joined.log.acc is not None
+    force = Rotation.from_quat(joined.log.ref_q[known][:, [1, 2, 3, 0]]).apply(joined.log.acc[known])
+    mean = np.nanmean(force, axis=0)
+    np.testing.assert_allclose(mean / np.linalg.norm(mean), [0.0, 0.0, 1.0], atol=0.02)
+    on_axis = max(np.abs(axis)) == 1.0
+    assert joined.log.metadata.rig_axis == ("y" if on_axis else None)
+    if on_axis:
+        assert joined.log.ref_angle is not None
+        expected = -np.interp(joined.log.t[known], t, angle)
+        np.testing.assert_allclose(joined.log.ref_angle[known], expected, atol=0.01)
+
+
+def test_a_known_lag_that_leaves_nothing_in_common_is_refused() -> None:
+    one = pair(3001)
+    with pytest.raises(InputError, match="no few seconds of motion in common"):
+        imufit.join(sensor_of(one), reference_of(one), lag=one.lag + 5000.0)

@@ -109,15 +109,15 @@ def test_a_built_in_effect_is_taken_out_of_live_rows_wherever_a_row_alone_is_eno
 def test_a_users_effect_is_refused_unless_it_says_that_a_row_is_enough(user_effect):
     # The name is that of an effect which other sensors have built in: only what an effect declares counts.
     @user_effect("mag.bias", parameters={"k": "s"})
-    def late(w):
-        return np.cross(w.m, w.omega) + w.alpha
+    def late(w, k):
+        return k * (np.cross(w.m, w.omega) + w.alpha)
 
     with pytest.raises(InputError, match=r"mag\.bias needs the rows around a row"):
         LiveCorrection(model_of("mag.bias"))
 
     @user_effect("gyr.since", parameters={"k": "rad/s/s"}, reach="history")
-    def since(w):
-        return (w.t - w.t_start)[:, None] * np.ones(3)
+    def since(w, k):
+        return k * (w.t - w.t_start)
 
     with pytest.raises(InputError, match=r"gyr\.since needs all rows since the start"):
         LiveCorrection(model_of("gyr.since"))
@@ -125,8 +125,8 @@ def test_a_users_effect_is_refused_unless_it_says_that_a_row_is_enough(user_effe
 
 def test_a_users_effect_of_the_row_is_taken_out_of_live_rows(user_effect):
     @user_effect("gyr.pull", parameters={"k": "rad/s/A"}, needs=["motor_current"], reach="row")
-    def pull(w):
-        return np.outer(w.column("motor_current"), [0.0, 0.0, 1.0])
+    def pull(w, k):
+        return np.outer(w.column("motor_current"), [0.0, 0.0, k])
 
     log, model = rows(), model_of("gyr.pull")
     corrected = live(model, log)
@@ -138,8 +138,8 @@ def test_a_users_effect_of_the_row_is_taken_out_of_live_rows(user_effect):
 @pytest.mark.parametrize(("needs", "said"), [(["temp"], "needs temperature_mean"), ([], "no column temp")])
 def test_a_temperature_never_counts_from_the_mean_of_a_batch(user_effect, needs, said):
     @user_effect("acc.warm", parameters={"k": "m/s^2/K"}, needs=needs, reach="row")
-    def warm(w):
-        return w.temperature[:, None] * np.ones(3)
+    def warm(w, k):
+        return k * w.temperature
 
     with pytest.raises(InputError, match=said):
         live(model_of("acc.warm"), rows())

@@ -159,8 +159,8 @@ OWN = """
 import imufit
 
 @imufit.effect("gyr.of_its_own", parameters={"k": "1"}, explanation="the body feels its own weight", typical=0.01)
-def of_its_own(w):
-    return w.f
+def of_its_own(w, k):
+    return k * w.f
 """
 
 

@@ -66,8 +66,8 @@ def test_biases_that_differ_between_logs_are_no_alarm_and_are_listed():
 @pytest.mark.parametrize("scope", ["sensor", "log"])
 def test_a_users_effect_has_one_value_for_all_logs_or_one_for_each_as_it_says(scope):
     @imufit.effect("gyr.fan", parameters={"z": "rad/s/A"}, typical=0.01, needs=["fan"], scope=scope)
-    def fan(w):
-        return np.outer(w.column("fan"), [0.0, 0.0, 1.0])
+    def fan(w, z):
+        return np.outer(w.column("fan"), [0.0, 0.0, z])
 
     sizes, logs = (0.01, -0.02), []
     for k, size in enumerate(sizes):

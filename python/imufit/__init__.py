@@ -25,8 +25,11 @@ if TYPE_CHECKING:
     from imufit.log import Log, LogStream, open_log, read
     from imufit.loop import Fit, SensorModel
     from imufit.model.catalogue import catalogue, explain, load_effects
-    from imufit.model.effect import Window, effect
-    from imufit.results import Addition, Comparison, Diagnosis, EffectCard, Ladder, ModelComparison, Parameter
+    from imufit.model.effect import effect
+    from imufit.model.effect import forget as forget_effect
+    from imufit.model.limits import Limits
+    from imufit.model.window import Window
+    from imufit.results import Addition, Comparison, Diagnosis, EffectCard, Ladder, ModelComparison, Parameter, Params
     from imufit.verbs import allan, calibrate, compare, diagnose, fit, info, join, ladder, plot, replay, tune
 else:
     from importlib import import_module
@@ -39,8 +42,17 @@ else:
         "lab.simulate": ("simulate",),
         "log": ("Log", "LogStream", "open_log", "read"),
         "loop": ("Fit", "SensorModel"),
-        "model": ("Window", "catalogue", "effect", "explain", "load_effects"),
-        "results": ("Addition", "Comparison", "Diagnosis", "EffectCard", "Ladder", "ModelComparison", "Parameter"),
+        "model": ("Limits", "Window", "catalogue", "effect", "explain", "forget_effect", "load_effects"),
+        "results": (
+            "Addition",
+            "Comparison",
+            "Diagnosis",
+            "EffectCard",
+            "Ladder",
+            "ModelComparison",
+            "Parameter",
+            "Params",
+        ),
         "verbs": (
             "allan",
             "calibrate",
@@ -80,10 +92,12 @@ __all__ = [
     "Fit",
     "InputError",
     "Ladder",
+    "Limits",
     "Log",
     "LogStream",
     "ModelComparison",
     "Parameter",
+    "Params",
     "SensorModel",
     "Window",
     "__version__",
@@ -96,6 +110,7 @@ __all__ = [
     "explain",
     "export",
     "fit",
+    "forget_effect",
     "info",
     "join",
     "ladder",

@@ -275,7 +275,11 @@ class Effect:
     @property
     def column(self) -> str | None: ...
     @property
-    def centred_column(self) -> str | None: ...
+    def centred_columns(self) -> list[str]: ...
+    @property
+    def memory(self) -> float: ...
+    @property
+    def limits(self) -> list[tuple[float, float]]: ...
     @property
     def scope(self) -> Literal["sensor", "log"]: ...
     @property
@@ -358,11 +362,13 @@ def find_effect(id: str) -> Effect | None: ...
 def python_effect(
     id: str,
     sensor: str,
-    parameters: Sequence[tuple[str, str, float | None]],
+    parameters: Sequence[tuple[str, str, float | None, str]],
     words: dict[str, str],
     stage: str,
     needs: Sequence[str],
     traits: Mapping[str, str],
+    memory: float,
+    limits: Sequence[tuple[float, float]],
     function: Callable[..., object],
 ) -> Effect: ...
 
@@ -457,7 +463,9 @@ def rest_channels() -> list[str]: ...
 class _Estimate(TypedDict):
     parameters: list[int]
     step: _Array
-    standard_error: _Array
+    covariance: _Array
+    fitted: list[bool]
+    at_bound: list[bool]
     full_step: _Array
     held_out: float
     folds: _Array
@@ -597,6 +605,7 @@ class Problem:
             tuple[Evidence, Evidence, Sequence[float], Sequence[Sequence[float]], Sequence[float], Sequence[int]]
         ],
         own: Sequence[bool],
+        limits: Sequence[tuple[int, int, tuple[float, float] | None]] = ...,
     ) -> Problem: ...
     @property
     def blocks(self) -> int: ...

@@ -13,6 +13,7 @@ from imufit.fitting.apply import apply
 from imufit.fitting.fitted_stack import FittedStack
 from imufit.log import AnyLog, AnyLogs, Log, LogSource, log_of, logs_of_any
 from imufit.model.effect_stack import EffectStack
+from imufit.model.user_function import Function
 from imufit.progress import Progress, silent
 from imufit.results import Addition, Comparison, Diagnosis, ModelComparison
 
@@ -22,19 +23,28 @@ class SensorModel(EffectStack):
 
     Parameters
     ----------
-    effects : sequence of str
-        Ids such as ``gyr.bias``, each once. The order does not matter: effects act in the order of their physics.
+    effects : sequence of str or callable
+        Ids such as ``gyr.bias``, or functions of effects of your own, each once. The order does not
+        matter: effects act in the order of their physics.
     parameters : mapping of str to mapping of str to float, optional
         Values by effect and parameter, SI units; zero where not given.
     constants : mapping, optional
         ``temperature_mean`` (degC) and ``covariate_means`` (by name) of the log that the model was fitted on.
     standard_errors : mapping, optional
         Standard errors in the shape of `parameters`.
+    limits : mapping, optional
+        `Limits` in the shape of `parameters`, of those that are fixed or have bounds.
 
     Raises
     ------
     InputError
         An effect or a parameter is unknown, or an effect stands there twice.
+
+    Notes
+    -----
+    ``model.params["gyr.scale.z"].set(value=0.01, vary=False)`` and ``model["gyr.scale"].set(z=0.01, fixed=True)``
+    change the model in place, as in lmfit; nothing else does. The model of a fit cannot be set, since the fit is a
+    result: take ``fit.model.copy()``.
     """
 
     def fit(self, log: AnyLogs, progress: Progress | None = None) -> Fit:
@@ -129,6 +139,10 @@ class Fit(FittedStack):
         Evidence of the logs around the fitted parameters.
     estimate : Estimate
         Parameters, standard errors and held-out error that the evidence gives.
+    params : Params
+        Fitted parameters by name: ``fit.params["acc.bias.x"].value``, ``.stderr``, ``.unit``, ``.typical``.
+    covariance, correlation : DataFrame
+        Of the fitted parameters, rows and columns ``EFFECT.PARAM``.
     """
 
     model: SensorModel
@@ -150,6 +164,31 @@ class Fit(FittedStack):
         """
         return compare(self, None if log is None else log_of(log), progress or silent)
 
+    def predict(self, log: AnyLog | None = None, progress: Progress | None = None) -> Log:
+        """Return the readings that the fitted model predicts from a log's reference.
+
+        Parameters
+        ----------
+        log : Log, str, Path, DataFrame or mapping of arrays, optional
+            With reference attitude; default: the log of the fit, if it is one. What each of several logs has for itself
+            (its bias) is its own in a log of the fit, and the mean in any other.
+        progress : callable, optional
+            Called with (rows done, rows in all, what is being done).
+
+        Returns
+        -------
+        Log
+            The same rows with predicted ``acc``, ``gyr`` and ``mag``, so that measured minus predicted is what
+            :meth:`residuals` returns and :meth:`compare` judges. NaN where nothing is judged.
+
+        Raises
+        ------
+        InputError
+            The log has no usable reference, or it is open which log is meant.
+        """
+        chosen = self.logs[self._number(None)] if log is None else log_of(log)
+        return self.predicted(chosen, progress or silent)
+
     def diagnose(self, log: AnyLogs | None = None, progress: Progress | None = None) -> Diagnosis:
         """Say which effect is missing from the model, judged on a log (default: its own); fitted parameters move along.
 
@@ -160,15 +199,18 @@ class Fit(FittedStack):
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
         """
-        return diagnose(self.on(_opened(log), progress or silent))
+        tell = progress or silent
+        fit = self.on(_opened(log), tell)
+        tell(0, 1, f"step 1: what is missing on top of {' + '.join(fit.model.effects) or 'the ideal sensor'}")
+        return diagnose(fit)
 
-    def add(self, effect: str, log: AnyLogs | None = None, progress: Progress | None = None) -> Addition:
+    def add(self, effect: str | Function, log: AnyLogs | None = None, progress: Progress | None = None) -> Addition:
         """Add an effect to the model and refit.
 
         Parameters
         ----------
-        effect : str
-            Id such as ``gyr.g_sensitivity``.
+        effect : str or callable
+            Id such as ``gyr.g_sensitivity``, or the function of an effect of your own.
         log : Log, str, Path, DataFrame, mapping of arrays, or a sequence of these, optional
             Logs to fit to; default: its own.
         progress : callable, optional
@@ -184,7 +226,10 @@ class Fit(FittedStack):
         InputError
             The effect is unknown, in the model already, or cannot be tested on this log.
         """
-        return add(self.on(_opened(log), progress or silent), effect)
+        tell = progress or silent
+        fit = self.on(_opened(log), tell)
+        tell(0, 1, f"step 1: adding {effect}")
+        return add(fit, effect)
 
     def against(self, other: Fit, progress: Progress | None = None) -> ModelComparison:
         """Hold another model that was fitted to the same log against this one.

@@ -3,7 +3,11 @@
 from collections.abc import Callable
 
 Progress = Callable[[int, int, str], None]
-"""Called with (rows done, rows in all, what is being done)."""
+"""Called with (done, in all, what is being done).
+
+(0, 1, what) begins a step that is one thing: no part of it can be counted, and nobody can tell how long it takes.
+Passes over the rows of a log, which can be counted, may lie within a step.
+"""
 
 
 def silent(done: int, total: int, label: str) -> None:

@@ -13,6 +13,7 @@ from imufit.diagnosing.ladder import ladder as ladder_from
 from imufit.errors import InputError
 from imufit.log import AnyLog, AnyLogs, Log, LogStream, log_of, logs_of_any, whole
 from imufit.loop import Fit, SensorModel
+from imufit.model.user_function import Function
 from imufit.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from imufit.results import Comparison, Diagnosis, Ladder, LogInfo, ModelComparison
     from imufit.tuning import Tuning
 
-AnyModel = SensorModel | Fit | Sequence[str] | str | Path | None
+AnyModel = SensorModel | Fit | Sequence[str | Function] | Function | str | Path | None
 """A model, a fit, effects by their ids, the file of a model; None is the ideal sensor."""
 
 
@@ -47,7 +48,7 @@ def model_of(given: AnyModel) -> SensorModel:
         return given.model
     if isinstance(given, Path) or (isinstance(given, str) and given.endswith(".toml")):
         return SensorModel.load(given)
-    return SensorModel([given] if isinstance(given, str) else list(given))
+    return SensorModel([given] if isinstance(given, str) or callable(given) else list(given))
 
 
 def fit(logs: AnyLogs, model: AnyModel = None, *, progress: Progress | None = None) -> Fit:

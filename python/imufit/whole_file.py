@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import secrets
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -54,7 +53,7 @@ def whole_file(path: str | Path) -> Iterator[IO[bytes]]:
         return
     if target.exists() and not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-    new = target.with_name(f".{target.name[:_NAME_KEPT]}.{secrets.token_hex(_NAME_BYTES)}.new")
+    new = target.with_name(f".{target.name[:_NAME_KEPT]}.{os.urandom(_NAME_BYTES).hex()}.new")
     try:
         with os.fdopen(os.open(new, _FLAGS, 0o666), "wb") as file:
             yield file

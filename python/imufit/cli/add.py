@@ -17,7 +17,7 @@ from imufit.cli.arguments import (
     plot_option,
     title_of,
 )
-from imufit.cli.names import check_effects
+from imufit.cli.names import check_effects, complete_effect
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import logs_argument
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Add an effect, refit, show the error before, expected and after.")
-@click.argument("effect", metavar="EFFECT")
+@click.command()
+@click.argument("effect", metavar="EFFECT", shell_complete=complete_effect)
 @logs_argument
 @model_option
 @model_output

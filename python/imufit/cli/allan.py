@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Noise density, bias instability and random walk of sensors at rest.")
+@click.command()
 @log_argument
 @click.option(
     "-o",
@@ -50,7 +50,7 @@ def allan(
     """
     keep_inputs([log], [output, settings_file, json_file, plot_file])
     out = Output(json_file)
-    with ProgressBar() as progress:
+    with ProgressBar(counted=True) as progress:
         recorded = engine.read_log(log, reading)
         found = engine.allan(recorded, progress)
     settings = engine.filter_noise(found)

@@ -10,54 +10,17 @@ from collections.abc import Sequence
 
 import click
 
-from imufit.cli.add import add
-from imufit.cli.allan import allan
-from imufit.cli.apply import apply
-from imufit.cli.calibrate import calibrate
-from imufit.cli.compare import compare
-from imufit.cli.convert import convert
-from imufit.cli.demo import demo
-from imufit.cli.diagnose import diagnose
-from imufit.cli.emulate import emulate
-from imufit.cli.explain import explain
-from imufit.cli.export import export
-from imufit.cli.fit import fit
-from imufit.cli.grade import grade
-from imufit.cli.info import info
-from imufit.cli.join import join
-from imufit.cli.ladder import ladder
-from imufit.cli.monitor import monitor
-from imufit.cli.names import unknown
-from imufit.cli.plot import plot
-from imufit.cli.record import record
-from imufit.cli.recover import recover
-from imufit.cli.replay import replay
-from imufit.cli.reveal import reveal
-from imufit.cli.simulate import simulate
-from imufit.cli.tune import tune
+from imufit.cli.names import OneOf
+from imufit.cli.on_demand import Commands
 from imufit.printable import MESSAGE, printable
 
 SUCCESS, INTERNAL, UNUSABLE, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 130, 141
 """Exit codes; the last two are those of a program that a signal ends, 128 + SIGINT and 128 + SIGPIPE."""
 DEBUG = "IMUFIT_DEBUG"
+_COMPLETE = "_IMUFIT_COMPLETE"
+"""Variable by which a shell asks for completions."""
 _LONGEST_MESSAGE = 3 * MESSAGE
 """Characters: place, problem and remedy, each of which is bounded."""
-
-
-class Commands(click.Group):
-    """The commands in the order of the loop, with a guess at misspelt names."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names in the order in which they were registered."""
-        return list(self.commands)
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command, or fail with the name that was probably meant."""
-        if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
-            ctx.fail(unknown("command", args[0], self.commands))
-        return super().resolve_command(ctx, args)
 
 
 def _version(ctx: click.Context, _param: click.Parameter, wanted: bool) -> None:
@@ -69,46 +32,35 @@ def _version(ctx: click.Context, _param: click.Parameter, wanted: bool) -> None:
         ctx.exit(SUCCESS)
 
 
+def _completion(ctx: click.Context, _param: click.Parameter, shell: str | None) -> None:
+    """Print the script for a shell and stop."""
+    from click.shell_completion import get_completion_class  # noqa: PLC0415
+
+    kind = None if shell is None else get_completion_class(shell)
+    if kind is not None:
+        click.echo(kind(imufit, {}, "imufit", _COMPLETE).source())
+        ctx.exit(SUCCESS)
+
+
 @click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Show the version.")
+@click.option(
+    "--completion",
+    type=OneOf("shell", ("bash", "zsh", "fish")),
+    is_eager=True,
+    expose_value=False,
+    callback=_completion,
+    help="Print what completes commands, options, effects, filters and scenarios in this shell.",
+)
 @click.pass_context
 def imufit(ctx: click.Context) -> None:
     """Find out which physical effect your inertial sensor model is missing, add it, and watch the error fall.
 
     LOG is a Parquet, CSV or NPZ table with one row per sample, or a serial transcript. `imufit demo` shows the whole
-    loop on a made-up log.
+    loop on a made-up log. `eval "$(imufit --completion bash)"` completes commands and names, in zsh alike.
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
-
-
-for _command in (
-    info,
-    plot,
-    calibrate,
-    compare,
-    diagnose,
-    add,
-    ladder,
-    fit,
-    apply,
-    export,
-    explain,
-    simulate,
-    reveal,
-    grade,
-    replay,
-    tune,
-    allan,
-    convert,
-    join,
-    record,
-    monitor,
-    recover,
-    emulate,
-    demo,
-):
-    imufit.add_command(_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -125,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 on success, 2 on unusable input or arguments, 130 when interrupted, 141 when nobody reads the output any
         more, 1 on a fault of the program.
     """
-    if "_IMUFIT_COMPLETE" in os.environ:
+    if _COMPLETE in os.environ:
         imufit.main(prog_name="imufit")
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:

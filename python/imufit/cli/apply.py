@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="A log with the model's effects taken out of its readings.")
+@click.command()
 @click.argument("model", metavar="MODEL", type=EXISTING)
 @log_argument
 @effects_from_option

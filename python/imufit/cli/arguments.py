@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import os
 from collections.abc import Callable, Iterable, Sequence
@@ -18,6 +19,8 @@ LOG_ENDINGS = (".parquet", ".csv", ".npz")
 PLOT_ENDINGS = (".png", ".svg", ".pdf")
 
 
+_ALIKE = 0.8
+"""Likeness, of 1, from which on another file may have been meant: one letter in five is wrong."""
 LARGEST_NUMBER = 1e9
 """Largest number an option takes: 30 years in seconds, and beyond every rate in Hz and every share in ppm."""
 LARGEST_WHOLE = 2**63 - 1
@@ -76,7 +79,18 @@ class NamedFile(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path."""
         _check_name(self, value, param, ctx)
+        if self.exists and not os.path.lexists(value) and (near := _neighbours(Path(value))):
+            self.fail(f"there is no {str(value)!r}: did you mean {' or '.join(near)}?", param, ctx)
         return super().convert(value, param, ctx)
+
+
+def _neighbours(path: Path) -> list[str]:
+    """Return the files of the same folder whose names are nearly that of `path`."""
+    try:
+        names = [entry.name for entry in os.scandir(path.parent)]
+    except OSError:
+        return []
+    return [str(path.with_name(name)) for name in difflib.get_close_matches(path.name, names, n=2, cutoff=_ALIKE)]
 
 
 def _check_name(kind: click.ParamType, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> None:  # type: ignore[type-arg]
@@ -194,6 +208,13 @@ def plot_option(command: Command) -> Command:
     return click.option(
         "--plot", "plot_file", type=OutputFile(PLOT_ENDINGS), metavar="FILE.png", help="Write the main figure."
     )(command)
+
+
+def verbose_option(command: Command) -> Command:
+    """Add -v."""
+    return click.option("-v", "--verbose", is_flag=True, help="Show every table, not only those of the answer.")(
+        command
+    )
 
 
 def model_output(command: Command) -> Command:

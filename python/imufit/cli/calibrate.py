@@ -19,6 +19,7 @@ from imufit.cli.arguments import (
     plot_option,
 )
 from imufit.cli.live_screen import LiveScreen
+from imufit.cli.names import OneOf
 from imufit.cli.output import Output
 from imufit.cli.reading import LOG, reading_options
 
@@ -26,25 +27,25 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Calibrate accelerometer, gyro and magnetometer.")
+@click.command()
 @click.argument("logs", metavar="LOG...", type=LOG, nargs=-1)
 @reading_options
 @click.option(
     "--cost",
-    type=click.Choice(["vector", "magnitude"]),
+    type=OneOf("cost", ("vector", "magnitude")),
     help="vector: six sides up on a level table, 12 unknowns. magnitude: nine or more attitudes, 9 unknowns.",
 )
 @click.option(
     "--sensor",
     "sensors",
-    type=click.Choice(["acc", "gyr", "mag"]),
+    type=OneOf("sensor", ("acc", "gyr", "mag")),
     multiple=True,
     help="Calibrate this sensor only. Repeatable.",
 )
 @click.option("--hold", type=Real(min=0.0, min_open=True), metavar="S", help="Shortest pose, s (default 0.6).")
 @click.option("--live", "port", metavar="PORT", help="Guide through a calibration of the device there.")
 @click.option("--baud", type=Whole(min=1), metavar="BAUD", help="Bits per second of PORT (default 115200).")
-@click.option("--form", type=click.Choice(["auto", "binary", "text"]), help="What PORT sends (default auto).")
+@click.option("--form", type=OneOf("form", ("auto", "binary", "text")), help="What PORT sends (default auto).")
 @click.option("--header", metavar="NAMES", help="Columns of text without a header, such as t_ms,acc_x,acc_y,acc_z.")
 @click.option(
     "--keep",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import html_option, json_option, keep_inputs, model_option, plot_option
+from imufit.cli.arguments import html_option, json_option, keep_inputs, model_option, plot_option, verbose_option
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import log_argument
@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Where the model fails: by channel, segment and covariate.")
+@click.command()
 @log_argument
 @model_option
 @json_option
 @html_option
 @plot_option
+@verbose_option
 def compare(
     log: Path,
     *,
@@ -31,6 +32,7 @@ def compare(
     json_file: Path | None,
     html_file: Path | None,
     plot_file: Path | None,
+    verbose: bool,
 ) -> None:
     """Hold the model against LOG: channel by channel, segment by segment, against every covariate."""
     keep_inputs([log, model], [json_file, html_file, plot_file])
@@ -38,10 +40,7 @@ def compare(
     with ProgressBar() as progress:
         opened = engine.open_log(log, reading)
         comparison = engine.sensor_model(path=model).compare(opened, progress=progress)
-    first, *others = comparison.sentences()
-    output.say(first, bold=True)
-    output.say(*others)
-    output.tables(comparison.tables())
+    output.result(comparison, verbose)
     output.json(comparison.to_dict())
     if plot_file is not None:
         output.plot(plot_file, comparison.plot())

@@ -38,7 +38,7 @@ class RowRange(click.ParamType):  # type: ignore[type-arg]
         return int(first), int(stop)
 
 
-@click.command(short_help="Another maker's file, a text table or a serial transcript becomes a log.")
+@click.command()
 @click.argument("file", metavar="FILE", type=LOG)
 @reading_options
 @click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")

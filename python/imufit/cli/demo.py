@@ -24,7 +24,7 @@ def choice(diagnosis: Diagnosis) -> str | None:
     return diagnosis.best or next(iter(diagnosis.ambiguous_with), None)
 
 
-@click.command(short_help="The whole loop on a log with a hidden effect.")
+@click.command()
 @click.option(
     "-o",
     "--output",

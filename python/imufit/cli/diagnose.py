@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import html_option, json_option, keep_inputs, model_option, plot_option, title_of
+from imufit.cli.arguments import (
+    html_option,
+    json_option,
+    keep_inputs,
+    model_option,
+    plot_option,
+    title_of,
+    verbose_option,
+)
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import logs_argument
@@ -17,12 +25,13 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Which effect is missing, with its expected gain.")
+@click.command()
 @logs_argument
 @model_option
 @json_option
 @html_option
 @plot_option
+@verbose_option
 def diagnose(
     logs: tuple[Path, ...],
     *,
@@ -31,6 +40,7 @@ def diagnose(
     json_file: Path | None,
     html_file: Path | None,
     plot_file: Path | None,
+    verbose: bool,
 ) -> None:
     """Say which effect is missing in the model of LOG, or that none is, or that this log cannot tell.
 
@@ -48,10 +58,7 @@ def diagnose(
         diagnosis = fit.diagnose(progress=progress)
         compared = html_file is not None and diagnosis.evidence == "reference"
         comparison = fit.compare(progress=progress) if compared else None
-    verdict, *rest = diagnosis.sentences()
-    output.say(verdict, bold=True)
-    output.say(*rest)
-    output.tables(diagnosis.tables())
+    output.result(diagnosis, verbose)
     output.json(diagnosis.to_dict())
     if plot_file is not None:
         output.plot(plot_file, diagnosis.plot())

@@ -10,6 +10,8 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import NamedFile, OutputFile, Real, Whole, json_option, keep_inputs
+from imufit.cli.life_line import LifeLine
+from imufit.cli.names import OneOf, complete_injection, complete_scenario_or_log
 from imufit.cli.output import Output
 from imufit.cli.reading import reading_options
 from imufit.cli.simulate import chosen_effects
@@ -49,8 +51,8 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
         return number
 
 
-@click.command(short_help="A device without hardware: a scenario or a log on a pty or socket.")
-@click.argument("source", metavar="SCENARIO|LOG")
+@click.command()
+@click.argument("source", metavar="SCENARIO|LOG", shell_complete=complete_scenario_or_log)
 @reading_options
 @click.option("--on", default="pty", show_default=True, metavar="pty|socket://127.0.0.1:PORT", help="Where it is read.")
 @click.option(
@@ -59,8 +61,8 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
     metavar="PATH",
     help="Symbolic link to the pty, which stays the same when the device is unplugged.",
 )
-@click.option("--device", type=click.Choice(DEVICES), default="floats", show_default=True, help="What it sends.")
-@click.option("--form", type=click.Choice(FORMS), default="binary", show_default=True, help="Frames or lines of text.")
+@click.option("--device", type=OneOf("device", DEVICES), default="floats", show_default=True, help="What it sends.")
+@click.option("--form", type=OneOf("form", FORMS), default="binary", show_default=True, help="Frames or lines of text.")
 @click.option("--rate", type=NumberOr("max"), metavar="HZ|max", help="Samples a second; max: what --baud carries.")
 @click.option("--duration", type=Real(min=0.0, min_open=True), metavar="S", help="Time until it ends, s.")
 @click.option("--loop", is_flag=True, help="Begin again after the last sample; for ever without --duration.")
@@ -87,7 +89,13 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
     "effects",
     multiple=True,
     metavar="ID[:NAME=VALUE,...]",
+    shell_complete=complete_injection,
     help="Effect of a scenario's sensor, SI units; without values they are drawn. Repeatable.",
+)
+@click.option(
+    "--data-sheet",
+    is_flag=True,
+    help="Put in errors within the limits of the MPU-6050's data sheet, drawn by --seed; --effect goes before them.",
 )
 @click.option("--seed", type=Whole(min=0), default=0, metavar="SEED", help="Seed of everything random.")
 @click.option("--wait/--no-wait", default=None, help="Switch it on when somebody reads (a socket) or at once (a pty).")
@@ -106,6 +114,7 @@ def emulate(
     faults: tuple[str, ...],
     fault_rates: tuple[str, ...],
     effects: tuple[str, ...],
+    data_sheet: bool,
     sent: Path | None,
     json_file: Path | None,
     **options: Any,
@@ -117,17 +126,20 @@ def emulate(
     """
     keep_inputs([Path(source)], [sent, json_file])
     out = Output(json_file)
+    chosen = chosen_effects(effects)
+    if data_sheet:
+        chosen = {**engine.data_sheet_errors(options["seed"]), **chosen}
     device = engine.emulator(
         source,
         reading,
         faults=faults,
         fault_rates=fault_rates,
         clock={"tick": tick, "drift": clock_drift, "jitter": clock_jitter, "start": clock_start},
-        effects=chosen_effects(effects),
+        effects=chosen,
         sent=sent or False,
         **options,
     )
-    with engine.running(device):
+    with LifeLine() as life, engine.running(device, life):
         # Whoever waits for the port reads one line; with the JSON on standard output it stands on standard error.
         click.echo(device.port, err=str(json_file) == "-")
         sys.stdout.flush()

@@ -95,7 +95,8 @@ def join(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joi
     """Lay a reference beside a sensor's log; one without a declared attitude is read as the sensor's rates show."""
     from imufit.joining import join, join_as_found  # noqa: PLC0415
 
-    way = join if reference.ref_q is not None else join_as_found
+    declared = reference.ref_q is not None or reference.ref_angle is not None
+    way = join if declared else join_as_found
     return way(log, reference, lag, skew)
 
 
@@ -418,15 +419,26 @@ def emulator(
     return Emulator(given, faults=faults, fault_rates=rates, clock=Clock(**clock), **settings)
 
 
+def data_sheet_errors(seed: int) -> dict[str, dict[str, float] | None]:
+    """Return the errors of a sensor within the limits of its data sheet."""
+    from imufit.devices.emulate.data_sheet import data_sheet_errors  # noqa: PLC0415
+
+    return {**data_sheet_errors(seed)}
+
+
 @contextmanager
-def running(device: Emulator) -> Iterator[None]:
-    """Let a device run until it has sent everything or is asked to end, also where Ctrl-C is ignored at the start."""
+def running(device: Emulator, watch: Callable[[int, str], None]) -> Iterator[None]:
+    """Let a device run until it has sent everything or is asked to end, also where Ctrl-C is ignored at the start.
+
+    `watch` is told the samples so far, and whether anybody reads them.
+    """
     from imufit.devices.record.signals import requests_to_end  # noqa: PLC0415
 
     with requests_to_end() as asked, device:
         yield
         while not device.join(0.1) and not asked():
-            pass
+            told = device.summary()
+            watch(told["samples"], "nobody reads" if told["samples"] and told["unread"] == told["samples"] else "")
 
 
 def unseal(path: Path) -> Truth:

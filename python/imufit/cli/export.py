@@ -13,7 +13,7 @@ from imufit.cli.output import Output
 from imufit.whole_file import write_text
 
 
-@click.command(short_help="A model as C, Arduino sketch, Python for imufusion or ahrs, JSON.")
+@click.command()
 @click.argument("model", metavar="MODEL", type=EXISTING)
 @effects_from_option
 @click.option(

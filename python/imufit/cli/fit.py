@@ -9,7 +9,7 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import effects_from_option, json_option, keep_inputs, model_output, plot_option
-from imufit.cli.names import check_effects
+from imufit.cli.names import check_effects, complete_effect
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import logs_argument
@@ -18,10 +18,15 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Fit a stack of effects.")
+@click.command()
 @logs_argument
 @click.option(
-    "--effects", required=True, multiple=True, metavar="ID,ID,...", help="Effects of the model, in any order."
+    "--effects",
+    required=True,
+    multiple=True,
+    metavar="ID,ID,...",
+    shell_complete=complete_effect,
+    help="Effects of the model, in any order.",
 )
 @effects_from_option
 @model_output

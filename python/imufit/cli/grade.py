@@ -14,7 +14,7 @@ from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 
 
-@click.command(short_help="The blind protocol: how often the answer is right.")
+@click.command()
 @click.option(
     "--set",
     "sets",
@@ -37,7 +37,7 @@ def grade(*, sets: tuple[str, ...], logs: int, seed: int | None, processes: int 
     first = secrets.randbelow(10**9) if seed is None else seed
     if seed is None:
         out.say(f"Seeds from {first} on: --seed {first} repeats this.")
-    with ProgressBar() as progress:
+    with ProgressBar(counted=True) as progress:
         result = engine.grade_blind(sets=sets, logs=logs, seed=first, processes=processes, progress=progress)
     out.tables(result.tables())
     failures = result.lines()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import effects_from_option, json_option, keep_inputs
+from imufit.cli.arguments import effects_from_option, json_option, keep_inputs, verbose_option
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import log_argument
@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="What is in a log: rates, gaps, rests, reference, and the effects that it can show.")
+@click.command()
 @log_argument
 @click.option("--quick", is_flag=True, help="Leave out which effects the log can show, which takes most of the time.")
 @effects_from_option
 @json_option
-def info(log: Path, *, reading: Reading, quick: bool, json_file: Path | None) -> None:
+@verbose_option
+def info(log: Path, *, reading: Reading, quick: bool, json_file: Path | None, verbose: bool) -> None:
     """Tell what is in LOG, and which effects it can and cannot show.
 
     An effect can be shown if its typical size stands out from the noise of this log: its parameters' standard errors
@@ -35,8 +36,7 @@ def info(log: Path, *, reading: Reading, quick: bool, json_file: Path | None) ->
     first, *others = found.sentences()
     out.say(first, bold=True)
     out.say(*others, *found.remarks())
-    *tables, columns = found.tables()
-    out.tables(tables)
-    out.say(*found.alike())
-    out.table(columns)
+    if verbose:
+        out.say(*found.alike())
+    out.result_tables(found, verbose)
     out.json(found.to_dict())

@@ -38,7 +38,7 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
         return kind, names
 
 
-@click.command(short_help="A sensor's log and somebody else's reference, on two clocks, become one log.")
+@click.command()
 @click.argument("sensor", metavar="SENSOR", type=LOG)
 @click.argument("reference", metavar="REFERENCE", type=LOG)
 @reading_options
@@ -58,7 +58,8 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
     metavar="KIND:COLUMNS",
     help="Columns that hold the attitude, where names and rates do not show them: quaternion:W,X,Y,Z, "
     "matrix:XX,XY,...,ZZ (row by row), "
-    "euler-ZYX:YAW[deg],PITCH[deg],ROLL[deg] (capitals: about the turned axes), angle-x:ANGLE[deg].",
+    "euler-ZYX:YAW[deg],PITCH[deg],ROLL[deg] (capitals: about the turned axes), angle-x:ANGLE[deg], angle:ANGLE[deg] "
+    "where the axis is not known.",
 )
 @click.option("--inverse", is_flag=True, help="The attitude turns vectors of the reference frame into the body.")
 @click.option("--lag", type=float, metavar="S", help="Time by which the reference's stamps are late, if it is known.")
@@ -81,7 +82,7 @@ def join(
     json_file: Path | None,
     plot_file: Path | None,
 ) -> None:
-    """Lay the attitude of REFERENCE beside the readings of SENSOR, whose clock is another.
+    """Lay the attitude, the angle or the positions of REFERENCE beside the readings of SENSOR, whose clock is another.
 
     The lag is found by the angular rates of both, whatever the axes of the sensor on the body are; then lag, skew and
     mount are refined on the attitude. LOG has all rows of SENSOR and, in rows of their own, all samples of REFERENCE.

@@ -16,6 +16,7 @@ from imufit.cli.arguments import (
     model_output,
     plot_option,
     title_of,
+    verbose_option,
 )
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
@@ -25,13 +26,14 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Repeat diagnose and add until nothing is missing.")
+@click.command()
 @logs_argument
 @model_option
 @model_output
 @json_option
 @html_option
 @plot_option
+@verbose_option
 def ladder(
     logs: tuple[Path, ...],
     *,
@@ -41,6 +43,7 @@ def ladder(
     json_file: Path | None,
     html_file: Path | None,
     plot_file: Path | None,
+    verbose: bool,
 ) -> None:
     """Add the missing effects one by one to the model of LOG, and show the held-out error fall.
 
@@ -52,10 +55,7 @@ def ladder(
         opened = engine.open_logs(logs, reading)
         start = engine.sensor_model(path=model) if model is not None else None
         result = engine.ladder(opened, start, progress)
-    verdict, *rest = result.sentences()
-    out.say(verdict, bold=True)
-    out.say(*rest)
-    out.tables(result.tables())
+    out.result(result, verbose)
     if output is not None:
         result.fit.save(output)
         out.wrote(output)

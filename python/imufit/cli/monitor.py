@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from imufit.cli import engine
-from imufit.cli.arguments import EXISTING, Real, effects_from_option, json_option, keep_inputs
+from imufit.cli.arguments import EXISTING, Real, effects_from_option, json_option, keep_inputs, plot_option
+from imufit.cli.horizon import horizon
+from imufit.cli.life_line import HOW_TO_STOP
 from imufit.cli.names import FILTERS, KnownList
 from imufit.cli.output import Output
 from imufit.cli.port import duration_option, frame_option, port_argument
@@ -18,12 +20,13 @@ from imufit.cli.reading import map_option
 from imufit.printable import printable
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.table import Table
 
     from imufit.devices.monitor import MonitorState
 
 
-@click.command(short_help="Attitude of a running device by several filters at once.")
+@click.command()
 @port_argument
 @map_option
 @click.option(
@@ -49,7 +52,9 @@ if TYPE_CHECKING:
     metavar="HZ",
     help="States per second.",
 )
+@click.option("--raw", is_flag=True, help="Show the readings as well, SI units.")
 @json_option
+@plot_option
 def monitor(
     port: str,
     *,
@@ -64,10 +69,12 @@ def monitor(
     give_up: float | None,
     plain: bool,
     updates: float,
+    raw: bool,
     json_file: Path | None,
+    plot_file: Path | None,
 ) -> None:
     """Show roll, pitch and yaw of the device on PORT by several filters until Ctrl-C, in degrees."""
-    keep_inputs([model_file], [json_file])
+    keep_inputs([model_file], [json_file, plot_file])
     out = Output(json_file)
     names = tuple(dict.fromkeys(name for group in filters for name in group))
     states = engine.monitor(
@@ -85,22 +92,39 @@ def monitor(
     )
     for_json = json_file is not None and str(json_file) == "-"
     screen = sys.stderr if for_json else sys.stdout
-    shown: Any = _Screen(screen) if screen.isatty() and not plain else _Lines(not for_json)
+    shown: Any = _Screen(screen, raw, frame) if screen.isatty() and not plain else _Lines(not for_json, raw)
     last = None
+    kept: list[tuple[float, dict[str, Any]]] = []
     with shown:
         for last in states:
             shown.show(last)
+            if plot_file is not None and last.angles:
+                kept.append((last.t, last.angles))
     if last is not None:
         if not last.n:
             raise click.UsageError(f"nothing came that could be shown: {last.trouble}")
         out.json(last.to_dict())
+        if plot_file is not None:
+            out.plot(plot_file, _figure(kept))
+
+
+def _figure(kept: list[tuple[float, dict[str, Any]]]) -> Figure:
+    """Draw the angles of all states."""
+    import numpy as np  # noqa: PLC0415
+
+    from imufit.figures.angles import angle_panels  # noqa: PLC0415
+
+    names = list(dict.fromkeys(name for _, angles in kept for name in angles))
+    unknown = np.full(3, np.nan)
+    series = {name: np.array([angles.get(name, unknown) for _, angles in kept]) for name in names}
+    return angle_panels(np.array([t for t, _ in kept]), series)
 
 
 class _Lines:
     """States as comma-separated lines on standard output."""
 
-    def __init__(self, wanted: bool) -> None:
-        self._wanted = wanted
+    def __init__(self, wanted: bool, raw: bool) -> None:
+        self._wanted, self._raw = wanted, raw
         self._header: tuple[str, ...] = ()
 
     def __enter__(self) -> None:
@@ -116,11 +140,18 @@ class _Lines:
         if not self._wanted or not state.n:
             return
         header = ("t_s", "rate_hz", "lost", "damaged", *(f"{f}_{a}_deg" for f in state.angles for a in _ANGLES))
+        readings = state.readings if self._raw else {}
+        header = (*header, *readings)
         if header != self._header:
             self._header = header
             click.echo(",".join(header))
-        angles = [f"{a:.2f}" if np.isfinite(a) else "" for three in state.angles.values() for a in np.degrees(three)]
-        click.echo(",".join([f"{state.t:.3f}", f"{state.rate_hz:.1f}", f"{state.lost}", f"{state.damaged}", *angles]))
+        angles = [
+            f"{a:.2f}" if math.isfinite(a) else "" for three in state.angles.values() for a in map(math.degrees, three)
+        ]
+        values = [f"{value:.6g}" for value in readings.values()]
+        click.echo(
+            ",".join([f"{state.t:.3f}", f"{state.rate_hz:.1f}", f"{state.lost}", f"{state.damaged}", *angles, *values])
+        )
 
 
 _ANGLES = ("roll", "pitch", "yaw")
@@ -129,11 +160,12 @@ _ANGLES = ("roll", "pitch", "yaw")
 class _Screen:
     """States as a table that stays in its place."""
 
-    def __init__(self, stream: Any) -> None:
+    def __init__(self, stream: Any, raw: bool, frame: str) -> None:
         from rich.console import Console  # noqa: PLC0415
         from rich.live import Live  # noqa: PLC0415
 
         console = Console(file=stream, highlight=False, markup=False, emoji=False)
+        self._raw, self._frame = raw, frame
         self._live = Live(console=console, auto_refresh=False)
 
     def __enter__(self) -> None:
@@ -146,7 +178,23 @@ class _Screen:
         """Renew the table."""
         for text in state.messages:
             self._live.console.print(f"device: {printable(text)}")
-        self._live.update(_table(state), refresh=True)
+        from rich.console import Group  # noqa: PLC0415
+        from rich.text import Text  # noqa: PLC0415
+
+        parts: list[Any] = [_table(state)]
+        if three := _leading(state):
+            # the body's y axis points left in a frame with z up, so that a positive pitch lowers the nose there
+            nose_up = three[1] if self._frame == "NED" else -three[1]
+            parts.insert(0, Text("\n".join(horizon(three[0], nose_up))))
+        if self._raw and state.readings:
+            parts.append(Text("  ".join(f"{name} {value:.4g}" for name, value in state.readings.items())))
+        self._live.update(Group(*parts), refresh=True)
+
+
+def _leading(state: MonitorState) -> tuple[float, float] | None:
+    """Return roll and pitch of the last filter that has them: the filters stand from the simplest on."""
+    known = [three for three in state.angles.values() if math.isfinite(three[0]) and math.isfinite(three[1])]
+    return (float(known[-1][0]), float(known[-1][1])) if known else None
 
 
 def _table(state: MonitorState) -> Table:
@@ -155,16 +203,18 @@ def _table(state: MonitorState) -> Table:
     from rich.table import Table  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
-    words = [f"{state.t:.1f} s" if np.isfinite(state.t) else "waiting", f"{state.rate_hz:.0f} Hz"]
+    words = [f"{state.t:.1f} s" if math.isfinite(state.t) else "waiting", f"{state.rate_hz:.0f} Hz"]
+    words += [f"{state.n} rows"]
     words += [f"lost {state.lost}", f"damaged {state.damaged}"]
     if state.unplugged:
         words.append(f"unplugged {state.unplugged}")
-    if np.isfinite(state.temp):
+    if math.isfinite(state.temp):
         words.append(f"{state.temp:.1f} degC")
     if not state.connected:
         words.insert(0, "line lost, trying again")
     elif state.trouble:
         words.append(state.trouble)
+    words.append(HOW_TO_STOP)
     table = Table(
         title=Text(printable(state.device)) if state.device else None,
         title_justify="left",
@@ -177,5 +227,5 @@ def _table(state: MonitorState) -> Table:
     for name in _ANGLES:
         table.add_column(f"{name}, deg", justify="right", min_width=10)
     for name, three in state.angles.items():
-        table.add_row(name, *(f"{a:.1f}" if np.isfinite(a) else "-" for a in np.degrees(three)))
+        table.add_row(name, *(f"{a:.1f}" if math.isfinite(a) else "-" for a in map(math.degrees, three)))
     return table

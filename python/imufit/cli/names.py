@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 FILTERS = (
     "accel",
@@ -58,6 +59,71 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     return f"unknown {kind} {name!r}: there is {', '.join(names)}"
 
 
+def beginning(names: Iterable[str], incomplete: str) -> list[CompletionItem]:
+    """Return what a shell offers for a word that is begun.
+
+    Parameters
+    ----------
+    names : iterable of str
+        What there is.
+    incomplete : str
+        The word; of names with commas between only the last one is completed.
+    """
+    head, comma, last = incomplete.rpartition(",")
+    return [CompletionItem(f"{head}{comma}{name}") for name in names if name.startswith(last)]
+
+
+def complete_effect(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return the effects of the catalogue that begin so."""
+    from imufit.cli import engine  # noqa: PLC0415
+
+    return beginning((card.id for card in engine.catalogue()), incomplete)
+
+
+def complete_injection(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return the effects that can be simulated and begin so."""
+    from imufit.cli import engine  # noqa: PLC0415
+
+    return beginning(engine.injections(), incomplete)
+
+
+def complete_scenario_or_log(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return the scenarios that begin so, and have the shell look for files besides."""
+    from imufit.cli import engine  # noqa: PLC0415
+
+    return [*beginning(engine.scenarios(), incomplete), CompletionItem(incomplete, type="file")]
+
+
+class OneOf(click.Choice):  # type: ignore[type-arg]
+    """One of a few words, with a guess at a misspelt one.
+
+    Parameters
+    ----------
+    kind : str
+        What the words stand for.
+    words : sequence of str
+        The words.
+    case_sensitive : bool
+        Whether capitals matter.
+    """
+
+    def __init__(self, kind: str, words: Sequence[str], case_sensitive: bool = True) -> None:
+        super().__init__(words, case_sensitive=case_sensitive)
+        self._kind = kind
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the word, or fail with the one that was probably meant."""
+        known = self.choices if self.case_sensitive else [word.lower() for word in self.choices]
+        if (value if self.case_sensitive else str(value).lower()) not in known:
+            self.fail(unknown(self._kind, str(value), self.choices), param, ctx)
+        return super().convert(value, param, ctx)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Return the words that begin so, as they are written."""
+        begun = incomplete if self.case_sensitive else incomplete.upper()
+        return beginning(self.choices, begun)
+
+
 class Known(click.ParamType):  # type: ignore[type-arg]
     """A name out of a list that is only fetched when it is needed.
 
@@ -79,6 +145,10 @@ class Known(click.ParamType):  # type: ignore[type-arg]
         if value not in names:
             self.fail(unknown(self.name, str(value), names), param, ctx)
         return str(value)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Return the names that begin so."""
+        return beginning(self._names(), incomplete)
 
 
 class KnownList(Known):

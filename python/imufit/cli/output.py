@@ -6,6 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,12 +15,28 @@ from imufit.whole_file import whole_file, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from rich.console import Console
 
-    from imufit.results import Table
+    from imufit.results import Result, Table
 
 _WIDTH_OF_FILES = 150
 _LONGEST_TEXT = 20_000
 """Characters of a paragraph or a line; names within are bounded where they are read, this is for what is not."""
+
+
+_PROSE = 28
+"""Least characters of a column that wraps: the longest id of an effect has 27, and prose can be read in it."""
+
+
+def _least_width(table: Table) -> int:
+    """Characters that a table needs at least: numbers and first cells do not wrap, other cells down to `_PROSE`."""
+    from rich.cells import cell_len  # noqa: PLC0415
+
+    least = 2
+    for place, (name, right, *cells) in enumerate(zip(table.names, table.right, *table.rows, strict=True)):
+        widest = max(cell_len(_harmless(cell)) for cell in (name, *cells))
+        least += (widest if place == 0 or right else min(widest, _PROSE)) + (3 if place else 0)
+    return least
 
 
 def _harmless(text: str) -> str:
@@ -37,6 +54,11 @@ class Output:
     """
 
     def __init__(self, json_file: Path | None = None) -> None:
+        self._json_file = json_file
+
+    @cached_property
+    def _console(self) -> Console:
+        """What prints: made when there is something to say, an input that is refused does not wait for it."""
         from rich.console import Console  # noqa: PLC0415
 
         class Piped(Console):
@@ -46,10 +68,9 @@ class Output:
                 """Hand on what rich has caught."""
                 raise BrokenPipeError
 
-        self._json_file = json_file
-        quiet = json_file is not None and str(json_file) == "-"
+        quiet = self._json_file is not None and str(self._json_file) == "-"
         width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else _WIDTH_OF_FILES
-        self._console = Piped(quiet=quiet, width=width, highlight=False, markup=False, emoji=False)
+        return Piped(quiet=quiet, width=width, highlight=False, markup=False, emoji=False)
 
     def say(self, *sentences: str, bold: bool = False) -> None:
         """Print sentences, one paragraph each."""
@@ -62,20 +83,42 @@ class Output:
         for line in lines:
             self._console.print(_harmless(line), soft_wrap=True)
 
+    def result(self, result: Result, verbose: bool) -> None:
+        """Print a result: the answer, its other sentences, then the tables of the answer or, if `verbose`, all."""
+        answer, *others = result.sentences()
+        self.say(answer, bold=True)
+        self.say(*others)
+        self.result_tables(result, verbose)
+
+    def result_tables(self, result: Result, verbose: bool) -> None:
+        """Print the tables of the answer and name the others; all of them if `verbose`."""
+        every = [table for table in result.tables() if table.rows]
+        if verbose:
+            self.tables(every)
+            return
+        shown = [table for table in result.answer_tables() if table.rows]
+        self.tables(shown)
+        kept = {(table.title, len(table.rows)) for table in shown}
+        more = [table.title for table in every if (table.title, len(table.rows)) not in kept]
+        if more:
+            self.say(f"With -v also: {'; '.join(title[0].lower() + title[1:] for title in more)}.")
+
     def table(self, table: Table, limit: int | None = None) -> None:
-        """Print a table, if it has rows."""
+        """Print a table, if it has rows: as blocks, one a row, where it is too wide for the screen."""
         if not table.rows:
             return
         from rich import box  # noqa: PLC0415
         from rich.table import Table as RichTable  # noqa: PLC0415
         from rich.text import Text  # noqa: PLC0415
 
-        rich_table = RichTable(
-            title=Text(_harmless(table.title)) if table.title else None,
-            title_justify="left",
-            box=box.SIMPLE_HEAD,
-            pad_edge=False,
-        )
+        if table.title:
+            self._console.print(Text(_harmless(table.title)), style="italic")
+        if table.blocks or _least_width(table) > self._console.width:
+            self._blocks(table, limit)
+            return
+        headed = any(table.names)
+        rich_table = RichTable(box=box.SIMPLE_HEAD if headed else None, pad_edge=False, show_header=headed)
+        rich_table.padding = (0, 1) if headed else (0, 3, 0, 0)
         for place, (name, right) in enumerate(zip(table.names, table.right, strict=True)):
             rich_table.add_column(
                 Text(_harmless(name)),
@@ -86,6 +129,22 @@ class Output:
         for row in table.rows[:limit]:
             rich_table.add_row(*(Text(_harmless(cell)) for cell in row))
         self._console.print(rich_table)
+
+    def _blocks(self, table: Table, limit: int | None) -> None:
+        """Print each row as a block: its first cell, then a line for each other cell that says something."""
+        from rich.table import Table as RichTable  # noqa: PLC0415
+        from rich.text import Text  # noqa: PLC0415
+
+        for row in table.rows[:limit]:
+            self._console.print(Text(_harmless(row[0]), style="bold"), soft_wrap=True)
+            block = RichTable.grid(padding=(0, 3, 0, 0))
+            block.add_column(no_wrap=True)
+            block.add_column(overflow="fold")
+            for name, cell in zip(table.names[1:], row[1:], strict=True):
+                if cell not in ("", "-"):
+                    block.add_row(Text(f"  {_harmless(name)}"), Text(_harmless(cell)))
+            self._console.print(block)
+            self._console.print()
 
     def tables(self, tables: Iterable[Table]) -> None:
         """Print tables, those without rows left out."""

@@ -10,6 +10,7 @@ import click
 from imufit.cli import engine
 from imufit.cli.arguments import PLOT_ENDINGS, OutputFile, Real, keep_inputs
 from imufit.cli.convert import RowRange
+from imufit.cli.names import OneOf
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import log_argument
@@ -33,7 +34,7 @@ class ColumnNames(click.ParamType):  # type: ignore[type-arg]
         return tuple(name.strip() for name in value.split(",") if name.strip())
 
 
-@click.command(short_help="Readings, reference and rests of a log over time, as a figure.")
+@click.command()
 @log_argument
 @click.option(
     "-o",
@@ -51,7 +52,7 @@ class ColumnNames(click.ParamType):  # type: ignore[type-arg]
 )
 @click.option(
     "--show",
-    type=click.Choice(("readings", "reference", "both")),
+    type=OneOf("part of the figure", ("readings", "reference", "both")),
     default="both",
     show_default=True,
     help="What to draw: the readings, the reference's attitude and rates, or both.",
@@ -78,7 +79,7 @@ def plot(
     made = OutputFile(PLOT_ENDINGS).convert(f"{log.stem}.png", None, None) if output is None else output
     keep_inputs([log], [made])
     out = Output()
-    with ProgressBar() as progress:
+    with ProgressBar(counted=True) as progress:
         figure = engine.plot(
             engine.open_log(log, reading),
             progress,

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 
 from imufit.cli.arguments import Real, Whole
-from imufit.cli.names import FRAMES, Known
+from imufit.cli.names import FRAMES, Known, OneOf
 
 frame_option = click.option(
     "--frame",
@@ -30,7 +30,7 @@ def port_argument(command: Command) -> Command:
     )(command)
     command = click.option(
         "--form",
-        type=click.Choice(["auto", "binary", "text"]),
+        type=OneOf("form", ("auto", "binary", "text")),
         default="auto",
         show_default=True,
         help="Form of the wire protocol.",

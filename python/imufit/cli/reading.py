@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import click
 
 from imufit.cli.arguments import NamedFile
-from imufit.cli.names import FRAMES
+from imufit.cli.names import FRAMES, OneOf
 from imufit.whole_file import identity
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -29,7 +29,7 @@ _DECLARATIONS = (
     ),
     click.option(
         "--frame",
-        type=click.Choice(FRAMES, case_sensitive=False),
+        type=OneOf("frame", FRAMES, case_sensitive=False),
         metavar="|".join(FRAMES),
         help="Frame of the reference attitude, whatever the file states.",
     ),

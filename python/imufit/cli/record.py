@@ -8,12 +8,13 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import LOG_ENDINGS, OutputFile, json_option, keep_inputs
+from imufit.cli.names import OneOf
 from imufit.cli.output import Output
 from imufit.cli.port import duration_option, frame_option, port_argument
 from imufit.cli.reading import map_option
 
 
-@click.command(short_help="From a serial device to a log that cannot be lost.")
+@click.command()
 @port_argument
 @map_option
 @click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
@@ -25,7 +26,7 @@ from imufit.cli.reading import map_option
     help="Commanded angle of a one-axis rig, e.g. 5deg: the column ref_angle. While it runs, type the next angle and "
     "Enter; type only Enter while the rig moves.",
 )
-@click.option("--axis", type=click.Choice(["x", "y", "z"]), help="Body axis about which the rig turns.")
+@click.option("--axis", type=OneOf("axis", ("x", "y", "z")), help="Body axis about which the rig turns.")
 @click.option("--force", is_flag=True, help="Overwrite LOG if it is there already.")
 @click.option("--quiet", is_flag=True, help="No status line and no messages of the device.")
 @json_option

@@ -11,7 +11,7 @@ from imufit.cli.arguments import LOG_ENDINGS, NamedFile, OutputFile, json_option
 from imufit.cli.output import Output
 
 
-@click.command(short_help="A log of what a recording left that was killed or ran out of disk.")
+@click.command()
 @click.argument("file", metavar="FILE", type=NamedFile())
 @click.option(
     "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="LOG", help="Log to write; without it the one meant to be."

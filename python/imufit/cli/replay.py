@@ -32,7 +32,7 @@ _MADE = 100
 """Bytes that a filter makes of a row: attitude, angles and errors."""
 
 
-@click.command(short_help="Attitude for every row, its error, and the methods' tilt beside each other.")
+@click.command()
 @log_argument
 @click.option(
     "--filter",
@@ -89,7 +89,7 @@ def replay(
     json_file: Path | None,
     plot_file: Path | None,
 ) -> None:
-    """Run attitude filters over LOG; where it has a reference, give their errors.
+    """Run attitude filters over LOG; where it has a reference, give their errors, else their angles.
 
     For a rig with one axis (metadata rig_axis) the error of the angle about that axis, else of the whole attitude and
     of the inclination: RMSE, offset, standard deviation, drift, noise density, settling time, gain on vibration, and
@@ -108,13 +108,15 @@ def replay(
         model = engine.sensor_model(path=model_file)
         rows = model.apply(rows)
         out.say(f"{' + '.join(model.effects) or 'No effect'} taken out.", *(f"Note: {note}." for note in rows.notes))
-    with ProgressBar() as progress:
+    with ProgressBar(counted=True) as progress:
         result = engine.replay(rows, names, progress, settings)
     compared = result.comparison(band)
     value = result.to_dict(compared)
     out.say(f"{value['n']} rows replayed.", bold=True)
     out.say(*(f"{count} rows skipped: {reason}." for reason, count in value.get("skipped", {}).items() if count))
-    if compared is None or compared.axis is None:
+    if all(errors is None for errors in value["filters"].values()):
+        out.table(result.angle_table())
+    elif compared is None or compared.axis is None:
         out.table(_attitude_table(value))
     if compared is not None:
         out.tables(compared.tables())

@@ -98,7 +98,7 @@ def read_answer(path: Path) -> dict[str, Any]:
     return answer
 
 
-@click.command(short_help="What was done to a simulated log; grades an answer.")
+@click.command()
 @click.argument("log", metavar="LOG", type=EXISTING)
 @click.option("--answer", type=EXISTING, metavar="JSON", help="Grade this JSON of `diagnose` or `ladder`.")
 @json_option

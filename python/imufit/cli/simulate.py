@@ -9,7 +9,7 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import LOG_ENDINGS, OutputFile, Real, Whole, json_option
-from imufit.cli.names import FRAMES, Known, unknown
+from imufit.cli.names import FRAMES, Known, complete_injection, unknown
 from imufit.cli.output import Output
 
 SIZES = ("large", "medium", "small")
@@ -70,13 +70,14 @@ def chosen_effects(texts: Sequence[str]) -> dict[str, dict[str, float] | None]:
     return chosen
 
 
-@click.command(short_help="A synthetic log, on request with a hidden effect.")
+@click.command()
 @click.argument("scenario", type=Known("scenario", lambda: list(engine.scenarios())), metavar="SCENARIO")
 @click.option(
     "--effect",
     "effects",
     multiple=True,
     metavar="ID[:NAME=VALUE,...]",
+    shell_complete=complete_injection,
     help="Effect to put in, SI units; without values they are drawn. Repeatable.",
 )
 @click.option("--hidden", type=Whole(min=0), metavar="SEED", help="Let this seed pick the effect, untold.")

@@ -9,7 +9,7 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import OutputFile, Real, json_option, keep_inputs, plot_option
-from imufit.cli.names import FILTERS, Known
+from imufit.cli.names import FILTERS, Known, OneOf
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import log_argument
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from imufit.log import Reading
 
 
-@click.command(short_help="Gains of a filter: by its error, or without reference by its predictions.")
+@click.command()
 @log_argument
 @click.option(
     "--filter",
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 @set_option
 @click.option(
     "--by",
-    type=click.Choice(["error", "prediction"]),
+    type=OneOf("criterion", ("error", "prediction")),
     help="What is minimised; without it the error where LOG has a reference.",
 )
 @click.option(
     "--metric",
-    type=click.Choice(["total", "heading", "inclination"]),
+    type=OneOf("part of the error", ("total", "heading", "inclination")),
     help="Of which angle; without it the total, or the inclination for a log without magnetometer.",
 )
 @click.option(
@@ -80,7 +80,7 @@ def tune(
     keep_inputs([log], [output, json_file, plot_file])
     settings = settings_from(assignments)
     out = Output(json_file)
-    with ProgressBar() as progress:
+    with ProgressBar(counted=True) as progress:
         found = engine.tune(
             engine.read_log(log, reading),
             filter_name,

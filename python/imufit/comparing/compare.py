@@ -17,6 +17,7 @@ from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS, UNITS
 from imufit.fitting.rest_passes import RestPasses
+from imufit.fitting.row_residuals import residual_chunks
 from imufit.progress import Progress
 from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
 
@@ -191,8 +192,7 @@ def _spectra(evidence: LogEvidence, step: Array) -> tuple[Spectrum, ...]:
     facts = evidence.facts
     rate = 1.0 / facts.dt
     chunks = 0
-    for arrays in evidence.passes.chunks(facts.margin, "spectrum"):
-        residuals = _imufit.evaluate(evidence.raw, arrays, step)
+    for arrays, residuals in residual_chunks(evidence, step, "spectrum"):
         t = arrays["t"][arrays["begin"] : arrays["end"]]
         steady = np.diff(t, prepend=t[0]) < 1.75 * facts.dt
         for index, residual in enumerate(residuals):

@@ -6,21 +6,23 @@ from typing import TYPE_CHECKING
 
 from imufit.errors import InputError
 from imufit.model.catalogue import find_effect
+from imufit.model.effect import id_of
 from imufit.results import Addition
 
 if TYPE_CHECKING:
     from imufit.fitting import FittedStack
+    from imufit.model.user_function import Function
 
 
-def add(fit: FittedStack, effect_id: str, expected: float | None = None) -> Addition:
+def add(fit: FittedStack, effect: str | Function, expected: float | None = None) -> Addition:
     """Add an effect to a fitted model and refit.
 
     Parameters
     ----------
     fit : FittedStack
         Where to start from.
-    effect_id : str
-        The effect.
+    effect : str or callable
+        The effect: its id, or the function of one of your own.
     expected : float, optional
         Held-out error expected; asked of the evidence if not given.
 
@@ -29,6 +31,7 @@ def add(fit: FittedStack, effect_id: str, expected: float | None = None) -> Addi
     InputError
         The effect is unknown, in the model already, or cannot be tested on this log.
     """
+    effect_id = id_of(effect)
     find_effect(effect_id)
     analysis = fit.analysis
     model = fit.model.with_effect(effect_id)

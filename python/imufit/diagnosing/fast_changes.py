@@ -84,7 +84,7 @@ def _residuals(evidence: LogEvidence, step: Array) -> tuple[Array, list[Array | 
     """Return time stamps and residuals of all channels at the start of a log."""
     times: list[Array] = []
     parts: list[list[Array | None]] = []
-    for arrays in evidence.passes.chunks(evidence.facts.margin, "looking for fast changes"):
+    for arrays in evidence.passes.chunks(evidence.passes.margin(evidence.facts), "looking for fast changes"):
         parts.append(_imufit.evaluate(evidence.raw, arrays, step))
         times.append(arrays["t"][arrays["begin"] : arrays["end"]])
         if sum(map(len, times)) >= MOST_ROWS:

@@ -40,7 +40,7 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
     InputError
         The log has no usable reference.
     """
-    climb = Climb(start)
+    climb = Climb(start, progress=progress or silent)
     climb.up()
     seen: set[frozenset[str]] = set()
     revisions: list[Revision] = []
@@ -78,6 +78,8 @@ class Climb:
         Where it starts from.
     first : Diagnosis, optional
         What is missing there, if that is known.
+    progress : callable, optional
+        Told of every step.
 
     Attributes
     ----------
@@ -93,10 +95,11 @@ class Climb:
         Rivals of each effect that was added at `ambiguous`. An effect that is found later may separate them.
     """
 
-    def __init__(self, start: FittedStack, first: Diagnosis | None = None) -> None:
+    def __init__(self, start: FittedStack, first: Diagnosis | None = None, progress: Progress = silent) -> None:
         self.start = self.fit = start
         self.steps: list[Step] = []
-        self.first = self.diagnosis = first or diagnose(start)
+        self._progress = progress
+        self.first = self.diagnosis = first or self._diagnose()
         self.tied: dict[str, tuple[str, ...]] = {}
 
     def up(self) -> None:
@@ -107,7 +110,7 @@ class Climb:
             if effect is None:
                 break
             expected = next(c.held_out_after for c in self.diagnosis.candidates if c.effect == effect)
-            addition = add(self.fit, effect, expected)
+            addition = self._add(effect, expected)
             lower = addition.after < addition.before
             if not (lower and (_told(addition) or _matters(addition))):
                 # What the evidence promised, the fit did not keep: the next one may.
@@ -118,7 +121,7 @@ class Climb:
             if effect in alike and len(alike) > 1:
                 self.tied[effect] = tuple(other for other in alike if other is not None and other != effect)
             self._take(addition)
-            self.diagnosis = diagnose(self.fit)
+            self.diagnosis = self._diagnose()
 
     def unsettled(self) -> list[str]:
         """List the effects of the model that others may still stand for."""
@@ -127,7 +130,7 @@ class Climb:
     def again(self, changes: Sequence[tuple[str, str | None]]) -> Climb:
         """Return the same way from the same start with effects replaced by others, or left out (None)."""
         effects = [step.effect for step in self.steps]
-        other = Climb(self.start, self.first)
+        other = Climb(self.start, self.first, self._progress)
         other.tied = dict(self.tied)
         for removed, by in changes:
             at = effects.index(removed)
@@ -136,9 +139,21 @@ class Climb:
             if rivals and by is not None:
                 other.tied[by] = tuple(rival for rival in (*rivals, removed) if rival != by)
         for effect in effects:
-            other._take(add(other.fit, effect))
-        other.diagnosis = diagnose(other.fit)
+            other._take(other._add(effect))
+        other.diagnosis = other._diagnose()
         return other
+
+    def _diagnose(self) -> Diagnosis:
+        """Ask what is missing from the model so far."""
+        on_top = self.steps[-1].effect if self.steps else "the model it starts from"
+        self._progress(0, 1, f"step {len(self.steps) + 1}: what is missing on top of {on_top}")
+        return diagnose(self.fit)
+
+    def _add(self, effect: str, expected: float | None = None) -> Addition:
+        """Add an effect to the model so far."""
+        others = sum(item.effect != effect for item in self.diagnosis.candidates)
+        self._progress(0, 1, f"step {len(self.steps) + 1}: {effect} against {others} candidates")
+        return add(self.fit, effect, expected)
 
     def _take(self, addition: Addition) -> None:
         self.fit = addition.fit

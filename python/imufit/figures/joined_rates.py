@@ -38,6 +38,14 @@ class TraceLike(Protocol):
     def aligned_t(self) -> Array:
         """(m,) times of the reference on the sensor's clock, s."""
 
+    @property
+    def label(self) -> str:
+        """Name and unit of the values as they are drawn."""
+
+    @property
+    def factor(self) -> float:
+        """Factor to this unit."""
+
 
 CLOSE = 10.0
 """Length of the close view, s."""
@@ -71,13 +79,14 @@ def joined_rates(trace: TraceLike, sentence: str) -> Figure:
         (close, trace.sensor_t, trace.aligned_t, f"The {CLOSE:.0f} s with most motion"),
     )
     for axes, own, other, words in views:
-        axes.plot(own, np.rad2deg(trace.sensor), color=style.BLUE, linewidth=1.0, label="sensor")
+        axes.plot(own, trace.factor * trace.sensor, color=style.BLUE, linewidth=1.0, label="sensor")
         axes.plot(
-            other, np.rad2deg(trace.reference), color=style.ORANGE, linewidth=1.0, linestyle="--", label="reference"
+            other, trace.factor * trace.reference, color=style.ORANGE, linewidth=1.0, linestyle="--", label="reference"
         )
         style.title(axes, words, 9.5)
-        axes.set_ylabel("rate, deg/s", fontsize=9)
-        axes.set_ylim(bottom=0.0)
+        axes.set_ylabel(trace.label, fontsize=9)
+        if np.nanmin(trace.sensor) >= 0.0:
+            axes.set_ylim(bottom=0.0)
         style.tidy(axes)
     close.set_xlim(*_liveliest(trace))
     close.set_xlabel("time, s", fontsize=9)
@@ -88,7 +97,7 @@ def joined_rates(trace: TraceLike, sentence: str) -> Figure:
 
 def _liveliest(trace: TraceLike) -> tuple[float, float]:
     """Return begin and end of the ten seconds in which the reference turns most."""
-    t, rate = trace.aligned_t, np.nan_to_num(trace.reference)
+    t, rate = trace.aligned_t, np.abs(np.nan_to_num(trace.reference))
     inside = (t >= trace.sensor_t[0]) & (t <= trace.sensor_t[-1])
     total = np.concatenate(([0.0], np.cumsum(np.where(inside, rate, 0.0))))
     width = min(len(t), max(1, int(np.searchsorted(t, t[0] + CLOSE))))

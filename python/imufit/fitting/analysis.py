@@ -38,7 +38,9 @@ class Estimate:
     ----------
     values, errors : dict of int to ndarray
         By slot: parameter values and standard errors, SI units; of an effect that each log has for itself those of
-        one log after the other.
+        one log after the other. The error of a fixed parameter is 0, that of one at its bound not a number.
+    covariance : ndarray
+        (k, k) covariance of these parameters, slot after slot, with the errors' squares in its diagonal.
     step : ndarray
         (p,) step of every parameter of the evidence.
     held_out, training : float
@@ -49,6 +51,7 @@ class Estimate:
 
     values: dict[int, Array]
     errors: dict[int, Array]
+    covariance: Array
     step: Array
     held_out: float
     training: float
@@ -107,6 +110,8 @@ class Analysis:
         keep_constants : bool
             Temperatures and covariates count from the means that the model was fitted with, not from these logs'.
         """
+        # Its owner may set the model later on; the evidence belongs to it as it is now.
+        model = model.of_a_fit()
         surveyed = survey(model, logs, progress, keep_constants=keep_constants)
         for effect, _ in model.stack():
             reasons = [each.refusal(effect) for each in surveyed]
@@ -201,7 +206,7 @@ class Analysis:
         known = {key for each in logs for key in each.slots}
         effects = [key for key in self.model.effects if key in known]
         values = {key: at for key, at in self.model.parameters.items() if key in known}
-        model = type(self.model)(effects, values, constants=self.model.constants)
+        model = type(self.model)(effects, values, constants=self.model.constants, limits=self.model.limits).of_a_fit()
         unnamed = tuple(key for key in self.unnamed if key in known)
         candidates = {key: effect for key, effect in self.candidates.items() if key in known}
         own = tuple(self.own[k] for k in chosen)
@@ -282,14 +287,36 @@ class Analysis:
         result = self.problem.estimate(free)
         # What is held is not known exactly, and leaves the others as open as if it were fitted along.
         along = self.problem.estimate(chosen) if held else result
-        errors = _by_slot(self, chosen, along["standard_error"])
+        covariance = along["covariance"]
+        errors = _by_slot(self, chosen, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
         searched = {slot: self.found.get(self.slots[slot]) for slot in held}
         # A slope does not see the jumps that tell most of it.
-        errors |= {slot: np.array(found.spread) for slot, found in searched.items() if found}
+        spreads = {slot: np.array(found.spread) for slot, found in searched.items() if found}
+        spreads = {slot: np.where(self._fixed(slot), 0.0, spread) for slot, spread in spreads.items()}
+        errors |= spreads
+        covariance = _with_errors(covariance, np.concatenate([errors[slot] for slot in chosen]) if chosen else None)
         steps = _by_slot(self, free, result["step"])
         values = {slot: np.asarray(self._present(slot)) for slot in chosen}
         values |= {slot: self._within_reach(slot, values[slot] + step) for slot, step in steps.items()}
-        return Estimate(values, errors, result["full_step"], result["held_out"], result["training"], result["folds"])
+        values = {slot: self._allowed(slot, at) for slot, at in values.items()}
+        return Estimate(
+            values, errors, covariance, result["full_step"], result["held_out"], result["training"], result["folds"]
+        )
+
+    def _fixed(self, slot: int) -> NDArray[np.bool_]:
+        """Return which parameters of a slot are fixed."""
+        if slot >= len(self.model.effects):
+            return np.zeros(len(self._present(slot)), bool)
+        fixed = [limits.fixed for limits in self.model.limits_of(self.slots[slot])]
+        return np.resize(np.array(fixed, dtype=bool), len(self._present(slot)))
+
+    def _allowed(self, slot: int, values: Array) -> Array:
+        """Return values of a slot as the model's limits allow them: a step to a bound ends on it to the last digit."""
+        if slot >= len(self.model.effects):
+            return values
+        count = len(self.model.limits_of(self.slots[slot]))
+        each = [self.model.allowed(self.slots[slot], at.tolist()) for at in values.reshape(-1, count)]
+        return np.array(each, dtype=np.float64).ravel()
 
     def _within_reach(self, slot: int, values: Array) -> Array:
         """Keep what a search started (a time constant) within half and twice its present value in one step."""
@@ -300,6 +327,8 @@ class Analysis:
             if name in effect.searched and name not in effect.only_searched:
                 low, high = sorted((0.5 * present[k], 2.0 * present[k]))
                 values[k] = min(max(values[k], low), high)
+                if effect.limits:
+                    values[k] = min(max(values[k], effect.limits[k][0]), effect.limits[k][1])
         return values
 
     def moved_to(self, estimate: Estimate) -> tuple[EffectStack, tuple[dict[str, list[float]], ...]]:
@@ -308,6 +337,8 @@ class Analysis:
         In the model, what each log has for itself stands with its mean.
         """
         parameters, errors = {}, {}
+        keys, covariance = self.covariance_of(estimate)
+        sizes = dict(zip(keys, np.sqrt(np.diag(covariance)), strict=True))
         own: tuple[dict[str, list[float]], ...] = tuple({} for _ in self.logs)
         for slot, key in enumerate(self.slots[: len(self.fitted_slots)]):
             effect = find_effect(key)
@@ -321,10 +352,9 @@ class Analysis:
             if slot >= len(self.model.effects):
                 continue
             names = [name for name, _, _ in effect.parameters]
-            mean, error = pooled(values, spread)
-            parameters[key] = dict(zip(names, map(float, mean), strict=True))
-            errors[key] = dict(zip(names, map(float, error), strict=True))
-            errors[key] |= dict.fromkeys(effect.only_searched, 0.0)
+            mean = self.model.allowed(key, pooled(values, spread)[0].tolist())
+            parameters[key] = dict(zip(names, mean, strict=True))
+            errors[key] = {name: float(sizes[f"{key}.{name}"]) for name in names}
         facts = [each.facts for each in self.logs]
         means = {name: mean for each in reversed(facts) for name, mean in each.covariate_means.items()}
         constants = {
@@ -332,11 +362,46 @@ class Analysis:
             "covariate_means": {
                 name: mean
                 for name, mean in means.items()
-                if any(effect.centred_column == name for effect, _ in self.model.stack())
+                if any(name in effect.centred_columns for effect, _ in self.model.stack())
             },
         }
         kept = {key: value for key, value in constants.items() if value is not None and value != {}}
-        return type(self.model)(self.model.effects, parameters, constants=kept, standard_errors=errors), own
+        model = type(self.model)(
+            self.model.effects, parameters, constants=kept, standard_errors=errors, limits=self.model.limits
+        )
+        return model.of_a_fit(), own
+
+    def covariance_of(self, estimate: Estimate) -> tuple[list[str], Array]:
+        """Return the covariance of all parameters of the model, and their names ``EFFECT.PARAM`` in its order.
+
+        What each of several logs has for itself stands with its mean. Rows of parameters that are fixed or only
+        searched for are zero, those of parameters at their bounds are not numbers.
+        """
+        keys: list[str] = []
+        ends = np.cumsum([0, *(len(values) for values in estimate.values.values())])
+        first = dict(zip(estimate.values, map(int, ends[:-1]), strict=True))
+        rows: list[Array] = []
+        unknown: list[bool] = []
+        zero: list[bool] = []
+        for slot, key in enumerate(self.model.effects):
+            effect = find_effect(key)
+            names = [name for name, _, _ in effect.parameters]
+            keys += [f"{key}.{name}" for name in names]
+            errors = estimate.errors[slot].reshape(-1, len(names))
+            shares = _shares(errors)
+            unknown += [bool(np.isnan(errors[:, k]).all()) for k in range(len(names))]
+            zero += [name in effect.only_searched for name in names]
+            for k in range(len(names)):
+                row = np.zeros(ends[-1])
+                row[first[slot] + k : first[slot] + errors.size : len(names)] = shares[:, k]
+                rows.append(row)
+        means = np.array(rows).reshape(len(keys), int(ends[-1]))
+        covariance = means @ np.nan_to_num(estimate.covariance) @ means.T
+        covariance[zero, :] = 0.0
+        covariance[:, zero] = 0.0
+        covariance[unknown, :] = np.nan
+        covariance[:, unknown] = np.nan
+        return keys, covariance
 
     def own_step(self, log: int, step: Array) -> Array:
         """Return a step of all parameters as one of the parameters of one log's evidence."""
@@ -345,7 +410,11 @@ class Analysis:
     def converged(self, estimate: Estimate) -> bool:
         """Return whether no parameter still moves by more than a tenth of its standard error."""
         return all(
-            bool(np.all(np.abs(estimate.values[slot] - self._present(slot)) <= 0.1 * estimate.errors[slot]))
+            bool(
+                np.all(
+                    np.abs(estimate.values[slot] - self._present(slot)) <= 0.1 * np.nan_to_num(estimate.errors[slot])
+                )
+            )
             for slot in estimate.values
         )
 
@@ -353,6 +422,9 @@ class Analysis:
     def linear(self) -> bool:
         """True if the reading is proportional to the fitted parameters, so that one solution is exact."""
         if self.fitted_slots and any(isinstance(each.passes, RestPasses) for each in self.logs):
+            return False
+        if any(limits.bounded for of in self.model.limits.values() for limits in of.values()):
+            # Questions are asked where the parameters stand: at a bound, of what is left there.
             return False
         stages = {effect.stage for effect, _ in self.model.stack()}
         stages |= {find_effect(key).stage for key in self.unnamed} if "gain" in stages else set()
@@ -402,6 +474,8 @@ class Analysis:
             effect, present = model.stack()[slot]
             fitted = [_fitted(each, model, self.unnamed, at) for each, at in zip(surveyed, own, strict=True)]
             others = [{key: at for key, at in values.items() if key != effect.id} for values in fitted]
+            if self._fixed(slot).all():
+                continue
             found |= search(surveyed, others, {effect.id: effect}, {effect.id: present})
             now = found[effect.id]
             if np.any(np.abs(np.subtract(now.start, present)) > 0.1 * np.array(now.spread)):
@@ -515,12 +589,18 @@ def pooled(values: Array, errors: Array) -> tuple[Array, Array]:
     """Mean of values of several logs (logs, k), weighted by their errors, and its standard error."""
     if len(values) == 1:
         return values[0], errors[0]
+    shares = _shares(errors)
+    known = (np.isfinite(errors) & (errors > 0.0)).any(axis=0)
+    square = (np.nan_to_num(shares * errors) ** 2).sum(axis=0)
+    return (shares * values).sum(axis=0), np.where(known, np.sqrt(square), np.nan)
+
+
+def _shares(errors: Array) -> Array:
+    """Shares (logs, k) of the values of several logs in their mean, by their errors (logs, k)."""
     known = np.isfinite(errors) & (errors > 0.0)
     weights = np.where(known, 1.0 / np.where(known, errors, 1.0) ** 2, 0.0)
     weights = np.where(known.any(axis=0), weights, 1.0)
-    sums = weights.sum(axis=0)
-    error = np.where(known.any(axis=0), 1.0 / np.sqrt(sums), np.nan)
-    return (weights * values).sum(axis=0) / sums, error
+    return np.asarray(weights / weights.sum(axis=0))
 
 
 def _with_own(
@@ -559,7 +639,26 @@ def _problem(
             for each in logs
         ],
         [known[key].scope == "log" for key in slots],
+        [
+            (slots[key], k, None if limits.fixed else (limits.lower, limits.upper))
+            for key in model.limits
+            for k, limits in enumerate(model.limits_of(key))
+            if limits.fixed or limits.bounded
+        ],
     )
+
+
+def _with_errors(covariance: Array, errors: Array | None) -> Array:
+    """Return a covariance with other standard errors where they differ; what is searched for is beside the others."""
+    if errors is None:
+        return covariance
+    known = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    other = (known != errors) & ~(np.isnan(known) & np.isnan(errors))
+    out = covariance.copy()
+    out[other, :] = 0.0
+    out[:, other] = 0.0
+    out[other, other] = errors[other] ** 2
+    return out
 
 
 def _started(logs: Sequence[SurveyedLog], model: EffectStack, own: Sequence[Values]) -> EffectStack:
@@ -572,4 +671,4 @@ def _started(logs: Sequence[SurveyedLog], model: EffectStack, own: Sequence[Valu
             ]
             found = search(logs, others, {effect.id: effect})
             model = model.starting_at({key: item.start for key, item in found.items()})
-    return model
+    return model.of_a_fit()

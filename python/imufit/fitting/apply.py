@@ -69,7 +69,7 @@ def _left_alone(model: EffectStack, log: Log) -> list[str]:
         of_sensor = [e.id for e, _ in model.stack() if e.sensors == [sensor] and e.reference_part is None]
         if of_sensor and getattr(log, sensor) is None:
             notes.append(f"{' and '.join(of_sensor)} left alone: the log has no {sensor}")
-    on_temperature = [effect.id for effect, _ in model.stack() if effect.centred_column == "temp"]
+    on_temperature = [effect.id for effect, _ in model.stack() if "temp" in effect.centred_columns]
     if on_temperature and "temperature_mean" not in model.constants and log.temp is not None:
         notes.append(f"{' and '.join(on_temperature)}: the model has no temperature_mean, the log's own was taken")
     return notes

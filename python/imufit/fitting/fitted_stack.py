@@ -7,14 +7,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.fitting.analysis import Analysis, Estimate, KeptAnalysis
+from imufit.fitting.row_residuals import row_residuals
+from imufit.log import whole
+from imufit.log.columns import SENSOR_NAMES
 from imufit.log.several import Logs, logs_of, name_of
 from imufit.model.catalogue import each_log_has_its_own, find_effect
 from imufit.model.effect_stack import EffectStack
 from imufit.progress import Progress, silent
-from imufit.results import LogParameters, Parameter
+from imufit.results import LogParameters, Parameter, Params
 from imufit.results.log_parameters import logs_json
 from imufit.results.parameter import by_effect, parameter_frame, parameter_table, plot_parameters
 
@@ -22,7 +26,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from imufit.log import LogSource
+    from imufit.log import Log, LogSource
+
+Array = NDArray[np.float64]
 
 
 class FittedStack:
@@ -51,6 +57,7 @@ class FittedStack:
         self._logs = tuple(each.surveyed.log for each in analysis.logs)
         self.estimate = estimate
         self.model, self.own = analysis.moved_to(estimate)
+        self._covariance = analysis.covariance_of(estimate)
         self.ratio = estimate.held_out
         self.training_ratio = estimate.training
 
@@ -126,9 +133,9 @@ class FittedStack:
             at = self.analysis.having(key).index(log) * len(effect.parameters)
             errors = self.estimate.errors[slot][at : at + len(effect.parameters)]
             found += [
-                Parameter(key, name, value, float(error), unit, typical)
-                for (name, unit, typical), value, error in zip(
-                    effect.parameters, self.own[log][key], errors, strict=True
+                Parameter(key, name, value, float(error), unit, typical, limits.fixed, limits.lower, limits.upper)
+                for (name, unit, typical), value, error, limits in zip(
+                    effect.parameters, self.own[log][key], errors, self.model.limits_of(key), strict=True
                 )
             ]
         return tuple(found)
@@ -166,6 +173,112 @@ class FittedStack:
     def parameters(self) -> tuple[Parameter, ...]:
         """Every parameter with its standard error, unit and typical size."""
         return self.model.listed()
+
+    @property
+    def params(self) -> Params:
+        """Fitted parameters by name: ``fit.params["acc.bias.x"].value``, ``.stderr``, ``.unit``, ``.typical``."""
+        return Params(self.parameters)
+
+    @property
+    def covariance(self) -> pd.DataFrame:
+        """Covariance of the fitted parameters, rows and columns ``EFFECT.PARAM``, in the products of their SI units.
+
+        The square roots of its diagonal are the standard errors. Parameters that are fixed, at a bound, or found by a
+        search of whole numbers have no row. What each of several logs has for itself stands with its mean.
+        """
+        import pandas as pd  # noqa: PLC0415
+
+        keys, matrix = self._covariance
+        size = np.diag(matrix)
+        chosen = np.flatnonzero(np.isfinite(size) & (size > 0.0))
+        labels = [keys[k] for k in chosen]
+        return pd.DataFrame(matrix[np.ix_(chosen, chosen)], index=labels, columns=labels)
+
+    @property
+    def correlation(self) -> pd.DataFrame:
+        """Correlation of the fitted parameters, from -1 to 1, rows and columns as those of `covariance`."""
+        import pandas as pd  # noqa: PLC0415
+
+        covariance = self.covariance
+        size = np.sqrt(np.diag(covariance))
+        found = np.clip(covariance.to_numpy() / np.outer(size, size), -1.0, 1.0)
+        # Rounding aside, every parameter is correlated with itself by 1.
+        np.fill_diagonal(found, 1.0)
+        return pd.DataFrame(found, index=covariance.index, columns=covariance.columns)
+
+    def residuals(self, sensor: str, log: int | str | LogSource | None = None) -> Array:
+        """Return the readings of one sensor minus what the fitted model makes of the reference, row by row.
+
+        Parameters
+        ----------
+        sensor : str
+            ``acc``, ``gyr`` or ``mag``.
+        log : int, str or Log, optional
+            Of a fit of several logs the one that is meant: its number, its file's name, or the log itself.
+
+        Returns
+        -------
+        ndarray
+            (n, 3) of the rows of the log, m/s^2, rad/s or uT; NaN where nothing is judged: no reading, no reference
+            around it, or a sample that is certain to be wrong.
+
+        Raises
+        ------
+        InputError
+            The log has no such sensor or no reference, or it is open which log is meant.
+        """
+        if sensor not in SENSOR_NAMES:
+            raise InputError(f"there is no sensor {sensor!r}", remedy=f"Use one of {', '.join(SENSOR_NAMES)}.")
+        number = self._number(log)
+        found = row_residuals(self.analysis.logs[number], self.analysis.own_step(number, self.estimate.step))
+        if sensor not in found:
+            raise InputError(
+                f"the log has no {sensor} that is judged",
+                file=self.logs[number].path,
+                remedy=f"Ask for {' or '.join(found)}.",
+            )
+        return found[sensor]
+
+    def _number(self, log: int | str | LogSource | None) -> int:
+        """Return the number of one of the logs."""
+        names = [name_of(each, k) for k, each in enumerate(self.logs)]
+        listed = ", ".join(f"{k} ({name})" for k, name in enumerate(names))
+        if log is None:
+            if len(names) > 1:
+                raise InputError(f"the fit is of {len(names)} logs", remedy=f"Say which one: log= one of {listed}.")
+            return 0
+        if isinstance(log, int) and not isinstance(log, bool) and -len(names) <= log < len(names):
+            return log % len(names)
+        same = [k for k, each in enumerate(self.logs) if log == names[k] or (not isinstance(log, int) and log == each)]
+        if len(same) != 1:
+            raise InputError(f"{log!r} is not one of the logs of the fit", remedy=f"Use one of {listed}.")
+        return same[0]
+
+    def predicted(self, log: LogSource, progress: Progress) -> Log:
+        """Return a log with the readings that the fitted model makes of its reference; see :meth:`imufit.Fit.predict`.
+
+        Parameters
+        ----------
+        log : LogSource
+            The log.
+        progress : callable
+            Called with (rows done, rows in all, what is being done).
+        """
+        known = next((k for k, each in enumerate(self.logs) if each == log), None)
+        if known is not None:
+            evidence, step = self.analysis.logs[known], self.analysis.own_step(known, self.estimate.step)
+        else:
+            analysis = Analysis.of(self.model, (log,), progress, keep_constants=True)
+            evidence, step = analysis.logs[0], analysis.own_step(0, analysis.estimate_unnamed().step)
+        residuals = row_residuals(evidence, step)
+        held = whole(log)
+        measured = {sensor: getattr(held, sensor) for sensor in SENSOR_NAMES}
+        return held.with_fields(
+            **{
+                sensor: None if values is None else values - residuals.get(sensor, np.nan)
+                for sensor, values in measured.items()
+            }
+        )
 
     def on(self, log: Logs | None, progress: Progress) -> Self:
         """Return this fit if `log` is what it was fitted to, else the model refitted to `log`.

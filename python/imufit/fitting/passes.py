@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -19,11 +20,15 @@ from imufit.fitting.range_end import RangeEnd
 from imufit.fitting.readings_seen import ReadingsSeen
 from imufit.log import Chunk, LogSource
 from imufit.log.columns import SENSOR_NAMES
+from imufit.model.effect import registered
 from imufit.progress import Progress
 
 CHUNK_ROWS = 16384
 """Rows of a chunk: a comparison takes some 8 kB of memory for each of them."""
 SURVEY_MARGIN = 4096
+PAST = 3.0
+"""Rows of the past that a chunk carries, in median rows of the longest memory: the past begins up to two memories
+before a row, and the rest is for rows that come more often than usual."""
 
 MASKS = ("ref_exact", "movement")
 """Columns that say how to use a row; they are no covariates."""
@@ -87,6 +92,12 @@ class Passes:
         self.row_faults, self._left_out = row_faults(log)
         self.commanded = self._commanded()
         """Attitude that the commanded angle of a rig gives, where the log's own is the same but noisier."""
+
+    def margin(self, facts: _imufit.Facts) -> int:
+        """Rows that a chunk carries on each side of its core, so that every effect sees its past."""
+        memory = max((effect.memory for effect in registered().values()), default=0.0)
+        past = PAST * memory / facts.dt if facts.dt > 0.0 else 0.0
+        return facts.margin + (self.log.n if not past < self.log.n else math.ceil(past))
 
     def chunks(self, margin: int, label: str) -> Iterator[dict[str, Any]]:
         """Chunks of the log as the compiled core takes them, telling the progress."""
@@ -263,13 +274,13 @@ class Passes:
 
     def evidence(self, evidence: _imufit.Evidence, facts: _imufit.Facts, label: str) -> _imufit.Evidence:
         """Fill empty evidence with the whole log."""
-        for arrays in self.chunks(facts.margin, label):
+        for arrays in self.chunks(self.margin(facts), label):
             evidence.add(arrays)
         return evidence
 
     def fill(self, profiles: Sequence[_imufit.Profile], facts: _imufit.Facts) -> None:
         """Fill empty searches with the whole log."""
-        for arrays in self.chunks(facts.margin, "searching periods and widths") if profiles else ():
+        for arrays in self.chunks(self.margin(facts), "searching periods and widths") if profiles else ():
             for profile in profiles:
                 profile.add(arrays)
 
@@ -278,7 +289,7 @@ class Passes:
     ) -> _imufit.Autocovariance:
         """Autocovariance of the residual left by a step of all parameters."""
         out = _imufit.Autocovariance()
-        for arrays in self.chunks(facts.margin, "measuring the noise"):
+        for arrays in self.chunks(self.margin(facts), "measuring the noise"):
             out.add(arrays, evidence, step)
         return out
 

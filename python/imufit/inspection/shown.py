@@ -159,7 +159,8 @@ class _Sight:
         """Return standard errors of the parameters of one slot, beside others."""
         chosen = sorted({*slots, slot, *self._analysis.fitted_slots})
         counts = [len(self._known[self._analysis.slots[each]].parameters) for each in chosen]
-        errors = np.asarray(self._analysis.problem.estimate(chosen)["standard_error"])
+        covariance = self._analysis.problem.estimate(chosen)["covariance"]
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return np.split(errors, np.cumsum(counts)[:-1])[chosen.index(slot)]
 
     def _parameters(self, effect: _imufit.Effect) -> tuple[ParameterSight, ...]:

@@ -18,28 +18,58 @@ CONJUGATE: Final = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True)
-class Course:
-    """Angular rates of a gyroscope, integrated.
+class Stretches:
+    """Times of samples and the gaps between them.
 
     Attributes
     ----------
     t : (n,) array
-        Times, s.
+        Ascending times, s.
+    gap : (n - 1,) array of bool
+        Where samples are missing.
+    """
+
+    t: Array
+    gap: NDArray[np.bool_]
+
+    @classmethod
+    def between_gaps(cls, t: Array) -> Stretches:
+        """Look for gaps between times."""
+        return cls(t, gap_after(t))
+
+    def row(self, t: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return the last sample before some times, the first or the last but one at most, and the time since, s."""
+        row = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
+        return row, t - self.t[row]
+
+    def seen(self, begin: Array, end: Array) -> NDArray[np.bool_]:
+        """Say which stretches lie within the times and touch no gap."""
+        count = np.concatenate(([0], np.cumsum(self.gap)))
+        first, _ = self.row(begin)
+        last, _ = self.row(end)
+        inside = (begin >= self.t[0]) & (end <= self.t[-1])
+        return np.asarray(inside & (count[last + 1] == count[first]))
+
+
+@dataclass(frozen=True)
+class Course(Stretches):
+    """Angular rates of a gyroscope, integrated.
+
+    Attributes
+    ----------
+    t, gap : arrays
+        As for `Stretches`.
     rate : (n - 1, 3) array
         Mean angular rate between two samples, rad/s, sensor axes.
     attitude : (n, 4) array
         Attitude at each sample, sensor to its axes at the first one; scalar first. Over a gap it stands still.
     angle : (n, 3) array
         Integral of the rates, axis by axis, rad.
-    gap : (n - 1,) array of bool
-        Where samples are missing.
     """
 
-    t: Array
     rate: Array
     attitude: Array
     angle: Array
-    gap: NDArray[np.bool_]
 
     @classmethod
     def of(cls, t: Array, gyr: Array) -> Course:
@@ -59,15 +89,11 @@ class Course:
         turns = np.where(gap[:, None], 0.0, rate * np.diff(t)[:, None])
         start = np.zeros((1, 3))
         attitude = _imufit.chained_turns(np.concatenate((start, turns)))
-        return cls(t, rate, attitude, np.concatenate((start, np.cumsum(turns, axis=0))), gap)
-
-    def _place(self, t: Array) -> tuple[NDArray[np.intp], Array]:
-        place = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
-        return place, t - self.t[place]
+        return cls(t, gap, rate, attitude, np.concatenate((start, np.cumsum(turns, axis=0))))
 
     def at(self, t: Array) -> Array:
         """Attitude at some times within the course, (k, 4)."""
-        place, since = self._place(t)
+        place, since = self.row(t)
         since = np.where(self.gap[place], 0.0, since)
         turn = _imufit.quaternion_from_rotation_vector(self.rate[place] * since[:, None])
         return _imufit.quaternion_product(self.attitude[place], turn)
@@ -75,14 +101,6 @@ class Course:
     def angle_at(self, t: Array) -> Array:
         """Integral of the rates up to some times within the course, (k, 3), rad."""
         return np.stack([np.interp(t, self.t, self.angle[:, k]) for k in range(3)], axis=1)
-
-    def seen(self, begin: Array, end: Array) -> NDArray[np.bool_]:
-        """Say which stretches lie within the course and touch no gap."""
-        count = np.concatenate(([0], np.cumsum(self.gap)))
-        first, _ = self._place(begin)
-        last, _ = self._place(end)
-        inside = (begin >= self.t[0]) & (end <= self.t[-1])
-        return np.asarray(inside & (count[last + 1] == count[first]))
 
 
 def reference_course(t: Array, q: Array) -> Course:
@@ -99,4 +117,4 @@ def reference_course(t: Array, q: Array) -> Course:
     gap = gap_after(t)
     turns = np.where(gap[:, None], 0.0, turns)
     angle = np.concatenate((np.zeros((1, 3)), np.cumsum(turns, axis=0)))
-    return Course(t, turns / np.diff(t)[:, None], q, angle, gap)
+    return Course(t, gap, turns / np.diff(t)[:, None], q, angle)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -12,19 +12,22 @@ import numpy as np
 from imufit.errors import InputError
 from imufit.joining.join import join
 from imufit.joining.joined import Joined
-from imufit.joining.likeliest import WORSE
 from imufit.joining.reference import KINDS, with_attitude
 from imufit.log import Log
-from imufit.log.arrays import rotation_from_quaternions
 from imufit.log.columns import WHOLE_TURN
+from imufit.log.scalar_first import rotation_from_quaternions
 
 _NAMED: Final = re.compile(r"(?P<base>.*?)[._ ]?q?[._ ]?(?P<part>[wxyz])", re.IGNORECASE)
 _NUMBERED: Final = re.compile(r"(?P<base>.*?)(?:\[(?P<index>\d)\]|_?(?P<digit>\d))")
 _ATTITUDE: Final = re.compile(r"q|quat|orient|rot|att|dcm|\br$", re.IGNORECASE)
 _ANGLE: Final = re.compile(r"(?P<base>.*?)(?P<part>roll|pitch|yaw).*", re.IGNORECASE)
+_ENCODER: Final = re.compile(r"angle|encoder|theta|joint", re.IGNORECASE)
 _UPRIGHT: Final = 0.35
 """Largest angle between the mean specific force and the vertical, rad: 20 degrees; of readings that differ by an
 exchange of axes the wrong ones are 90 degrees off, or lie anywhere."""
+_WORSE: Final = 1.5
+"""A way that leaves this many times as much of the rates (square) as the best one is another attitude: ways that are
+the same but for constant turns leave the same."""
 _MOST_WAYS: Final = 24
 """Ways that are tried at most: six bodies, each in four."""
 
@@ -50,6 +53,8 @@ class Way:
     @property
     def summary(self) -> str:
         """The way in a few words."""
+        if self.kind == "angle":
+            return f"one angle, {self.columns[0]}"
         between = " ... " if len(self.columns) > 2 else " "
         turned = ", reference to body" if self.inverse else ", body to reference"
         return f"{self.kind} of {self.columns[0]}{between}{self.columns[-1]}{turned}"
@@ -84,6 +89,8 @@ def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | Non
     """
     ways = list(_ways(reference))[:_MOST_WAYS]
     file = reference.path or "reference"
+    if not ways and (reference.ref_p is not None or reference.ref_angle is not None):
+        return join(log, reference, lag, skew)
     if not ways:
         held = ", ".join(list(reference.covariates)[:12]) or "none"
         raise InputError(
@@ -102,7 +109,7 @@ def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | Non
     if not found:
         raise refused[0]
     least = min(joined.traces.left for _, joined in found)
-    alike = [each for each in found if each[1].traces.left <= WORSE * least]
+    alike = [each for each in found if each[1].traces.left <= _WORSE * least]
     upright = [each for each in alike if _off_vertical(each[1].log) < _UPRIGHT] if len(alike) > 1 else alike
     if len(upright) != 1:
         raise InputError(
@@ -112,7 +119,7 @@ def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | Non
         )
     way, best = upright[0]
     note = f"{reference.path.name if reference.path else 'reference'}: attitude read as {way.summary}"
-    return replace(best, log=replace(best.log, notes=(*best.log.notes, note)))
+    return replace(best, log=best.log.with_fields(notes=(*best.log.notes, note)))
 
 
 def _off_vertical(log: Log) -> float:
@@ -132,9 +139,15 @@ def _off_vertical(log: Log) -> float:
 
 def _ways(reference: Log) -> Iterator[Way]:
     names = [name for name, values in reference.covariates.items() if np.isfinite(values).any()]
-    for kind, columns in (*_quaternions(names), *_matrices(names), *_angles(reference, names)):
+    whole = (*_quaternions(names), *_matrices(names), *_angles(reference, names))
+    for kind, columns in whole:
         for inverse in (False, True):
             yield Way(kind, columns, inverse)
+    if not whole:
+        for name in names:
+            if _ENCODER.search(name):
+                # The rates show the direction of the axis, and so the sign.
+                yield Way("angle", (f"{name}{_unit(reference, (name,))}",), False)
 
 
 def _quaternions(names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -172,6 +185,11 @@ def _angles(reference: Log, names: Sequence[str]) -> Iterator[tuple[str, tuple[s
             sets.setdefault(match["base"], {})[match["part"].lower()] = name
     for parts in sets.values():
         if set(parts) == {"roll", "pitch", "yaw"}:
-            largest = max(float(np.nanmax(np.abs(reference.covariates[name]))) for name in parts.values())
-            unit = "[deg]" if largest > WHOLE_TURN or any("deg" in name.lower() for name in parts.values()) else ""
+            unit = _unit(reference, parts.values())
             yield "euler-ZYX", tuple(f"{parts[part]}{unit}" for part in ("yaw", "pitch", "roll"))
+
+
+def _unit(reference: Log, names: Collection[str]) -> str:
+    """Return the mark of degrees where a name says so, or an angle exceeds a whole turn in rad."""
+    largest = max(float(np.nanmax(np.abs(reference.covariates[name]))) for name in names)
+    return "[deg]" if largest > WHOLE_TURN or any("deg" in name.lower() for name in names) else ""

@@ -3,24 +3,36 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
-from imufit.joining.course import Course, reference_course
-from imufit.joining.joined import Joined
-from imufit.joining.likeliest import Placed, likeliest, placed
+from imufit.joining.by_force import likeliest_by_force
+from imufit.joining.course import Course, Stretches, reference_course
+from imufit.joining.forces import position_forces, sensor_forces
+from imufit.joining.gravity import mounted, vertical
+from imufit.joining.joined import Compared, Joined, RateTrace
+from imufit.joining.likeliest import SURE, Likeliest, Placed, likeliest, placed
 from imufit.joining.mount import SMALL, nearest_square_turn, turned
 from imufit.joining.refine import Aligned, refine
-from imufit.joining.search import LEAST_OVERLAP, Correlation
+from imufit.joining.search import FASTER, LEAST_OVERLAP, Candidate, Correlation
 from imufit.log import Log
+from imufit.log.assemble import attitude_of_rig
+from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
 
 Array = NDArray[np.float64]
 
 TOUCHING: Final = 1e-6
 """Samples of the reference this near to a row of the sensor stand in that row, s."""
+STEADY: Final = 0.8
+"""Mean specific force in a level frame over its mean length, 1, from which on it shows the vertical: of an
+axis that is not where it was taken to be the forces of a half turn cancel to two thirds."""
+LEAST_POSITIONS: Final = 60
+"""Positions with which a search by force begins: two to a mean, thirty means."""
+RIG_AXES: Final[tuple[Literal["x", "y", "z"], ...]] = ("x", "y", "z")
 
 
 def join(log: Log, reference: Log, lag: float | None = None, skew: float | None = None) -> Joined:
@@ -34,9 +46,10 @@ def join(log: Log, reference: Log, lag: float | None = None, skew: float | None 
     Parameters
     ----------
     log : Log
-        With a gyroscope.
+        With a gyroscope; with an accelerometer, where the reference has positions alone.
     reference : Log
-        With a reference attitude `ref_q` of a body on which the sensor is fixed, on any clock.
+        Of a body on which the sensor is fixed, on any clock: with an attitude `ref_q`; or an angle `ref_angle` about an
+        axis that need not be known; or positions `ref_p` alone, which are joined by the length of the specific force.
     lag : float, optional
         Time by which the reference's stamps are late at its first sample, s, where it is known: the reference's clock
         less the sensor's. Found if None.
@@ -52,34 +65,136 @@ def join(log: Log, reference: Log, lag: float | None = None, skew: float | None 
     InputError
         A recording lacks what is needed, the rates have nothing in common, or several lags explain them equally well.
     """
+    if reference.ref_q is None and reference.ref_angle is not None:
+        return _join_angle(log, reference, lag, skew)
+    if reference.ref_q is None and reference.ref_p is not None:
+        return _join_positions(log, reference, lag, skew)
+    return _join_attitude(log, reference, lag, skew)
+
+
+def _join_attitude(log: Log, reference: Log, lag: float | None, skew: float | None, by_gravity: bool = True) -> Joined:
+    """Join an attitude; the mount is found by gravity too, unless the reference frame need not be level."""
     sensor, body, rows = _courses(log, reference)
     if min(float(course.t[-1] - course.t[0]) for course in (sensor, body)) < LEAST_OVERLAP:
         raise _apart(reference)
-    rates = Correlation(sensor, body)
+    rates = Correlation(sensor, body, skew)
     if lag is None:
-        best, rival = _only_one(sensor, body, rates, skew, (log, reference))
+        best, rival = _only_one(likeliest(sensor, body, rates, skew), (log, reference))
     else:
-        refined = refine(sensor, body, lag, rates.at(lag).mount, skew, known=True)
+        refined = refine(sensor, body, replace(rates.at(lag), lag=lag), skew is not None, lag_known=True)
         if refined is None:
             raise _apart(reference)
         best, rival = placed(sensor, body, rates, refined), 0.0
+    aligned = best.aligned
+    assert best.common is not None
+    found = mounted(best.common, aligned, log if by_gravity else log.with_fields(acc=None), reference, rows)
+    square, left = nearest_square_turn(found.matrix)
+    mount = square if left < SMALL else found.matrix
+    joined = _result(_joined(log, reference, rows, aligned, mount), best, rival)
+    return replace(joined, mount=mount, mount_error=found.error, by_gravity=found.by_gravity, left=left)
+
+
+def _join_angle(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joined:
+    """Join an angle about an axis that is fixed in the sensor, and found by the rates; gravity levels the frame."""
+    assert reference.ref_angle is not None
+    turning = replace(reference, ref_q=attitude_of_rig(reference.ref_angle, "x"))
+    found = _join_attitude(log, turning, lag, skew, by_gravity=False)
+    assert found.mount is not None
+    assert found.log.ref_q is not None
+    # The body of the reference turns about its x axis; at angle 0 the sensor has the axes of the frame until levelled.
+    axis = found.mount[:, 0]
+    turns = Rotation.from_matrix(found.mount) * rotation_from_quaternions(found.log.ref_q)
+    level = _levelling(found.log, turns)
+    ref_q = quaternions_from_rotation(turns if level is None else level * turns)
+    ref_q[~found.log.has_reference] = np.nan
+    joined = found.log.with_fields(ref_q=ref_q)
+    along = int(np.argmax(np.abs(axis)))
+    if abs(axis[along]) > 1.0 - 1e-9:
+        rows = np.flatnonzero(np.isfinite(reference.ref_angle))
+        aligned_t = reference.t[rows] - found.lag - found.skew * (reference.t[rows] - reference.t[rows[0]])
+        angle = np.sign(axis[along]) * np.interp(joined.t, aligned_t, np.unwrap(reference.ref_angle[rows]))
+        metadata = replace(joined.metadata, rig_axis=RIG_AXES[along])
+        joined = replace(joined, ref_angle=np.where(joined.has_reference, angle, np.nan), metadata=metadata)
+    return replace(found, log=joined, axis=axis, by_gravity=level is not None)
+
+
+def _levelling(log: Log, turns: Rotation) -> Rotation | None:
+    """Turn that takes the mean specific force upwards; None where its direction in the frame is not steady."""
+    if log.acc is None:
+        return None
+    known = np.isfinite(log.acc).all(axis=1) & log.has_reference
+    if not known.any():
+        return None
+    force = turns[known].apply(log.acc[known])
+    mean = force.mean(axis=0)
+    if np.linalg.norm(mean) < STEADY * np.linalg.norm(force, axis=1).mean():
+        return None
+    return Rotation.align_vectors(vertical(log.metadata.frame)[None], mean[None])[0]
+
+
+def _join_positions(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joined:
+    """Join positions without an attitude, by the length of the specific force."""
+    if log.acc is None or not np.isfinite(log.acc).all(axis=1).sum() > 1:
+        raise InputError(
+            "the log has no accelerometer, and only the specific force shows when positions were accelerated",
+            file=log.path or "log",
+            column="acc_x",
+            remedy="Record the accelerometer too, or name its columns with --map.",
+        )
+    assert reference.ref_p is not None
+    rows = _ascending(reference, np.asarray(np.isfinite(reference.ref_p).all(axis=1)))
+    if len(rows) < LEAST_POSITIONS:
+        raise _apart(reference)
+    t, p, sensor = reference.t[rows], reference.ref_p[rows], sensor_forces(log)
+    near = None if lag is None else Candidate(lag, skew or 0.0, 0.0, np.eye(3))
+    up = vertical(reference.metadata.frame)
+    most = FASTER * float(np.nanmax(np.linalg.norm(log.acc, axis=1)))
+    as_told = likeliest_by_force(sensor, position_forces(t, p, up, most), near, skew)
+    if lag is not None and as_told is not None:
+        return _result(_joined(log, reference, rows, as_told.best.aligned, None), as_told.best, 0.0)
+    turned_over = likeliest_by_force(sensor, position_forces(t, p, -up, most), near, skew)
+    logs = (log, reference)
+    if turned_over is None or (as_told is not None and as_told.odds - turned_over.odds >= SURE):
+        best, rival = _only_one(as_told, logs)
+        return _result(_joined(log, reference, rows, best.aligned, None), best, rival)
+    other, _ = _only_one(turned_over, logs)
+    if as_told is not None and turned_over.odds - as_told.odds < SURE:
+        # A body that rises and falls as a wave does the same half a wave later, upside down.
+        raise _ambiguous(as_told.best, other, log)
+    raise InputError(
+        f"the z axis of the positions points {'up' if up[2] < 0.0 else 'down'}, and frame "
+        f"{reference.metadata.frame} says otherwise",
+        file=reference.path or "reference",
+        column="ref_pz",
+        remedy=f"Name the frame: --frame {'ENU' if up[2] < 0.0 else 'NED'}.",
+    )
+
+
+def _result(log: Log, best: Placed, rival: float) -> Joined:
+    """Say what was found, without a mount."""
     aligned, traces = best.aligned, best.traces
-    square, left = nearest_square_turn(aligned.mount)
-    mount = square if left < SMALL else aligned.mount
     return Joined(
-        log=_joined(log, reference, rows, aligned, mount),
+        log=log,
         lag=aligned.lag,
         lag_error=aligned.lag_error,
         skew=aligned.skew,
         skew_error=aligned.skew_error,
-        mount=mount,
-        left=left,
+        mount=None,
+        mount_error=float("inf"),
+        by_gravity=False,
+        left=0.0,
         correlation=traces.correlation,
         overlap=traces.overlap,
         attitude_error=aligned.attitude_error,
         rival=rival,
         traces=traces,
     )
+
+
+def _ascending(reference: Log, there: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Rows that hold something, the later ones of one time left out."""
+    rows = np.flatnonzero(there)
+    return rows[np.concatenate(([True], np.diff(reference.t[rows]) > 0.0))] if len(rows) else rows
 
 
 def _courses(log: Log, reference: Log) -> tuple[Course, Course, NDArray[np.intp]]:
@@ -97,28 +212,26 @@ def _courses(log: Log, reference: Log) -> tuple[Course, Course, NDArray[np.intp]
             column="ref_qw",
             remedy="Name its columns, e.g. --reference-map ref_qw=w.",
         )
-    rows = np.flatnonzero(reference.has_reference)
-    rows = rows[np.concatenate(([True], np.diff(reference.t[rows]) > 0.0))]
+    rows = _ascending(reference, reference.has_reference)
     return Course.of(log.t, log.gyr), reference_course(reference.t[rows], reference.ref_q[rows]), rows
 
 
-def _only_one(
-    sensor: Course, body: Course, rates: Correlation, skew: float | None, logs: tuple[Log, Log]
-) -> tuple[Placed, float]:
+def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, float]:
     """Return the likeliest alignment and its rival, as in `Joined`; refuse one that is not the only one."""
-    found = likeliest(sensor, body, rates, skew)
     if found is None:
         raise _apart(logs[1])
     best, second = found.best, found.second
-    if found.unrelated:
-        raise _unrelated(best.traces.correlation, *logs)
-    if second is not None and found.ambiguous:
+    if found.unrelated and best.traces.left > 0.5:
+        raise _unrelated(best.traces, *logs)
+    if second is None and found.unrelated:
         raise InputError(
-            f"the lag is ambiguous: {best.aligned.lag:.3f} s and {second.aligned.lag:.3f} s make the rates agree "
-            f"equally well (correlation {best.traces.correlation:.3f} and {second.traces.correlation:.3f})",
+            f"the motion that both recordings saw is too short or too uniform to tell the lag: correlation "
+            f"{best.traces.correlation:.3f} over {best.traces.overlap:.1f} s",
             file=logs[0].path or "log",
-            remedy="Move the sensor once as at no other time, or give the lag with --lag.",
+            remedy="Move the sensor for longer, once as at no other time, or give the lag with --lag.",
         )
+    if second is not None and (found.ambiguous or found.unrelated):
+        raise _ambiguous(best, second, logs[0])
     return best, found.rival
 
 
@@ -130,30 +243,36 @@ def _apart(reference: Log) -> InputError:
     )
 
 
-def _unrelated(correlation: float, log: Log, reference: Log) -> InputError:
+def _ambiguous(best: Placed, second: Placed, log: Log) -> InputError:
     return InputError(
-        f"the rates of the sensor and of {reference.path or 'the reference'} are not those of one motion: "
-        f"their correlation is {correlation:.2f}",
+        f"the lag is ambiguous: {best.aligned.lag:.3f} s and {second.aligned.lag:.3f} s make "
+        f"{best.traces.compared.value} agree equally well "
+        f"(correlation {best.traces.correlation:.3f} and {second.traces.correlation:.3f})",
         file=log.path or "log",
-        remedy="Are they of the same recording, and is the attitude that of the body in the reference frame?",
+        remedy="Move the sensor once as at no other time, or give the lag with --lag.",
     )
 
 
-def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, mount: Array) -> Log:
-    """Lay the rows of both in the order of the sensor's clock."""
-    assert reference.ref_q is not None
+def _unrelated(traces: RateTrace, log: Log, reference: Log) -> InputError:
+    of = "attitude that of the body in" if traces.compared is Compared.RATES else "position in metres, in"
+    return InputError(
+        f"{traces.compared.value} of the sensor and of {reference.path or 'the reference'} are not those of "
+        f"one motion: their correlation is {traces.correlation:.2f}",
+        file=log.path or "log",
+        remedy=f"Are they of the same recording, and is the {of} the reference frame?",
+    )
+
+
+def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, mount: Array | None) -> Log:
+    """Lay the rows of both in the order of the sensor's clock; without a mount there is no attitude."""
     t_ref = aligned.on_sensor_clock(reference.t[rows], float(reference.t[rows[0]]))
-    q_ref = turned(reference.ref_q[rows], mount)
     within = (t_ref >= log.t[0]) & (t_ref <= log.t[-1])
-    course = reference_course(t_ref, q_ref)
-    between = course.seen(log.t, log.t)
-    at = np.where(between[:, None], course.at(log.t), np.nan)
+    between = Stretches.between_gaps(t_ref).seen(log.t, log.t)
     nearest = np.clip(np.searchsorted(log.t, t_ref), 1, log.n - 1)
     nearest -= np.abs(t_ref - log.t[nearest - 1]) < np.abs(t_ref - log.t[nearest])
     touching = np.abs(t_ref - log.t[nearest]) <= TOUCHING
     exact = np.zeros(log.n)
     exact[nearest[touching]] = 1.0
-    at[nearest[touching]] = q_ref[touching]
     own = np.flatnonzero(within & ~touching)
     t = np.concatenate((log.t, t_ref[own]))
     order = np.argsort(t, kind="stable")
@@ -164,7 +283,13 @@ def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, 
         added = np.full((len(own), *values.shape[1:]), np.nan) if more is None else more
         return np.asarray(np.concatenate((values, added))[order])
 
-    position = None
+    attitude = position = None
+    if mount is not None:
+        assert reference.ref_q is not None
+        q_ref = turned(reference.ref_q[rows], mount)
+        at = np.where(between[:, None], reference_course(t_ref, q_ref).at(log.t), np.nan)
+        at[nearest[touching]] = q_ref[touching]
+        attitude = laid(at, q_ref[own])
     if reference.ref_p is not None:
         p_ref = reference.ref_p[rows]
         filled = np.stack([np.interp(log.t, t_ref, p_ref[:, k]) for k in range(3)], axis=1)
@@ -178,7 +303,8 @@ def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, 
     metadata = replace(
         log.metadata,
         frame=reference.metadata.frame,
-        extra={**log.metadata.extra, "lag": aligned.lag, "skew": aligned.skew, "mount": mount.tolist()},
+        extra={**log.metadata.extra, "lag": aligned.lag, "skew": aligned.skew}
+        | ({} if mount is None else {"mount": mount.tolist()}),
     )
     return Log.of_fields(
         t=np.asarray(t[order]),
@@ -186,7 +312,7 @@ def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, 
         gyr=laid(log.gyr),
         mag=laid(log.mag),
         temp=laid(log.temp),
-        ref_q=laid(at, q_ref[own]),
+        ref_q=attitude,
         ref_p=position,
         pose=None if log.pose is None else np.concatenate((log.pose, np.full(len(own), "", dtype=object)))[order],
         covariates={name: values for name, values in covariates.items() if values is not None}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.joining.mount import SMALL, words
+from imufit.joining.mount import OPEN, SMALL, axis_words, words
 from imufit.log import Log
 from imufit.results.result import Result
 from imufit.results.table import Table
@@ -19,9 +20,16 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+class Compared(Enum):
+    """What two recordings are compared by, in the words of a sentence."""
+
+    RATES = "the rates"
+    FORCES = "the lengths of the specific force"
+
+
 @dataclass(frozen=True, eq=False)
 class RateTrace:
-    """Size of the mean angular rates of both recordings, without their means.
+    """Size of what was compared of both recordings: mean angular rates without their means, or specific force.
 
     Attributes
     ----------
@@ -35,6 +43,8 @@ class RateTrace:
         Of the rates, axis by axis, over the common stretch after joining.
     overlap : float
         Length of the common stretch, s, gaps taken off.
+    compared : Compared
+        What the two were compared by.
     """
 
     sensor_t: Array
@@ -44,6 +54,17 @@ class RateTrace:
     aligned_t: Array
     correlation: float
     overlap: float
+    compared: Compared = Compared.RATES
+
+    @property
+    def label(self) -> str:
+        """Name and unit for an axis of a figure."""
+        return "rate, deg/s" if self.compared is Compared.RATES else "specific force, m/s²"
+
+    @property
+    def factor(self) -> float:
+        """What the values are multiplied with for this unit."""
+        return float(np.rad2deg(1.0)) if self.compared is Compared.RATES else 1.0
 
     @property
     def left(self) -> float:
@@ -69,8 +90,13 @@ class Joined(Result):
         standard error.
     skew, skew_error : float
         Rate of the reference's clock over the sensor's, less one, and the standard error.
-    mount : (3, 3) array
-        Turn from the reference body's axes to the sensor's that was applied.
+    mount : (3, 3) array or None
+        Turn from the reference body's axes to the sensor's that was applied; None where the reference has positions
+        alone. The body of an encoder turns about its x axis.
+    mount_error : float
+        Standard error of the turn about the axis about which it is least sure, rad; infinite where nothing shows it.
+    by_gravity : bool
+        True if all motion is about one axis, so that the turn about this axis follows from gravity.
     left : float
         Angle between the turn that was found and the nearest one that maps axes on axes, rad.
     correlation : float
@@ -83,6 +109,8 @@ class Joined(Result):
         Share of the rates (square) that is left at this lag over that at the next likeliest one; 0 without one.
     traces : RateTrace
         Rates, for the figure.
+    axis : (3,) array or None
+        Unit vector, in the sensor, of the axis of an encoder; None for other references.
     """
 
     log: Log
@@ -90,13 +118,16 @@ class Joined(Result):
     lag_error: float
     skew: float
     skew_error: float
-    mount: Array
+    mount: Array | None
+    mount_error: float
+    by_gravity: bool
     left: float
     correlation: float
     overlap: float
     attitude_error: float
     rival: float
     traces: RateTrace
+    axis: Array | None = None
 
     @property
     def sentence(self) -> str:
@@ -108,11 +139,35 @@ class Joined(Result):
     def remarks(self) -> tuple[str, ...]:
         """What a reader should know besides."""
         angle = np.rad2deg(self.left)
-        if self.left < SMALL:
-            return (
-                (f"The sensor is turned by {angle:.1f} deg besides: `ref.alignment` finds it.",) if angle > 0.05 else ()
+        if self.mount is None:
+            return ("The reference has positions alone: the log has no attitude.",)
+        if self.axis is not None:
+            level = (
+                f"At angle 0 the sensor is tilted as gravity shows, in frame {self.frame}; its heading is arbitrary."
             )
-        return ("The sensor's axes are not parallel to those of the reference body: the whole turn was applied.",)
+            unknown = "Gravity does not show how the axis lies: the attitude is taken to be none at angle 0."
+            return (level if self.by_gravity else unknown,)
+        if self.mount_error > OPEN:
+            return (
+                "All motion is about one axis, and nothing shows how the sensor is turned about this axis. "
+                "Its axes are taken to be as nearly parallel to those of the reference body as the motion allows.",
+            )
+        settled = (
+            (f"All motion is about one axis. The turn about this axis follows from gravity, with frame {self.frame}.",)
+            if self.by_gravity
+            else ()
+        )
+        if self.left >= SMALL:
+            whole = "The sensor's axes are not parallel to those of the reference body: the whole turn was applied."
+            return (*settled, whole)
+        if angle > 0.05:
+            return (*settled, f"The sensor is turned by {angle:.1f} deg besides: `ref.alignment` finds it.")
+        return settled
+
+    @property
+    def frame(self) -> str:
+        """Frame of the reference."""
+        return self.log.metadata.frame
 
     def sentences(self) -> list[str]:
         """Return the answer and the remarks."""
@@ -123,12 +178,20 @@ class Joined(Result):
         rows = (
             ("lag", f"{self.lag:.4f} ± {self.lag_error:.4f} s"),
             ("skew", f"{1e6 * self.skew:.1f} ± {1e6 * self.skew_error:.1f} ppm"),
-            ("axes of the sensor on the reference body", words(self.mount)),
+            *self._how_mounted(),
             ("common stretch", f"{self.overlap:.1f} s"),
-            ("correlation of the rates", f"{self.correlation:.4f}"),
-            ("left of the attitude within seconds", f"{np.rad2deg(self.attitude_error):.2f} deg"),
+            (f"correlation of {self.traces.compared.value}", f"{self.correlation:.4f}"),
         )
+        if self.mount is not None:
+            rows = (*rows, ("left of the attitude within seconds", f"{np.rad2deg(self.attitude_error):.2f} deg"))
         return (Table("", ("", ">"), rows),)
+
+    def _how_mounted(self) -> tuple[tuple[str, str], ...]:
+        if self.axis is not None:
+            return (("axis of the encoder in the sensor", axis_words(self.axis)),)
+        if self.mount is None:
+            return ()
+        return (("axes of the sensor on the reference body", words(self.mount)),)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the log, in SI units."""
@@ -137,12 +200,16 @@ class Joined(Result):
             "lag_error": self.lag_error,
             "skew": self.skew,
             "skew_error": self.skew_error,
-            "mount": self.mount.tolist(),
+            "mount": None if self.mount is None else self.mount.tolist(),
+            "mount_error": self.mount_error if np.isfinite(self.mount_error) else None,
+            "mount_by_gravity": self.by_gravity,
             "left": self.left,
             "correlation": self.correlation,
             "overlap": self.overlap,
-            "attitude_error": self.attitude_error,
+            "attitude_error": self.attitude_error if self.mount is not None else None,
             "rival": self.rival,
+            "compared": self.traces.compared.name.lower(),
+            "axis": None if self.axis is None else self.axis.tolist(),
             "rows": self.log.n,
         }
 

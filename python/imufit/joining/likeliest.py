@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,19 +12,19 @@ from numpy.typing import NDArray
 from imufit.joining.course import Course
 from imufit.joining.joined import RateTrace
 from imufit.joining.refine import Aligned, refine
-from imufit.joining.search import Correlation, turn_between
+from imufit.joining.search import Candidate, Correlation, LagSearch, turn_between
 
 Array = NDArray[np.float64]
 
 RIVAL: Final = 0.3
 """A second lag with this share of the first one's log likelihood is looked at to a fraction of a sample as well."""
-WORSE: Final = 1.5
-"""It makes the lag ambiguous unless it leaves this many times as much of the rates (square): of a motion that repeats
-itself both leave the noise, of steps that resemble one another the wrong one leaves three times as much and more."""
 SAME: Final = 0.5
-"""Two maxima of the likelihood that lead to the same lag, to this many bins, are one."""
-LEAST_CORRELATION: Final = 0.3
-"""Below this correlation of the rates the two recordings are not called one motion."""
+"""Two alignments that put one sample of the reference at the same time, to this many bins, are one."""
+FEW: Final = 100
+"""Blocks of the attitude, of 1.5 s each, by which several lags are refined before the likeliest one is by all."""
+SURE: Final = 7.0
+"""Log odds from which on an alignment is believed: one in a thousand is wrong. They count against all alignments that
+were tried, of unrelated recordings, and against the second one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +35,14 @@ class Placed:
     ----------
     aligned : Aligned
         Lag, skew, and the mount that makes the mean rates agree best.
+    common : CommonRates or None
+        The rates of both at the same times; None where something else was compared.
     traces : RateTrace
         The rates and how well they agree.
     """
 
     aligned: Aligned
+    common: CommonRates | None
     traces: RateTrace
 
 
@@ -52,10 +56,19 @@ class Likeliest:
         The likeliest one.
     second : Placed or None
         Of the others the one that leaves least of the rates; None if no other comes near.
+    independent : float
+        Time after which the rates say something new, s.
+    tried : float
+        Number of different alignments that were looked at.
+    next_gain : float
+        Largest gain of the others, as that of the traces; 0 without any.
     """
 
     best: Placed
     second: Placed | None
+    independent: float
+    tried: float
+    next_gain: float
 
     @property
     def rival(self) -> float:
@@ -64,13 +77,21 @@ class Likeliest:
 
     @property
     def ambiguous(self) -> bool:
-        """True if two lags make the rates agree equally well."""
-        return self.rival * WORSE > 1.0
+        """True if two lags make the rates agree equally well, or nearly so for as little as there is."""
+        return self._odds(self.best.traces.gain - self.next_gain) < SURE
 
     @property
     def unrelated(self) -> bool:
-        """True if the rates have nothing in common."""
-        return self.best.traces.correlation < LEAST_CORRELATION
+        """True if one of as many unrelated alignments agrees as well."""
+        return self.odds < SURE + float(np.log(self.tried))
+
+    @property
+    def odds(self) -> float:
+        """Log of the likelihood ratio of "the rates are the same" over "they are unrelated"."""
+        return self._odds(self.best.traces.gain)
+
+    def _odds(self, gain: float) -> float:
+        return 0.5 * gain / self.independent
 
 
 def likeliest(
@@ -96,16 +117,31 @@ def likeliest(
     """
     peaks = rates.peaks()
     near = [peak for peak in peaks if peak.gain >= RIVAL * peaks[0].gain]
+    some = most if len(near) == 1 else min(most or FEW, FEW)
     found: list[Placed] = []
     for peak in near:
-        aligned = refine(sensor, body, peak.lag, peak.mount, skew, most=most)
-        if aligned is None or any(abs(aligned.lag - other.aligned.lag) <= SAME * rates.step for other in found):
+        aligned = refine(sensor, body, peak, skew is not None, most=some)
+        if aligned is None or any(rates.meet(aligned, other.aligned, SAME) for other in found):
             continue
         found.append(placed(sensor, body, rates, aligned))
     if not found:
         return None
-    found.sort(key=lambda each: -each.traces.gain)
-    return Likeliest(found[0], min(found[1:], key=lambda each: each.traces.left, default=None))
+    answer = of_these(found, rates)
+    if some != most:
+        rough = answer.best.aligned
+        near_best = Candidate(rough.lag, rough.skew, 0.0, rough.mount)
+        aligned = refine(sensor, body, near_best, skew is not None, most=most)
+        if aligned is not None:
+            return replace(answer, best=placed(sensor, body, rates, aligned))
+    return answer
+
+
+def of_these(found: Sequence[Placed], search: LagSearch) -> Likeliest:
+    """Return the likeliest of some alignments, one at least, and what speaks against it."""
+    best, *others = sorted(found, key=lambda each: -each.traces.gain)
+    second = min(others, key=lambda each: each.traces.left, default=None)
+    next_gain = max((each.traces.gain for each in others), default=0.0)
+    return Likeliest(best, second, search.independent, search.tried, next_gain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,4 +209,4 @@ def placed(sensor: Course, body: Course, rates: Correlation, aligned: Aligned) -
         correlation=common.correlation(mount),
         overlap=common.overlap,
     )
-    return Placed(replace(aligned, mount=mount), traces)
+    return Placed(replace(aligned, mount=mount), common, traces)

@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
+from imufit.log.scalar_first import quaternions_from_rotation
 
 Array = NDArray[np.float64]
 
 SMALL: Final = np.deg2rad(15.0)
 """A turn so near to one that maps axes on axes is that one and a small error of mounting: `ref.alignment` finds it."""
+OPEN: Final = 0.25
+"""Standard error from which on a turn is not known, rad: at a normal error the nearest right angles are the wrong ones
+in one case of a thousand."""
 AXES: Final = "xyz"
 
 
@@ -47,6 +51,14 @@ def words(mount: Array) -> str:
     return text if left < SMALL else f"{text} to within {np.rad2deg(left):.0f} deg"
 
 
+def axis_words(axis: Array) -> str:
+    """Say along which axis of a sensor a unit vector lies, such as ``+y``, or its components."""
+    along = int(np.argmax(np.abs(axis)))
+    if abs(axis[along]) >= np.cos(SMALL):
+        return f"{'+' if axis[along] > 0.0 else '-'}{AXES[along]}"
+    return ", ".join(f"{each:.3f}" for each in axis)
+
+
 def turned(q: Array, mount: Array) -> Array:
     """Return the attitude of the sensor, (n, 4), from that of the reference body it is mounted on.
 
@@ -57,5 +69,5 @@ def turned(q: Array, mount: Array) -> Array:
     mount : (3, 3) array
         Turn from the reference body's axes to the sensor's.
     """
-    back = Rotation.from_matrix(mount.T).as_quat()[[3, 0, 1, 2]]
+    back = quaternions_from_rotation(Rotation.from_matrix(mount.T))
     return _imufit.quaternion_product(q, np.broadcast_to(back, q.shape).copy())

@@ -14,12 +14,13 @@ from imufit import _imufit
 from imufit.errors import InputError
 from imufit.joining.course import CONJUGATE
 from imufit.log import Log
+from imufit.log.scalar_first import quaternions_from_rotation
 
 Array = NDArray[np.float64]
 
-KINDS: Final = "quaternion:W,X,Y,Z  matrix:XX,XY,...,ZZ  euler-SEQUENCE:A,B,C  angle-AXIS:A"
+KINDS: Final = "quaternion:W,X,Y,Z  matrix:XX,XY,...,ZZ  euler-SEQUENCE:A,B,C  angle-AXIS:A  angle:A"
 _SEQUENCE: Final = re.compile(r"euler-([XYZ]{3}|[xyz]{3})")
-_ANGLE: Final = re.compile(r"angle-([xyz])")
+_ANGLE: Final = re.compile(r"angle(-[xyz])?")
 _DEGREES: Final = "[deg]"
 _RADIANS: Final = "[rad]"
 NOT_UNIT: Final = 1e-2
@@ -36,7 +37,8 @@ def with_attitude(log: Log, kind: str, columns: Sequence[str], inverse: bool = F
     kind : str
         "quaternion" (columns: scalar, x, y, z); "matrix" (nine, row by row); "euler-SEQUENCE", the sequence as in
         scipy's `Rotation`: capitals about the turned axes, small letters about the fixed ones ("euler-ZYX": yaw, pitch,
-        roll); "angle-AXIS" with the one angle about a body axis "x", "y" or "z".
+        roll); "angle-AXIS" with the one angle about a body axis "x", "y" or "z"; "angle" with the one angle about an
+        axis that is not known.
     columns : sequence of str
         Their names; angles are in radians unless ``[deg]`` stands behind the name.
     inverse : bool
@@ -45,7 +47,8 @@ def with_attitude(log: Log, kind: str, columns: Sequence[str], inverse: bool = F
     Returns
     -------
     Log
-        With `ref_q`, body to reference frame; rows in which a column is missing have none.
+        With `ref_q`, body to reference frame, or for "angle" with `ref_angle`; rows in which a column is missing have
+        none.
 
     Raises
     ------
@@ -53,13 +56,16 @@ def with_attitude(log: Log, kind: str, columns: Sequence[str], inverse: bool = F
         The kind is unknown, a column is missing, or the numbers are not an attitude.
     """
     values = np.stack([_column(log, name, kind) for name in columns], axis=1)
+    used = {name.removesuffix(_DEGREES).removesuffix(_RADIANS) for name in columns}
+    covariates = {name: column for name, column in log.covariates.items() if name not in used}
+    if kind == "angle":
+        _check_number(log, kind, columns, 1)
+        return log.with_fields(ref_angle=-values[:, 0] if inverse else values[:, 0], covariates=covariates)
     q = np.full((log.n, 4), np.nan)
     there = np.isfinite(values).all(axis=1)
     q[there] = _attitudes(log, kind, columns, values[there])
     if inverse:
         q = q * CONJUGATE
-    used = {name.removesuffix(_DEGREES).removesuffix(_RADIANS) for name in columns}
-    covariates = {name: column for name, column in log.covariates.items() if name not in used}
     return log.with_fields(ref_q=q, covariates=covariates)
 
 
@@ -69,8 +75,7 @@ def _attitudes(log: Log, kind: str, columns: Sequence[str], values: Array) -> Ar
     file = log.path or "reference"
     if wanted == 0:
         raise InputError(f"{kind!r} is not a kind of attitude", file=file, remedy=f"Write one of {KINDS}.")
-    if len(columns) != wanted:
-        raise InputError(f"{kind} has {wanted} columns, {len(columns)} were named", file=file, remedy=f"Write {KINDS}.")
+    _check_number(log, kind, columns, wanted)
     if kind == "quaternion":
         size = np.linalg.norm(values, axis=1)
         _check(np.abs(size - 1.0) <= NOT_UNIT, "the quaternion does not have unit length", log, columns)
@@ -83,7 +88,14 @@ def _attitudes(log: Log, kind: str, columns: Sequence[str], values: Array) -> Ar
         return _imufit.quaternion_from_matrix_rows(values)
     axes = sequence.group(1) if sequence else kind[-1]
     angles = values if sequence else values[:, :1]
-    return np.asarray(Rotation.from_euler(axes, angles).as_quat()[:, [3, 0, 1, 2]])
+    return quaternions_from_rotation(Rotation.from_euler(axes, angles))
+
+
+def _check_number(log: Log, kind: str, columns: Sequence[str], wanted: int) -> None:
+    """Refuse too few columns, or too many."""
+    if len(columns) != wanted:
+        problem = f"{kind} has {wanted} column{'s' if wanted > 1 else ''}, {len(columns)} were named"
+        raise InputError(problem, file=log.path or "reference", remedy=f"Write {KINDS}.")
 
 
 def _check(right: NDArray[np.bool_], problem: str, log: Log, columns: Sequence[str]) -> None:

@@ -8,6 +8,7 @@ the lag is wrong, and with the rate times the time if a clock is fast (Gauss-New
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.joining.course import CONJUGATE, Course
-from imufit.joining.search import turn_between
+from imufit.joining.search import USUAL_SKEW, Candidate, turn_between
 
 Array = NDArray[np.float64]
 
@@ -37,8 +38,12 @@ WILD: Final = 5.0
 LARGEST_ERROR: Final = 0.1
 """Prior standard deviation of the linear map of the rates, 1: scale and axes of a sensor are right to some percent, the
 mount as found by the rates to some degrees."""
-LARGEST_SKEW: Final = 1e-4
-"""Prior standard deviation of the skew, 1: crystals are right to some 50 ppm."""
+OWN_LAG: Final = 1e-3
+"""Standard deviation of the lag of one block, s: stamps are told in milliseconds by many recorders, filters and the
+motion between samples shift a turn by as much. A single turn then shows no skew, however little noise it has: of a
+machine tool that moved once in a minute, a skew of 875 ppm at a standard error of 64 ppm was found without this."""
+MOST_AT_ONCE: Final = 2**16
+"""Samples of the reference that are compared at once: 30 MB of columns."""
 
 
 @dataclass(frozen=True)
@@ -72,28 +77,49 @@ class Aligned:
         return np.asarray(t - self.lag - self.skew * (t - start))
 
 
+@dataclass(frozen=True)
 class _Blocks:
-    """The reference cut into blocks."""
+    """The reference cut into blocks: rows (b, k), and which of them there are, (b, k); shorter blocks are filled up."""
 
-    def __init__(self, reference: Course) -> None:
+    rows: NDArray[np.intp]
+    there: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, reference: Course, most: int | None) -> _Blocks:
+        """Cut a reference; `most` blocks at most, evenly over the recording."""
         steps = float(np.median(np.diff(reference.t)))
         every = max(1, int(1.0 / (steps * MOST_RATE)))
         length = max(BLOCK, LEAST_SAMPLES * steps * every)
-        pieces = np.split(np.arange(len(reference.t)), np.flatnonzero(reference.gap) + 1)
-        self.rows: list[NDArray[np.intp]] = []
-        for piece in pieces:
+        blocks = []
+        for piece in np.split(np.arange(len(reference.t)), np.flatnonzero(reference.gap) + 1):
             number = np.floor((reference.t[piece] - reference.t[piece[0]]) / length)
             cuts = np.flatnonzero(np.diff(number)) + 1
-            self.rows += [rows[::every] for rows in np.split(piece, cuts) if len(rows[::every]) >= LEAST_SAMPLES]
+            blocks += [rows[::every] for rows in np.split(piece, cuts) if len(rows[::every]) >= LEAST_SAMPLES]
+        if most is not None and len(blocks) > most:
+            blocks = [blocks[k] for k in np.linspace(0, len(blocks) - 1, most).astype(int)]
+        longest = max(map(len, blocks), default=1)
+        rows = np.array([np.concatenate((each, np.repeat(each[-1:], longest - len(each)))) for each in blocks])
+        sizes = np.array([len(each) for each in blocks])
+        return cls(rows.reshape(-1, longest), np.arange(longest) < sizes[:, None])
+
+    def without(self, wild: NDArray[np.bool_]) -> _Blocks:
+        """Leave some samples out."""
+        return _Blocks(self.rows, self.there & ~wild)
+
+    def pieces(self) -> Iterator[tuple[slice, _Blocks]]:
+        """Yield some blocks at a time."""
+        size = max(1, MOST_AT_ONCE // self.rows.shape[1])
+        for begin in range(0, len(self.rows), size):
+            some = slice(begin, begin + size)
+            yield some, _Blocks(self.rows[some], self.there[some])
 
 
 def refine(
     sensor: Course,
     reference: Course,
-    lag: float,
-    mount: Array,
-    skew: float | None = None,
-    known: bool = False,
+    near: Candidate,
+    skew_known: bool = False,
+    lag_known: bool = False,
     most: int | None = None,
 ) -> Aligned | None:
     """Refine lag, skew and mount from what is nearly right.
@@ -102,14 +128,10 @@ def refine(
     ----------
     sensor, reference : Course
         Integrated rates, each on its own clock.
-    lag : float
-        Time by which the reference's stamps are late, s, to a bin of the search.
-    mount : (3, 3) array
-        Turn from the reference body's axes to the sensor's.
-    skew : float, optional
-        The skew, where it is known.
-    known : bool
-        True if the lag, that of the first sample, is known as well.
+    near : Candidate
+        Lag, skew and mount to a bin of the search.
+    skew_known, lag_known : bool
+        True for what is not to be refined: the skew, the lag at the first sample.
     most : int, optional
         Blocks to look at, evenly over the recording; all of them if None.
 
@@ -118,27 +140,26 @@ def refine(
     Aligned or None
         None where no block of the reference lies within the sensor's recording.
     """
-    blocks = _Blocks(reference).rows
-    if most is not None and len(blocks) > most:
-        blocks = [blocks[k] for k in np.linspace(0, len(blocks) - 1, most).astype(int)]
+    blocks = tame = _Blocks.of(reference, most)
     start = float(reference.t[0])
-    middle = start if known else float(0.5 * (reference.t[0] + reference.t[-1]))
+    middle = start if lag_known else float(0.5 * (reference.t[0] + reference.t[-1]))
     # The lag is that of the middle: there the skew hardly moves it.
-    at_middle, rate = lag, skew or 0.0
-    kept: dict[int, NDArray[np.bool_]] = {}
-    prior = np.concatenate(([0.0, LARGEST_SKEW**-2], np.full(9, LARGEST_ERROR**-2)))
+    at_middle, rate, mount = near.lag + near.skew * (middle - start), near.skew, near.mount
     free = np.ones(11, np.bool_)
-    free[:2] = not known, skew is None
+    free[:2] = not lag_known, not skew_known
     linear = np.zeros((3, 3))
     for turn in range(ROUNDS):
         guess = at_middle, rate, (np.eye(3) + linear) @ mount, middle
-        sums = _sums(sensor, reference, blocks, kept, guess)
+        sums = _sums(sensor, reference, tame, guess)
         if sums is None:
             return None
         # Blocks scatter by more than their samples do (White 1980): what the samples seem to say counts for less.
-        meat = np.sum([np.outer(part, part) for part in sums.scores], axis=0) / sums.variance
+        meat = sums.scores.T @ sums.scores / sums.variance
         inflation = max(1.0, float(np.mean(np.diag(meat)[:2] / np.diag(sums.information)[:2])))
         variance = inflation * sums.variance
+        # A Cauchy prior as the normal one of the same pull: a clock of a crystal is held, one that is far off is not.
+        held = 2.0 / (USUAL_SKEW**2 + rate**2)
+        prior = np.concatenate(([0.0, held], np.full(9, LARGEST_ERROR**-2)))
         normal = (sums.information / variance + np.diag(prior))[np.ix_(free, free)]
         pull = np.sum(sums.scores, axis=0) / variance + prior * np.concatenate(([0.0, rate], linear.ravel()))
         step = np.zeros(11)
@@ -146,7 +167,9 @@ def refine(
         at_middle, rate = at_middle + step[0], rate + step[1]
         linear = linear + step[2:].reshape(3, 3)
         if turn in (1, 4):
-            kept = _tame(sensor, reference, blocks, (at_middle, rate, (np.eye(3) + linear) @ mount, middle))
+            tame = blocks.without(
+                _wild(sensor, reference, blocks, (at_middle, rate, (np.eye(3) + linear) @ mount, middle))
+            )
         elif turn > 5 and abs(step[0]) < 1e-6:
             break
     assert sums is not None
@@ -167,44 +190,86 @@ def refine(
 _Guess = tuple[float, float, Array, float]
 
 
-def _block(
-    sensor: Course, reference: Course, rows: NDArray[np.intp], guess: _Guess
-) -> tuple[Array, Array, Array] | None:
-    """Return error (k, 3), columns of the unknowns (k, 3, 11) and those of the block (k, 3, 6)."""
+@dataclass(frozen=True)
+class _Errors:
+    """What is compared in some blocks.
+
+    Attributes
+    ----------
+    seen : (blocks,) array of bool
+        Blocks that lie within the sensor's recording; the other arrays are theirs alone.
+    there : (b, k) array of bool
+        Samples that count.
+    error : (b, k, 3) array
+        Attitude error since the start of the block, rad.
+    columns : (b, k, 3, 11) array
+        Its derivatives by lag, skew and the linear map of the rates.
+    at_start : (b, k, 3, 6) array
+        The same by the attitude at the start and a constant rate.
+    """
+
+    seen: NDArray[np.bool_]
+    there: NDArray[np.bool_]
+    error: Array
+    columns: Array
+    at_start: Array
+
+    @property
+    def samples(self) -> NDArray[np.intp]:
+        """Number of samples of each block, (b,)."""
+        return np.asarray(self.there.sum(axis=1))
+
+    def left(self, values: Array) -> Array:
+        """Take out of (b, k, 3, c) columns what the unknowns of a block explain; (b, 3 k, c), zero where none is."""
+        own = _flat(values, self.there)
+        start = _flat(self.at_start, self.there)
+        start /= np.maximum(np.linalg.norm(start, axis=1, keepdims=True), 1e-300)
+        across = start.transpose(0, 2, 1)
+        # The ridge, far below the noise, keeps blocks apart whose samples are at one time.
+        return np.asarray(own - start @ np.linalg.solve(across @ start + 1e-12 * np.eye(6), across @ own))
+
+
+def _flat(values: Array, there: NDArray[np.bool_]) -> Array:
+    """Lay samples and axes of (b, k, 3, c) columns in one row, zero where no sample is."""
+    return np.asarray((values * there[:, :, None, None]).reshape(len(values), 3 * there.shape[1], values.shape[-1]))
+
+
+def _errors(sensor: Course, reference: Course, blocks: _Blocks, guess: _Guess) -> _Errors:
+    """Compare the attitude of some blocks with what the gyroscope integrates."""
     lag, skew, mount, middle = guess
-    since = reference.t[rows] - middle
-    t = reference.t[rows] - lag - skew * since
-    if not sensor.seen(t[:1], t[-1:])[0]:
-        return None
-    own = sensor.at(t)
-    own = _imufit.quaternion_product(np.broadcast_to(own[0] * CONJUGATE, own.shape).copy(), own)
-    q = reference.attitude[rows]
-    q = _imufit.quaternion_product(np.broadcast_to(q[0] * CONJUGATE, q.shape).copy(), q)
+    since = reference.t[blocks.rows] - middle
+    t = reference.t[blocks.rows] - lag - skew * since
+    number = np.arange(len(t))
+    first = np.argmax(blocks.there, axis=1)
+    last = blocks.there.shape[1] - 1 - np.argmax(blocks.there[:, ::-1], axis=1)
+    seen = (blocks.there.sum(axis=1) >= LEAST_SAMPLES) & sensor.seen(t[number, first], t[number, last])
+    rows, t, since, there, first = blocks.rows[seen], t[seen], since[seen], blocks.there[seen], first[seen]
+    number = np.arange(len(t))
+    flat = t.ravel()
+
+    def since_start(q: Array) -> Array:
+        """Turn since the start of the block, (b k, 4)."""
+        start = np.repeat(q.reshape(*t.shape, 4)[number, first] * CONJUGATE, t.shape[1], axis=0)
+        return _imufit.quaternion_product(start, q)
+
+    own, q = since_start(sensor.at(flat)), since_start(reference.attitude[rows.ravel()])
     turned = _imufit.quaternion_from_rotation_vector(_imufit.rotation_vector_from_quaternion(q) @ mount.T)
     error = _imufit.rotation_vector_from_quaternion(_imufit.quaternion_product(own * CONJUGATE, turned))
     # Over more than a sample: the noise of the rate at a sample is part of the error that it is to explain.
-    rate = (sensor.angle_at(t + SMOOTH) - sensor.angle_at(t - SMOOTH)) / (2.0 * SMOOTH)
-    angle = sensor.angle_at(t) - sensor.angle_at(t[:1])
-    k = len(rows)
-    columns = np.zeros((k, 3, 11))
-    columns[:, :, 0] = rate
-    columns[:, :, 1] = rate * since[:, None]
+    rate = ((sensor.angle_at(flat + SMOOTH) - sensor.angle_at(flat - SMOOTH)) / (2.0 * SMOOTH)).reshape(*t.shape, 3)
+    angle = sensor.angle_at(flat).reshape(*t.shape, 3)
+    angle -= angle[number, first][:, None]
+    columns = np.zeros((*t.shape, 3, 11))
+    columns[..., 0] = rate
+    # A fast clock shows from block to block. Within one, a motion that is not quite as modelled would pass for it.
+    columns[..., 1] = rate * (np.sum(since * there, axis=1) / there.sum(axis=1))[:, None, None]
+    at_start = np.zeros((*t.shape, 3, 6))
     for i in range(3):
-        columns[:, i, 2 + 3 * i : 5 + 3 * i] = angle
-    at_start = np.zeros((k, 3, 6))
-    for i in range(3):
-        unit = np.broadcast_to(np.eye(3)[i], (k, 3)).copy()
-        at_start[:, :, i] = _imufit.rotate_back(own, unit)
-        at_start[:, i, 3 + i] = t - t[0]
-    return error, columns, at_start
-
-
-def _without_start(values: Array, at_start: Array) -> Array:
-    """Take out of (k, 3, c) columns what the unknowns of a block explain; (3 k, c)."""
-    flat = at_start.reshape(-1, 6)
-    basis, _ = np.linalg.qr(flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300))
-    own = values.reshape(len(flat), -1)
-    return np.asarray(own - basis @ (basis.T @ own))
+        columns[:, :, i, 2 + 3 * i : 5 + 3 * i] = angle
+        unit = np.tile(np.eye(3)[i], (len(flat), 1))
+        at_start[..., i] = _imufit.rotate_back(own, unit).reshape(*t.shape, 3)
+        at_start[:, :, i, 3 + i] = t - t[number, first][:, None]
+    return _Errors(seen, there, error.reshape(*t.shape, 3), columns, at_start)
 
 
 @dataclass(frozen=True)
@@ -212,49 +277,39 @@ class _Sums:
     """Normal equations of all blocks: information, scores by block, and the variance of what is left, rad^2."""
 
     information: Array
-    scores: list[Array]
+    scores: Array
     variance: float
 
 
-def _sums(
-    sensor: Course,
-    reference: Course,
-    blocks: list[NDArray[np.intp]],
-    kept: dict[int, NDArray[np.bool_]],
-    guess: _Guess,
-) -> _Sums | None:
-    information, scores, variances = np.zeros((11, 11)), [], []
-    for number, rows in enumerate(blocks):
-        chosen = rows[kept[number]] if number in kept else rows
-        found = _block(sensor, reference, chosen, guess) if len(chosen) >= LEAST_SAMPLES else None
-        if found is None:
-            continue
-        error, columns, at_start = found
-        left = _without_start(np.concatenate((error[:, :, None], columns), axis=2), at_start)
-        information += left[:, 1:].T @ left[:, 1:]
-        scores.append(left[:, 1:].T @ left[:, 0])
-        variances.append(float(left[:, 0] @ left[:, 0]) / (len(left) - 6))
-    if not scores:
+def _sums(sensor: Course, reference: Course, blocks: _Blocks, guess: _Guess) -> _Sums | None:
+    products, freedom = [], []
+    for _, some in blocks.pieces():
+        found = _errors(sensor, reference, some, guess)
+        left = found.left(np.concatenate((found.error[..., None], found.columns), axis=3))
+        products.append(left.transpose(0, 2, 1) @ left)
+        freedom.append(3 * found.samples - 6)
+    if not any(map(len, products)):
         return None
+    sums = np.concatenate(products)
     # The median of the blocks: a few bad ones do not widen the errors of all.
-    return _Sums(information, scores, max(float(np.median(variances)), 1e-20))
+    variance = max(float(np.median(sums[:, 0, 0] / np.concatenate(freedom))), 1e-20)
+    # Each block has a lag of its own besides, of which nothing but its size is known.
+    own = sums[:, :, 1]
+    sums -= own[:, :, None] * own[:, None, :] / (own[:, 1] + variance / OWN_LAG**2)[:, None, None]
+    return _Sums(sums[:, 1:, 1:].sum(axis=0), sums[:, 1:, 0], variance)
 
 
-def _tame(
-    sensor: Course, reference: Course, blocks: list[NDArray[np.intp]], guess: _Guess
-) -> dict[int, NDArray[np.bool_]]:
-    """Say which samples of each block are not far off."""
-    sizes = {}
-    for number, rows in enumerate(blocks):
-        found = _block(sensor, reference, rows, guess)
-        if found is None:
-            continue
-        error, _, at_start = found
+def _wild(sensor: Course, reference: Course, blocks: _Blocks, guess: _Guess) -> NDArray[np.bool_]:
+    """Say which samples of each block are far off."""
+    sizes = np.zeros(blocks.rows.shape)
+    usual = []
+    for place, some in blocks.pieces():
+        found = _errors(sensor, reference, some, guess)
         # By medians first: the start of the block may itself be wild.
-        middle = error - np.median(error, axis=0)
-        left = _without_start(middle[:, :, None], at_start).reshape(-1, 3)
-        sizes[number] = np.linalg.norm(left, axis=1)
-    if not sizes:
-        return {}
-    usual = float(np.median(np.concatenate(list(sizes.values()))))
-    return {number: size <= WILD * usual for number, size in sizes.items()}
+        middle = np.nanmedian(np.where(found.there[..., None], found.error, np.nan), axis=1, keepdims=True)
+        left = found.left((found.error - middle)[..., None]).reshape(*found.there.shape, 3)
+        size = np.linalg.norm(left, axis=2)
+        usual.append(size[found.there])
+        sizes[place][found.seen] = size
+    together = np.concatenate(usual) if usual else np.zeros(0)
+    return np.asarray(sizes > WILD * float(np.median(together)) if together.size else np.zeros_like(blocks.there))

@@ -2,22 +2,24 @@
 
 Sensor and reference need not have parallel axes: for every lag the turn between them is found that makes the rates
 agree best (Schönemann 1966, A generalized solution of the orthogonal Procrustes problem, Psychometrika 31), all lags at
-once by Fourier transform.
+once by Fourier transform. One of the clocks may be fast by up to a percent: the transform is repeated with the time of
+the reference stretched, in steps so small that the ends of the recordings stay within half a bin.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.signal import find_peaks
 
 from imufit.joining.course import Course
 
 Array = NDArray[np.float64]
+Transform = NDArray[np.complex128]
 
 STEP: Final = 0.05
 """Shortest bin of the mean rates, s: people, vehicles and robots turn slower than 10 Hz, vibration is faster."""
@@ -29,18 +31,28 @@ FASTER: Final = 1.5
 """A reference that turns this many times as fast as the fastest the sensor ever does shows a wild pose."""
 MOST_BINS: Final = 2**19
 """Bins of the longer recording; beyond, bins are wider (seven hours at the shortest)."""
+LARGEST_SKEW: Final = 0.01
+"""Rate of one clock over the other, less one, up to which it is looked for: a clock of a resistor and a capacitor, or a
+rate of samples that was rounded, is off by a percent."""
+USUAL_SKEW: Final = 1e-4
+"""Scale of the prior of the skew, 1 (Cauchy): crystals are right to some 50 ppm each."""
+MOST_STRETCHED: Final = 2**21
+"""Bins of all stretched references together, a second or two of computing: all skews up to 1 % of ten minutes. Longer
+recordings are searched through smaller skews: up to 0.2 % at half an hour, 50 ppm at three hours."""
+TURNS: Final = 15
+"""Newton steps to the largest root. Where motion is about one axis, each halves the error, and 15 leave 3e-5 of it."""
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Mean angular rates in bins.
+    """Mean angular rates, or something else that both recordings show, in bins.
 
     Attributes
     ----------
     start, step : float
         Time of the first bin's begin and width of the bins, s.
-    values : (n, 3) array
-        rad/s; zero where nothing is known.
+    values : (n, 3) or (n, 1) array
+        Rates in rad/s, or what else there is; zero where nothing is known.
     known : (n,) array of bool
         Bins without a gap.
     """
@@ -53,7 +65,7 @@ class Rates:
     @classmethod
     def of(cls, course: Course, step: float, most: float = np.inf) -> Rates:
         """Take the means of a course; bins with a rate above `most`, rad/s, are not known."""
-        edges = np.arange(course.t[0], course.t[-1], step)
+        edges = course.t[0] + step * np.arange(int((course.t[-1] - course.t[0]) / step) + 1)
         values = np.diff(course.angle_at(edges), axis=0) / step
         known = course.seen(edges[:-1], edges[1:]) & (np.linalg.norm(values, axis=1) <= most)
         # A constant is a bias of the sensor, not a motion.
@@ -68,24 +80,24 @@ class Candidate:
     Attributes
     ----------
     lag : float
-        Time by which the reference's stamps are late, s: its clock less the sensor's.
+        Time by which the reference's stamps are late at its first sample, s: its clock less the sensor's.
+    skew : float
+        Rate of the reference's clock over the sensor's, less one.
     gain : float
-        Log of the likelihood ratio of "the rates are the same" over "they are unrelated", in units of one bin.
+        Log of the likelihood ratio of "the rates are the same" over "they are unrelated", and of the skew's prior.
     mount : (3, 3) array
         Turn from the reference body's axes to the sensor's.
     """
 
     lag: float
+    skew: float
     gain: float
     mount: Array
 
 
-def binned(sensor: Course, reference: Course, step: float) -> tuple[Rates, Rates]:
-    """Take the mean rates of both; where the reference turns faster than the sensor ever does, a pose is wild."""
-    edges = np.arange(sensor.t[0], sensor.t[-1], step)
-    fastest = np.linalg.norm(np.diff(sensor.angle_at(edges), axis=0), axis=1) / step
-    most = FASTER * float(fastest.max()) if fastest.size else np.inf
-    return Rates.of(sensor, step), Rates.of(reference, step, most)
+def skew_prior(skew: float) -> float:
+    """Return the log of the density of a skew over that of none."""
+    return -float(np.log1p((skew / USUAL_SKEW) ** 2))
 
 
 def bin_width(sensor: Course, reference: Course) -> float:
@@ -95,74 +107,236 @@ def bin_width(sensor: Course, reference: Course) -> float:
     return max(STEP, longest / MOST_BINS, *sampled)
 
 
-class Correlation:
-    """Correlation of the rates of a sensor and a reference at every lag.
+@dataclass(frozen=True)
+class _Lags:
+    """What there is at every lag with one skew: log likelihood ratio (lags,) and products of the rates (9, lags)."""
+
+    skew: float
+    gain: Array
+    shared: Array
+
+
+class LagSearch:
+    """Correlation, at every lag, of something that both recordings show.
 
     Parameters
     ----------
-    sensor, reference : Course
-        Integrated rates, each on its own clock.
+    own : Rates
+        What the sensor shows.
+    stretched : callable
+        Gives what the reference shows, in bins that are longer by a skew.
+    skew : float, optional
+        Rate of the reference's clock over the sensor's, less one; None if it is to be looked for.
 
     Attributes
     ----------
     step : float
         Width of the bins, s.
     own, other : Rates
-        Mean rates of sensor and reference.
-    gain : (lags,) array
-        Log of the likelihood ratio at every lag, as in `Candidate`.
-    shared : (lags, 3, 3) array
-        Sums of the products of the rates at every lag.
+        What sensor and reference show.
+    skews : (k,) array
+        Skews that are looked at, the smallest first.
+    independent : float
+        Time after which the products of both say something new if the recordings are unrelated, s.
     """
 
-    def __init__(self, sensor: Course, reference: Course) -> None:
-        self.step = bin_width(sensor, reference)
-        self.own, self.other = own, other = binned(sensor, reference, self.step)
-        n, m = len(own.values), len(other.values)
-        self.first = other.start - own.start + (m - 1) * self.step
-        size = fft.next_fast_len(n + m, real=True)
+    def __init__(self, own: Rates, stretched: Callable[[float], Rates], skew: float | None) -> None:
+        self.own, self.other, self.step = own, stretched(0.0), own.step
+        self._stretched = stretched
+        n, m = len(own.values), len(self.other.values)
+        self._size = fft.next_fast_len(n + int(m * (1.0 + LARGEST_SKEW)) + 1, real=True)
+        values, known = own.values, own.known.astype(float)
+        self._rate = fft.rfft(values.T, self._size)
+        self._energy = fft.rfft(np.sum(values**2, axis=1), self._size)
+        self._known = fft.rfft(known, self._size)
+        self._sums = float(np.sum(values**2)), float(known.sum())
+        other = fft.rfft(self.other.values.T, self._size)
+        self.independent = self.step * _independent(self._rate, other, min(n, m))
+        spacing = 2.0 / max(1, min(n, m))
+        number = min(int(LARGEST_SKEW / spacing), int(MOST_STRETCHED / (2 * (n + m))))
+        steps = np.arange(-number, number + 1)
+        self.skews = spacing * steps[np.argsort(np.abs(steps), kind="stable")] if skew is None else np.array([skew])
 
-        def correlated(a: Array, b: Array) -> Array:
-            """Sum over k of a[k + j] b[k], for j from -(m - 1) to n - 1."""
-            product = fft.irfft(fft.rfft(a, size) * np.conj(fft.rfft(b, size)), size)
-            return np.concatenate((product[size - m + 1 :], product[:n]))
+    @property
+    def tried(self) -> float:
+        """Number of different alignments that were looked at."""
+        lags = (len(self.own.values) + len(self.other.values)) * self.step / self.independent
+        return max(lags, 1.0) * len(self.skews)
 
-        known = own.known.astype(float), other.known.astype(float)
-        sizes = np.sum(own.values**2, axis=1), np.sum(other.values**2, axis=1)
+    def _lags(self, skew: float) -> _Lags:
+        """Compare at every lag with the reference stretched by a skew."""
+        n, size = len(self.own.values), self._size
+        other = self.other if skew == 0.0 else self._stretched(skew)
+        m = len(other.values)
+
+        def correlated(a: Transform, b: Transform) -> Array:
+            """Sum over k of a[k + j] b[k], for j from -(m - 1) to n - 1, from the transforms of both."""
+            product = fft.irfft(a * np.conj(b), size)
+            return np.concatenate((product[..., size - m + 1 :], product[..., :n]), axis=-1)
+
+        known, squares = other.known.astype(float), np.sum(other.values**2, axis=1)
+        there, rate = fft.rfft(known, size), fft.rfft(other.values.T, size)
         # Where there is none, rounding may leave less.
-        rounding = 1e-12 * np.array([size.sum() for size in sizes])
-        energy = correlated(sizes[0], known[1]) - rounding[0], correlated(known[0], sizes[1]) - rounding[1]
-        common = correlated(known[0], known[1])
-        self.shared = np.empty((n + m - 1, 3, 3))
-        for i in range(3):
-            for k in range(3):
-                self.shared[:, i, k] = correlated(own.values[:, i], other.values[:, k])
-        least = max(LEAST_OVERLAP, LEAST_SHARE * min(known[0].sum(), known[1].sum()) * self.step)
+        energy = (
+            correlated(self._energy, there) - 1e-12 * self._sums[0],
+            correlated(self._known, fft.rfft(squares, size)) - 1e-12 * float(squares.sum()),
+        )
+        common = correlated(self._known, there)
+        shared = correlated(self._rate[:, None], rate[None]).reshape(len(self._rate) ** 2, -1)
+        least = max(LEAST_OVERLAP, LEAST_SHARE * min(self._sums[1], known.sum()) * self.step)
         usable = (common * self.step >= least) & (energy[0] > 0.0) & (energy[1] > 0.0)
-        singular = np.linalg.svd(self.shared[usable], compute_uv=False)
-        sign = np.sign(np.linalg.det(self.shared[usable]))
-        agreed = singular[:, 0] + singular[:, 1] + sign * singular[:, 2]
-        values = np.zeros(n + m - 1)
-        values[usable] = np.clip(agreed / np.sqrt(energy[0][usable] * energy[1][usable]), 0.0, 1.0 - 1e-9)
-        self.gain = -0.5 * common * np.log1p(-(values**2))
+        agreed = largest_agreement(shared[:, usable]) if len(shared) == 9 else shared[0, usable]
+        values = np.clip(agreed / np.sqrt(energy[0][usable] * energy[1][usable]), 0.0, 1.0 - 1e-9)
+        gain = np.zeros(n + m - 1)
+        # Of bins that depend on one another, as many count as are independent; only then a prior can stand beside them.
+        counted = common[usable] * self.step / self.independent
+        gain[usable] = -0.5 * counted * np.log1p(-(values**2)) + skew_prior(skew)
+        return _Lags(skew, gain, shared)
 
     def at(self, lag: float) -> Candidate:
-        """Return what there is at a lag, s; at the nearest one that the recordings allow."""
-        place = round((self.first - lag) / self.step)
-        return self._candidate(min(max(place, 0), len(self.gain) - 1))
+        """Return what there is at a lag, s; at the nearest one that the recordings allow, with the likeliest skew."""
+        return max((self._candidate(each, self._place(each, lag)) for each in self._all()), key=lambda each: each.gain)
 
     def peaks(self, most: int = 8) -> list[Candidate]:
-        """Return the lags, `most` at most, at which the likelihood has a maximum, likeliest first."""
-        places, _ = find_peaks(np.concatenate(([-1.0], self.gain, [-1.0])))
-        order = sorted(places - 1, key=lambda place: -self.gain[place])[:most]
-        return [self._candidate(int(place)) for place in order if self.gain[place] > 0.0]
+        """Return the likeliest maxima of the likelihood, `most` at most.
 
-    def _candidate(self, place: int) -> Candidate:
+        Two of them never put the same sample of the reference beside the same one of the sensor: one of two such maxima
+        is the foot of the other, seen with another skew.
+        """
+        from scipy.signal import find_peaks  # noqa: PLC0415 - costs half a second that few logs need
+
+        found: list[Candidate] = []
+        for each in self._all():
+            places, _ = find_peaks(np.concatenate(([-1.0], each.gain, [-1.0])))
+            order = sorted(places - 1, key=lambda place: -each.gain[place])[:most]
+            found += [self._candidate(each, int(place)) for place in order if each.gain[place] > 0.0]
+        found.sort(key=lambda each: -each.gain)
+        apart: list[Candidate] = []
+        for candidate in found:
+            if len(apart) < most and not any(self.meet(candidate, other) for other in apart):
+                apart.append(candidate)
+        return apart
+
+    def meet(self, one: Clocks, other: Clocks, bins: float = 2.0) -> bool:
+        """Say whether two relations of the clocks are the same, to some bins, somewhere in the common stretch."""
+        since = self._common(one)
+        apart = np.array([one.lag - other.lag + (one.skew - other.skew) * each for each in since])
+        return bool(np.abs(apart).min() <= bins * self.step or apart[0] * apart[1] < 0.0)
+
+    def _common(self, clocks: Clocks) -> tuple[float, float]:
+        """Begin and end of the common stretch, s since the first sample of the reference."""
+        begin = self.own.start - self.other.start + clocks.lag
+        length = self.step * len(self.other.values)
+        return max(0.0, begin), min(length, begin + self.step * len(self.own.values))
+
+    def _all(self) -> Iterator[_Lags]:
+        return (self._lags(float(skew)) for skew in self.skews)
+
+    def _first(self, lags: _Lags) -> float:
+        """Lag at the first place, s."""
+        return self.other.start - self.own.start + (len(lags.gain) - len(self.own.values)) * self.step
+
+    def _place(self, lags: _Lags, lag: float) -> int:
+        return min(max(round((self._first(lags) - lag) / self.step), 0), len(lags.gain) - 1)
+
+    def _candidate(self, lags: _Lags, place: int) -> Candidate:
         return Candidate(
-            self.first - place * self.step,
-            float(self.gain[place]),
-            turn_between(self.shared[place]),
+            self._first(lags) - place * self.step,
+            lags.skew,
+            float(lags.gain[place]),
+            turn_between(lags.shared[:, place].reshape(3, 3)) if len(lags.shared) == 9 else np.eye(3),
         )
+
+
+def _independent(own: Transform, other: Transform, shorter: int) -> float:
+    """Bins after which the products of two unrelated recordings are independent (Bartlett 1935), by their transforms.
+
+    M. S. Bartlett, Some aspects of the time-correlation problem in regard to tests of significance, Journal of the
+    Royal Statistical Society 98.
+    """
+    shapes = [fft.irfft(np.sum(np.abs(each) ** 2, axis=0))[:shorter] for each in (own, other)]
+    if min(float(shape[0]) for shape in shapes) <= 0.0:
+        return 1.0
+    products = shapes[0] * shapes[1] / (shapes[0][0] * shapes[1][0])
+    return max(1.0, float(2.0 * products.sum() - 1.0))
+
+
+class Correlation(LagSearch):
+    """Correlation of the angular rates of a sensor and a reference at every lag, whatever the turn between their axes.
+
+    Parameters
+    ----------
+    sensor, reference : Course
+        Integrated rates, each on its own clock.
+    skew : float, optional
+        As for `LagSearch`.
+    """
+
+    def __init__(self, sensor: Course, reference: Course, skew: float | None = 0.0) -> None:
+        step = bin_width(sensor, reference)
+        edges = np.arange(sensor.t[0], sensor.t[-1], step)
+        fastest = np.linalg.norm(np.diff(sensor.angle_at(edges), axis=0), axis=1) / step
+        # Where the reference turns faster than the sensor ever does, a pose is wild.
+        most = FASTER * float(fastest.max()) if fastest.size else np.inf
+        super().__init__(
+            Rates.of(sensor, step), lambda stretch: Rates.of(reference, step / (1.0 - stretch), most), skew
+        )
+
+
+class Clocks(Protocol):
+    """How a reference's clock goes beside the sensor's: late by `lag`, s, at its first sample, and fast by `skew`."""
+
+    @property
+    def lag(self) -> float:
+        """Time by which the stamps are late at the first sample, s."""
+
+    @property
+    def skew(self) -> float:
+        """Rate of the clock over the sensor's, less one."""
+
+
+def largest_agreement(shared: Array) -> Array:
+    """Return the largest trace of R' A over rotations R for each matrix A of products.
+
+    The trace is the largest root of the characteristic polynomial of Davenport's matrix (Shuster and Oh 1981,
+    Three-axis attitude determination from vector observations, J. Guidance and Control 4): four real roots, so that
+    Newton's method comes down to the largest from above.
+
+    Parameters
+    ----------
+    shared : (9, k) array
+        Matrices, row by row.
+
+    Returns
+    -------
+    (k,) array
+    """
+    scale = np.sqrt(np.sum(shared**2, axis=0))
+    a = shared / np.maximum(scale, 1e-300)
+    minors = np.stack(
+        [
+            a[i] * a[j] - a[k] * a[n]
+            for i, j, k, n in (
+                (4, 8, 5, 7),
+                (5, 6, 3, 8),
+                (3, 7, 4, 6),
+                (2, 7, 1, 8),
+                (0, 8, 2, 6),
+                (1, 6, 0, 7),
+                (1, 5, 2, 4),
+                (2, 3, 0, 5),
+                (0, 4, 1, 3),
+            )
+        ]
+    )
+    determinant = np.sum(a[:3] * minors[:3], axis=0)
+    constant = 1.0 - 4.0 * np.sum(minors**2, axis=0)
+    root = np.full(a.shape[1], np.sqrt(3.0))
+    for _ in range(TURNS):
+        value = ((root**2 - 2.0) * root - 8.0 * determinant) * root + constant
+        slope = (4.0 * root**2 - 4.0) * root - 8.0 * determinant
+        root -= np.where(slope > 1e-9, value / np.maximum(slope, 1e-9), 0.0)
+    return np.asarray(root * scale)
 
 
 def turn_between(shared: Array) -> Array:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
 from imufit.log.assemble import group_fields
@@ -19,19 +18,10 @@ from imufit.log.time_order import TimeScan
 from imufit.log.unmeasured import Unmeasured
 from imufit.log.words import meant
 
+if TYPE_CHECKING:
+    pass
+
 Array = NDArray[np.float64]
-
-
-def rotation_from_quaternions(q: Array) -> Rotation:
-    """Make rotations of (n, 4) quaternions, scalar first; rows of NaN become the identity."""
-    scalar_last = q[:, [1, 2, 3, 0]].copy()
-    scalar_last[np.isnan(scalar_last).any(axis=1)] = [0.0, 0.0, 0.0, 1.0]
-    return Rotation.from_quat(scalar_last)
-
-
-def quaternions_from_rotation(rotation: Rotation) -> Array:
-    """Return (n, 4) quaternions, scalar first."""
-    return np.ascontiguousarray(np.atleast_2d(rotation.as_quat())[:, [3, 0, 1, 2]])
 
 
 def contiguous(values: ArrayLike, name: str, shape: tuple[int, ...] | None = None) -> Array:

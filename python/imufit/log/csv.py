@@ -15,6 +15,7 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
+from imufit.log.arrow_numbers import numbers_of
 from imufit.log.check import is_truth, number_from_text
 from imufit.log.csv_layout import NOT_DATA, is_comment, lines_in, read_layout, split_line, text_of, too_long
 from imufit.log.metadata import Metadata
@@ -173,7 +174,7 @@ class CsvSource:
         column = table.column(name)
         kind = self._kinds[name]
         if pa.types.is_floating(column.type):
-            return np.asarray(column.to_numpy(), dtype=np.float64)
+            return numbers_of(column.cast(pa.float64()))
         if kind == "word":
             return np.array([number_from_text(cell, truth=True) for cell in column.to_pylist()], dtype=np.float64)
         return cells_of(column)

@@ -52,17 +52,35 @@ class FrameSource:
         self.text = frozenset(name for name, column in self._columns.items() if _as_array(column[:0]).dtype == object)
 
     def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
-        """Give the named columns block by block."""
+        """Give the named columns block by block.
+
+        Parameters
+        ----------
+        columns : sequence of str
+            Columns of the table.
+        """
         yield from self.blocks(columns)
 
     def blocks(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
-        """Give the named columns block by block."""
+        """Give the named columns block by block.
+
+        Parameters
+        ----------
+        columns : sequence of str
+            Columns of the table.
+        """
         for start in range(0, self.n, BLOCK_ROWS):
             rows = min(BLOCK_ROWS, self.n - start)
             yield start, rows, {name: _as_array(self._columns[name][start : start + rows]) for name in columns}
 
     def line_of(self, row: int) -> int | None:
-        """Tables have no lines."""
+        """Tables have no lines.
+
+        Parameters
+        ----------
+        row : int
+            Row, from 0.
+        """
 
 
 def _as_array(column: pd.Series[Any]) -> NDArray[Any]:

@@ -10,19 +10,13 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from imufit.errors import InputError
-from imufit.log.arrays import (
-    check_keywords,
-    contiguous,
-    fields_from_arrays,
-    quaternions_from_rotation,
-    rotation_from_quaternions,
-)
+from imufit.log.arrays import check_keywords, contiguous, fields_from_arrays
 from imufit.log.columns import GROUPS, present
 from imufit.log.metadata import Metadata
 from imufit.log.parquet import ROW_GROUP
+from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
 from imufit.log.size import BLOCK_ROWS
 from imufit.log.unit_check import Clock
 from imufit.log.writer import write_rows
@@ -32,6 +26,7 @@ if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
     from matplotlib.figure import Figure
+    from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 Text = NDArray[np.object_]
@@ -127,7 +122,7 @@ class Log:
         if attitude is not None and ref_q is not None:
             raise InputError("attitude and ref_q are both given", file="log", remedy="Give one of them: they are one.")
         known = attitude if ref_q is None else ref_q
-        quaternions = quaternions_from_rotation(known) if isinstance(known, Rotation) else known
+        quaternions = known if known is None or isinstance(known, np.ndarray) else _quaternions(known)
         check_keywords(more)
         given = {"acc": acc, "gyr": gyr, "mag": mag, "temp": temp}
         given |= {"ref_q": quaternions, "ref_p": ref_p, "ref_angle": ref_angle}
@@ -617,6 +612,13 @@ def gathered(pieces: Iterable[Log], n: int) -> Log:
     if first is None:
         raise ValueError("a log is joined of at least one part")
     return first.with_fields(**whole)
+
+
+def _quaternions(attitude: Rotation | ArrayLike) -> ArrayLike:
+    """Return the quaternions of rotations; what is not rotations stays as it is."""
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - costs a fifth of a second, arrays do not need it
+
+    return quaternions_from_rotation(attitude) if isinstance(attitude, Rotation) else attitude
 
 
 def _arrays(log: Log) -> dict[str, Any]:

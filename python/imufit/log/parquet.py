@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Final
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
+from imufit.log.arrow_numbers import numbers_of
 from imufit.log.metadata import Metadata, mapping_from_json
 from imufit.log.size import NUMBER, TEXT_CELL, TEXT_GROUP, rows_at_once, size_in_words
 from imufit.log.text_cells import cells_of
@@ -126,7 +126,7 @@ def _array(column: Any) -> NDArray[Any]:
     """Make float64 of anything numeric, objects of everything else."""
     kind = column.type
     if _is_number(kind):
-        return _numbers(pc.cast(column, pa.float64(), safe=False))
+        return numbers_of(pc.cast(column, pa.float64(), safe=False))
     if pa.types.is_boolean(kind):
         return _array(pc.cast(column, pa.uint8()))
     return cells_of(column)
@@ -134,18 +134,6 @@ def _array(column: Any) -> NDArray[Any]:
 
 def _is_number(kind: Any) -> bool:
     return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind))
-
-
-def _numbers(values: Any) -> NDArray[np.float64]:
-    """Give (n,) float64 from Arrow's memory, NaN for null; `to_numpy` would load pandas, 40 MB."""
-    if not len(values):
-        return np.empty(0)
-    known, memory = values.buffers()
-    numbers = np.frombuffer(memory, np.float64, len(values), 8 * values.offset)
-    if not values.null_count:
-        return numbers
-    bits = np.unpackbits(np.frombuffer(known, np.uint8), bitorder="little")
-    return np.where(bits[values.offset : values.offset + len(values)], numbers, np.nan)
 
 
 class ParquetRows:

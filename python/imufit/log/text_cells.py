@@ -9,6 +9,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from imufit.log.arrow_numbers import numbers_of
+
 
 def cells_of(column: Any) -> NDArray[np.object_]:
     """Cells of an Arrow column that holds no numbers; equal ones are one object.
@@ -32,8 +34,8 @@ def cells_of(column: Any) -> NDArray[np.object_]:
         except pa.ArrowNotImplementedError:
             return _objects(column.to_pylist())
     words = _objects([*column.dictionary.to_pylist(), None])
-    places = pc.fill_null(column.indices.cast(pa.int64()), len(words) - 1)
-    return words[np.frombuffer(places.buffers()[1], np.int64, len(places), 8 * places.offset)]
+    places = numbers_of(column.indices.cast(pa.float64()))
+    return words[np.where(np.isnan(places), len(words) - 1, places).astype(np.intp)]
 
 
 def _objects(cells: list[Any]) -> NDArray[np.object_]:

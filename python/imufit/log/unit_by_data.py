@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from imufit.log.clock_check import turn_ratio
 from imufit.log.metadata import STANDARD_GRAVITY
@@ -122,6 +121,8 @@ def _left_over(t: Array, gyr: Array, acc: Array, factor: float) -> float:
     if windows < 1:
         return float("nan")
     shaped = [a[: windows * rows].reshape(windows, rows, -1) for a in (gyr, acc)]
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - costs a fifth of a second that many commands do not need
+
     turn = Rotation.identity(windows)
     total = shaped[1][:, 0].copy()
     for row in range(1, rows):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import difflib
-import runpy
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
 from imufit import _imufit
 from imufit.errors import InputError
-from imufit.model.effect import registered
+from imufit.model.effect import registered, run_effects
 from imufit.results import EffectCard
 
 COLUMN = ".column:"
@@ -130,7 +129,7 @@ def load_effects(path: str | Path) -> list[str]:
     if not file.is_file():
         raise InputError(f"there is no file {file}", file=file, remedy="Check the name.")
     before = set(registered())
-    runpy.run_path(str(file))
+    run_effects(file)
     added = [effect_id for effect_id in registered() if effect_id not in before]
     if not added:
         raise InputError("the file defines no new effect", file=file, remedy="Use the decorator @imufit.effect(...).")

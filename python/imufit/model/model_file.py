@@ -9,6 +9,7 @@ from typing import Any
 from imufit.errors import InputError
 from imufit.log.columns import LARGEST_COVARIATE
 from imufit.model.catalogue import find_effect
+from imufit.model.limits import Limits
 from imufit.printable import NAME, printable
 from imufit.whole_toml import HOW_TO_END, read_toml, write_toml
 
@@ -32,6 +33,9 @@ class ModelFile:
         As far as they are known, SI units.
     units : dict of str to dict of str to str
         Units that the file states.
+    limits : dict of str to dict of str to Limits
+        Parameters that are fixed or have bounds. They stand before the parameters, so that a file that is cut off
+        cannot lose them alone; versions that do not know the key read the rest.
     marked : bool
         Whether it ends in the mark of `imufit.whole_toml`.
     """
@@ -42,6 +46,7 @@ class ModelFile:
     standard_errors: dict[str, dict[str, float]] = field(default_factory=dict)
     units: dict[str, dict[str, str]] = field(default_factory=dict)
     marked: bool = True
+    limits: dict[str, dict[str, Limits]] = field(default_factory=dict)
 
     def write(self, path: str | Path) -> None:
         """Write the file, whole or not at all.
@@ -59,6 +64,11 @@ class ModelFile:
         document: dict[str, Any] = {"kind": KIND, "format": FORMAT, "effects": self.effects}
         if self.constants:
             document["constants"] = self.constants
+        if self.limits:
+            document["limits"] = {
+                key: {name: limits.to_dict() for name, limits in of_effect.items()}
+                for key, of_effect in self.limits.items()
+            }
         document["parameters"] = self.parameters
         document["units"] = {key: _units(key) for key in self.effects}
         if self.standard_errors:
@@ -96,6 +106,7 @@ class ModelFile:
                 _standard_errors(document.get("standard_errors", {})),
                 _tables(document.get("units", {}), "units"),
                 marked,
+                _limits(document.get("limits", {})),
             )
         except InputError as error:
             raise InputError(error.problem, file=file, remedy=error.remedy) from None
@@ -130,8 +141,7 @@ class ModelFile:
         known = set(self.constants.get("covariate_means", {}))
         known |= {"temp"} if "temperature_mean" in self.constants else set()
         for effect in map(find_effect, self.effects):
-            column = effect.centred_column
-            if column is not None and column not in known:
+            for column in set(effect.centred_columns) - known:
                 raise InputError(
                     f"constants do not tell the mean of {column}, which {effect.id} counts from: is the file cut off?",
                     remedy=HOW_TO_END,
@@ -181,6 +191,15 @@ def _standard_errors(value: Any) -> dict[str, dict[str, float]]:
             if number < 0.0:
                 raise InputError(f"the standard error of {key} {name} is {shown(number)}, which is negative")
     return errors
+
+
+def _limits(value: Any) -> dict[str, dict[str, Limits]]:
+    return {
+        key: {
+            name: Limits.of(_table(table, f'limits."{key}".{name}'), f"{key}.{name}") for name, table in tables.items()
+        }
+        for key, tables in _tables(value, "limits").items()
+    }
 
 
 def _check_mean(value: Any, name: str) -> None:

@@ -29,6 +29,7 @@ from imufit import _imufit
 from imufit.filters import ALL, AttitudeFilter, Smoother
 from imufit.log import Log
 from imufit.progress import Progress, silent
+from imufit.replaying.angle_table import angle_table
 from imufit.replaying.clipped import ranges
 from imufit.replaying.tilt_comparison import compare_tilt, tilt_errors
 from imufit.results.result import Result
@@ -118,13 +119,19 @@ class Replay(Result):
         return [f"{ran}: {best} comes nearest to the reference, {total[best]:.2f} deg RMS."]
 
     def tables(self) -> tuple[Table, ...]:
-        """Error of each filter, deg RMS."""
+        """Error of each filter, deg RMS; without a reference the angles at some times."""
+        if self.log.ref_q is None:
+            return (self.angle_table(),)
         rows = tuple(
             (name, f"{errors['total_deg']:.3f}", f"{errors['heading_deg']:.3f}", f"{errors['inclination_deg']:.3f}")
             for name, errors in self.errors.items()
             if errors is not None
         )
         return (Table("Error, deg RMS", ("filter", ">total", ">heading", ">inclination"), rows),)
+
+    def angle_table(self) -> Table:
+        """Roll, pitch and yaw of every filter at the start, at the end and at the extremes of roll and pitch."""
+        return angle_table(self.log.t, {name: self.euler(name) for name in self.attitude})
 
     def rotation(self, name: str) -> Rotation:
         """Attitude of one filter as n scipy rotations, body to reference frame; rows before the start are NaN.
@@ -227,13 +234,18 @@ class Replay(Result):
     def plot(self) -> Figure:
         """Tilt of all filters over time with the reference, and its error: paper B's Figures 3 to 5.
 
-        Panels for the whole log, the first move and the strongest vibration, as far as the log holds them.
+        Panels for the whole log, the first move and the strongest vibration, as far as the log holds them. Without a
+        reference a panel each for roll, pitch and yaw.
 
         Raises
         ------
         InputError
             No filter was replayed whose tilt could be drawn.
         """
+        if self.log.ref_q is None:
+            from imufit.figures.angles import angle_panels  # noqa: PLC0415
+
+            return angle_panels(self.log.t, {name: self.euler(name) for name in self.attitude})
         from imufit.replaying.tilt_figure import tilt_figure_of  # noqa: PLC0415
 
         return tilt_figure_of(self.log, self.attitude, _NEEDS)

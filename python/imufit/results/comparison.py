@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
     from imufit.results.attitude import AttitudeComparison
 
+MAIN_CAUSES = 5
+"""Covariates that stand under the answer: as many as channels of two sensors can have on one screen of 24 lines."""
+
 
 @dataclass(frozen=True)
 class ChannelResidual:
@@ -318,6 +321,10 @@ class Comparison(Result):
         """Every table, most important first."""
         tables = (self.channel_table(), self.where_table(), self.segment_table(), fault_table(self.data_faults))
         return tables if self.attitude is None else (*tables, self.attitude.table())
+
+    def answer_tables(self) -> tuple[Table, ...]:
+        """Residual by channel, and what most of the excess depends on."""
+        return self.channel_table(), self.where_table(MAIN_CAUSES)
 
     def sentences(self) -> list[str]:
         """Return the result, what it does to the attitude, faults of the data, and the notes."""

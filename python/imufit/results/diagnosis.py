@@ -31,6 +31,8 @@ VERDICTS = {
 
 PASSED = "passed"
 """Status of an effect that is there, or explains as much as one that is."""
+NEXT = 5
+"""Candidates behind those that stand out that are shown with them: the answer stays on a screen of 24 lines."""
 NOT_TESTABLE = "not testable here"
 """Status of an effect that a log cannot show."""
 
@@ -328,20 +330,28 @@ class Diagnosis(Result):
         limit : int
             Rows at most.
         """
-        rows = tuple(
-            (
-                item.effect,
-                f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}",
-                quantity.share(item.probability),
-                in_words(item.parameters, 2) if item.status == "passed" else "-",
-                item.smallest_detectable,
-                ", ".join(str(rival) for rival in item.confounded_with[:2]) or "-",
-                item.status,
-            )
-            for item in self.candidates[:limit]
-        )
-        header = ("effect", "held-out error", ">probability", "predicted", "smallest detectable", "rivals", "status")
-        return Table("Candidates, best first", header, rows)
+        rows = tuple(_candidate_row(item) for item in self.candidates[:limit])
+        return Table("Candidates, best first", _CANDIDATE, rows, blocks=True)
+
+    def answer_table(self) -> Table:
+        """Return the candidates that the answer names, or that passed the test; without rows where none did."""
+        rows = tuple(_candidate_row(item) for item in self.candidates if self._stands_out(item))
+        return Table("Candidates that stand out", _CANDIDATE, rows, blocks=True)
+
+    def next_table(self, limit: int = NEXT) -> Table:
+        """Return the candidates behind those that stand out, best first, in one line each.
+
+        Parameters
+        ----------
+        limit : int
+            Rows at most.
+        """
+        others = [item for item in self.candidates if not self._stands_out(item)][:limit]
+        rows = tuple(row[:4] for row in map(_candidate_row, others))
+        return Table("Next candidates", _CANDIDATE[:4], rows)
+
+    def _stands_out(self, item: Candidate) -> bool:
+        return item.status == PASSED or item.effect in (self.best, *self.ambiguous_with)
 
     def unexplained_table(self) -> Table:
         """Dependences without a named cause."""
@@ -376,6 +386,10 @@ class Diagnosis(Result):
             noise_table(self.noise),
         )
 
+    def answer_tables(self) -> tuple[Table, ...]:
+        """Return the candidates, briefly, what no effect explains, and the logs that disagree."""
+        return self.answer_table(), self.next_table(), self.unexplained_table(), self.disagreement_table()
+
     def sentences(self) -> list[str]:
         """Verdict, result, next experiment, faults of the data that only concern some rows, and notes."""
         experiment = f"Next: {self.experiment}" if self.experiment else ""
@@ -386,3 +400,19 @@ class Diagnosis(Result):
     def local_faults(self) -> list[str]:
         """Sentences on faults of the data beside which effects can be judged."""
         return [str(fault) for fault in self.data_faults if not fault.spoils]
+
+
+_CANDIDATE = ("effect", "status", "held-out error", ">probability", "predicted", "smallest detectable", "rivals")
+
+
+def _candidate_row(item: Candidate) -> tuple[str, ...]:
+    """One candidate in shown units."""
+    return (
+        item.effect,
+        item.status,
+        f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}",
+        quantity.share(item.probability),
+        in_words(item.parameters) if item.status == PASSED else "-",
+        item.smallest_detectable,
+        ", ".join(str(rival) for rival in item.confounded_with[:2]) or "-",
+    )

@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from imufit.figures import quantity
 from imufit.log.columns import SENSOR_NAMES
@@ -135,6 +134,8 @@ def mapping(sensor: str, matrix: Array) -> str:
 
 def _turn(matrix: Array) -> str:
     """Say a rotation as angle and axis."""
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - costs a fifth of a second that many commands do not need
+
     vector = Rotation.from_matrix(matrix).as_rotvec()
     angle = float(np.linalg.norm(vector))
     axis = vector / max(angle, 1e-12)

@@ -12,7 +12,7 @@ from imufit.results.data_fault import fault_table
 from imufit.results.diagnosis import VERDICTS, Diagnosis
 from imufit.results.json_value import json_fields, json_value
 from imufit.results.log_parameters import logs_json
-from imufit.results.parameter import by_effect
+from imufit.results.parameter import by_effect, parameter_table
 from imufit.results.result import Result
 from imufit.results.table import Table
 
@@ -197,7 +197,12 @@ class Ladder(Result):
             self.diagnosis.disagreement_table(),
             self.diagnosis.log_table(),
             fault_table(self.diagnosis.data_faults),
+            parameter_table(getattr(self.fit, "parameters", ()) or (), "Parameters of the model"),
         )
+
+    def answer_tables(self) -> tuple[Table, ...]:
+        """Return the steps, what no effect explains, and the logs that disagree."""
+        return self.step_table(), self.diagnosis.unexplained_table(), self.diagnosis.disagreement_table()
 
     def sentences(self) -> list[str]:
         """Verdict, result, attitude, warnings, next experiment, faults of the data that only concern some rows."""

@@ -499,6 +499,11 @@ class LogInfo(Result):
         kinds = () if self.refusal else (seen_table, weak_table, unseen_table, open_table)
         return [*samples, *(kind(self.effects) for kind in kinds), self.column_table()]
 
+    def answer_tables(self) -> list[Table]:
+        """Return samples, gaps, clipped readings, what the log cannot show and why, and the columns."""
+        kept = [self.series_table(), self.gap_table(), self.clipped_table()]
+        return [*kept, *(() if self.refusal else (unseen_table(self.effects),)), self.column_table()]
+
     def alike(self) -> list[str]:
         """Return which effects the log cannot tell apart, a sentence for each group."""
         return alike(self.effects)

@@ -34,6 +34,11 @@ class Parameter:
         SI unit.
     typical : float or None
         Size that is usual for such sensors, same unit.
+    fixed : bool
+        Whether fits leave it as it is; its standard error is then 0.
+    lower, upper : float
+        Smallest and largest value that it may have, infinite where there is none; same unit. At one of these the data
+        would take it further, and its standard error is not a number.
     """
 
     effect: str
@@ -42,6 +47,41 @@ class Parameter:
     standard_error: float
     unit: str
     typical: float | None = None
+    fixed: bool = False
+    lower: float = -math.inf
+    upper: float = math.inf
+
+    @property
+    def key(self) -> str:
+        """Effect and name with a dot between, such as ``gyr.bias.x``."""
+        return f"{self.effect}.{self.name}"
+
+    @property
+    def stderr(self) -> float:
+        """Standard error, in `unit`: another name for `standard_error`."""
+        return self.standard_error
+
+    @property
+    def vary(self) -> bool:
+        """False if the parameter is fixed."""
+        return not self.fixed
+
+    @property
+    def min(self) -> float:
+        """Smallest value that it may have: another name for `lower`."""
+        return self.lower
+
+    @property
+    def max(self) -> float:
+        """Largest value that it may have: another name for `upper`."""
+        return self.upper
+
+    @property
+    def at_bound(self) -> str | None:
+        """``min`` or ``max`` if the parameter stands at that bound, else None."""
+        if self.fixed:
+            return None
+        return "min" if self.value <= self.lower else "max" if self.value >= self.upper else None
 
     @property
     def told(self) -> bool:
@@ -51,15 +91,22 @@ class Parameter:
     @property
     def shown(self) -> str:
         """Value and standard error in the shown unit."""
+        if self.fixed:
+            return f"{quantity.quantity(self.value, self.unit)} (fixed)"
+        if self.at_bound is not None:
+            return f"{quantity.quantity(self.value, self.unit)} (at its {self.at_bound})"
         return quantity.with_error(self.value, self.standard_error, self.unit) if self.told else "not told"
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of one parameter: value, standard error, unit, typical size."""
+        """JSON of one parameter: value, standard error, unit, typical size; its limits, if it has any."""
+        limits = {"min": self.lower, "max": self.upper}
         return {
             "value": json_value(self.value),
             "standard_error": json_value(self.standard_error),
             "unit": self.unit,
             "typical": json_value(self.typical),
+            **({"fixed": True} if self.fixed else {}),
+            **{word: bound for word, bound in limits.items() if math.isfinite(bound)},
         }
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -129,7 +176,7 @@ def parameter_frame(parameters: Iterable[Parameter]) -> pd.DataFrame:
     """Parameters as a data frame in SI units."""
     import pandas as pd  # noqa: PLC0415
 
-    columns = ["effect", "name", "value", "standard_error", "unit", "typical"]
+    columns = ["effect", "name", "value", "standard_error", "unit", "typical", "fixed"]
     return pd.DataFrame([[getattr(item, name) for name in columns] for item in parameters], columns=columns)
 
 

@@ -22,6 +22,10 @@ class Result:
         """Every table, most important first."""
         return ()
 
+    def answer_tables(self) -> Sequence[Table]:
+        """Tables that belong to the answer: a terminal shows the others on request."""
+        return self.tables()
+
     def paragraphs(self) -> Sequence[str]:
         """Return the sentences that stand above the tables where the whole result is shown."""
         return self.sentences()

@@ -19,11 +19,14 @@ class Table:
         One name per column; a leading ``>`` aligns the column right.
     rows : tuple of tuple of str
         Cells.
+    blocks : bool
+        Whether a terminal shows each row as a block of its own, a line for each cell: so it is where cells hold lists.
     """
 
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+    blocks: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -229,7 +229,7 @@ impl Evidence {
     pub fn add(&mut self, window: &Window) -> Result<(), EffectError> {
         let layout = &self.layout;
         let parts: Vec<Result<Blocks, EffectError>> = window
-            .parts(PART, 1, layout.facts.margin())
+            .parts(PART, 1, layout.model.margin(window, &layout.facts))
             .par_iter()
             .map(|part| take(layout, part))
             .collect();

@@ -6,6 +6,7 @@
 pub mod bins;
 pub mod block_equations;
 pub mod block_sums;
+pub mod bounded;
 pub mod evidence;
 pub mod noise;
 pub mod normal_equations;

@@ -68,7 +68,7 @@ impl Autocovariance {
             .collect();
         let every = layout.facts.n.div_ceil(ROWS).max(1);
         let parts: Vec<Result<Self, EffectError>> = window
-            .parts(PART, every, layout.facts.margin())
+            .parts(PART, every, layout.model.margin(window, &layout.facts))
             .par_iter()
             .map(|part| Self::of(part, evidence, &means, step))
             .collect();

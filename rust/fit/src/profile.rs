@@ -115,7 +115,7 @@ impl Profile {
     pub fn add(&mut self, window: &Window) -> Result<(), EffectError> {
         let every = self.facts.n.div_ceil(ROWS).max(1);
         let parts: Vec<Result<Vec<Sums>, EffectError>> = window
-            .parts(PART, every, self.facts.margin())
+            .parts(PART, every, self.model.margin(window, &self.facts))
             .par_iter()
             .map(|part| self.sums(part))
             .collect();

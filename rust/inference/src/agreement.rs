@@ -47,7 +47,9 @@ pub fn disagreements(
 ) -> Vec<Disagreement> {
     let criterion = search.criterion;
     let problem = criterion.problem;
-    if equations.len() < 2 || problem.own[slot] {
+    // A value that the user has given is nothing that the logs have to agree about.
+    let given = indices(&problem.slots, &[slot]).iter().any(|j| problem.standing[*j]);
+    if equations.len() < 2 || problem.own[slot] || given {
         return Vec::new();
     }
     let others = search::without(members, slot);

@@ -176,6 +176,7 @@ pub(crate) fn question(problem: &Problem, model: &[usize], channel: usize, covar
         precision: DVector::from_fn(p + m, |k, _| model.get(k).map_or(0.0, |j| problem.precision(*j))),
         model: p,
         sums: sums.collect(),
+        bounds: None,
         logs: problem.logs.clone(),
     })
 }

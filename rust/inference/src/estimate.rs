@@ -11,7 +11,9 @@ use crate::stack::{Criterion, Stack};
 pub struct Estimate {
     /// Step of each parameter from where the evidence was taken.
     pub step: DVector<f64>,
-    /// Covariance.
+    /// Whether each parameter stands at a bound that keeps it from a better value.
+    pub at_bound: Vec<bool>,
+    /// Covariance; of a parameter at its bound not a number.
     pub covariance: DMatrix<f64>,
 }
 
@@ -22,10 +24,36 @@ const SCATTER: f64 = 1.7;
 /// mean that is no drift but something missing, must not decide what a constant is. The covariance is that of such an
 /// estimate from observations of unit variance whose zeros do wander.
 pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
+    let within = problem.step_within(model)?;
+    if !within.at_bound.contains(&true) {
+        return Some(Estimate {
+            step: within.solution,
+            at_bound: within.at_bound,
+            covariance: covariance(problem, model)?,
+        });
+    }
+    // Of those at their bounds the data tell nothing more; the others are as sure as beside values that are given.
+    let (held, free): (Vec<usize>, Vec<usize>) = (0..model.len()).partition(|k| within.at_bound[*k]);
+    let places = |chosen: &[usize]| chosen.iter().map(|k| model[*k]).collect::<Vec<usize>>();
+    let steps: Vec<f64> = held.iter().map(|k| within.solution[*k]).collect();
+    let of_free = covariance(&problem.given(&places(&held), &steps), &places(&free))?;
+    let mut all = DMatrix::from_element(model.len(), model.len(), f64::NAN);
+    for (row, i) in free.iter().enumerate() {
+        for (column, j) in free.iter().enumerate() {
+            all[(*i, *j)] = of_free[(row, column)];
+        }
+    }
+    Some(Estimate {
+        step: within.solution,
+        at_bound: within.at_bound,
+        covariance: all,
+    })
+}
+
+/// Covariance of parameters that are fitted to all whitened observations alike.
+fn covariance(problem: &Problem, model: &[usize]) -> Option<DMatrix<f64>> {
     let total = problem.total(model);
-    let precision = DVector::from_iterator(model.len(), model.iter().map(|j| 0.01 * problem.precision(*j)));
-    let solved = total.solve(&precision)?;
-    let inverse = solved.covariance();
+    let inverse = total.solve(&problem.weak_precision(model))?.covariance();
     let mut covariance = &inverse + &inverse * spread(problem, model) * &inverse;
     // Where the blocks scatter more than whitened noise does, they are believed.
     let question = problem.question(model, &[], &DMatrix::zeros(0, 0));
@@ -39,10 +67,7 @@ pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
             }
         }
     }
-    Some(Estimate {
-        step: solved.solution,
-        covariance,
-    })
+    Some(covariance)
 }
 
 /// What the noise of the zeros and of the reference's heading adds to the covariance of the right-hand side, at its likeliest strength.

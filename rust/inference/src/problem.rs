@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use imufit_fit::block_equations::{BlockEquations, Form};
 use imufit_fit::block_sums::{self, ChannelSums};
+use imufit_fit::bounded::{Bounds, Within};
 use imufit_fit::evidence::Layout;
 use imufit_fit::normal_equations::NormalEquations;
 use imufit_fit::part::{self, Part};
@@ -36,7 +37,25 @@ pub struct Problem {
     pub known: Vec<Option<f64>>,
     /// Block sums of every channel of every log, for zeros that wander.
     pub sums: Vec<ChannelSums>,
+    /// Parameters of the model that no fit moves.
+    pub fixed: Vec<bool>,
+    /// Parameters of the model that stand still: those that no fit moves, and those that would leave their bounds.
+    pub standing: Vec<bool>,
+    /// Bounds of the step of every parameter.
+    pub bounds: Bounds,
 }
+
+/// What the user allows one parameter of an effect of the model.
+#[derive(Clone, Copy, Debug)]
+pub enum Limit {
+    /// It stays as it is.
+    Fixed,
+    /// Its value stays between these two.
+    Between(f64, f64),
+}
+
+/// A parameter that is limited: its slot, its number among those of the effect, and its limit.
+pub type Limited = (usize, usize, Limit);
 
 /// Parameters that a question is about: those of the model, then the reduced ones of a candidate.
 pub struct Question {
@@ -46,6 +65,8 @@ pub struct Question {
     pub raw: Vec<NormalEquations>,
     /// Prior precision of each parameter.
     pub precision: DVector<f64>,
+    /// Bounds of the step of each parameter, if there are any.
+    pub bounds: Option<Bounds>,
     /// How many parameters belong to the model.
     pub model: usize,
     /// Block sums of every channel over the same parameters, for zeros that wander.
@@ -76,8 +97,9 @@ fn attenuation(layout: &Layout, sensor: usize) -> [f64; 3] {
 }
 
 impl Problem {
-    /// From the evidence of one log or of several; `own` tells which of all logs' slots each log has for itself.
-    pub fn new(parts: Vec<Part>, own: &[bool]) -> Self {
+    /// From the evidence of one log or of several; `own` tells which of all logs' slots each log has for itself, `limits` what the user
+    /// allows parameters of the model.
+    pub fn new(parts: Vec<Part>, own: &[bool], limits: &[Limited]) -> Self {
         let (slots, places) = part::joined(&parts, own);
         let p = slots.last().map_or(0, |s| s.first + s.parameters.len());
         let parts: Arc<[Part]> = parts.into();
@@ -106,7 +128,8 @@ impl Problem {
                 };
             }
         }
-        Self {
+        let (fixed, bounds) = limited(&slots, limits, p);
+        let mut problem = Self {
             parts,
             slots,
             own: own.to_vec(),
@@ -117,7 +140,66 @@ impl Problem {
             typical,
             known,
             sums,
+            standing: fixed.clone(),
+            fixed,
+            bounds,
+        };
+        if problem.bounds.any() {
+            let model: Vec<usize> = (0..problem.slots.len())
+                .filter(|s| problem.slots[*s].in_model)
+                .collect();
+            let fitted = problem.fitted(&model);
+            if let Some(within) = problem.step_within(&fitted) {
+                for (j, at_bound) in fitted.iter().zip(within.at_bound) {
+                    problem.standing[*j] |= at_bound;
+                }
+            }
         }
+        problem
+    }
+
+    /// Places of the parameters of some slots that a fit moves, in order.
+    pub fn fitted(&self, slots: &[usize]) -> Vec<usize> {
+        let all = indices(&self.slots, slots);
+        all.into_iter().filter(|j| !self.fixed[*j]).collect()
+    }
+
+    /// Those of them that stand at no bound.
+    pub fn free(&self, slots: &[usize]) -> Vec<usize> {
+        let all = indices(&self.slots, slots);
+        all.into_iter().filter(|j| !self.standing[*j]).collect()
+    }
+
+    /// Step of some parameters within their bounds, by all whitened observations alike.
+    pub fn step_within(&self, parameters: &[usize]) -> Option<Within> {
+        let precision = self.weak_precision(parameters);
+        let total = self.total(parameters);
+        match self.bounds_of(parameters, 0) {
+            Some(bounds) => total.solve_within(&precision, &bounds),
+            None => total.solve(&precision).map(|solved| Within {
+                solution: solved.solution,
+                at_bound: vec![false; parameters.len()],
+            }),
+        }
+    }
+
+    /// Prior precision of some parameters of an estimate: a hundredth of that of other questions, so that it decides only what the data leave
+    /// open.
+    pub fn weak_precision(&self, parameters: &[usize]) -> DVector<f64> {
+        DVector::from_iterator(parameters.len(), parameters.iter().map(|j| 0.01 * self.precision(*j)))
+    }
+
+    /// Bounds of some parameters and of so many more without any; `None` where nothing is bounded.
+    fn bounds_of(&self, parameters: &[usize], more: usize) -> Option<Bounds> {
+        let of = |all: &DVector<f64>, open: f64| {
+            all.select_rows(parameters)
+                .resize_vertically(parameters.len() + more, open)
+        };
+        let bounds = Bounds {
+            lower: of(&self.bounds.lower, f64::NEG_INFINITY),
+            upper: of(&self.bounds.upper, f64::INFINITY),
+        };
+        bounds.any().then_some(bounds)
     }
 
     /// The same problem with an effect of the model taken out again, to first order: what its present values explain stands in the
@@ -132,17 +214,26 @@ impl Problem {
         let kept: Vec<usize> = (0..slot.parameters.len()).filter(counts).collect();
         let places: Vec<usize> = kept.iter().map(|k| slot.first + k).collect();
         let without: Vec<f64> = kept.iter().map(|k| -slot.parameters[*k]).collect();
+        self.given(&places, &without)
+    }
+
+    /// The same problem once some parameters have made these steps: what the steps explain is taken off the observations.
+    #[must_use]
+    pub fn given(&self, parameters: &[usize], steps: &[f64]) -> Self {
         Self {
             parts: self.parts.clone(),
             slots: self.slots.clone(),
             own: self.own.clone(),
             places: self.places.clone(),
             logs: self.logs.clone(),
-            equations: self.equations.given(&places, &without),
+            equations: self.equations.given(parameters, steps),
             plausible: self.plausible.clone(),
             typical: self.typical.clone(),
             known: self.known.clone(),
-            sums: self.sums.iter().map(|s| s.given(&places, &without)).collect(),
+            sums: self.sums.iter().map(|s| s.given(parameters, steps)).collect(),
+            fixed: self.fixed.clone(),
+            standing: self.standing.clone(),
+            bounds: self.bounds.clone(),
         }
     }
 
@@ -250,6 +341,7 @@ impl Problem {
             white: reduce(Form::White),
             raw: reduce(Form::Raw),
             precision,
+            bounds: self.bounds_of(model, m),
             model: p,
             sums,
             logs: self.logs.clone(),
@@ -277,8 +369,35 @@ impl Question {
 
     /// Solution from the whitened equations given.
     pub fn solve(&self, equations: &NormalEquations) -> Option<DVector<f64>> {
-        equations.solve(&self.precision).map(|s| s.solution)
+        match &self.bounds {
+            Some(bounds) => equations.solve_within(&self.precision, bounds).map(|w| w.solution),
+            None => equations.solve(&self.precision).map(|s| s.solution),
+        }
     }
+}
+
+/// Which of `p` parameters are fixed, and the bounds of the step of each; of an effect that each log has for itself those of all logs.
+fn limited(slots: &[Slot], limits: &[Limited], p: usize) -> (Vec<bool>, Bounds) {
+    let mut fixed = vec![false; p];
+    let mut bounds = Bounds {
+        lower: DVector::from_element(p, f64::NEG_INFINITY),
+        upper: DVector::from_element(p, f64::INFINITY),
+    };
+    for (number, parameter, limit) in limits {
+        let slot = &slots[*number];
+        let count = slot.effect.card().parameters.len();
+        for k in (*parameter..slot.parameters.len()).step_by(count) {
+            let place = slot.first + k;
+            match limit {
+                Limit::Fixed => fixed[place] = true,
+                Limit::Between(lower, upper) => {
+                    bounds.lower[place] = lower - slot.parameters[k];
+                    bounds.upper[place] = upper - slot.parameters[k];
+                }
+            }
+        }
+    }
+    (fixed, bounds)
 }
 
 /// Places of all parameters of some slots, in order.

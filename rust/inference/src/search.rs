@@ -98,10 +98,12 @@ impl<'a> Search<'a> {
     /// Prior deviations of the parameters of the model and of some members beside it.
     fn parameters(&self, members: &[usize]) -> Vec<(usize, f64)> {
         let problem = self.criterion.problem;
-        let of_model = indices(&problem.slots, &self.model)
+        let of_model = problem
+            .free(&self.model)
             .into_iter()
             .map(|j| (j, 1.0 / problem.precision(j).sqrt()));
-        let of_members = indices(&problem.slots, members)
+        let of_members = problem
+            .free(members)
             .into_iter()
             .map(|j| (j, self.criterion.deviation(j)));
         of_model.chain(of_members).collect()
@@ -333,9 +335,16 @@ impl<'a> Search<'a> {
         let of = |w: &Weighed| log_sum_exp(&[0.0, w.ln_bayes]) - LN_2;
         let prior = |slot: &usize| {
             let asked = Asked::slot(self.criterion, *slot);
-            let values = &self.criterion.problem.slots[*slot].parameters;
+            let of = &self.criterion.problem.slots[*slot];
+            let (values, first) = (&of.parameters, of.first);
             let density = match &asked.prior {
-                Prior::Normal(deviation) => ln_prior(values, deviation),
+                Prior::Normal(deviation) => {
+                    // What no fit moves is known, and costs nothing.
+                    let open = |k: &usize| !self.criterion.problem.fixed[first + k];
+                    let open: Vec<usize> = (0..values.len()).filter(open).collect();
+                    let of = |all: &[f64]| open.iter().map(|k| all[*k]).collect::<Vec<f64>>();
+                    ln_prior(&of(values), &of(deviation))
+                }
                 Prior::Known(_) => 0.0,
             };
             density + self.ln_possible(members, *slot, &asked) - asked.trials

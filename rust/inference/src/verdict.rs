@@ -537,7 +537,7 @@ fn sensors_of(problem: &Problem, origin: &Origin) -> Vec<Sensor> {
 /// Held-out error of the model, alone or with a candidate.
 fn held_out_of(search: &Search, candidate: Option<usize>) -> HeldOut {
     let problem = search.criterion.problem;
-    let model = indices(&problem.slots, &search.model);
+    let model = problem.fitted(&search.model);
     let own = candidate.map_or_else(Vec::new, |slot| indices(&problem.slots, &[slot]));
     let question = match problem.known_values(&own) {
         Some(values) => problem.question_given(&model, &own, &values),
@@ -638,7 +638,7 @@ fn correlations(
     };
     let slots = problem.slots.as_slice();
     let beta: Vec<f64> = first.parameters.iter().map(|p| p.0).collect();
-    let (fitted, own) = (indices(slots, model), indices(slots, &[first.slot]));
+    let (fitted, own) = (problem.free(model), indices(slots, &[first.slot]));
     let asked = candidates.iter().filter(|c| c.slot != first.slot && c.ln_bayes > 0.0);
     asked
         .map(|c| {

@@ -127,7 +127,7 @@ pub fn check(effect: &Arc<dyn Effect>, at: &[f64], window: &Window, facts: &LogF
         .parameters
         .iter()
         .enumerate()
-        .filter(|(_, card)| card.found != Found::Search)
+        .filter(|(_, card)| card.found != Found::Search && !effect.columns_are_quotients())
     {
         let h = 1e-3 * card.typical.unwrap_or(1.0);
         let (mut above, mut below) = (at.to_vec(), at.to_vec());

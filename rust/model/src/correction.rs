@@ -13,7 +13,7 @@ mod timing;
 use std::sync::Arc;
 
 use crate::card::Stage;
-use crate::effect::{Columns, Effect, EffectError};
+use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::ideal::SensorTime;
 use crate::sensor::Sensor;
@@ -208,10 +208,52 @@ fn parts_of(sensor: Sensor, effects: &[(Arc<dyn Effect>, Vec<f64>)], log: &Log) 
     Ok(parts)
 }
 
-/// What the effects on one sensor read of sensor `other`: its value, its derivative.
+/// What the effects on one sensor read of sensor `other`: its value, its derivative. Of its own value they read the row itself, which is
+/// being solved for, unless they look back.
 fn reads(parts: &[Part], sensor: Sensor, other: Sensor) -> (bool, bool) {
-    let any = |of: fn(&Dependence) -> &[bool; 3]| parts.iter().any(|p| of(&p.dependence)[other.index()]);
-    (sensor != other && any(|d| &d.value), any(|d| &d.rate))
+    let any = |of: fn(&Dependence) -> &[bool; 3], looking_back: bool| {
+        let asked = parts.iter().filter(|p| !looking_back || p.looks_back());
+        asked.map(|p| of(&p.dependence)[other.index()]).any(|reads| reads)
+    };
+    (any(|d| &d.value, sensor == other), any(|d| &d.rate, false))
+}
+
+/// What effects that look back add to one sensor in every row, everything being as it is `seen`.
+fn added_by_the_past(log: &Log, parts: &[Part], sensor: Sensor, seen: &Seen, n: usize) -> Result<Triple, EffectError> {
+    let mut sum = Triple::zeros(n);
+    let ideal = seen.ideal(&(0..n), log.attitude.as_deref());
+    let mut columns = Columns::default();
+    for part in parts.iter().filter(|p| p.looks_back()) {
+        let rows = Rows {
+            facts: log.facts,
+            t: log.window.t,
+            ideal: &ideal,
+            x: match sensor {
+                Sensor::Acc => &ideal.f,
+                Sensor::Gyr => &ideal.omega,
+                Sensor::Mag => &ideal.m,
+            },
+            temperature: log.temperature.as_deref(),
+            vibration: log.vibration.as_deref(),
+            covariates: &log.covariates,
+            position: &[],
+            history: 0,
+        };
+        if let Some(added) = part.effect.added(&rows, sensor, &part.parameters)? {
+            sum.add(&added, 1.0);
+            continue;
+        }
+        columns.reset(n, part.parameters.len());
+        part.effect.columns(&rows, sensor, &part.parameters, &mut columns)?;
+        for (p, value) in part.parameters.iter().enumerate() {
+            for (axis, target) in sum.0.iter_mut().enumerate() {
+                for (y, c) in target.iter_mut().zip(columns.get(p, axis).unwrap_or_default()) {
+                    *y += value * c;
+                }
+            }
+        }
+    }
+    Ok(sum)
 }
 
 /// Corrects the sensors in turn until nothing changes.
@@ -296,7 +338,11 @@ fn correct_sensor(
     x: &mut Triple,
 ) -> Result<(), CorrectionError> {
     let n = y.len();
-    let stack: Vec<&Part> = parts.iter().collect();
+    let stack: Vec<&Part> = parts.iter().filter(|p| !p.looks_back()).collect();
+    let mut y = y.clone();
+    if stack.len() < parts.len() {
+        y.add(&added_by_the_past(log, parts, sensor, seen, n)?, -1.0);
+    }
     let mut columns = Columns::default();
     for begin in (0..n).step_by(BLOCK_ROWS) {
         let rows = begin..(begin + BLOCK_ROWS).min(n);

@@ -27,10 +27,12 @@ pub struct Rows<'a> {
     pub covariates: &'a [Vec<f64>],
     /// Reference position, m (n), NaN where not known; empty without one.
     pub position: &'a [Vector3<f64>],
+    /// Rows at the beginning that are only the past of those asked about; an effect without [`Effect::memory`] gets none.
+    pub history: usize,
 }
 
 impl Rows<'_> {
-    /// Number of rows.
+    /// Number of rows, those of the past among them.
     pub fn len(&self) -> usize {
         self.t.len()
     }
@@ -159,10 +161,10 @@ pub trait Effect: Send + Sync {
         None
     }
 
-    /// The column of the log that it counts from the mean of, `temp` or the name of a covariate: whoever takes the effect out of
-    /// another log has to know that mean.
-    fn centred_column(&self) -> Option<&str> {
-        None
+    /// The columns of the log that it counts from the means of, `temp` or names of covariates: whoever takes the effect out of
+    /// another log has to know these means.
+    fn centred_columns(&self) -> Vec<String> {
+        Vec::new()
     }
 
     /// True where it is fitted along whatever is asked, without being named: the field, if this log is all that is known of it.
@@ -193,8 +195,24 @@ pub trait Effect: Send + Sync {
     }
 
     /// What it adds to the reading where that is not the sum of its parameters times their columns; `None` where it is.
-    fn added(&self, _rows: &Rows, _sensor: Sensor, _parameters: &[f64]) -> Option<Triple> {
-        None
+    fn added(&self, _rows: &Rows, _sensor: Sensor, _parameters: &[f64]) -> Result<Option<Triple>, EffectError> {
+        Ok(None)
+    }
+
+    /// Time before a row, s, within which rows decide what it adds there; infinite for all rows of the log, zero where no past is asked
+    /// for. The past that it gets begins at whole multiples of this time since the log's start, so that nothing depends on how rows are cut.
+    fn memory(&self) -> f64 {
+        0.0
+    }
+
+    /// True if its columns are difference quotients of what it adds: another difference quotient says nothing of them.
+    fn columns_are_quotients(&self) -> bool {
+        false
+    }
+
+    /// Least and largest value of each parameter; empty where every value is possible.
+    fn limits(&self) -> Vec<(f64, f64)> {
+        Vec::new()
     }
 
     /// Different readings of one ideal axis that determine its parameters beside all effects of lower order (a cubic goes through any

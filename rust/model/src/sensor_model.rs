@@ -94,6 +94,70 @@ pub struct Evaluation {
     pub temperature: Option<Vec<f64>>,
 }
 
+/// Temperature of the core rows less its mean over the log, K, slow samples held.
+fn held_temperature(window: &Window, facts: &LogFacts) -> Option<Vec<f64>> {
+    let core = window.begin..window.end;
+    let known = |t: &[f64]| core.map(|i| held(t, i) - facts.temperature_mean).collect();
+    window.temperature.map(known)
+}
+
+/// Covariates of the core rows, slow samples held.
+fn held_covariates(window: &Window) -> Vec<Vec<f64>> {
+    let core = window.begin..window.end;
+    let known = |c: &&[f64]| core.clone().map(|i| held(c, i)).collect();
+    window.covariates.iter().map(known).collect()
+}
+
+/// Everything that an effect with memory sees: the rows asked about and those before them.
+struct Past<'a> {
+    t: &'a [f64],
+    ideal: Ideal,
+    temperature: Option<Vec<f64>>,
+    covariates: Vec<Vec<f64>>,
+    history: usize,
+}
+
+impl<'a> Past<'a> {
+    /// Core rows of a window, of which the first `history` are of the past.
+    fn new(window: &Window<'a>, facts: &LogFacts, change: &ReferenceChange, sensor: Sensor, history: usize) -> Self {
+        let own = Ideal::of_sensor(window, facts, change, sensor);
+        Self {
+            t: &window.t[window.begin..window.end],
+            ideal: own.unwrap_or_else(|| Ideal::new(window, facts, change)),
+            temperature: held_temperature(window, facts),
+            covariates: held_covariates(window),
+            history,
+        }
+    }
+
+    /// The same as effects see rows, quantities without axes that hold noise alone.
+    fn rows<'b>(
+        &'b mut self,
+        facts: &'b LogFacts,
+        sensor: Sensor,
+        seen: &impl Fn(&Ideal) -> Option<Ideal>,
+    ) -> Rows<'b> {
+        if let Some(ideal) = seen(&self.ideal) {
+            self.ideal = ideal;
+        }
+        Rows {
+            facts,
+            t: self.t,
+            x: match sensor {
+                Sensor::Acc => &self.ideal.f,
+                Sensor::Gyr => &self.ideal.omega,
+                Sensor::Mag => &self.ideal.m,
+            },
+            ideal: &self.ideal,
+            temperature: self.temperature.as_deref(),
+            vibration: None,
+            covariates: &self.covariates,
+            position: &[],
+            history: self.history,
+        }
+    }
+}
+
 /// True where the value of an effect lies in the ideal readings.
 const fn in_reference(stage: Stage) -> bool {
     matches!(stage, Stage::Reference | Stage::Time)
@@ -188,7 +252,7 @@ impl SensorModel {
             Sensor::Gyr => &rows.ideal.omega,
             Sensor::Mag => &rows.ideal.m,
         };
-        self.predict(rows, ideal.clone(), None, sensor)
+        self.predict(rows, None, ideal.clone(), None, sensor)
     }
 
     /// Sets the parameters of the model's effects from a vector over all parameters.
@@ -238,6 +302,7 @@ impl SensorModel {
                 vibration: Some(&ones),
                 covariates: &covariates,
                 position: &[],
+                history: 0,
             };
             for slot in self.slots.iter().filter(|s| s.effect.sensors().contains(&sensor)) {
                 columns.reset(4, slot.parameters.len());
@@ -265,18 +330,52 @@ impl SensorModel {
             })
     }
 
+    /// Longest memory of its effects on one sensor, s.
+    fn memory(&self, sensor: Sensor) -> f64 {
+        let on_sensor = self.slots.iter().filter(|s| s.effect.sensors().contains(&sensor));
+        on_sensor.map(|s| s.effect.memory()).fold(0.0, f64::max)
+    }
+
+    /// Rows around a part of a window that its evaluation may look at: all there are where an effect looks far back.
+    pub fn margin(&self, window: &Window, facts: &LogFacts) -> usize {
+        if Sensor::ALL.iter().any(|s| self.memory(*s) > 0.0) {
+            window.len()
+        } else {
+            facts.margin()
+        }
+    }
+
+    /// The window with core rows that begin where the past of the first one does, whatever the window is part of.
+    fn with_past<'a>(&self, window: &Window<'a>, facts: &LogFacts, sensor: Sensor) -> Option<Window<'a>> {
+        let longest = self.memory(sensor);
+        let first = *window.t.get(window.begin)?;
+        if longest == 0.0 {
+            return None;
+        }
+        let begins = |memory: f64| {
+            // Whole multiples as the effect itself counts them, and a row more rather than one less.
+            let stretches = ((first - facts.t_start) / memory).floor() - 1.0 - 1e-6;
+            facts.t_start + stretches * memory
+        };
+        let memories = self.slots.iter().filter(|s| s.effect.sensors().contains(&sensor));
+        let earliest = memories
+            .map(|s| s.effect.memory())
+            .filter(|m| *m > 0.0)
+            .map(|m| if m.is_finite() { begins(m) } else { f64::NEG_INFINITY })
+            .fold(first, f64::min);
+        let begin = window.t[..window.begin].partition_point(|t| *t < earliest);
+        Some(window.with_core(begin, window.end))
+    }
+
     /// Residual and columns over the core rows of a window.
-    pub fn evaluate(&self, window: &Window, facts: &LogFacts) -> Result<Evaluation, EffectError> {
+    pub fn evaluate(&self, whole: &Window, facts: &LogFacts) -> Result<Evaluation, EffectError> {
+        // What looks back no further than the margin gets no more, whoever else is asked beside it.
+        let near = whole.part(whole.begin, whole.end, self.margin(whole, facts).min(facts.margin()));
+        let window = &near;
         let ideal = Ideal::new(window, facts, &self.reference_change());
         let core = window.begin..window.end;
-        let temperature: Option<Vec<f64>> = window
-            .temperature
-            .map(|t| core.clone().map(|i| held(t, i) - facts.temperature_mean).collect());
-        let covariates: Vec<Vec<f64>> = window
-            .covariates
-            .iter()
-            .map(|c| core.clone().map(|i| held(c, i)).collect())
-            .collect();
+        let temperature = held_temperature(window, facts);
+        let covariates = held_covariates(window);
         let position: Vec<Vector3<f64>> = window.position.map_or_else(Vec::new, |p| {
             // A reference in rows of its own has none in those of the readings.
             let axes: [Vec<f64>; 3] = std::array::from_fn(|axis| p.iter().skip(axis).step_by(3).copied().collect());
@@ -320,13 +419,19 @@ impl SensorModel {
                 vibration: vibration.as_deref(),
                 covariates: &covariates,
                 position: &position,
+                history: 0,
             };
+            let mut past = self
+                .with_past(whole, facts, sensor)
+                .map(|long| Past::new(&long, facts, &change, sensor, whole.begin - long.begin));
+            let past = past.as_mut().map(|p| p.rows(facts, sensor, &seen_of));
             let reading_of = match sensor {
                 Sensor::Acc => &ideal.f,
                 Sensor::Gyr => &ideal.omega,
                 Sensor::Mag => &ideal.m,
             };
-            let (modelled, columns) = self.predict(rows, reading_of.clone(), ideal.detail(sensor), sensor)?;
+            let (modelled, columns) =
+                self.predict(rows, past.as_ref(), reading_of.clone(), ideal.detail(sensor), sensor)?;
             for (axis, columns) in columns.into_iter().enumerate() {
                 let residual = core
                     .clone()
@@ -365,6 +470,7 @@ impl SensorModel {
     fn predict(
         &self,
         rows: Rows,
+        past: Option<&Rows>,
         mut x: Triple,
         detail: Option<&Triple>,
         sensor: Sensor,
@@ -393,15 +499,18 @@ impl SensorModel {
                     continue;
                 }
                 columns.reset(n, slot.parameters.len());
-                let rows = Rows {
-                    x: seen.as_ref().unwrap_or(&x),
-                    ..rows
+                let rows = match past.filter(|_| slot.effect.memory() > 0.0) {
+                    Some(past) => *past,
+                    None => Rows {
+                        x: seen.as_ref().unwrap_or(&x),
+                        ..rows
+                    },
                 };
                 slot.columns(&rows, sensor, &mut columns)?;
                 // The value of a reference effect is in the ideal readings already.
                 let counts = slot.in_model && !in_reference(stage);
                 let added = if counts {
-                    slot.effect.added(&rows, sensor, &slot.parameters)
+                    slot.effect.added(&rows, sensor, &slot.parameters)?
                 } else {
                     None
                 };

@@ -2,14 +2,14 @@
 
 use imufit_fit::part::Part;
 use imufit_fit::{residual, saturated};
-use imufit_inference::problem::{Problem, parameters_of};
+use imufit_inference::problem::{Limit, Problem, parameters_of};
 use imufit_inference::search::{self, Search};
 use imufit_inference::stack::{self, Criterion};
 use imufit_inference::{estimate, held_out, revision, verdict};
 use imufit_model::rest_channels;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::{DMatrix, DVector};
-use numpy::PyArray1;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -51,6 +51,9 @@ type LogEvidence<'py> = (
     Vec<usize>,
 );
 
+/// Slot, number of a parameter, smallest and largest value; None: it is not fitted.
+type PyLimit = (usize, usize, Option<(f64, f64)>);
+
 /// Log, channel index, standard deviation of a walk's step over a block and of the scatter, time of a block, s.
 type ZeroNoise = (usize, usize, f64, f64, f64);
 
@@ -65,9 +68,11 @@ pub struct PyProblem(Problem);
 impl PyProblem {
     /// `logs`: for each log its whitened and its plain evidence, the variance of the whitened residual of each of the nine
     /// channels, their noise floors in their units, and for each slot of the evidence its slot among those of all logs.
-    /// `own`: for each of these whether every log has its own parameters of it.
+    /// `own`: for each of these whether every log has its own parameters of it. `limits`: slot, number of a parameter of its effect, and the
+    /// smallest and the largest value that it may have, or None where it is not fitted.
     #[new]
-    fn new(py: Python<'_>, logs: Vec<LogEvidence<'_>>, own: Vec<bool>) -> PyResult<Self> {
+    #[pyo3(signature = (logs, own, limits=Vec::new()))]
+    fn new(py: Python<'_>, logs: Vec<LogEvidence<'_>>, own: Vec<bool>, limits: Vec<PyLimit>) -> PyResult<Self> {
         let mut parts = Vec::with_capacity(logs.len());
         for (white, raw, variance, loudness, floors, slots) in logs {
             let known = white.0.layout.model.slots().len();
@@ -104,7 +109,15 @@ impl PyProblem {
                 return Err(value_error(format!("the logs have different effects in slot {number}")));
             }
         }
-        Ok(Self(compute(py, || Problem::new(parts, &own))?))
+        let limit = |(slot, parameter, range): PyLimit| {
+            let between = |(lower, upper)| Limit::Between(lower, upper);
+            (slot, parameter, range.map_or(Limit::Fixed, between))
+        };
+        if limits.iter().any(|(slot, _, _)| *slot >= own.len()) {
+            return Err(value_error("there is no such slot"));
+        }
+        let limits: Vec<_> = limits.into_iter().map(limit).collect();
+        Ok(Self(compute(py, || Problem::new(parts, &own, &limits))?))
     }
 
     /// For each of a log's own parameters its place among those of all logs.
@@ -118,30 +131,42 @@ impl PyProblem {
         self.0.blocks()
     }
 
-    /// Fits the slots given: step and standard error (k,) of each of their k parameters, SI units; full step (p,) of
-    /// all; held-out and training residual RMS over noise floor; whitened held-out sum of squares of each fold.
+    /// Fits the slots given: step (k,) and covariance (k, k) of their k parameters, SI units, zero for those that are not fitted, not a number
+    /// for those at a bound; which of them are fitted, and which of these stand at a bound; full step (p,) of all; held-out and training residual RMS over noise floor; whitened held-out sum of squares of each fold.
     fn estimate<'py>(&self, py: Python<'py>, slots: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
         self.known(&slots)?;
         let all = &self.0.slots;
         let parameters = parameters_of(slots.iter().map(|s| &all[*s]));
+        let moved = |k: &usize| !self.0.fixed[parameters[*k]];
+        let chosen: Vec<usize> = (0..parameters.len()).filter(moved).collect();
+        let free: Vec<usize> = chosen.iter().map(|k| parameters[*k]).collect();
         let (fitted, base) = compute(py, || {
             (
-                estimate::estimate(&self.0, &parameters),
-                held_out::held_out(&self.0.question(&parameters, &[], &DMatrix::zeros(0, 0))),
+                estimate::estimate(&self.0, &free),
+                held_out::held_out(&self.0.question(&free, &[], &DMatrix::zeros(0, 0))),
             )
         })?;
         let fitted = fitted.ok_or_else(|| value_error("the normal equations cannot be solved"))?;
         let mut step = DVector::zeros(self.0.plausible.len());
-        for (k, p) in parameters.iter().enumerate() {
-            step[*p] = fitted.step[k];
+        let p = parameters.len();
+        let (mut own, mut at_bound) = (vec![0.0; p], vec![false; p]);
+        let mut covariance = vec![vec![0.0; p]; p];
+        for (k, place) in chosen.iter().enumerate() {
+            step[free[k]] = fitted.step[k];
+            (own[*place], at_bound[*place]) = (fitted.step[k], fitted.at_bound[k]);
+            for (j, other) in chosen.iter().enumerate() {
+                covariance[*place][*other] = fitted.covariance[(k, j)];
+            }
         }
         let (square, n) = training(&self.0, &step);
-        let p = parameters.len();
         let out = PyDict::new(py);
+        let mut fitted = vec![false; p];
+        chosen.iter().for_each(|k| fitted[*k] = true);
         out.set_item("parameters", parameters)?;
-        out.set_item("step", PyArray1::from_slice(py, fitted.step.as_slice()))?;
-        let errors: Vec<f64> = (0..p).map(|j| fitted.covariance[(j, j)].max(0.0).sqrt()).collect();
-        out.set_item("standard_error", PyArray1::from_vec(py, errors))?;
+        out.set_item("step", PyArray1::from_vec(py, own))?;
+        out.set_item("covariance", PyArray2::from_vec2(py, &covariance)?)?;
+        out.set_item("fitted", fitted)?;
+        out.set_item("at_bound", at_bound)?;
         out.set_item("full_step", PyArray1::from_slice(py, step.as_slice()))?;
         out.set_item("held_out", base.ratio)?;
         out.set_item("folds", PyArray1::from_vec(py, base.white))?;
@@ -217,7 +242,7 @@ impl PyProblem {
     /// block, that of the scatter of block means besides, both in the channel's unit, time of a block, s).
     fn zero_noise(&self, py: Python<'_>, slots: Vec<usize>) -> PyResult<Vec<ZeroNoise>> {
         self.known(&slots)?;
-        let parameters = parameters_of(slots.iter().map(|s| &self.0.slots[*s]));
+        let parameters = self.0.free(&slots);
         let found = compute(py, || stack::zero_noise(&self.0, &parameters))?;
         let row = |z: &stack::ZeroNoise| (z.log, z.channel, z.walk, z.scatter, z.block);
         Ok(found.iter().map(row).collect())

@@ -40,10 +40,23 @@ impl PyEffect {
         self.0.column().map(str::to_string)
     }
 
-    /// The column of a log that it counts from the mean of: `temp`, a covariate, or None.
+    /// The columns of a log that it counts from the means of: `temp`, covariates. Those of a user's effect are known once
+    /// its function has been called.
     #[getter]
-    fn centred_column(&self) -> Option<String> {
-        self.0.centred_column().map(str::to_string)
+    fn centred_columns(&self) -> Vec<String> {
+        self.0.centred_columns()
+    }
+
+    /// Time before a row, s, within which rows decide what it adds there; infinite for all of them, 0 for no past.
+    #[getter]
+    fn memory(&self) -> f64 {
+        self.0.memory()
+    }
+
+    /// Least and largest value of each parameter; empty where every value is possible.
+    #[getter]
+    fn limits(&self) -> Vec<(f64, f64)> {
+        self.0.limits()
     }
 
     /// Whose property its parameters are: `sensor`, or `log` where each log has its own.

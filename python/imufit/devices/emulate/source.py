@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -181,9 +182,11 @@ def open_source(
     if not isinstance(source, Log):
         path = Path(source)
         if not path.is_file():
+            near = difflib.get_close_matches(str(source), SCENARIOS, n=1)
+            meant = f"Did you mean {near[0]}? " if near else ""
             raise InputError(
                 f"{str(source)!r} is neither a scenario nor a file",
-                remedy=f"Scenarios are {', '.join(SCENARIOS)}.",
+                remedy=f"{meant}Scenarios are {', '.join(SCENARIOS)}.",
             )
         source = read(path, mapping=parse_mapping(*mapping) or None)
     found = of_log(source, source.path.name if source.path else "log")

@@ -49,12 +49,11 @@ class LiveCorrection:
                     f"{effect.id} needs {LACKING[effect.reach]}, which live rows do not have",
                     remedy="Take a model without it here, or record and use imufit apply.",
                 )
-            column = effect.centred_column
-            if column == "temp" and not self._warmth_known:
+            if "temp" in effect.centred_columns and not self._warmth_known:
                 raise InputError(
                     f"{effect.id} needs temperature_mean, which the model does not hold", remedy="Fit it anew."
                 )
-            if column not in (None, "temp") and column not in means:
+            for column in sorted({*effect.centred_columns} - {"temp", *means}):
                 raise InputError(
                     f"{effect.id} needs the mean of {column}, which the model does not hold", remedy="Fit it anew."
                 )

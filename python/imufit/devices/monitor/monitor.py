@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
 
@@ -54,6 +54,8 @@ class MonitorState:
         Messages of the device since the last state.
     trouble : str
         Why nothing could be decoded so far; empty if something was.
+    readings : dict of float
+        Last reading of every column, SI units, the model's effects taken out.
     """
 
     t: float
@@ -68,6 +70,7 @@ class MonitorState:
     device: str
     messages: tuple[str, ...]
     trouble: str
+    readings: dict[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of `monitor`: angles in deg."""
@@ -76,7 +79,8 @@ class MonitorState:
             name: dict(zip(("roll_deg", "pitch_deg", "yaw_deg"), np.degrees(angles).tolist(), strict=True))
             for name, angles in self.angles.items()
         }
-        return {**{name: json_value(getattr(self, name)) for name in names}, "filters": json_value(filters)}
+        told = {name: json_value(getattr(self, name)) for name in names}
+        return {**told, "filters": json_value(filters), "readings": json_value(self.readings)}
 
 
 class Monitor:
@@ -126,6 +130,7 @@ class Monitor:
         self._columns: tuple[str, ...] = ()
         self._marks: deque[tuple[float, int]] = deque()
         self._t, self._n, self._temp = np.nan, 0, np.nan
+        self._readings: dict[str, float] = {}
 
     def __enter__(self) -> Self:
         self._rows.__enter__()
@@ -169,6 +174,9 @@ class Monitor:
         self._attitude.add(batch)
         self._n += batch["t"].size
         self._t = float(batch["t"][-1])
+        for name, values in batch.items():
+            if name != "t" and np.issubdtype(values.dtype, np.number) and np.isfinite(values).any():
+                self._readings[name] = float(values[np.isfinite(values)][-1])
         warm = batch.get("temp", np.empty(0))
         if np.isfinite(warm).any():
             self._temp = float(warm[np.isfinite(warm)][-1])
@@ -192,4 +200,5 @@ class Monitor:
             device=self._rows.name,
             messages=tuple(self._rows.take_texts()),
             trouble=self._rows.trouble,
+            readings=dict(self._readings),
         )

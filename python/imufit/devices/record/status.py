@@ -28,6 +28,9 @@ EVERY: Final = 0.2
 """Time between two states of the line, s."""
 PATIENCE: Final = 5.0
 """Time after which it is said that nothing whole comes, s."""
+SPARSE: Final = 10.0
+"""Time between two lines where no terminal is, s: a file of one hour has 360 of them."""
+HOW_TO_STOP: Final = "Ctrl-C ends it"
 _WINDOW: Final = 2.0  # over which the rate is taken, s
 
 
@@ -56,6 +59,7 @@ class StatusLine:
         self._held: list[Arrived] = []
         self._begin = time.monotonic()
         self._next = 0.0
+        self._next_sparse = self._begin + SPARSE
         self._marks: deque[tuple[float, int]] = deque()
         self._temp = np.nan
         self._warned = False
@@ -90,6 +94,9 @@ class StatusLine:
             if why := reception.nothing_whole:
                 self._say(f"after {PATIENCE:.0f} s: {why}")
         if not self._shown:
+            if now >= self._next_sparse:
+                self._next_sparse = now + SPARSE
+                self._say(self._line(reception, now))
             return
         self._held += rows
         if now < self._next:
@@ -139,8 +146,9 @@ class StatusLine:
         self._marks.append((now, counts["samples"]))
         while now - self._marks[0][0] > _WINDOW:
             self._marks.popleft()
-        passed = now - self._marks[0][0]
-        rate = (counts["samples"] - self._marks[0][1]) / passed if passed > 0.0 else 0.0
+        since, before = self._marks[0] if now > self._marks[0][0] else (self._begin, 0)
+        passed = now - since
+        rate = (counts["samples"] - before) / passed if passed > 0.0 else 0.0
         words = [f"{now - self._begin:.0f} s", f"{counts['samples']} rows", f"{rate:.0f} Hz"]
         if self._attitude is not None:
             words += [shown for name in ("mahony", "complementary") if (shown := self._angles(name))]
@@ -151,7 +159,7 @@ class StatusLine:
             words.append(f"unplugged {reception.line.opening}")
         if reception.line.lost_since is not None:
             words = [f"line lost for {now - reception.line.lost_since:.0f} s, trying again", *words]
-        return "  ".join(words)
+        return "  ".join([*words, HOW_TO_STOP])
 
     def _angles(self, name: str) -> str:
         """Roll, pitch and, with a magnetometer, yaw in degrees."""

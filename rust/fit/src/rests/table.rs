@@ -91,6 +91,7 @@ impl<'a> Table<'a> {
             vibration: Some(&self.vibration),
             covariates: &self.covariates,
             position: &[],
+            history: 0,
         }
     }
 

@@ -107,6 +107,7 @@ pub fn dependence(
             vibration: Some(&trial.temperature),
             covariates: &covariates,
             position: &[],
+            history: 0,
         };
         effect.columns(&rows, sensor, parameters, &mut columns)?;
         let all = (0..parameters.len()).flat_map(|p| (0..3).map(move |axis| (p, axis)));

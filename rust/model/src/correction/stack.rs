@@ -23,6 +23,13 @@ pub struct Part {
     pub dependence: Dependence,
 }
 
+impl Part {
+    /// True if rows before a row decide what it adds there.
+    pub fn looks_back(&self) -> bool {
+        self.effect.memory() > 0.0
+    }
+}
+
 /// What the effects on one sensor see of the others: values and time derivatives in every row of the log, where they ask for them.
 #[derive(Default)]
 pub struct Seen {
@@ -94,8 +101,9 @@ impl Block<'_> {
                     vibration: self.vibration,
                     covariates: &self.covariates,
                     position: &[],
+                    history: 0,
                 };
-                if let Some(added) = part.effect.added(&rows, sensor, &part.parameters) {
+                if let Some(added) = part.effect.added(&rows, sensor, &part.parameters)? {
                     after.add(&added, 1.0);
                     continue;
                 }

@@ -70,8 +70,8 @@ impl Effect for Covariate {
         Some(&self.column)
     }
 
-    fn centred_column(&self) -> Option<&str> {
-        Some(&self.column)
+    fn centred_columns(&self) -> Vec<String> {
+        vec![self.column.clone()]
     }
 
     fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {

@@ -103,8 +103,9 @@ impl Effect for Linear {
         }
     }
 
-    fn centred_column(&self) -> Option<&str> {
-        (self.needs == Needs::Temperature).then_some("temp")
+    fn centred_columns(&self) -> Vec<String> {
+        let temperature = self.needs == Needs::Temperature;
+        temperature.then(|| "temp".to_string()).into_iter().collect()
     }
 
     fn columns(&self, rows: &Rows, _: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {

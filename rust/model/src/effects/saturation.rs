@@ -94,13 +94,13 @@ impl Effect for Saturation {
         Ok(())
     }
 
-    fn added(&self, rows: &Rows, _: Sensor, parameters: &[f64]) -> Option<Triple> {
+    fn added(&self, rows: &Rows, _: Sensor, parameters: &[f64]) -> Result<Option<Triple>, EffectError> {
         let range = parameters[0];
-        Some(if range > 0.0 {
+        Ok(Some(if range > 0.0 {
             cut_off(rows, range)
         } else {
             Triple::zeros(rows.len())
-        })
+        }))
     }
 
     fn search(&self, facts: &LogFacts, found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {

@@ -88,14 +88,14 @@ impl Effect for WarmUp {
         Ok(())
     }
 
-    fn added(&self, rows: &Rows, _: Sensor, parameters: &[f64]) -> Option<Triple> {
+    fn added(&self, rows: &Rows, _: Sensor, parameters: &[f64]) -> Result<Option<Triple>, EffectError> {
         let tau = parameters[3];
         if tau <= 0.0 {
-            return Some(Triple::zeros(rows.len()));
+            return Ok(Some(Triple::zeros(rows.len())));
         }
-        Some(Triple(std::array::from_fn(|axis| {
+        Ok(Some(Triple(std::array::from_fn(|axis| {
             left(rows, tau).map(|e| parameters[axis] * e).collect()
-        })))
+        }))))
     }
 
     fn search(&self, facts: &LogFacts, found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {

@@ -1,0 +1,51 @@
+"""A replay of a log without a reference: its angles as a table and as a figure."""
+
+import imufit
+import numpy as np
+import pytest
+from cli_stand_in import run
+from imufit.log import Log
+
+G = 9.80665
+ROLL = 0.5
+"""Angle about x to which the sensor is turned and back, rad."""
+
+
+@pytest.fixture
+def log(tmp_path):
+    """Ten seconds: level, rolled by `ROLL` between 4 and 6 s, level again; NED, so that z points down."""
+    t = np.arange(0.0, 10.0, 0.01)
+    roll = np.interp(t, [0.0, 3.0, 4.0, 6.0, 7.0, 10.0], [0.0, 0.0, ROLL, ROLL, 0.0, 0.0])
+    acc = -G * np.stack([np.zeros_like(t), np.sin(roll), np.cos(roll)], axis=1)
+    gyr = np.stack([np.gradient(roll, t), np.zeros_like(t), np.zeros_like(t)], axis=1)
+    path = tmp_path / "bare.parquet"
+    Log.from_arrays(t, acc=acc, gyr=gyr).write(path)
+    return path
+
+
+def test_the_table_has_start_end_and_extremes(log):
+    table = imufit.replay(log, "accel").tables()[0]
+    rows = {row[1]: row[2:] for row in table.rows}
+    assert {"start", "end", "least roll", "most roll", "least pitch", "most pitch"} == set(rows)
+    assert float(rows["most roll"][1]) == pytest.approx(np.degrees(ROLL), abs=0.01)
+    assert 4.0 <= float(rows["most roll"][0]) <= 6.0
+    assert (float(rows["start"][0]), float(rows["end"][0])) == (0.0, 9.99)
+    assert float(rows["end"][1]) == pytest.approx(0.0, abs=0.01)
+
+
+def test_the_command_shows_and_draws_the_angles(capsys, log, tmp_path):
+    figure = tmp_path / "angles.png"
+    code, out, err = run(capsys, "replay", log, "--filter", "accel,kalman", "--plot", figure)
+    assert (code, err) == (0, [])
+    assert "most roll" in out
+    assert "28.6" in out
+    assert "reference, RMSE" not in out
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_figure_has_a_panel_for_each_angle_and_a_line_for_each_filter(log):
+    figure = imufit.replay(log, ["accel", "kalman"]).plot()
+    assert [axes.get_ylabel() for axes in figure.axes] == ["roll, deg", "pitch, deg", "yaw, deg"]
+    lines = figure.axes[0].get_lines()
+    assert [line.get_label() for line in lines] == ["accel", "kalman"]
+    assert np.nanmax(lines[0].get_ydata()) == pytest.approx(np.degrees(ROLL), abs=0.01)
