@@ -160,7 +160,7 @@ class Trials:
         return np.array(self.each(name, partial(judge, settings={}, parameters={}, name=name)))
 
     def low_passed(self, name: str) -> Array:
-        """Total errors (1 + low passes, trials) of a filter, deg: without one, then for each of ALMOST_INERTIAL."""
+        """Total errors (1 + low passes, trials) of a filter, deg: without one, then each of ALMOST_INERTIAL."""
         found = [self.judged(name)[:, 0]]
         for tau in ALMOST_INERTIAL:
             each = self.each(f"{name}, low pass of {tau:g} s", partial(judge_low_passed, tau=tau, name=name))

@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 from filterpy.kalman import KalmanFilter
-from imufit import Log, _imufit
+from imufit import Log, _imufit, filters
 from imufit.replaying import Stream, replay_many
 from peers import MISSING, PEERS, CLoop
 from scipy.signal import lfilter
@@ -248,6 +248,25 @@ def beside_others(t: np.ndarray, acc: np.ndarray, gyr: np.ndarray, mag: np.ndarr
     print(f"imufit mahony and C, exact: largest difference {apart:.1e} rad")
 
 
+def objects(t: np.ndarray, acc: np.ndarray, gyr: np.ndarray, mag: np.ndarray, start: np.ndarray) -> None:
+    """`imufit.filters` beside the compiled filters that they call; both take their turns, the best of each counts."""
+    print(f"\n{'object':<22}{'rows/s':>12}{'compiled rows/s':>17}{'ratio':>8}")
+    for name, kind in filters.ALL.items():
+        made, core = kind(initial=start), _imufit.Filter(name, initial=start.tolist())
+        runs = (
+            lambda made=made: (made.reset(), made.run(gyr, acc, mag, t)),
+            lambda core=core: (core.reset(), core.run(t, acc, gyr, mag)),
+        )
+        best = [np.inf, np.inf]
+        for _ in range(9):
+            for k, run in enumerate(runs):
+                before = time.process_time()
+                run()
+                best[k] = min(best[k], time.process_time() - before)
+        ours, compiled = (len(t) / each for each in best)
+        print(f"{kind.__name__:<22}{ours:>12.3g}{compiled:>17.3g}{ours / compiled:>8.3f}")
+
+
 def live_and_many(t: np.ndarray, acc: np.ndarray, gyr: np.ndarray) -> None:
     names = ("accel", "gyro", "complementary", "kalman")
     few = 20_000
@@ -300,6 +319,7 @@ def main(rows: int) -> None:
         print(f"{label:<22}{ours:>12.3g}{theirs:>14.3g}{ours / theirs:>8.0f}{difference:>26.1e}")
     one_axis(rows, few)
     beside_others(t, acc, gyr, mag, start)
+    objects(t, acc, gyr, mag, start)
     live_and_many(t, acc, gyr)
 
 
