@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 
 import imufit
@@ -62,7 +61,7 @@ def with_bad(log: Log, sensor: str, kind: str, size: float, seed: int) -> Log:
         direction = rng.normal(size=3)
         bad[:] = size * direction / np.linalg.norm(direction)
     column[first : first + rows] = bad
-    return replace(log, **{sensor: column})
+    return log.with_fields(**{sensor: column})
 
 
 def apart(log: Log, name: str, found: np.ndarray, expected: np.ndarray) -> np.ndarray:

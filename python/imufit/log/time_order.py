@@ -20,6 +20,8 @@ COARSE_AT_MOST: Final = 0.02
 _PARTS: Final = 10
 _PARTS_AT_LEAST: Final = 4
 _KEPT_STEPS: Final = 100_000
+MOST_AT_ONE: Final = 10_000
+"""Rows at one stamp from which on the clock stands still: more than a second of the fastest sensors, at 8 kHz."""
 EVEN: Final = 0.9
 """Share of the clock's steps that have as many rows as their length says, by one row or a quarter. Of steps of a clock
 all do; 0.9 leaves room for rows that were lost."""
@@ -170,6 +172,7 @@ class TimeScan:
         self._next: list[NDArray[np.float64]] = []
         self._steps: list[NDArray[np.float64]] = []
         self._kept = 0
+        self._standing = 0
 
     def add(self, t: NDArray[np.float64], written: bool = False) -> None:
         """Take the next block of time stamps.
@@ -252,6 +255,10 @@ class TimeScan:
             self._rows.append(offset + found)
             self._stamps.append(t[found])
             self._next.append(np.append(t, np.nan)[found + 1])
+        ends = np.concatenate(([-1 - self._standing], np.flatnonzero(steps != 0.0), [steps.size]))
+        if np.diff(ends).max() > MOST_AT_ONE:
+            raise self.repeated()
+        self._standing = int(steps.size - 1 - ends[-2])
 
     def finish(self) -> TimeRepair:
         """Judge the repeated stamps once every block has been taken."""
@@ -304,8 +311,7 @@ class TimeScan:
         if stamps.size >= COARSE_AT_LEAST and bool(np.all(stamps == stamps.astype(np.float32))):
             digit = float(np.spacing(np.float32(stamp)))
             different = np.unique(stamps)
-            typical = float(np.median(np.diff(different))) if different.size > 1 else digit
-            if digit > 0.5 * typical:
+            if different.size > 1 and digit > 0.5 * float(np.median(np.diff(different))):
                 problem += f": t is in single precision (float32), which tells times of this size only to {digit:g} s"
                 remedy = "Write t as float64, or subtract the first time before it is rounded; record or export again."
         return self._place.error(problem, row=row, column="t", remedy=remedy)
