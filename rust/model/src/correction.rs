@@ -213,7 +213,7 @@ fn parts_of(sensor: Sensor, effects: &[(Arc<dyn Effect>, Vec<f64>)], log: &Log) 
 fn reads(parts: &[Part], sensor: Sensor, other: Sensor) -> (bool, bool) {
     let any = |of: fn(&Dependence) -> &[bool; 3], looking_back: bool| {
         let asked = parts.iter().filter(|p| !looking_back || p.looks_back());
-        asked.map(|p| of(&p.dependence)[other.index()]).any(|reads| reads)
+        asked.any(|p| of(&p.dependence)[other.index()])
     };
     (any(|d| &d.value, sensor == other), any(|d| &d.rate, false))
 }
