@@ -212,7 +212,7 @@ fn parts_of(sensor: Sensor, effects: &[(Arc<dyn Effect>, Vec<f64>)], log: &Log) 
 /// being solved for, unless they look back.
 fn reads(parts: &[Part], sensor: Sensor, other: Sensor) -> (bool, bool) {
     let any = |of: fn(&Dependence) -> &[bool; 3], looking_back: bool| {
-        let asked = parts.iter().filter(|p| !looking_back || p.looks_back());
+        let mut asked = parts.iter().filter(|p| !looking_back || p.looks_back());
         asked.any(|p| of(&p.dependence)[other.index()])
     };
     (any(|d| &d.value, sensor == other), any(|d| &d.rate, false))
