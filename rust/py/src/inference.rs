@@ -161,7 +161,9 @@ impl PyProblem {
         let (square, n) = training(&self.0, &step);
         let out = PyDict::new(py);
         let mut fitted = vec![false; p];
-        chosen.iter().for_each(|k| fitted[*k] = true);
+        for k in &chosen {
+            fitted[*k] = true;
+        }
         out.set_item("parameters", parameters)?;
         out.set_item("step", PyArray1::from_vec(py, own))?;
         out.set_item("covariance", PyArray2::from_vec2(py, &covariance)?)?;
