@@ -58,6 +58,11 @@ class Motion:
         return made.run(self.t, self.acc, self.gyr, self.mag)
 
 
+def turn_behind(name: str, motion: Motion) -> float:
+    """How far a filter is behind by its own equations: Madgwick's (42) compares a row with the attitude of the row before."""
+    return float(np.linalg.norm(motion.gyr, axis=1).max() * np.diff(motion.t).max()) if name == "madgwick" else 0.0
+
+
 def test_the_rate_of_the_synthetic_motion_is_the_body_rate() -> None:
     motion = Motion(dt=0.001)
     steps = (motion.truth[:-1].inv() * motion.truth[1:]).as_rotvec() / 0.001
@@ -235,10 +240,11 @@ def test_every_filter_follows_ideal_readings(name: str) -> None:
     motion = Motion(3000, dt=0.005, frame="ENU")
     q, skipped = motion.run(name, initial=scalar_first(motion.truth[0])[0].tolist())
     errors = _imufit.attitude_errors(q, scalar_first(motion.truth))
+    allowed = 2e-3 + turn_behind(name, motion)
     assert skipped == {}
-    assert errors[:, 2].max() < 2e-3  # inclination
+    assert errors[:, 2].max() < allowed  # inclination
     if name != "accel":
-        assert errors[:, 0].max() < 2e-3
+        assert errors[:, 0].max() < allowed
 
 
 def spoiled_column(rng: np.random.Generator, column: np.ndarray) -> np.ndarray:
@@ -380,7 +386,7 @@ class TestRules:
         q, skipped = motion.run(name, initial=scalar_first(motion.truth[0])[0].tolist())
         assert skipped == {"free_fall": 100}
         if name not in ("accel", "triad", "quest"):
-            assert angles(motion.truth, rotation_of(q)).max() < 5e-3
+            assert angles(motion.truth, rotation_of(q)).max() < 5e-3 + turn_behind(name, motion)
 
     def test_the_start_takes_both_vectors_then_one_then_none(self) -> None:
         motion = Motion(500)

@@ -267,15 +267,15 @@ def test_the_file_of_a_model_keeps_bounds_and_refuses_what_cannot_be(tmp_path):
 
 def test_a_second_effect_of_one_name_is_refused():
     @imufit.effect("gyr.twice", parameters={"k": "1"})
-    def first(w):
-        return w.omega
+    def first(w, k):
+        return k * w.omega
 
     try:
         with pytest.raises(InputError, match="defined already") as caught:
 
             @imufit.effect("gyr.twice", parameters={"k": "1"})
-            def second(w):
-                return w.f
+            def second(w, k):
+                return k * w.omega
 
         assert "forget_effect" in caught.value.remedy
         with pytest.raises(InputError, match="built in"):

@@ -16,8 +16,9 @@
 //!
 //! The Earth's frame of the paper has x along the field's horizontal part and z up; the filter keeps its attitude there and
 //! turns the result into the reference frame. The equations are the paper's: a step adds and renormalises, so that a turn
-//! by `a` in one step comes out as `2 atan(a / 2)`, which is less by `a^3 / 12` (1 rad/s at 100 Hz: 1.7 deg in an hour without directions). What the
-//! paper leaves open:
+//! by `a` in one step comes out as `2 atan(a / 2)`, which is less by `a^3 / 12` (1 rad/s at 100 Hz: 1.7 deg in an hour without directions). The
+//! descent compares the readings with the attitude of the row before, as in (42): in motion the attitude lags by up to
+//! one row. What the paper leaves open:
 //!
 //! - The rate is the mean of both rows, as for every filter here ([`crate::intake`]).
 //! - A direction that is slower than the log counts for the time since its last reading: gradients are weighed by these times,
