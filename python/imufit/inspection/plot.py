@@ -144,7 +144,7 @@ class _Drawn:
                     "there is no such column of numbers",
                     file=log.path,
                     column=name,
-                    remedy=f"Did you mean {near[0]}?" if near else "imufit info lists the columns.",
+                    remedy=f"Did you mean {near[0]}?" if near else f"The columns are {', '.join(list(numbers)[:12])}.",
                 )
         return {name: self._trace(name, 1) for name in columns}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import shlex
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -20,6 +19,7 @@ from imufit.log.place import Place
 from imufit.log.units import Conversion, conversion, unit_in_header
 from imufit.log.words import meant, nearest
 from imufit.printable import NAME, printable
+from imufit.remedy import Remedy
 
 ROW: Final = "row"
 """Name that stands for the row number in a mapping, when the file has no column of that name."""
@@ -260,7 +260,7 @@ def _to_si(target: str, unit: str, place: Place) -> Conversion:
     try:
         return conversion(target, unit)
     except InputError as error:
-        raise place.error(error.problem, column=error.column, remedy=error.remedy) from None
+        raise place.error(error.problem, column=error.column, remedy=error.advice) from None
 
 
 def _planned(
@@ -306,7 +306,10 @@ def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place,
     if not complete and "ref_angle" not in targets and not bare:
         raise place.error(
             "there is no sensor: neither acc_x acc_y acc_z nor gyr_* nor mag_* nor a reference ref_q*",
-            remedy="Name the columns with --map acc_x=COLUMN[UNIT] and so on." + _listing(free),
+            remedy="Name the columns with "
+            + place.mapped({f"acc_{axis}": "COLUMN[UNIT]" for axis in "xyz"})
+            + "."
+            + _listing(free),
         )
 
 
@@ -314,21 +317,20 @@ def _missing(missing: dict[str, str], targets: Sequence[str], place: Place) -> I
     """Error for the first missing column, with the mapping for all of them."""
     first = min(missing, key=CONTRACT.index)
     known = {column: name for column, name in missing.items() if name}
-    pairs = ",".join(f"{column}={known[column]}" for column in sorted(known, key=CONTRACT.index))
+    pairs = {column: known[column] for column in sorted(known, key=CONTRACT.index)}
     if not missing[first]:
         group = next((group for group in GROUPS.values() if first in group), ())
         there = [column for column in group if column in targets]
         problem = f"column {first} is missing" + (f" although {' and '.join(there)} are there" if there else "")
-        remedy = f"Add it, or leave out the others of {', '.join(group)}."
+        remedy = Remedy.of(f"Add it, or leave out the others of {', '.join(group)}.")
         if first == "t":
-            rate = f"t=row[100Hz],{pairs}" if pairs else "t=row[100Hz]"
-            remedy = f"Give time in s, for a fixed rate with --map {shlex.quote(rate) if pairs else rate}."
+            remedy = "Give time in s, for a fixed rate with " + place.mapped({"t": "row[100Hz]", **pairs}) + "."
             remedy += "" if pairs or set(targets) & set(CONTRACT) else _listing(targets)
         return place.error(problem, column=first, remedy=remedy)
     return place.error(
         f"column {first} is missing; did you mean {missing[first]}?",
         column=first,
-        remedy=f"Use --map {shlex.quote(pairs)}",
+        remedy="Use " + place.mapped(pairs),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +29,7 @@ from imufit.log.unit_check import HEAD, Clock, check_units
 from imufit.log.unmeasured import Unmeasured
 from imufit.log.writer import write_rows
 from imufit.printable import NAME, printable
+from imufit.remedy import Remedy
 
 
 class LogStream:
@@ -69,7 +71,7 @@ class LogStream:
 
     @classmethod
     def of_source(
-        cls, source: Source, metadata: Metadata, mapping: Mapping[str, str] | None = None, clock: Clock = "open"
+        cls, source: Source, metadata: Metadata, reading: Reading | None = None, clock: Clock = "open"
     ) -> Self:
         """Make the log of a source that is no file.
 
@@ -79,13 +81,13 @@ class LogStream:
             A table in memory.
         metadata : Metadata
             Frame, gravity and so on.
-        mapping : mapping, optional
-            Source text for target columns.
+        reading : Reading, optional
+            How the table is to be read, where it does not say so itself.
         clock : "open" or "a log's"
             Whether the source says of itself that it is a log, so that its time is in seconds.
         """
         log = cls.__new__(cls)
-        log._begin(source, None, metadata, {}, clock, Reading(mapping), bare=False)
+        log._begin(source, None, metadata, {}, clock, reading or Reading(), bare=False)
         return log
 
     def _begin(
@@ -252,11 +254,16 @@ class LogStream:
         share = min(held / self.size, kept / made)
         rows = int(self.n * share)
         more_words = f", or allow more with {option} {math.ceil(gigabytes / share)}" if option else ""
+        whole = "" if self._path is None else f"imufit.open_log({str(self._path)!r}, stream=True)"
         file = self._path or Path("log.parquet")
         part = file.with_name(f"{file.stem}-part.parquet")
         raise self._place.error(
             f"{self.n} rows take {size_in_words(made)} of memory, and this needs all of them at once",
-            remedy=f"Take a part: imufit convert {file} --rows 0:{rows} -o {part}{more_words}",
+            remedy="Take a part: "
+            + Remedy(
+                f"next({whole or 'log'}.chunks({rows})).core",
+                f"imufit convert {shlex.quote(str(file))} --rows 0:{rows} -o {shlex.quote(str(part))}{more_words}",
+            ),
         )
 
     def write(self, path: str | Path) -> None:
