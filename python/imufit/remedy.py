@@ -137,6 +137,17 @@ def mapped(columns: Mapping[str, str], shell: str = "--map") -> Remedy:
     return Remedy(f"mapping={dict(columns)!r}", f"{shell} {quoted}")
 
 
+def template(sensor: str) -> Remedy:
+    """Show how the columns of a sensor are named, where nothing is known of what they are called.
+
+    Parameters
+    ----------
+    sensor : str
+        Its prefix, such as ``acc``.
+    """
+    return Remedy(f"mapping={{'{sensor}_x': 'COLUMN[UNIT]', ...}}", f"--map {sensor}_x=COLUMN[UNIT],...")
+
+
 def reading(file: str | Path | None, how: Remedy) -> Remedy:
     """Name the call that reads a log in another way; the command line has the option alone.
 

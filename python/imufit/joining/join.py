@@ -22,7 +22,7 @@ from imufit.joining.search import FASTER, LEAST_OVERLAP, Candidate, Correlation
 from imufit.log import Log
 from imufit.log.assemble import attitude_of_rig
 from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
-from imufit.remedy import Remedy, mapped, option, reading, when_read
+from imufit.remedy import Remedy, mapped, option, reading, template, when_read
 
 Array = NDArray[np.float64]
 
@@ -140,7 +140,7 @@ def _join_positions(log: Log, reference: Log, lag: float | None, skew: float | N
             "the log has no accelerometer, and only the specific force shows when positions were accelerated",
             file=log.path or "log",
             column="acc_x",
-            remedy="Record the accelerometer too, or name its columns, such as " + _columns("acc") + ".",
+            remedy="Record the accelerometer too, or name its columns, such as " + when_read(template("acc")) + ".",
         )
     assert reference.ref_p is not None
     rows = _ascending(reference, np.asarray(np.isfinite(reference.ref_p).all(axis=1)))
@@ -199,7 +199,7 @@ def _courses(log: Log, reference: Log) -> tuple[Course, Course, NDArray[np.intp]
             "the log has no gyroscope, and only its rates show when the reference turned",
             file=log.path or "log",
             column="gyr_x",
-            remedy="Record the gyroscope too, or name its columns, such as " + _columns("gyr") + ".",
+            remedy="Record the gyroscope too, or name its columns, such as " + when_read(template("gyr")) + ".",
         )
     if reference.ref_q is None or not reference.has_reference.sum() > 1:
         raise InputError(
@@ -244,11 +244,6 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
             + _with_lag(second),
         )
     return best, found.rival
-
-
-def _columns(sensor: str) -> Remedy:
-    """Name a mapping of the columns of a sensor."""
-    return when_read(mapped({f"{sensor}_{axis}": "COLUMN[UNIT]" for axis in "xyz"}))
 
 
 def _with_lag(found: Placed) -> Remedy:

@@ -19,7 +19,7 @@ from imufit.log.place import Place
 from imufit.log.units import Conversion, conversion, unit_in_header
 from imufit.log.words import meant, nearest
 from imufit.printable import NAME, printable
-from imufit.remedy import Remedy
+from imufit.remedy import Remedy, reading, template
 
 ROW: Final = "row"
 """Name that stands for the row number in a mapping, when the file has no column of that name."""
@@ -306,10 +306,7 @@ def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place,
     if not complete and "ref_angle" not in targets and not bare:
         raise place.error(
             "there is no sensor: neither acc_x acc_y acc_z nor gyr_* nor mag_* nor a reference ref_q*",
-            remedy="Name the columns with "
-            + place.mapped({f"acc_{axis}": "COLUMN[UNIT]" for axis in "xyz"})
-            + "."
-            + _listing(free),
+            remedy="Name the columns with " + reading(place.file, template("acc")) + "." + _listing(free),
         )
 
 
