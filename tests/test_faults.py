@@ -83,8 +83,7 @@ def test_signed_permutations_are_undone_by_their_mapping() -> None:
     for matrix in PERMUTATIONS[1:]:
         shown = dict(zip(("gyr_x", "gyr_y", "gyr_z"), matrix @ y, strict=True))
         undone = dict(shown)
-        for part in fault_words.mapping("gyr", matrix).split(","):
-            target, source = part.split("=")
+        for target, source in fault_words.mapping("gyr", matrix).items():
             undone[target] = shown[source.lstrip("-")] * (-1.0 if source.startswith("-") else 1.0)
         np.testing.assert_allclose(list(undone.values()), y)
     assert np.array_equal(PERMUTATIONS[0], np.eye(3))

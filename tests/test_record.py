@@ -371,7 +371,7 @@ def test_nothing_is_overwritten(pty, tmp_path):
         record(pty.port, log, duration=0.1)
     log.unlink()
     part.write_text("precious")
-    with pytest.raises(InputError, match=r"Run imufit recover .*a\.parquet\.part first"):
+    with pytest.raises(InputError, match=r"Run imufit.devices.record.recover\('.*a\.parquet\.part'\) first"):
         record(pty.port, log, duration=0.1, force=True)
     assert part.read_text() == "precious"
     (tmp_path / "b.toml").write_text("effects = []")
@@ -432,7 +432,7 @@ def test_a_log_that_cannot_be_written_leaves_the_part_and_names_the_command(pty,
     pty.send(device.announce() + device.samples(range(30)))
     recorder.until(lambda: recorder.seen == 30)
     monkeypatch.setattr(imufit.whole_file.os, "fsync", full)
-    with pytest.raises(InputError, match=r"30 rows are safe in .*a\.parquet\.part.*Make room, then run imufit recover"):
+    with pytest.raises(InputError, match=r"30 rows are safe in .*a\.parquet\.part.*Make room, then run imufit.devices.record.recover"):
         recorder.result()
     assert [file.name for file in tmp_path.iterdir()] == ["a.parquet.part"], "nothing half-made is left"
     monkeypatch.undo()
