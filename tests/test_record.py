@@ -432,7 +432,9 @@ def test_a_log_that_cannot_be_written_leaves_the_part_and_names_the_command(pty,
     pty.send(device.announce() + device.samples(range(30)))
     recorder.until(lambda: recorder.seen == 30)
     monkeypatch.setattr(imufit.whole_file.os, "fsync", full)
-    with pytest.raises(InputError, match=r"30 rows are safe in .*a\.parquet\.part.*Make room, then run imufit.devices.record.recover"):
+    with pytest.raises(
+        InputError, match=r"30 rows are safe in .*a\.parquet\.part.*Make room, then run imufit.devices.record.recover"
+    ):
         recorder.result()
     assert [file.name for file in tmp_path.iterdir()] == ["a.parquet.part"], "nothing half-made is left"
     monkeypatch.undo()

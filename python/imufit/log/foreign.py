@@ -208,7 +208,7 @@ def plan_columns(
 
 def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> PlannedColumn:
     """Find the column, sign and unit, or the constant, that a mapping's source text means."""
-    bare, unit = _bracket(text)
+    bare, unit = bracket(text)
     if target == "t":
         for name, order in ((text.strip(), ""), (bare, unit)):
             day, _, clock = name.partition(BETWEEN)
@@ -217,7 +217,7 @@ def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> Plan
         if unit in ORDERS and bare in names:
             return PlannedColumn("t", bare, Conversion(), order=unit)
     for name, given in ((text.strip(), None), (bare, unit)):
-        for sign, given_name in _signed(name):
+        for sign, given_name in signed(name):
             column = given_name
             if column not in names:
                 column = _named_otherwise(given_name, names) or column
@@ -272,13 +272,26 @@ def _planned(
     return PlannedColumn(target, column if column in names else RowNumber(), to_si)
 
 
-def _bracket(text: str) -> tuple[str, str]:
-    """Split ``AccX[g]`` into the name and the unit."""
+def bracket(text: str) -> tuple[str, str]:
+    """Split ``AccX[g]`` into the name and the unit.
+
+    Parameters
+    ----------
+    text : str
+        Source of a column in a mapping.
+    """
     found = re.fullmatch(r"(.*?)\s*\[([^\[\]]*)\]\s*", text)
     return (found[1].strip(), found[2]) if found else (text.strip(), "")
 
 
-def _signed(name: str) -> list[tuple[float, str]]:
+def signed(name: str) -> list[tuple[float, str]]:
+    """Return every sign and name that a source without its unit may mean: a name may begin with a sign.
+
+    Parameters
+    ----------
+    name : str
+        Source of a column in a mapping, without its unit.
+    """
     if name[:1] in "+-" and name[1:]:
         return [(1.0, name), (-1.0 if name[0] == "-" else 1.0, name[1:].strip())]
     return [(1.0, name)]

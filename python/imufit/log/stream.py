@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from imufit.log.assemble import check_truth_values, fields_of, time_of
 from imufit.log.columns import CONTRACT, EULER
+from imufit.log.completed import completed
 from imufit.log.cut import cut
 from imufit.log.foreign import plan_columns
 from imufit.log.log import HEAD_ROWS, LINE, Chunk, Log, concatenate, gathered
@@ -102,9 +103,10 @@ class LogStream:
     ) -> None:
         self._path, self._source, self._metadata = path, source, reading.metadata(metadata)
         self._place = Place(path, source.line_of)
-        names, mapping = source.names, reading.mapping
-        dropped = reading.dropped(names, [*CONTRACT, *EULER, *(mapping or {})], self._place)
-        found = recognise(_Left(source, dropped) if dropped else source, mapping, self._place)
+        names = source.names
+        dropped = reading.dropped(names, [*CONTRACT, *EULER, *(reading.mapping or {})], self._place)
+        left = _Left(source, dropped) if dropped else source
+        found = recognise(left, completed(reading.mapping, left, self._place), self._place)
         dropped = reading.dropped(names, found.mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
         self._plan = plan_columns(
