@@ -235,10 +235,10 @@ def test_swapped_axes_of_a_calibration(tmp_path: Path) -> None:
     restored = imufit.Log.from_dataframe(turned, mapping=mapping)
     np.testing.assert_array_equal(restored.acc, recorded.acc)
     turned.write(tmp_path / "a.parquet")
-    code, _, err = program("calibrate", str(tmp_path / "a.parquet"))
+    code, _, err = program("calibrate", str(tmp_path / "a.parquet"), "--sensor", "acc")
     assert code == 2
     (shell,) = shell_mappings(err)
-    assert program("calibrate", str(tmp_path / "a.parquet"), "--map", shell)[0] == 0
+    assert program("calibrate", str(tmp_path / "a.parquet"), "--sensor", "acc", "--map", shell)[0] == 0
 
 
 def test_a_refused_join_names_lag_and_attitude_in_both(tmp_path: Path) -> None:

@@ -176,11 +176,10 @@ def skew(lag: float, rate: float, correlation: float, declared: float, path: Pat
 def _joined(path: Path | None, lag: float, rate: float | None = None) -> Remedy:
     """Name the call that joins a log with itself: its reference is moved by a lag, s, and a rate of its clock."""
     python, shell = ("log", "LOG") if path is None else (repr(str(path)), shlex.quote(str(path)))
-    skews = ("", "") if rate is None else (f", skew={rate:.6f}", f" --skew {1e6 * rate:.0f}")
-    return Remedy(
-        f"imufit.join({python}, {python}, lag={lag:.4f}{skews[0]}).log",
-        f"imufit join {shell} {shell} --lag {lag:.4f}{skews[1]} -o joined.parquet",
-    )
+    known = Remedy(f"imufit.join({python}, {python}, lag={lag:.4f}", f"imufit join {shell} {shell} --lag {lag:.4f}")
+    if rate is not None:
+        known += Remedy(f", skew={rate:.6f}", f" --skew {1e6 * rate:.0f}")
+    return known + Remedy(").log", " -o joined.parquet")
 
 
 def another_motion(declared: float, lags: Sequence[tuple[float, float]], *, fits: bool) -> Words:
