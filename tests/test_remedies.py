@@ -18,14 +18,16 @@ import imufit
 import numpy as np
 import pandas as pd
 import pytest
+from imufit.cli.app import imufit as group
 from imufit.cli.app import main
 from imufit.errors import InputError
 from imufit.remedy import Reader, Remedy, mapped, option, told_to
 from pasted import call_of, python_mappings, shell_mappings
 
 G = 9.80665
-OPTION = re.compile(r"--[a-z]")
-"""What no message to a Python user holds."""
+COMMANDS = sorted(group.list_commands(None))
+OPTION = re.compile(rf"--[a-z]|\bimufit ({'|'.join(map(re.escape, COMMANDS))})\b")
+"""What no message to a Python user holds: an option, or a command of the program."""
 SOURCES = Path(imufit.__file__).parent
 
 
@@ -322,7 +324,7 @@ def test_options_of_the_command_line_stand_in_remedies_alone() -> None:
 
 def _texts(tree: ast.AST) -> list[ast.Constant]:
     """Constants of text that are neither docstrings nor within a call that makes a remedy."""
-    makers = ("Remedy", "mapped", "option", "keyword", "template", "recovering")
+    makers = ("Remedy", "mapped", "option", "keyword", "template", "recovering", "command")
     out: list[ast.Constant] = []
 
     def walk(node: ast.AST) -> None:

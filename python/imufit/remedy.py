@@ -77,6 +77,19 @@ class Remedy:
         return self.python if _reader is Reader.PYTHON else self.shell
 
 
+def command(name: str, call: str | None = None) -> Remedy:
+    """Name a command and what asks the same in Python, such as ``imufit.diagnose`` and ``imufit diagnose``.
+
+    Parameters
+    ----------
+    name : str
+        Of the command.
+    call : str, optional
+        What it is in Python, where that is no function of the same name.
+    """
+    return Remedy(f"imufit.{name}" if call is None else call, f"imufit {name}")
+
+
 def keyword(name: str) -> Remedy:
     """Name a keyword argument and the option of the same name without a value, such as ``baud`` and ``--baud``.
 

@@ -19,7 +19,7 @@ from imufit.log.rows_of_kinds import recording_of_instances, recording_of_kinds
 from imufit.log.tables import TablesSource
 from imufit.log.text import TEXT_SUFFIXES, looks_like_text, open_text
 from imufit.log.unpacked import COMPRESSED, is_utf_16, open_unpacked
-from imufit.remedy import Remedy, recovering
+from imufit.remedy import command, recovering
 
 SUFFIXES: Final = (".parquet", ".npz", *TEXT_SUFFIXES)
 
@@ -109,7 +109,7 @@ def open_source(path: Path) -> Source:
                 f"the suffix {suffix or '(none)'} is not a log's, and the file is no text",
                 file=path,
                 remedy=f"Logs are {', '.join(SUFFIXES)}: export it as text, of which "
-                + Remedy("imufit.read", "imufit convert")
+                + command("convert", "imufit.read")
                 + " makes a log.",
             )
         if (found := recording_of_kinds(path)) is not None:

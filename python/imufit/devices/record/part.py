@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from imufit.devices.record.arrived import Announced, Arrived
 from imufit.errors import InputError
-from imufit.remedy import Remedy
+from imufit.remedy import command
 
 try:
     import fcntl
@@ -318,7 +318,7 @@ def _read(path: Path, data: Any, size: int) -> Part | None:
         raise InputError(
             "this is no part of a recording",
             file=path,
-            remedy=Remedy("imufit.devices.record.record", "imufit record") + " writes LOG.part while it runs.",
+            remedy=command("record", "imufit.devices.record.record") + " writes LOG.part while it runs.",
         )
     try:
         about = json.loads(metadata[_KEY])
