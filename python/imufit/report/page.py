@@ -167,9 +167,9 @@ def _next_step(diagnosis: Diagnosis | None, ladder: Ladder | None) -> str:
         return f"Ask which effect is missing: `{command('diagnose')}`."
     found = "; ".join(str(item) for item in diagnosis.unexplained)
     rivals = " and ".join(diagnosis.ambiguous_with)
+    add = command("add", "Fit.add")
     steps = {
-        "missing": f"Add {diagnosis.best} with `{command('add', 'Fit.add')}`, or let `{command('ladder')}` go on until nothing is "
-        "missing.",
+        "missing": f"Add {diagnosis.best} with `{add}`, or let `{command('ladder')}` go on until nothing is missing.",
         "unknown": f"Find what couples in here: {found}." if found else "Look at the worst segments.",
         "ambiguous": f"Record a log with another motion or temperature profile, so that {rivals} can be told apart.",
         "adequate": "Use the model as it stands. Record another log of this sensor to check it."
