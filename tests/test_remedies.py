@@ -22,7 +22,13 @@ from imufit.cli.app import imufit as group
 from imufit.cli.app import main
 from imufit.errors import InputError
 from imufit.lab.simulate.sealed import HEADER
+from imufit.log import parse_mapping
 from imufit.remedy import Reader, Remedy, mapped, option, told_to
+from join_pairs import repetitive
+from mistakes.catalogue import CATALOGUE, Mistake, Need
+from mistakes.catalogue import Remedy as Wanted
+from mistakes.judge import write
+from mistakes.sound import Sound, simulated
 from pasted import call_of, python_mappings, shell_mappings
 
 G = 9.80665
@@ -84,6 +90,8 @@ def foreign(swapped: bool = True) -> pd.DataFrame:
     )
 
 
+MAPPED = [row for row in CATALOGUE if row.remedy is Wanted.MAPPING and not row.needs & {Need.STILL, Need.ANGLE}]
+"""Mistakes of a moving sensor that a mapping undoes."""
 FILES: dict[str, Callable[[], pd.DataFrame]] = {
     "accelerometer in g": lambda: scaled("acc_", 1 / G),
     "accelerometer in counts": lambda: scaled("acc_", 16384 / G),
@@ -203,6 +211,30 @@ def test_a_fault_of_the_data_has_both_remedies_and_both_cure(name: str, tmp_path
     assert '"data_faults": []' in json.read_text()
 
 
+@pytest.mark.parametrize("mistake", MAPPED, ids=lambda row: row.id)
+def test_no_mistake_is_answered_with_an_option_in_python(mistake: Mistake, motion: Sound, tmp_path: Path) -> None:
+    spoilt = mistake.spoil(motion.log.rows(slice(0, 1200)), np.random.default_rng(7))
+    assert spoilt is not None
+    said = answered(write(spoilt, tmp_path / "log.csv"))
+    assert not OPTION.search(said), said
+    for mapping in python_mappings(said):
+        # whether it restores the readings is judged elsewhere: here it is one that can be read
+        assert parse_mapping(*(f"{target}={source}" for target, source in mapping.items())) == mapping
+
+
+def answered(path: Path) -> str:
+    """What Python is told about a log: a result as it is printed, or a refusal."""
+    try:
+        return str(imufit.compare(path))
+    except InputError as error:
+        return str(error)
+
+
+@pytest.fixture(scope="module")
+def motion(tmp_path_factory: pytest.TempPathFactory) -> Sound:
+    return simulated("handheld", 2, tmp_path_factory.mktemp("motion"))
+
+
 def test_a_frame_is_named_as_keyword_and_as_option(tmp_path: Path) -> None:
     path = written(fresh(), tmp_path / "a.csv")
     (fault,) = imufit.diagnose(imufit.read(path, frame="ENU")).data_faults
@@ -264,6 +296,39 @@ def test_a_refused_join_names_lag_and_attitude_in_both(tmp_path: Path) -> None:
         imufit.join(bare.with_fields(gyr=None), log)
     assert "mapping={'gyr_x': 'COLUMN[UNIT]', ...}" in str(caught.value)
     assert "--map gyr_x=COLUMN[UNIT],..." in str(caught.value.shell_remedy)
+
+
+@pytest.mark.parametrize("seed", [3101, 3102])
+def test_an_ambiguous_lag_is_given_as_python_and_as_the_command_line_are_told(seed: int, tmp_path: Path) -> None:
+    one = repetitive(seed)
+    log = imufit.Log(t=one.t, acc=one.acc, gyr=one.gyr)
+    reference = imufit.Log(t=one.ref_t, ref_q=one.ref_q, frame="ENU")
+    with pytest.raises(InputError, match="the lag is ambiguous") as caught:
+        imufit.join(log, reference)
+    assert not OPTION.search(str(caught.value))
+    for lag in re.findall(r"lag=(-?[\d.]+\d)", str(caught.value)):
+        assert imufit.join(log, reference, lag=float(lag)).lag == float(lag)
+    files = [str(tmp_path / "a.parquet"), str(tmp_path / "b.parquet")]
+    log.write(files[0])
+    reference.write(files[1])
+    out = str(tmp_path / "c.parquet")
+    code, _, err = program("join", *files, "-o", out)
+    assert code == 2
+    lags = re.findall(r"--lag (-?[\d.]+\d)", err)
+    assert len(lags) == 2
+    for lag in lags:
+        assert program("join", *files, "-o", out, "--lag", lag)[0] == 0
+
+
+def test_notes_name_the_option_to_the_command_line_alone(tmp_path: Path) -> None:
+    path = written(fresh().assign(temp=sound()["temp"] + 273.15), tmp_path / "a.csv")
+    (note,) = [note for note in imufit.read(path).notes if "kelvin" in note]
+    assert not OPTION.search(note)
+    (mapping,) = python_mappings(note)
+    assert np.nanmedian(imufit.read(path, mapping=mapping).temp) < 100.0
+    code, out, _ = program("convert", str(path), "-o", str(tmp_path / "b.parquet"))
+    assert code == 0
+    assert shell_mappings(" ".join(out.split())) == ["temp=temp[K]"]
 
 
 def test_an_error_survives_its_way_from_a_worker_with_both_remedies() -> None:

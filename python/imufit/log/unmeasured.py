@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from imufit.log.columns import GROUPS, LARGEST, LARGEST_COVARIATE, SENSORS, SMALLEST, UNITS
 from imufit.log.place import Place
-from imufit.remedy import Remedy, mapped
+from imufit.remedy import Remedy, when_read
 
 Array = NDArray[np.float64]
 
@@ -121,7 +121,7 @@ class Unmeasured:
             problem = f"{value} is not a reading"
         elif target in LARGEST:
             problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that {target} can measure"
-            remedy += " Or is it another unit? Name it, as in " + mapped({target: f"{seen.name}[UNIT]"}) + "."
+            remedy += " Or is it another unit? " + when_read(Remedy("mapping=", "--map")) + " takes it."
         else:
             problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that is measured"
         raise self._place.error(problem, row=row, column=seen.name, remedy=remedy)

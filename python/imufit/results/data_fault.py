@@ -64,12 +64,10 @@ class DataFault(Part):
     file: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of one fault; the key ``file`` only where there are several logs."""
+        """JSON of one fault, its remedy in the shell's words; the key ``file`` only where there are several logs."""
         names = [name for name in self.__dataclass_fields__ if name != "file" or self.file is not None]
-        return {
-            "remedy" if name == "advice" else name: self.remedy if name == "advice" else json_value(getattr(self, name))
-            for name in names
-        }
+        values = {"remedy" if name == "advice" else name: json_value(getattr(self, name)) for name in names}
+        return values | {"remedy": self.shell_remedy}
 
     @property
     def remedy(self) -> str:
