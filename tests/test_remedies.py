@@ -232,7 +232,7 @@ def answered(path: Path) -> str:
 
 @pytest.fixture(scope="module")
 def motion(tmp_path_factory: pytest.TempPathFactory) -> Sound:
-    return simulated("handheld", 2, tmp_path_factory.mktemp("motion"))
+    return simulated("arm", 2, tmp_path_factory.mktemp("motion"))
 
 
 def test_a_frame_is_named_as_keyword_and_as_option(tmp_path: Path) -> None:
