@@ -141,13 +141,13 @@ def mapped(columns: Mapping[str, str], shell: str = "--map") -> Remedy:
     columns : mapping
         Source text for each column of the log.
     shell : str
-        The option, where it is another one.
+        The option, where it is another one; empty where it was named before.
     """
     text = ",".join(f"{target}={source}" for target, source in columns.items())
     quoted = shlex.quote(text)
     # Also where a shell needs no quotes: they show where the mapping ends and the sentence goes on.
     quoted = f"'{text}'" if quoted == text else quoted
-    return Remedy(f"mapping={dict(columns)!r}", f"{shell} {quoted}")
+    return Remedy(f"mapping={dict(columns)!r}", f"{shell} {quoted}".lstrip())
 
 
 def template(sensor: str) -> Remedy:

@@ -257,7 +257,8 @@ def _other_clock(seen: str, unit: str, place: Place, column: str) -> InputError:
 
 def _time_from(source: str, column: str, place: Place) -> Remedy:
     """Name the source of the time that is likely, and the one for a time in s."""
-    return "Use " + place.mapped({"t": source}) + ", or " + mapped({"t": f"{column}[s]"}) + " if it is s."
+    in_seconds = mapped({"t": f"{column}[s]"}, shell="")
+    return "Use " + place.mapped({"t": source}) + ", or " + in_seconds + " if it is s."
 
 
 def rest_norm(acc: Array, rows: int = 50, relative: bool = True) -> float:
