@@ -54,7 +54,7 @@ def answer(path: Path) -> str:
     try:
         return f"read: {held(read(path))}"
     except InputError as error:
-        maps = re.findall(r"--map (?:'([^']*)'|(\S+?)\.?(?:\s|$))", error.remedy or "")
+        maps = re.findall(r"--map (?:'([^']*)'|(\S+?)\.?(?:\s|$))", error.shell_remedy or "")
         # a message without a proposal shows how a mapping is written
         maps = [one or other for one, other in maps if "COLUMN" not in other]
         if len(maps) != 1:

@@ -351,7 +351,7 @@ def check(device, world, taken, said):
         _recovered(device, world, taken, _cut(world, taken))
     elif taken.ended == "full":
         if not log.exists() and part.parts_of(log):
-            assert "imufit recover" in said, said
+            assert "imufit.devices.record.recover(" in said, said
             _recovered(device, world, taken, taken.ended_at)
         elif log.exists():
             _compared(device, taken, read(log), taken.ended_at)

@@ -11,6 +11,7 @@ from imufit.lab.simulate import simulate
 from imufit.log import parse_mapping
 from imufit.model.effect_stack import EffectStack
 from imufit.results import DataFault
+from pasted import python_mappings, shell_mappings
 
 DEG = np.pi / 180.0
 
@@ -45,7 +46,8 @@ def test_the_mapping_restores_the_columns(change, words) -> None:
         return
     (fault,) = found
     assert words in f"{fault.evidence} {fault.remedy}"
-    mapping = parse_mapping(fault.remedy.split("'")[1])
+    mapping = python_mappings(fault.remedy)[0]
+    assert mapping == parse_mapping(shell_mappings(fault.shell_remedy)[0])
     restored = Log.from_dataframe(table, log.metadata.to_mapping(), mapping=mapping).to_dataframe()
     for name in change:
         np.testing.assert_allclose(restored[name], right[name], rtol=1e-6, atol=1e-9)

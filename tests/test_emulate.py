@@ -202,7 +202,7 @@ def test_link_points_to_the_terminal_that_is_there_now(tmp_path):
 
 
 def test_line_carries_a_tenth_of_its_baud_rate_in_bytes():
-    with pytest.raises(InputError, match=r"Use --rate 213, which is the highest that fits") as refused:
+    with pytest.raises(InputError, match=r"Use rate=213.0, which is the highest that fits") as refused:
         Emulator("handheld", rate=214.0, baud=115200)
     assert "carries 11520" in str(refused.value)
     highest = Emulator("handheld", rate="max", baud=115200, duration=2.0)
@@ -256,9 +256,9 @@ def test_other_texts_are_no_faults(text):
         ({"form": "xml"}, "binary, text"),
         ({"speed": 0.0}, "speed"),
         ({"duration": 0.0}, "duration"),
-        ({"rate": "max"}, "Give --baud"),
-        ({"faults": ["unplug@1"]}, "Give --link"),
-        ({"fault_rates": {"unplug": 1.0}}, "Give --link"),
+        ({"rate": "max"}, "Give baud"),
+        ({"faults": ["unplug@1"]}, "Give link"),
+        ({"fault_rates": {"unplug": 1.0}}, "Give link"),
         ({"fault_rates": {"fire": 1.0}}, "'fire' is not known"),
         ({"on": "socket://10.0.0.1:5"}, "not this machine"),
         ({"on": "/dev/ttyUSB0"}, "Use pty or socket"),

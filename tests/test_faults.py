@@ -12,6 +12,7 @@ from imufit.faults import row_faults
 from imufit.faults.frames import PERMUTATIONS
 from imufit.lab.simulate import FAULTS, simulate, with_fault
 from imufit.results import fault_words
+from pasted import python_mappings
 from scipy.spatial.transform import Rotation
 
 GLOBAL = [
@@ -43,11 +44,9 @@ def test_what_spoils_a_log_is_named_instead_of_an_effect(fault: str) -> None:
 def mapped(log: Log, remedy: str) -> Log:
     """Apply the mapping of columns that a remedy names, without units."""
     table = log.to_dataframe()
-    text = remedy.partition("--map ")[2].strip("'.").split("'")[0].split(" ")[0].strip(".,")
-    pairs = [part.split("=") for part in text.split(",")]
-    for _target, source in pairs:
-        assert "[" not in source
-    new = {target: table[s.lstrip("-")] * (-1.0 if s.startswith("-") else 1.0) for target, s in pairs}
+    (mapping,) = python_mappings(remedy)
+    assert all("[" not in source for source in mapping.values())
+    new = {target: table[s.lstrip("-")] * (-1.0 if s.startswith("-") else 1.0) for target, s in mapping.items()}
     return Log.from_dataframe(table.assign(**new), log.metadata)
 
 
@@ -84,8 +83,7 @@ def test_signed_permutations_are_undone_by_their_mapping() -> None:
     for matrix in PERMUTATIONS[1:]:
         shown = dict(zip(("gyr_x", "gyr_y", "gyr_z"), matrix @ y, strict=True))
         undone = dict(shown)
-        for part in fault_words.mapping("gyr", matrix).split(","):
-            target, source = part.split("=")
+        for target, source in fault_words.mapping("gyr", matrix).items():
             undone[target] = shown[source.lstrip("-")] * (-1.0 if source.startswith("-") else 1.0)
         np.testing.assert_allclose(list(undone.values()), y)
     assert np.array_equal(PERMUTATIONS[0], np.eye(3))

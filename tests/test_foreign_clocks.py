@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 from imufit.errors import InputError
-from imufit.log import Log, parse_mapping, read
+from imufit.log import Log, read
 from imufit.log.units import lookup
+from pasted import python_mappings
 
 N = 400
 T = np.arange(N) / 100
@@ -54,9 +54,8 @@ def test_order_of_day_and_month_is_asked_where_no_day_shows_it(tmp_path: Path) -
     path = file(tmp_path, {"Time": stamps("%m/%d/%Y %H:%M:%S.%f", 2024, 6, 5, 23, 59, 58)})
     with pytest.raises(InputError, match=r"mm/dd/yyyy") as asked:
         read(path)
-    found = re.search(r"--map '([^']*)'", str(asked.value))
-    assert found is not None
-    assert steady(read(path, parse_mapping(found[1])))
+    (found,) = python_mappings(str(asked.value))
+    assert steady(read(path, found))
 
 
 def test_date_and_time_of_day_in_two_columns(tmp_path: Path) -> None:
@@ -100,9 +99,8 @@ def test_units_of_two_sensors_are_asked_with_the_time_at_once(tmp_path: Path) ->
     path.write_text("\n".join(["acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z", *rows]) + "\n")
     with pytest.raises(InputError, match="column t is missing") as asked:
         read(path)
-    found = re.search(r"--map '([^']*)'", str(asked.value))
-    assert found is not None
-    log = read(path, parse_mapping(found[1]))
+    (found,) = python_mappings(str(asked.value))
+    log = read(path, found)
     assert log.acc is not None
     assert log.acc[:, 2].mean() == pytest.approx(9.80665, rel=1e-3)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 from foreign_files import KINDS, WRITERS, Foreign, Part, Sound, sound, write
 from imufit.errors import InputError
 from imufit.log import Log, parse_mapping, read
+from pasted import python_mappings, shell_mappings
 
 SEEDS = {"handheld": 774101, "arm": 774102, "rest_first": 774103, "rest": 774104}
 """Seed of the log of each kind."""
@@ -63,9 +63,11 @@ def attempt(foreign: Foreign) -> tuple[Log | None, InputError | None]:
 
 def judge_question(error: InputError, foreign: Foreign) -> Log:
     """Paste the one mapping of a question: all that stands in the file must come out of it."""
-    maps = re.findall(r"--map '([^']*)'", error.remedy or "")
+    maps = shell_mappings(error.shell_remedy or "")
     assert len(maps) == 1, f"one mapping is wanted: {error}"
-    log = read(foreign.path, parse_mapping(maps[0]))
+    mapping = parse_mapping(maps[0])
+    assert python_mappings(str(error)) == [mapping], f"Python is told another mapping: {error}"
+    log = read(foreign.path, mapping)
     for name in ("acc", "gyr", "mag"):
         part, got = getattr(foreign, name), getattr(log, name)
         if part is None or (got is None and name in foreign.may_lack):
@@ -94,6 +96,6 @@ def test_read_right_or_asked(tmp_path: Path, name: str, kind: str) -> None:
         return
     assert error is not None
     assert due != "reads", f"this file tells all, but imufit asks: {error}"
-    refused = due == "refuses" and "--map '" not in (error.remedy or "")
+    refused = due == "refuses" and "--map '" not in (error.shell_remedy or "")
     if any((foreign.acc, foreign.gyr, foreign.mag)) and not refused:
         judge_question(error, foreign)

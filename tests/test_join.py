@@ -223,7 +223,8 @@ def test_positions_without_an_attitude_are_joined_by_the_length_of_the_specific_
     upside_down = replace(reference, metadata=replace(reference.metadata, frame="NED"))
     with pytest.raises(InputError, match="the z axis of the positions points up") as refused:
         imufit.join(sensor_of(one), upside_down)
-    assert "--frame ENU" in str(refused.value)
+    assert "frame='ENU'" in str(refused.value)
+    assert "--frame ENU" in str(refused.value.shell_remedy)
 
 
 def test_positions_of_another_motion_are_refused() -> None:

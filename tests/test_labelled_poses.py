@@ -125,7 +125,7 @@ def test_six_poses_without_labels_are_too_few():
     ("labels", "row", "words"),
     [
         (("+x", "-x", "+z", "-y", "+z", "-z"), 1510, r"label \+z contradicts.*\+y points up"),
-        (("-x", "+x", "+y", "-y", "+z", "-z"), 10, r"label -x contradicts.*--map"),
+        (("-x", "+x", "+y", "-y", "+z", "-z"), 10, r"label -x contradicts.*mapping="),
     ],
 )
 def test_a_label_that_contradicts_the_readings_is_named_with_its_row(labels, row, words):

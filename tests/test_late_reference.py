@@ -51,7 +51,7 @@ def own_rows(log: Log) -> Log:
 
 
 def lag_of(fault: DataFault) -> float:
-    words = shlex.split(fault.remedy)
+    words = shlex.split(fault.shell_remedy)
     return float(words[words.index("--lag") + 1])
 
 
@@ -73,7 +73,7 @@ def test_no_channel_is_blamed_and_the_verdict_says_what_to_do() -> None:
     assert found.verdict == "unknown"
     assert found.best is None
     assert found.candidates == ()
-    assert "imufit join LOG LOG --lag 2.00" in found.sentence
+    assert "imufit.join(log, log, lag=2.00" in found.sentence
 
 
 def test_samples_of_the_reference_in_rows_of_their_own_say_the_same() -> None:
@@ -86,7 +86,7 @@ def test_a_log_on_the_disk_says_the_same(tmp_path: Path) -> None:
     late(2.0).write(tmp_path / "a log.parquet")
     (found,) = named(LogStream(tmp_path / "a log.parquet"))
     assert found.fault == "late"
-    assert shlex.split(found.remedy.partition(": ")[2])[2] == str(tmp_path / "a log.parquet")
+    assert shlex.split(found.shell_remedy.partition(": ")[2])[2] == str(tmp_path / "a log.parquet")
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.02, 0.05])

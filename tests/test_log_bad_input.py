@@ -182,14 +182,16 @@ def test_decimal_comma_is_recognised(tmp_path: Path) -> None:
 def test_misspelt_sensor(tmp_path: Path, suffix: str, old: str) -> None:
     df = frame().rename(columns={"acc_x": f"{old}_x"})
     assert message(save(df, tmp_path / f"a{suffix}")) == (
-        f"a{suffix}: column acc_x is missing; did you mean {old}_x? Use --map acc_x={old}_x"
+        f"a{suffix}: column acc_x is missing; did you mean {old}_x? "
+        f"Use imufit.read('{tmp_path}/a{suffix}', mapping={{'acc_x': '{old}_x'}})"
     )
 
 
 def test_slip_of_the_finger(tmp_path: Path) -> None:
     df = frame().rename(columns={f"gyr_{a}": f"gry_{a}" for a in "xyz"})
     assert message(save(df, tmp_path / "a.csv")) == (
-        "a.csv: column gyr_x is missing; did you mean gry_x? Use --map gyr_x=gry_x,gyr_y=gry_y,gyr_z=gry_z"
+        "a.csv: column gyr_x is missing; did you mean gry_x? "
+        f"Use imufit.read('{tmp_path}/a.csv', mapping={{'gyr_x': 'gry_x', 'gyr_y': 'gry_y', 'gyr_z': 'gry_z'}})"
     )
 
 
@@ -218,7 +220,8 @@ def test_sensor_that_is_partly_there(tmp_path: Path, suffix: str) -> None:
 def test_no_time(tmp_path: Path, suffix: str) -> None:
     df = frame().drop(columns="t")
     assert message(save(df, tmp_path / f"a{suffix}")) == (
-        f"a{suffix}: column t is missing. Give time in s, for a fixed rate with --map t=row[100Hz]."
+        f"a{suffix}: column t is missing. Give time in s, for a fixed rate with "
+        f"imufit.read('{tmp_path}/a{suffix}', mapping={{'t': 'row[100Hz]'}})."
     )
 
 
@@ -304,7 +307,7 @@ def test_unknown_suffix_missing_file_directory(tmp_path: Path) -> None:
     (tmp_path / "a.doc").write_bytes(b"\xd0\xcf\x11\xe0\x00\x00\x06\x00")
     assert message(tmp_path / "a.doc") == (
         "a.doc: the suffix .doc is not a log's, and the file is no text. Logs are .parquet, .npz, .csv, .txt, .tsv, "
-        ".dat, .log: export it as text, of which imufit convert makes a log."
+        ".dat, .log: export it as text, of which imufit.read makes a log."
     )
     assert message(tmp_path / "b.csv") == f"b.csv: there is no file {tmp_path / 'b.csv'}. Check the name."
     (tmp_path / "c.csv").mkdir()

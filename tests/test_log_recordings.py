@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from imufit.errors import InputError
 from imufit.log import Log, open_log, parse_mapping, read
+from pasted import shell_mappings
 from recording import DATA, recording
 
 FILES = sorted(DATA.rglob("*.parquet")) if DATA.is_dir() else []
@@ -64,7 +65,7 @@ def test_original_without_header() -> None:
     with pytest.raises(InputError, match="the columns c1 to c6 have no names") as caught:
         read(path)
     # the mapping that the error names is all it takes
-    log = read(path, parse_mapping((caught.value.remedy or "").split("'")[1]))
+    log = read(path, parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0]))
     close(log, "many_positions/mpu9150_unit0.parquet")
     assert log.notes == ("mpu9150_unit0.log: no header: the columns are called c1 to c6",)
 

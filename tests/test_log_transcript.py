@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from imufit.errors import InputError
 from imufit.log import Log, open_log, parse_mapping, read
+from pasted import python_mappings, shell_mappings
 from recording import recording
 
 ACC = ",".join(f"acc_{axis}=a{axis}[g]" for axis in "xyz")
@@ -207,8 +208,9 @@ def test_without_mapping_the_error_names_one_that_works(tmp_path: Path) -> None:
     lines = numbered("accel=({x}, {y}, {z})")
     with pytest.raises(InputError, match="column t is missing") as caught:
         transcript(tmp_path, *lines, mapping="")
-    mapping = (caught.value.remedy or "").split("'")[1]
+    mapping = shell_mappings(str(caught.value.shell_remedy))[0]
     assert mapping == "t=row[100Hz],acc_x=accel_x[g],acc_y=accel_y[g],acc_z=accel_z[g]"
+    assert python_mappings(str(caught.value)) == [parse_mapping(mapping)]
     assert read(tmp_path / "a.log", parse_mapping(mapping)).n == 20
 
 

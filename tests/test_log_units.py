@@ -9,6 +9,7 @@ import pytest
 from imufit.errors import InputError
 from imufit.log import Log, parse_mapping, read
 from imufit.log.units import conversion
+from pasted import python_mappings, shell_mappings
 from scipy.spatial.transform import Rotation
 
 G = 9.80665
@@ -204,8 +205,9 @@ def test_other_unit_is_recognised_and_the_remedy_works(
     error = caught.value
     assert f"which looks like {words} not" in error.problem
     assert error.column == f"{sensor}_x"
-    assert f"{sensor}_x={sensor}_x[{unit}]" in (error.remedy or "")
-    mapping = parse_mapping((error.remedy or "").split("'")[1])
+    assert f"{sensor}_x={sensor}_x[{unit}]" in (error.shell_remedy or "")
+    mapping = parse_mapping(shell_mappings(str(error.shell_remedy))[0])
+    assert python_mappings(str(error))[0] == mapping
     corrected = getattr(read(path, mapping), sensor)
     np.testing.assert_allclose(corrected, getattr(moving(), sensor), rtol=1e-9, atol=1e-9)
 
@@ -215,8 +217,10 @@ def test_exact_message_of_a_wrong_unit(tmp_path: Path) -> None:
         read(written(tmp_path, acc=1 / G))
     assert str(caught.value) == (
         "a.csv: column acc_x: at rest the norm of acc is 1, which looks like g, not m/s^2. "
-        "Use --map 'acc_x=acc_x[g],acc_y=acc_y[g],acc_z=acc_z[g]'"
+        f"Use imufit.read('{tmp_path / 'a.csv'}', "
+        "mapping={'acc_x': 'acc_x[g]', 'acc_y': 'acc_y[g]', 'acc_z': 'acc_z[g]'})"
     )
+    assert caught.value.shell_remedy == "Use --map 'acc_x=acc_x[g],acc_y=acc_y[g],acc_z=acc_z[g]'"
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
@@ -244,7 +248,8 @@ def test_clock_in_milliseconds_is_not_taken_for_a_gyroscope_in_another_unit() ->
     df = df.assign(**{f"ref_q{axis}": np.nan for axis in "wxyz"})
     with pytest.raises(InputError, match="looks like ms, not s") as caught:
         Log.from_dataframe(df)
-    assert "t=t[ms]" in (caught.value.remedy or "")
+    assert "imufit.Log.from_dataframe(df, mapping={'t': 't[ms]'})" in (caught.value.remedy or "")
+    assert "t=t[ms]" in (caught.value.shell_remedy or "")
 
 
 def test_strong_iron_beside_a_magnetometer_is_noted_not_refused() -> None:

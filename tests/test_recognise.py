@@ -11,6 +11,7 @@ import pytest
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
 from imufit.log import Log, LogStream, parse_mapping, read
+from pasted import shell_mappings
 from recording import recording
 
 STANDARD_GRAVITY = 9.80665
@@ -173,7 +174,7 @@ def test_what_readings_do_not_show_is_asked_once_and_for_the_whole_file(tmp_path
     path = counts(tmp_path / "a.csv", rest)
     with pytest.raises(InputError, match="does not state the unit of the gyroscope, and the readings") as caught:
         read(path)
-    log = read(path, parse_mapping((caught.value.remedy or "").split("'")[1]))
+    log = read(path, parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0]))
     same(log, rest, "acc", "gyr")
 
 
@@ -182,7 +183,9 @@ def test_a_log_without_names_and_time_is_asked_once(tmp_path: Path, sound: Log) 
     np.savetxt(tmp_path / "a.txt", rows, fmt="%.6f")
     with pytest.raises(InputError, match="have no names") as caught:
         read(tmp_path / "a.txt")
-    same(read(tmp_path / "a.txt", parse_mapping((caught.value.remedy or "").split("'")[1])), sound, "acc", "gyr")
+    same(
+        read(tmp_path / "a.txt", parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])), sound, "acc", "gyr"
+    )
 
 
 def test_two_sensors_of_a_kind_are_not_chosen_between(tmp_path: Path, sound: Log) -> None:

@@ -334,8 +334,8 @@ def test_text_without_a_header_takes_the_one_that_is_given(pty, tmp_path):
     ("sent", "said"),
     [
         (b"", "nothing came from the device"),
-        (b"\x99" * 3000, "3000 bytes came, but no whole frame and no rows under a header: check --baud"),
-        (text_rows(range(9)), "no header that names them: give one with --header"),
+        (b"\x99" * 3000, "3000 bytes came, but no whole frame and no rows under a header: check baud"),
+        (text_rows(range(9)), "no header that names them: give one, header='t_ms"),
         (b"no sensor on the bus\n" * 3, "the device says 'no sensor on the bus'"),
         (Sender().samples(range(7)), "7 samples came, but no announcement"),
         (Sender().announce(), "announced itself, but sent no sample"),
@@ -371,7 +371,7 @@ def test_nothing_is_overwritten(pty, tmp_path):
         record(pty.port, log, duration=0.1)
     log.unlink()
     part.write_text("precious")
-    with pytest.raises(InputError, match=r"Run imufit recover .*a\.parquet\.part first"):
+    with pytest.raises(InputError, match=r"Run imufit.devices.record.recover\('.*a\.parquet\.part'\) first"):
         record(pty.port, log, duration=0.1, force=True)
     assert part.read_text() == "precious"
     (tmp_path / "b.toml").write_text("effects = []")
@@ -432,7 +432,9 @@ def test_a_log_that_cannot_be_written_leaves_the_part_and_names_the_command(pty,
     pty.send(device.announce() + device.samples(range(30)))
     recorder.until(lambda: recorder.seen == 30)
     monkeypatch.setattr(imufit.whole_file.os, "fsync", full)
-    with pytest.raises(InputError, match=r"30 rows are safe in .*a\.parquet\.part.*Make room, then run imufit recover"):
+    with pytest.raises(
+        InputError, match=r"30 rows are safe in .*a\.parquet\.part.*Make room, then run imufit.devices.record.recover"
+    ):
         recorder.result()
     assert [file.name for file in tmp_path.iterdir()] == ["a.parquet.part"], "nothing half-made is left"
     monkeypatch.undo()

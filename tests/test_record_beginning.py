@@ -76,7 +76,7 @@ def test_what_is_kept_is_recovered_again_without_doubles(tmp_path):
 def test_without_an_announcement_the_remedy_names_the_device(tmp_path):
     log = tmp_path / "a.parquet"
     path = written(log, chunks()[:3])
-    with pytest.raises(InputError, match=r"30 samples are in it.*Plug the device in.*--port PORT"):
+    with pytest.raises(InputError, match=r"30 samples are in it.*Plug the device in.*port='PORT'"):
         recover(log)
     assert path.exists()
 

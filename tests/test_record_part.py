@@ -214,7 +214,7 @@ def test_a_part_that_is_still_written_is_left_alone(tmp_path):
 def test_a_part_read_as_a_log_names_the_command(tmp_path):
     path = tmp_path / "a.parquet.part"
     path.write_bytes(BYTES)
-    with pytest.raises(InputError, match="imufit recover"):
+    with pytest.raises(InputError, match=r"imufit.devices.record.recover\("):
         imufit.read(path)
 
 

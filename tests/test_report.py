@@ -99,7 +99,7 @@ def test_page_escapes_what_comes_from_the_log(whole):
 @pytest.mark.parametrize(
     ("parts", "words"),
     [
-        ({"comparison": comparison()}, "imufit diagnose"),
+        ({"comparison": comparison()}, "imufit.diagnose"),
         ({"diagnosis": diagnosis()}, "Add gyr.g_sensitivity"),
         ({"diagnosis": diagnosis("ambiguous")}, "Turn the sensor about y at rest"),
         ({"diagnosis": diagnosis("unknown")}, "V-shaped"),

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from imufit.printable import NAME, printable
+from imufit.remedy import Remedy
 
 
 class InputError(ValueError):
@@ -26,8 +27,9 @@ class InputError(ValueError):
         Data row, counted from 0.
     column : str, optional
         Column or metadata key concerned.
-    remedy : str, optional
-        What the user can do about it: a full sentence.
+    remedy : str or Remedy, optional
+        What the user can do about it: a full sentence. A :class:`imufit.remedy.Remedy` says it in the words of Python
+        and in those of the command line.
     line : int, optional
         Line of the text file, counted from 1.
     """
@@ -39,16 +41,26 @@ class InputError(ValueError):
         file: str | Path | None = None,
         row: int | None = None,
         column: str | None = None,
-        remedy: str | None = None,
+        remedy: str | Remedy | None = None,
         line: int | None = None,
     ) -> None:
         self.problem = printable(problem, keep="\n\t\r")
         self.file = None if file is None else str(file)
         self.row = row
         self.column = column
-        self.remedy = None if remedy is None else printable(remedy, keep="\n\t\r")
+        self.advice = None if remedy is None else _shown(Remedy.of(remedy))
         self.line = line
         super().__init__(self._message())
+
+    @property
+    def remedy(self) -> str | None:
+        """What the user can do about it, in Python; in the words of the command line where that is running."""
+        return None if self.advice is None else str(self.advice)
+
+    @property
+    def shell_remedy(self) -> str | None:
+        """What the user can do about it, in the words of the command line."""
+        return None if self.advice is None else self.advice.shell
 
     @property
     def where(self) -> str:
@@ -63,6 +75,9 @@ class InputError(ValueError):
             if not self.problem.startswith(f"column {column} "):
                 where.append(f"column {column}")
         return ", ".join(where)
+
+    def __str__(self) -> str:
+        return self._message()
 
     def _message(self) -> str:
         parts = [printable(Path(self.file).name, NAME)] if self.file else []
@@ -80,7 +95,12 @@ class InputError(ValueError):
             "file": self.file,
             "row": self.row,
             "column": self.column,
-            "remedy": self.remedy,
+            "remedy": self.advice,
             "line": self.line,
         }
         return partial(InputError, self.problem, **where), ()
+
+
+def _shown(remedy: Remedy) -> Remedy:
+    """Words that a person may see."""
+    return Remedy(printable(remedy.python, keep="\n\t\r"), printable(remedy.shell, keep="\n\t\r"))

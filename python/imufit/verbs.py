@@ -336,7 +336,15 @@ def plot(
     return drawing(log_of(log), progress=progress, ax=ax, **options).result
 
 
-def join(log: AnyLog, reference: AnyLog, lag: float | None = None, skew: float | None = None) -> Joined:
+def join(
+    log: AnyLog,
+    reference: AnyLog,
+    lag: float | None = None,
+    skew: float | None = None,
+    *,
+    attitude: str | None = None,
+    inverse: bool = False,
+) -> Joined:
     """Lay a reference on another clock beside a sensor's log.
 
     Parameters
@@ -349,15 +357,22 @@ def join(log: AnyLog, reference: AnyLog, lag: float | None = None, skew: float |
         Lag of the reference, s, instead of the one that is found.
     skew : float, optional
         Its clock's skew, instead of the one that is found.
+    attitude : str, optional
+        Columns that hold the attitude, where names and rates do not show them, such as
+        ``euler-ZYX:yaw[deg],pitch[deg],roll[deg]``; see :func:`imufit.joining.with_attitude`.
+    inverse : bool
+        Whether that attitude turns vectors of the reference frame into the body.
 
     Raises
     ------
     InputError
         The two have too little motion in common, or the lag is ambiguous.
     """
-    from imufit.joining import join, join_as_found  # noqa: PLC0415  only needed here
+    from imufit.joining import declared_attitude, join, join_as_found, with_attitude  # noqa: PLC0415  only needed here
 
     other = LogStream(reference, bare=True).read() if isinstance(reference, (str, Path)) else _held(log_of(reference))
+    if attitude is not None:
+        other = with_attitude(other, *declared_attitude(attitude), inverse=inverse)
     way = join if other.ref_q is not None else join_as_found
     return way(_held(log_of(log)), other, lag, skew)
 

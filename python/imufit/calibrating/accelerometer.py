@@ -13,6 +13,7 @@ from imufit import _imufit
 from imufit.calibrating.calibration import AXES, SensorCalibration, named, off_diagonal, rms
 from imufit.calibrating.temperature import Temperature
 from imufit.errors import InputError
+from imufit.remedy import option
 from imufit.rests.poses import SAME_DIRECTION, UP, Pose
 
 if TYPE_CHECKING:
@@ -193,7 +194,7 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     if rms(lengths - gravity) > 1.5 * rms(np.linalg.norm(readings, axis=1) - gravity) + 0.01:
         remarks.append(
             "The lengths got worse: a tilted table or a crooked side passes for misalignment. Record one log with the "
-            "gyro, so that headings are known, or nine attitudes for --cost magnitude."
+            f"gyro, so that headings are known, or nine attitudes for {option('cost', 'magnitude')}."
         )
     return _result("vector", readings, solution, gravity, lengths, residuals, remarks, extras, chosen)
 

@@ -14,6 +14,7 @@ from imufit.calibrating.magnetometer import fit_magnetometer
 from imufit.calibrating.temperature import Temperature
 from imufit.errors import InputError
 from imufit.loop import SensorModel
+from imufit.remedy import template, when_read
 from imufit.rests.poses import Found, Pose, distinct, find_poses, repeated
 from imufit.rests.turns import find_turns
 from imufit.rests.unit import check_unit
@@ -73,7 +74,7 @@ def calibrate(
         raise InputError(
             f"there is nothing to calibrate: the log has {'neither' if len(sensors) > 1 else 'no'} {columns}",
             file=str(given[0].path or "log"),
-            remedy="Name the columns with --map.",
+            remedy="Name the columns, such as " + when_read(template(sensors[0])) + ".",
         )
     gravity = float(given[0].metadata.gravity)
     found, first = [], 1

@@ -8,6 +8,7 @@ import numpy as np
 
 from imufit.calibrating.calibration import AXES
 from imufit.errors import InputError
+from imufit.remedy import mapped, option, when_read
 from imufit.rests.poses import SIDES, Pose, distinct, repeated
 
 UNKNOWNS = {"vector": 12, "magnitude": 9}
@@ -55,7 +56,9 @@ def check_labels(poses: Sequence[Pose], file: object) -> tuple[list[Pose], list[
             f"the labels name other axes than the readings: {pairs}",
             file=str(file),
             column="pose",
-            remedy="The axes are swapped: correct the labels, or map the columns, e.g. --map acc_x=acc_y,acc_y=acc_x.",
+            remedy="The axes are swapped: correct the labels, or map the columns, e.g. "
+            + when_read(mapped({"acc_x": "acc_y", "acc_y": "acc_x"}))
+            + ".",
         )
     judged = []
     for pose in poses:
@@ -94,7 +97,9 @@ def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
             "the magnitude cost has 9 unknowns (scale 3, non-orthogonality 3, bias 3) and each pose gives one "
             f"equation: {count} different poses are too few{doubled}",
             file=str(file),
-            remedy="Record at least nine attitudes, some of them oblique, or use --cost vector with the six sides up.",
+            remedy="Record at least nine attitudes, some of them oblique, or use "
+            + option("cost", "vector")
+            + " with the six sides up.",
         )
     sides = {pose.name for pose in poses}
     axes = {side[1] for side in sides}

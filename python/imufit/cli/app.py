@@ -13,6 +13,7 @@ import click
 from imufit.cli.names import OneOf
 from imufit.cli.on_demand import Commands
 from imufit.printable import MESSAGE, printable
+from imufit.remedy import Reader, told_to
 
 SUCCESS, INTERNAL, UNUSABLE, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 130, 141
 """Exit codes; the last two are those of a program that a signal ends, 128 + SIGINT and 128 + SIGPIPE."""
@@ -81,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         imufit.main(prog_name="imufit")
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), told_to(Reader.SHELL):
             if not os.environ.get(DEBUG):
                 warnings.simplefilter("ignore")
             return _run(given)

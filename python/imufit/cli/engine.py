@@ -83,6 +83,13 @@ def calibrate_live(
     return calibrate_live(port, keep, mapping=mapping, sensors=chosen, **options)
 
 
+def declared_attitude(text: str) -> tuple[str, tuple[str, ...]]:
+    """Take kind and columns of an attitude apart."""
+    from imufit.joining import declared_attitude  # noqa: PLC0415
+
+    return declared_attitude(text)
+
+
 def reference_log(path: Path, reading: Reading, attitude: tuple[str, tuple[str, ...]] | None, inverse: bool) -> Log:
     """Read a reference; its attitude stands in the columns of its kind, or in those of a log."""
     from imufit.joining import with_attitude  # noqa: PLC0415
@@ -276,7 +283,7 @@ def export(path: Path, form: str) -> str:
     try:
         return export(model, form)
     except InputError as error:
-        raise InputError(error.problem, file=path, remedy=error.remedy) from None
+        raise InputError(error.problem, file=path, remedy=error.advice) from None
 
 
 def changes(recorded: Log, corrected: Log) -> dict[str, dict[str, Any]]:

@@ -31,11 +31,7 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
         """Take kind and columns apart."""
         if isinstance(value, tuple):
             return value
-        kind, colon, columns = value.partition(":")
-        names = tuple(name.strip() for name in columns.split(","))
-        if not colon or not all(names):
-            self.fail(f"{value!r} names no columns: write KIND:COLUMN,COLUMN,...", param, ctx)
-        return kind, names
+        return engine.declared_attitude(value)
 
 
 @click.command()

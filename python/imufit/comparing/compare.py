@@ -19,6 +19,7 @@ from imufit.fitting.passes import CHANNELS, UNITS
 from imufit.fitting.rest_passes import RestPasses
 from imufit.fitting.row_residuals import residual_chunks
 from imufit.progress import Progress
+from imufit.remedy import command
 from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
 
 if TYPE_CHECKING:
@@ -80,7 +81,11 @@ def _refuse_rests(analysis: Analysis) -> None:
             raise InputError(
                 "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz), which a comparison needs",
                 file=each.surveyed.log.path,
-                remedy="Ask `imufit diagnose`, which judges the rests of such a log, or `imufit calibrate`.",
+                remedy="Ask `"
+                + command("diagnose")
+                + "`, which judges the rests of such a log, or `"
+                + command("calibrate")
+                + "`.",
             )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ from imufit.calibrating.wizard import Stage, Wizard
 from imufit.devices.record import LiveConverter, record
 from imufit.errors import InputError
 from imufit.log import Log, read
+from imufit.remedy import Remedy
 from imufit.rests.poses import SIDES
 
 PATIENCE: Final = 300.0
@@ -89,7 +91,9 @@ def calibrate_live(
         why = f"given up after {give_up:g} s without anything new" if looked.is_late() else "stopped"
         raise InputError(
             f"{why}: {looked.wizard.wanted} missing",
-            remedy=f"What came is in {keep}: imufit calibrate {keep} makes of it what it can.",
+            remedy=f"What came is in {keep}: "
+            + Remedy(f"imufit.calibrate({str(keep)!r})", f"imufit calibrate {shlex.quote(str(keep))}")
+            + " makes of it what it can.",
         )
     log = read(keep)
     return calibrate(log, cost, sensors=sensors, settings=settings), log

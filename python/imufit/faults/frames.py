@@ -480,7 +480,7 @@ def _worded(
         other = next((words for words in others if words), None)
         sensor = None if change.kind in ("mount", "exchange", "clock") else change.sensor or "ref"
         add(SHOWN.get(change.kind, change.kind), sensor, fault_words.changed(change.words, list(left.values()), other))
-    frame = next((r.change.words[1] for r in alike if r.change.words and r.change.kind == "frame"), "")
+    frame = next((r.change.words[1] for r in alike if r.change.words and r.change.kind == "frame"), None)
     for sensor in good:
         match = best.matches[sensor]
         if match.column is not None:

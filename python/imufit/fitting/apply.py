@@ -46,7 +46,7 @@ def apply(model: EffectStack, log: LogSource) -> Log:
         )
     except InputError as error:
         wrong = "Add it to the log, or take the effect out of the model." if error.row is None else "Check the model."
-        remedy = error.remedy or wrong
+        remedy = error.advice or wrong
         raise InputError(error.problem, file=log.path, row=error.row, remedy=remedy) from None
     notes = [*_left_alone(model, recorded), *_lost(dict(zip(SENSORS, lost, strict=True)))]
     acc, gyr, mag = (

@@ -10,6 +10,7 @@ import numpy as np
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.remedy import mapped, when_read
 from imufit.rests import SIDES, UP, Pose, side_numbers
 
 if TYPE_CHECKING:
@@ -57,7 +58,9 @@ def _labelled(log: Log, rest: Pose, numbers: np.ndarray[tuple[int], np.dtype[np.
             file=file,
             row=int(rows[0]),
             column="pose",
-            remedy="Correct the label; or, if every pose is so, the axes with --map (at rest acc points up).",
+            remedy="Correct the label; or, if every pose is so, the axes (at rest acc points up), such as "
+            + when_read(mapped({f"acc_{axis}": f"-acc_{axis}" for axis in "xyz"}))
+            + ".",
         )
     return replace(rest, label=sides[0])
 

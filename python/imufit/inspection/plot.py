@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from imufit.joining.course import reference_course
 from imufit.log import Log, LogSource, SomeRows, judged_rows
 from imufit.log.columns import SENSOR_NAMES
 from imufit.log.size import BLOCK_ROWS
-from imufit.log.words import nearest
+from imufit.log.words import nearest, one_of
 from imufit.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -77,8 +77,10 @@ def drawing(
     Raises
     ------
     InputError
-        The log has no such column, no such rows, or nothing to draw.
+        The log has no such column, no such rows, or nothing to draw, or `show` is something else.
     """
+    if show not in get_args(Show):
+        raise InputError(f"{show!r} cannot be shown", remedy=one_of(show, get_args(Show)))
     progress = progress or silent
     part = log if rows is None else SomeRows(log, [rows])
     low, high = _extent(part, begin, end)
@@ -144,7 +146,7 @@ class _Drawn:
                     "there is no such column of numbers",
                     file=log.path,
                     column=name,
-                    remedy=f"Did you mean {near[0]}?" if near else "imufit info lists the columns.",
+                    remedy=f"Did you mean {near[0]}?" if near else f"The columns are {', '.join(list(numbers)[:12])}.",
                 )
         return {name: self._trace(name, 1) for name in columns}
 

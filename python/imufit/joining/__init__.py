@@ -3,6 +3,6 @@
 from imufit.joining.found_attitude import join_as_found
 from imufit.joining.join import join
 from imufit.joining.joined import Joined
-from imufit.joining.reference import with_attitude
+from imufit.joining.reference import declared_attitude, with_attitude
 
-__all__ = ["Joined", "join", "join_as_found", "with_attitude"]
+__all__ = ["Joined", "declared_attitude", "join", "join_as_found", "with_attitude"]

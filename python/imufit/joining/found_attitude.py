@@ -16,6 +16,7 @@ from imufit.joining.reference import KINDS, with_attitude
 from imufit.log import Log
 from imufit.log.columns import WHOLE_TURN
 from imufit.log.scalar_first import rotation_from_quaternions
+from imufit.remedy import Remedy, option
 
 _NAMED: Final = re.compile(r"(?P<base>.*?)[._ ]?q?[._ ]?(?P<part>[wxyz])", re.IGNORECASE)
 _NUMBERED: Final = re.compile(r"(?P<base>.*?)(?:\[(?P<index>\d)\]|_?(?P<digit>\d))")
@@ -60,9 +61,10 @@ class Way:
         return f"{self.kind} of {self.columns[0]}{between}{self.columns[-1]}{turned}"
 
     @property
-    def words(self) -> str:
-        """The options of the command that say the same."""
-        return f'--attitude "{self.kind}:{",".join(self.columns)}"{" --inverse" if self.inverse else ""}'
+    def words(self) -> Remedy:
+        """The keyword arguments, and the options, that say the same."""
+        declared = option("attitude", f"{self.kind}:{','.join(self.columns)}")
+        return declared + Remedy(", inverse=True", " --inverse") if self.inverse else declared
 
 
 def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joined:
@@ -96,7 +98,7 @@ def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | Non
         raise InputError(
             f"no columns look like an attitude; there are {held}",
             file=file,
-            remedy=f"Name them with --attitude {KINDS}.",
+            remedy="Name them with " + Remedy("attitude=", "--attitude ") + f"KIND:COLUMNS, which is {KINDS}.",
         )
     found: list[tuple[Way, Joined]] = []
     refused: list[InputError] = []
@@ -115,7 +117,7 @@ def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | Non
         raise InputError(
             "rates and gravity do not show how the columns are to be read as an attitude",
             file=file,
-            remedy=f"Say which holds: {' or '.join(way.words for way, _ in (upright or alike)[:2])}.",
+            remedy="Say which holds: " + (upright or alike)[0][0].words + " or " + (upright or alike)[1][0].words + ".",
         )
     way, best = upright[0]
     note = f"{reference.path.name if reference.path else 'reference'}: attitude read as {way.summary}"

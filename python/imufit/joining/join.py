@@ -22,6 +22,7 @@ from imufit.joining.search import FASTER, LEAST_OVERLAP, Candidate, Correlation
 from imufit.log import Log
 from imufit.log.assemble import attitude_of_rig
 from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
+from imufit.remedy import Remedy, mapped, option, reading, template, when_read
 
 Array = NDArray[np.float64]
 
@@ -139,7 +140,7 @@ def _join_positions(log: Log, reference: Log, lag: float | None, skew: float | N
             "the log has no accelerometer, and only the specific force shows when positions were accelerated",
             file=log.path or "log",
             column="acc_x",
-            remedy="Record the accelerometer too, or name its columns with --map.",
+            remedy="Record the accelerometer too, or name its columns, such as " + when_read(template("acc")) + ".",
         )
     assert reference.ref_p is not None
     rows = _ascending(reference, np.asarray(np.isfinite(reference.ref_p).all(axis=1)))
@@ -159,7 +160,7 @@ def _join_positions(log: Log, reference: Log, lag: float | None, skew: float | N
             f"{reference.metadata.frame} says otherwise",
             file=reference.path or "reference",
             column="ref_pz",
-            remedy=f"Name the frame: --frame {'ENU' if up[2] < 0.0 else 'NED'}.",
+            remedy="Name the frame: " + reading(reference.path, option("frame", "ENU" if up[2] < 0.0 else "NED")),
         )
     best, rival = _only_one(found, (log, reference))
     return _result(_joined(log, reference, rows, best.aligned, None), best, rival)
@@ -198,14 +199,19 @@ def _courses(log: Log, reference: Log) -> tuple[Course, Course, NDArray[np.intp]
             "the log has no gyroscope, and only its rates show when the reference turned",
             file=log.path or "log",
             column="gyr_x",
-            remedy="Record the gyroscope too, or name its columns with --map.",
+            remedy="Record the gyroscope too, or name its columns, such as " + when_read(template("gyr")) + ".",
         )
     if reference.ref_q is None or not reference.has_reference.sum() > 1:
         raise InputError(
             "the file has no reference attitude",
             file=reference.path or "reference",
             column="ref_qw",
-            remedy="Name its columns, e.g. --reference-map ref_qw=w.",
+            remedy="Name its columns, e.g. "
+            + reading(
+                reference.path or "reference.csv",
+                mapped({f"ref_q{part}": part for part in "wxyz"}, shell="--reference-map"),
+            )
+            + ".",
         )
     rows = _ascending(reference, reference.has_reference)
     return Course.of(log.t, log.gyr), reference_course(reference.t[rows], reference.ref_q[rows]), rows
@@ -223,7 +229,8 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
             f"the motion that both recordings saw is too short or too uniform to tell the lag: correlation "
             f"{best.traces.correlation:.3f} over {best.traces.overlap:.1f} s",
             file=logs[0].path or "log",
-            remedy="Move the sensor for longer, once as at no other time, or give the lag with --lag.",
+            remedy="Move the sensor for longer, once as at no other time, or give the lag, in s, such as "
+            + _with_lag(best),
         )
     if second is not None and (found.ambiguous or found.unrelated):
         raise InputError(
@@ -231,9 +238,17 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
             f"{best.traces.compared.value} agree equally well "
             f"(correlation {best.traces.correlation:.3f} and {second.traces.correlation:.3f})",
             file=logs[0].path or "log",
-            remedy="Move the sensor once as at no other time, or give the lag with --lag.",
+            remedy="Move the sensor once as at no other time, or give the lag that is known: "
+            + _with_lag(best)
+            + " or "
+            + _with_lag(second),
         )
     return best, found.rival
+
+
+def _with_lag(found: Placed) -> Remedy:
+    """Name the option that states a lag, s, to the millisecond."""
+    return option("lag", round(found.aligned.lag, 3))
 
 
 def _apart(reference: Log) -> InputError:

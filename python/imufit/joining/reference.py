@@ -27,6 +27,26 @@ NOT_UNIT: Final = 1e-2
 """A quaternion this far from unit length, or a matrix this far from a rotation, holds something else."""
 
 
+def declared_attitude(text: str) -> tuple[str, tuple[str, ...]]:
+    """Take kind and columns of an attitude apart.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``euler-ZYX:yaw[deg],pitch[deg],roll[deg]``.
+
+    Raises
+    ------
+    InputError
+        The text names no columns.
+    """
+    kind, colon, columns = text.partition(":")
+    names = tuple(name.strip() for name in columns.split(","))
+    if not colon or not all(names):
+        raise InputError(f"{text!r} names no columns", remedy="Write KIND:COLUMN,COLUMN,...")
+    return kind, names
+
+
 def with_attitude(log: Log, kind: str, columns: Sequence[str], inverse: bool = False) -> Log:
     """Make the reference attitude of other columns.
 

@@ -1,7 +1,7 @@
 """Log files: read, check, convert, write."""
 
 from imufit.errors import InputError
-from imufit.log.anything import AnyLog, AnyLogs, log_of, logs_of_any
+from imufit.log.anything import AnyLog, AnyLogs, AnyTable, log_of, logs_of_any, pandas_of
 from imufit.log.contents import Contents, contents
 from imufit.log.excerpt import judged_rows
 from imufit.log.frame import FrameSource
@@ -16,6 +16,7 @@ from imufit.log.units import parse_mapping
 __all__ = [
     "AnyLog",
     "AnyLogs",
+    "AnyTable",
     "Chunk",
     "Contents",
     "FrameSource",
@@ -33,6 +34,7 @@ __all__ = [
     "log_of",
     "logs_of_any",
     "open_log",
+    "pandas_of",
     "parse_mapping",
     "parse_noise",
     "read",

@@ -35,7 +35,8 @@ class ArrowTable(Protocol):
         ...
 
 
-AnyLog: TypeAlias = "LogSource | LogHolder | str | PathLike[str] | pd.DataFrame | ArrowTable | Mapping[str, Any]"
+AnyTable: TypeAlias = "pd.DataFrame | ArrowTable | Mapping[str, Any]"
+AnyLog: TypeAlias = "LogSource | LogHolder | str | PathLike[str] | AnyTable"
 AnyLogs: TypeAlias = "AnyLog | Sequence[AnyLog]"
 
 
@@ -57,21 +58,43 @@ def log_of(given: AnyLog) -> LogSource:
     if isinstance(given, (str, PathLike)):
         return open_log(Path(given))
     if isinstance(given, Mapping):
-        return _log_of_arrays(given)
+        log = _log_of_groups(given)
+        return Log.from_dataframe(given) if log is None else log
     if isinstance(given, LogSource):
         return given
     if hasattr(given, "to_log"):
         return given.to_log()
+    table, stated = pandas_of(given)
+    # the metadata that a table of pandas inherits were not stated of the time that it has now
+    return Log.from_dataframe(table, None if table is given else stated)
+
+
+def pandas_of(given: AnyTable) -> tuple[pd.DataFrame, Mapping[str, Any]]:
+    """Return a table as one of pandas, with the metadata of a log that stand with it.
+
+    Parameters
+    ----------
+    given : DataFrame, table of Arrow or polars, Log, or mapping
+        A mapping holds arrays, as for `log_of`.
+
+    Raises
+    ------
+    InputError
+        It is not a table.
+    """
     import pandas as pd  # noqa: PLC0415  heavy, and only needed here
 
     if isinstance(given, pd.DataFrame):
-        return Log.from_dataframe(given)
+        return given, given.attrs.get(METADATA, {})
+    if isinstance(given, Mapping):
+        log = _log_of_groups(given)
+        return (pd.DataFrame(_columns(given)), {}) if log is None else (log.to_pandas(), log.metadata.to_mapping())
     if hasattr(given, "__arrow_c_stream__"):
         import pyarrow as pa  # noqa: PLC0415  heavy, and only needed here
 
         table = pa.table(given)
         text = (table.schema.metadata or {}).get(METADATA.encode())
-        return Log.from_dataframe(table.to_pandas(), mapping_from_json(text, Path("log")) if text else {})
+        return table.to_pandas(), mapping_from_json(text, Path("log")) if text else {}
     raise InputError(
         f"a log cannot be made of {type(given).__name__}",
         remedy="Pass a Log, the name of a file, a table of pandas or polars, or a dict of arrays.",
@@ -91,13 +114,17 @@ def logs_of_any(given: AnyLogs) -> tuple[LogSource, ...]:
     return (log_of(given),)
 
 
-def _log_of_arrays(arrays: Mapping[str, Any]) -> Log:
-    if any(name in GROUPS or name == "attitude" for name in arrays):
-        if "t" not in arrays:
-            raise InputError("the arrays have no time", remedy='Give seconds as "t".')
-        return Log(**arrays)
-    import pandas as pd  # noqa: PLC0415  heavy, and only needed here
+def _log_of_groups(arrays: Mapping[str, Any]) -> Log | None:
+    """Make the log of arrays of several columns; None where they are single columns of a table."""
+    if not any(name in GROUPS or name == "attitude" for name in arrays):
+        return None
+    if "t" not in arrays:
+        raise InputError("the arrays have no time", remedy='Give seconds as "t".')
+    return Log(**arrays)
 
+
+def _columns(arrays: Mapping[str, Any]) -> dict[str, Any]:
+    """Check the columns of a table."""
     for name, column in arrays.items():
         if np.ndim(column) > 1:
             raise InputError(
@@ -108,4 +135,4 @@ def _log_of_arrays(arrays: Mapping[str, Any]) -> Log:
     lengths = {str(name): len(column) for name, column in arrays.items()}
     if len(set(lengths.values())) > 1:
         raise InputError("the arrays have different lengths: " + ", ".join(f"{k} {n}" for k, n in lengths.items()))
-    return Log.from_dataframe(pd.DataFrame(dict(arrays)))
+    return dict(arrays)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,16 +13,23 @@ from imufit.errors import InputError
 from imufit.log.assemble import group_fields
 from imufit.log.check import check_poses, checked_labels, truth_value
 from imufit.log.columns import CONTRACT, GROUPS
-from imufit.log.metadata import KNOWN, Metadata
+from imufit.log.metadata import ALIKE, KNOWN, Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import TimeScan
 from imufit.log.unmeasured import Unmeasured
 from imufit.log.words import meant
+from imufit.printable import NAME, printable
 
 if TYPE_CHECKING:
     pass
 
 Array = NDArray[np.float64]
+
+ARGUMENTS: Final = ("reference", "ref_p", "ref_angle", "pose", "temp", "covariates", "labels")
+"""Keywords under which columns are given to a log besides its sensors."""
+_LIKELY: Final = 0.6
+"""Share of letters in common (difflib, and its default) from which a name is offered for an array that no log has:
+`magref` and `mag_reference` have 0.63."""
 
 
 def contiguous(values: ArrayLike, name: str, shape: tuple[int, ...] | None = None) -> Array:
@@ -38,7 +46,7 @@ def contiguous(values: ArrayLike, name: str, shape: tuple[int, ...] | None = Non
 
 
 def check_keywords(metadata: Mapping[str, Any]) -> None:
-    """Refuse an array among the metadata: a column under a name that a log does not know.
+    """Refuse an array or columns among the metadata: they came under a name that a log does not know.
 
     Parameters
     ----------
@@ -51,10 +59,22 @@ def check_keywords(metadata: Mapping[str, Any]) -> None:
         The column is named, with the nearest that there is.
     """
     for key, value in metadata.items():
-        if key not in KNOWN and np.ndim(value) > 0 and np.size(value) > 1 and not isinstance(value, Mapping):
+        if key in KNOWN:
+            continue
+        if isinstance(value, Mapping):
+            close = difflib.get_close_matches(key.lower(), ARGUMENTS, n=1, cutoff=ALIKE)
+            if close:
+                raise InputError(
+                    f"a log has no {printable(key, NAME)}", file="log", column=key, remedy=f"Did you mean {close[0]}?"
+                )
+        elif np.ndim(value) > 0 and np.size(value) > 1:
             column = meant(f"{key}_x")
             group = next((group for group, columns in GROUPS.items() if column in columns), "")
-            remedy = f"Did you mean {group}?" if group else "Columns without a fixed meaning go into covariates={...}."
+            known = [*ARGUMENTS, *sorted(KNOWN)]
+            close = [group] if group else difflib.get_close_matches(key.lower(), known, n=1, cutoff=_LIKELY)
+            remedy = (
+                f"Did you mean {close[0]}?" if close else "Columns without a fixed meaning go into covariates={...}."
+            )
             raise InputError("a log has no array of this name", file="log", column=key, remedy=remedy)
 
 

@@ -7,7 +7,6 @@ of the two it is follows from the step between rows, which only one of them make
 
 from __future__ import annotations
 
-import shlex
 from typing import Final
 
 import numpy as np
@@ -70,7 +69,7 @@ def turn_ratio(t: Array, gyr: Array, ref_q: Array) -> float:
 
 
 def other_clock(t: Array, ratio: float, gyr_units: tuple[float, ...], column: str) -> tuple[str, str] | None:
-    """Say which clock explains a ratio of turns, and the mapping that puts it right; None where none does.
+    """Say which clock explains a ratio of turns, and the source of `t` that puts it right; None where none does.
 
     Parameters
     ----------
@@ -87,23 +86,18 @@ def other_clock(t: Array, ratio: float, gyr_units: tuple[float, ...], column: st
     if not (np.isfinite(ratio) and ratio > 0.0 and step > 0.0):
         return None
 
-    def mapped(what: str) -> str:
-        return shlex.quote(f"t={what}")
-
     if abs(np.log(ratio / 60.0)) < _MINUTE_NEAR and step < 1.0 / _USUAL_RATE[0] / 60.0:
-        return "t is in min", mapped(f"{column}[*60]")
+        return "t is in min", f"{column}[*60]"
     if step < _SLOW:
         return None
     for unit, factor in _CLOCKS:
         if abs(np.log(ratio * factor)) < _NEAR:
-            return f"t is in {unit}", mapped(f"{column}[{unit}]")
+            return f"t is in {unit}", f"{column}[{unit}]"
     own = any(abs(np.log(ratio / each)) < 0.1 for each in gyr_units)
     rate = 1.0 / ratio
     if np.all(np.diff(t) == 1.0) and not own and _USUAL_RATE[0] < rate < _USUAL_RATE[1]:
         rounded = round_rate(rate)
-        return f"t counts rows, of which {rate:.4g} come in a second (rate by the gyroscope)", mapped(
-            f"row[{rounded:g}Hz]"
-        )
+        return f"t counts rows, of which {rate:.4g} come in a second (rate by the gyroscope)", f"row[{rounded:g}Hz]"
     return None
 
 

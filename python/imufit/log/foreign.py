@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import shlex
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -20,6 +19,7 @@ from imufit.log.place import Place
 from imufit.log.units import Conversion, conversion, unit_in_header
 from imufit.log.words import meant, nearest
 from imufit.printable import NAME, printable
+from imufit.remedy import Remedy, reading, template
 
 ROW: Final = "row"
 """Name that stands for the row number in a mapping, when the file has no column of that name."""
@@ -208,7 +208,7 @@ def plan_columns(
 
 def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> PlannedColumn:
     """Find the column, sign and unit, or the constant, that a mapping's source text means."""
-    bare, unit = _bracket(text)
+    bare, unit = bracket(text)
     if target == "t":
         for name, order in ((text.strip(), ""), (bare, unit)):
             day, _, clock = name.partition(BETWEEN)
@@ -217,7 +217,7 @@ def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> Plan
         if unit in ORDERS and bare in names:
             return PlannedColumn("t", bare, Conversion(), order=unit)
     for name, given in ((text.strip(), None), (bare, unit)):
-        for sign, given_name in _signed(name):
+        for sign, given_name in signed(name):
             column = given_name
             if column not in names:
                 column = _named_otherwise(given_name, names) or column
@@ -260,7 +260,7 @@ def _to_si(target: str, unit: str, place: Place) -> Conversion:
     try:
         return conversion(target, unit)
     except InputError as error:
-        raise place.error(error.problem, column=error.column, remedy=error.remedy) from None
+        raise place.error(error.problem, column=error.column, remedy=error.advice) from None
 
 
 def _planned(
@@ -272,13 +272,26 @@ def _planned(
     return PlannedColumn(target, column if column in names else RowNumber(), to_si)
 
 
-def _bracket(text: str) -> tuple[str, str]:
-    """Split ``AccX[g]`` into the name and the unit."""
+def bracket(text: str) -> tuple[str, str]:
+    """Split ``AccX[g]`` into the name and the unit.
+
+    Parameters
+    ----------
+    text : str
+        Source of a column in a mapping.
+    """
     found = re.fullmatch(r"(.*?)\s*\[([^\[\]]*)\]\s*", text)
     return (found[1].strip(), found[2]) if found else (text.strip(), "")
 
 
-def _signed(name: str) -> list[tuple[float, str]]:
+def signed(name: str) -> list[tuple[float, str]]:
+    """Return every sign and name that a source without its unit may mean: a name may begin with a sign.
+
+    Parameters
+    ----------
+    name : str
+        Source of a column in a mapping, without its unit.
+    """
     if name[:1] in "+-" and name[1:]:
         return [(1.0, name), (-1.0 if name[0] == "-" else 1.0, name[1:].strip())]
     return [(1.0, name)]
@@ -306,7 +319,7 @@ def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place,
     if not complete and "ref_angle" not in targets and not bare:
         raise place.error(
             "there is no sensor: neither acc_x acc_y acc_z nor gyr_* nor mag_* nor a reference ref_q*",
-            remedy="Name the columns with --map acc_x=COLUMN[UNIT] and so on." + _listing(free),
+            remedy="Name the columns with " + reading(place.file, template("acc")) + "." + _listing(free),
         )
 
 
@@ -314,21 +327,20 @@ def _missing(missing: dict[str, str], targets: Sequence[str], place: Place) -> I
     """Error for the first missing column, with the mapping for all of them."""
     first = min(missing, key=CONTRACT.index)
     known = {column: name for column, name in missing.items() if name}
-    pairs = ",".join(f"{column}={known[column]}" for column in sorted(known, key=CONTRACT.index))
+    pairs = {column: known[column] for column in sorted(known, key=CONTRACT.index)}
     if not missing[first]:
         group = next((group for group in GROUPS.values() if first in group), ())
         there = [column for column in group if column in targets]
         problem = f"column {first} is missing" + (f" although {' and '.join(there)} are there" if there else "")
-        remedy = f"Add it, or leave out the others of {', '.join(group)}."
+        remedy = Remedy.of(f"Add it, or leave out the others of {', '.join(group)}.")
         if first == "t":
-            rate = f"t=row[100Hz],{pairs}" if pairs else "t=row[100Hz]"
-            remedy = f"Give time in s, for a fixed rate with --map {shlex.quote(rate) if pairs else rate}."
+            remedy = "Give time in s, for a fixed rate with " + place.mapped({"t": "row[100Hz]", **pairs}) + "."
             remedy += "" if pairs or set(targets) & set(CONTRACT) else _listing(targets)
         return place.error(problem, column=first, remedy=remedy)
     return place.error(
         f"column {first} is missing; did you mean {missing[first]}?",
         column=first,
-        remedy=f"Use --map {shlex.quote(pairs)}",
+        remedy="Use " + place.mapped(pairs),
     )
 
 

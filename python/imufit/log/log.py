@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from imufit.errors import InputError
 from imufit.log.arrays import check_keywords, contiguous, fields_from_arrays
 from imufit.log.columns import GROUPS, present
-from imufit.log.metadata import Metadata
+from imufit.log.metadata import Frame, Metadata
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
 from imufit.log.size import BLOCK_ROWS
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from scipy.spatial.transform import Rotation
+
+    from imufit.log.anything import AnyTable
 
 Array = NDArray[np.float64]
 Text = NDArray[np.object_]
@@ -461,30 +463,38 @@ class Log:
     @classmethod
     def from_dataframe(
         cls,
-        df: pd.DataFrame,
+        df: AnyTable,
         metadata: Metadata | Mapping[str, Any] | None = None,
         mapping: Mapping[str, str] | None = None,
+        *,
+        frame: Frame | None = None,
+        noise: Mapping[str, float] | None = None,
+        drop: str | Sequence[str] = (),
     ) -> Self:
-        """Make a log from a pandas table, with the same checks as on reading a file.
+        """Make a log from a table, with the same checks as on reading a file.
 
         Parameters
         ----------
-        df : DataFrame
+        df : DataFrame, table of Arrow or polars, Log, or mapping of columns
             Columns as in a log file.
         metadata : Metadata or mapping, optional
             Frame, gravity and so on; without it what :meth:`to_pandas` left with the table.
         mapping : mapping, optional
             Source text for target columns, as for files.
+        frame, noise, drop
+            As for :func:`imufit.read`.
         """
+        from imufit import log as logs  # noqa: PLC0415  a table is read as a file is, which is built on this class
+
+        table, left = logs.pandas_of(df)
         # the metadata that a table inherits were not stated of the time that it has now
         clock: Clock = "a log's" if metadata not in (None, {}, Metadata()) else "open"
         if metadata is None:
-            metadata = df.attrs.get(METADATA, {})
+            metadata = left
         if not isinstance(metadata, Metadata):
             metadata = Metadata.from_mapping(metadata, "log")
-        from imufit import log as logs  # noqa: PLC0415  a table is read as a file is, which is built on this class
-
-        held = logs.LogStream.of_source(logs.FrameSource(df), metadata, mapping, clock).read()
+        reading = logs.Reading(mapping, frame, noise or {}, (drop,) if isinstance(drop, str) else tuple(drop))
+        held = logs.LogStream.of_source(logs.FrameSource(table), metadata, reading, clock).read()
         return cls.of_fields(**{item.name: getattr(held, item.name) for item in fields(held)})
 
     def sensors(self) -> dict[str, Array | None]:

@@ -16,13 +16,16 @@ from imufit.log.arrow_numbers import numbers_of
 from imufit.log.metadata import Metadata, mapping_from_json
 from imufit.log.size import NUMBER, TEXT_CELL, TEXT_GROUP, rows_at_once, size_in_words
 from imufit.log.text_cells import cells_of
+from imufit.remedy import command
 
 _KEY: Final = b"imufit"
 ROW_GROUP: Final = 131_072
 """Rows of a row group that is written: what a reader has to hold at least."""
 _BROKEN: Final = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
 """What the reader raises about damaged bytes; a schema's size may be anything."""
-_DAMAGED: Final = "Copy or record it again; imufit recover saves what a crash left."
+_DAMAGED: Final = (
+    "Copy or record it again; " + command("recover", "imufit.devices.record.recover") + " saves what a crash left."
+)
 
 
 class ParquetSource:

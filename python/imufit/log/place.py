@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from imufit.errors import InputError
 from imufit.printable import NAME, printable
+from imufit.remedy import Remedy, mapped, reading
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,18 @@ class Place:
         """Name of the file for notes."""
         return "log" if self.file is None else printable(self.file.name, NAME)
 
+    def mapped(self, columns: Mapping[str, str]) -> Remedy:
+        """Name the call, or the option, that reads this log with other columns.
+
+        Parameters
+        ----------
+        columns : mapping
+            Source text for each column of the log.
+        """
+        return reading(self.file, mapped(columns))
+
     def error(
-        self, problem: str, *, row: int | None = None, column: str | None = None, remedy: str | None = None
+        self, problem: str, *, row: int | None = None, column: str | None = None, remedy: str | Remedy | None = None
     ) -> InputError:
         """Make the error for this place; raise it yourself."""
         line = self.line_of(row) if self.line_of is not None and row is not None else None

@@ -196,7 +196,7 @@ def parse_noise(*texts: str) -> dict[str, float]:
         try:
             factor = conversion(GROUPS[sensor][0], found["unit"] or "").factor
         except InputError as error:
-            raise InputError(f"the noise of {sensor}: {error.problem}", remedy=error.remedy) from None
+            raise InputError(f"the noise of {sensor}: {error.problem}", remedy=error.advice) from None
         noise[sensor] = number * factor
     return noise
 

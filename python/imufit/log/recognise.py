@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
@@ -24,6 +23,7 @@ from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, turned
 from imufit.log.unit_check import HEAD, OtherUnitError, check_units, units_of_force, without_gravity
 from imufit.log.units import conversion, lookup
 from imufit.log.words import Words, sensor_of, strange, time_columns, unit_of, words_of
+from imufit.remedy import Remedy
 
 Array = NDArray[np.float64]
 
@@ -168,7 +168,7 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         raise place.error(
             _question(asked, several, timeless),
             column="t" if timeless else clock.column if first == "t" and clock else chosen[first].columns[0],
-            remedy=_remedy(complete),
+            remedy=_remedy(complete, place),
         )
     return Recognised(complete, (*told, *_notes(place, maker, timed or counted, chosen, units)), left)
 
@@ -200,7 +200,7 @@ def _ask_time_and_units(source: Readable, place: Place) -> None:
         raise place.error(
             f"column t is missing, and {_named(groups)} is not in SI units",
             column="t",
-            remedy=_remedy({"t": ROW_RATE, **mapping}),
+            remedy=_remedy({"t": ROW_RATE, **mapping}, place),
         )
 
 
@@ -281,10 +281,9 @@ def _temperature(parsed: Sequence[Words], names: Sequence[str], given: Mapping[s
     return {"temp": found[0]} if len(found) == 1 else {}
 
 
-def _remedy(mapping: Mapping[str, str]) -> str:
+def _remedy(mapping: Mapping[str, str], place: Place) -> Remedy:
     """Word the one mapping of a file."""
-    text = f"--map {shlex.quote(','.join(f'{target}={source}' for target, source in mapping.items()))}"
-    return f"If this is right, use {text}"
+    return "If this is right, use " + place.mapped(mapping)
 
 
 def _without_names(source: Readable, place: Place) -> InputError:
@@ -306,7 +305,7 @@ def _without_names(source: Readable, place: Place) -> InputError:
         for group, triple, each in named:
             complete |= {target: f"{name}[{each}]" for target, name in zip(GROUPS[group], triple, strict=True)}
     return place.error(
-        f"the columns {names[0]} to {names[-1]} have no names", column=names[0], remedy=_remedy(complete)
+        f"the columns {names[0]} to {names[-1]} have no names", column=names[0], remedy=_remedy(complete, place)
     )
 
 

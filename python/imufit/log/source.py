@@ -19,6 +19,7 @@ from imufit.log.rows_of_kinds import recording_of_instances, recording_of_kinds
 from imufit.log.tables import TablesSource
 from imufit.log.text import TEXT_SUFFIXES, looks_like_text, open_text
 from imufit.log.unpacked import COMPRESSED, is_utf_16, open_unpacked
+from imufit.remedy import command, recovering
 
 SUFFIXES: Final = (".parquet", ".npz", *TEXT_SUFFIXES)
 
@@ -96,7 +97,7 @@ def open_source(path: Path) -> Source:
         if not path.is_dir() and path.stat().st_size == 0:
             raise InputError("the file is empty (0 bytes)", file=path, remedy="Record or copy it again.")
         if re.fullmatch(r"\.part\d*", suffix):
-            raise InputError("this is what a recording wrote while it ran", file=path, remedy=f"imufit recover {path}")
+            raise InputError("this is what a recording wrote while it ran", file=path, remedy=recovering(path))
         if suffix in _ARRAYS:
             return _ARRAYS[suffix](path)
         if (found := _recording(path)) is not None:
@@ -107,7 +108,9 @@ def open_source(path: Path) -> Source:
             raise InputError(
                 f"the suffix {suffix or '(none)'} is not a log's, and the file is no text",
                 file=path,
-                remedy=f"Logs are {', '.join(SUFFIXES)}: export it as text, of which imufit convert makes a log.",
+                remedy=f"Logs are {', '.join(SUFFIXES)}: export it as text, of which "
+                + command("convert", "imufit.read")
+                + " makes a log.",
             )
         if (found := recording_of_kinds(path)) is not None:
             return TablesSource(path, found)

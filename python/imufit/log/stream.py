@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from imufit.log.assemble import check_truth_values, fields_of, time_of
 from imufit.log.columns import CONTRACT, EULER
+from imufit.log.completed import completed
 from imufit.log.cut import cut
 from imufit.log.foreign import plan_columns
 from imufit.log.log import HEAD_ROWS, LINE, Chunk, Log, concatenate, gathered
@@ -28,6 +30,7 @@ from imufit.log.unit_check import HEAD, Clock, check_units
 from imufit.log.unmeasured import Unmeasured
 from imufit.log.writer import write_rows
 from imufit.printable import NAME, printable
+from imufit.remedy import Remedy
 
 
 class LogStream:
@@ -69,7 +72,7 @@ class LogStream:
 
     @classmethod
     def of_source(
-        cls, source: Source, metadata: Metadata, mapping: Mapping[str, str] | None = None, clock: Clock = "open"
+        cls, source: Source, metadata: Metadata, reading: Reading | None = None, clock: Clock = "open"
     ) -> Self:
         """Make the log of a source that is no file.
 
@@ -79,13 +82,13 @@ class LogStream:
             A table in memory.
         metadata : Metadata
             Frame, gravity and so on.
-        mapping : mapping, optional
-            Source text for target columns.
+        reading : Reading, optional
+            How the table is to be read, where it does not say so itself.
         clock : "open" or "a log's"
             Whether the source says of itself that it is a log, so that its time is in seconds.
         """
         log = cls.__new__(cls)
-        log._begin(source, None, metadata, {}, clock, Reading(mapping), bare=False)
+        log._begin(source, None, metadata, {}, clock, reading or Reading(), bare=False)
         return log
 
     def _begin(
@@ -100,9 +103,10 @@ class LogStream:
     ) -> None:
         self._path, self._source, self._metadata = path, source, reading.metadata(metadata)
         self._place = Place(path, source.line_of)
-        names, mapping = source.names, reading.mapping
-        dropped = reading.dropped(names, [*CONTRACT, *EULER, *(mapping or {})], self._place)
-        found = recognise(_Left(source, dropped) if dropped else source, mapping, self._place)
+        names = source.names
+        dropped = reading.dropped(names, [*CONTRACT, *EULER, *(reading.mapping or {})], self._place)
+        left = _Left(source, dropped) if dropped else source
+        found = recognise(left, completed(reading.mapping, left, self._place), self._place)
         dropped = reading.dropped(names, found.mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
         self._plan = plan_columns(
@@ -252,11 +256,16 @@ class LogStream:
         share = min(held / self.size, kept / made)
         rows = int(self.n * share)
         more_words = f", or allow more with {option} {math.ceil(gigabytes / share)}" if option else ""
+        whole = "" if self._path is None else f"imufit.open_log({str(self._path)!r}, stream=True)"
         file = self._path or Path("log.parquet")
         part = file.with_name(f"{file.stem}-part.parquet")
         raise self._place.error(
             f"{self.n} rows take {size_in_words(made)} of memory, and this needs all of them at once",
-            remedy=f"Take a part: imufit convert {file} --rows 0:{rows} -o {part}{more_words}",
+            remedy="Take a part: "
+            + Remedy(
+                f"next({whole or 'log'}.chunks({rows})).core",
+                f"imufit convert {shlex.quote(str(file))} --rows 0:{rows} -o {shlex.quote(str(part))}{more_words}",
+            ),
         )
 
     def write(self, path: str | Path) -> None:

@@ -6,7 +6,6 @@ Each rule refuses only what is unmistakable. A sensor that merely reads oddly pa
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Final, Literal
@@ -20,6 +19,7 @@ from imufit.log.columns import GROUPS
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 from imufit.log.time_unit import time_unit
+from imufit.remedy import Remedy, mapped
 
 LEAST_STEP: Final = 1e-6
 """Mean time from row to row, s, below which no sensor samples: the fastest accelerometers give 1e5 samples a second."""
@@ -102,17 +102,22 @@ class OtherUnitError(InputError):
         Names the file.
     origin : mapping
         Column of the file for each column of the log.
-    otherwise : str
+    otherwise : str or Remedy
         What else it may be, and the mapping for it.
     """
 
     def __init__(
-        self, problem: str, units: Mapping[str, str], place: Place, origin: Mapping[str, str], otherwise: str = ""
+        self,
+        problem: str,
+        units: Mapping[str, str],
+        place: Place,
+        origin: Mapping[str, str],
+        otherwise: str | Remedy = "",
     ) -> None:
         self.units = dict(units)
         self.otherwise = otherwise
         column = next(iter(units))
-        remedy = f"Use {_map(units, origin)}{otherwise}"
+        remedy = "Use " + place.mapped(_in_units(units, origin)) + otherwise
         super().__init__(problem, file=place.file or "log", column=column, remedy=remedy)
 
 
@@ -179,7 +184,7 @@ def check_units(
     if others:
         # all of it in one mapping, so that nobody is asked twice
         units = {column: unit for other in others for column, unit in other.units.items()}
-        others_words = "".join(other.otherwise for other in others)
+        others_words = sum((Remedy.of(other.otherwise) for other in others), Remedy("", ""))
         raise OtherUnitError(others[0].problem, units, place, origin, others_words)
     return notes
 
@@ -191,11 +196,11 @@ def _check_exchange(acc: Array, gyr: Array, gravity: float, place: Place, origin
         pairs = [
             (f"{one}_{axis}", f"{other}_{axis}") for one, other in (("acc", "gyr"), ("gyr", "acc")) for axis in "xyz"
         ]
-        mapping = ",".join(f"{target}={origin.get(source, source)}" for target, source in pairs)
+        mapping = {target: origin.get(source, source) for target, source in pairs}
         raise place.error(
             f"at rest gyr shows gravity and acc {still:.4g}: the columns of acc and gyr are exchanged",
             column="acc_x",
-            remedy=f"Use --map {shlex.quote(mapping)}",
+            remedy="Use " + place.mapped(mapping),
         )
 
 
@@ -206,8 +211,8 @@ def _check_temp(temp: Array, place: Place, origin: Mapping[str, str]) -> list[st
         return []
     column, (unit, words) = origin.get("temp", "temp"), ("K", "kelvin") if usual > _KELVIN else ("degF", "fahrenheit")
     return [
-        f"{place.name}: temp is around {usual:.4g}, hot for degC: if it is in {words}, use --map "
-        f"{shlex.quote(f'temp={column}[{unit}]')}"
+        f"{place.name}: temp is around {usual:.4g}, hot for degC: if it is in {words}, use "
+        f"{place.mapped({'temp': f'{column}[{unit}]'})}"
     ]
 
 
@@ -221,8 +226,8 @@ def _check_time(t: Array, place: Place, origin: Mapping[str, str], stated: bool)
         raise place.error(
             f"{t.size} rows lie within {t[-1] - t[0]:.3g} s, more than any sensor samples: t is not in s",
             column="t",
-            remedy="Say how many s one of its units has, such as --map "
-            + shlex.quote(f"t={column}[*3600]")
+            remedy="Say how many s one of its units has, such as "
+            + place.mapped({"t": f"{column}[*3600]"})
             + " for hours.",
         )
     dt = float(np.median(np.diff(t)))
@@ -238,7 +243,7 @@ def _slow_clock(t: Array, place: Place, column: str) -> list[str]:
         return []
     return [
         f"{place.name}: rows are {step:.4g} s apart, and nothing turns that would show whether t is in s: if it is in "
-        f"{unit}, use --map {shlex.quote(f't={column}[{unit}]')}"
+        f"{unit}, use {place.mapped({'t': f'{column}[{unit}]'})}"
     ]
 
 
@@ -246,8 +251,14 @@ def _other_clock(seen: str, unit: str, place: Place, column: str) -> InputError:
     return place.error(
         f"{seen}, which looks like {unit}, not s",
         column="t",
-        remedy=f"Use --map {shlex.quote(f't={column}[{unit}]')}, or {shlex.quote(f't={column}[s]')} if it is s.",
+        remedy=_time_from(f"{column}[{unit}]", column, place),
     )
+
+
+def _time_from(source: str, column: str, place: Place) -> Remedy:
+    """Name the source of the time that is likely, and the one for a time in s."""
+    in_seconds = mapped({"t": f"{column}[s]"}, shell="")
+    return "Use " + place.mapped({"t": source}) + ", or " + in_seconds + " if it is s."
 
 
 def rest_norm(acc: Array, rows: int = 50, relative: bool = True) -> float:
@@ -311,7 +322,10 @@ def _one_of(
 ) -> OtherUnitError:
     """Make the error for a sensor that is in the first of these units, or else in one of the others."""
     (_, first, unit), *others = units
-    more = "".join(f", or if it is {words}: {_map(_all_in(sensor, other), origin)}" for _, words, other in others)
+    more = sum(
+        (f", or if it is {words}: " + mapped(_in_units(_all_in(sensor, other), origin)) for _, words, other in others),
+        Remedy("", ""),
+    )
     si = {"acc": "m/s^2", "mag": "uT"}[sensor]
     return OtherUnitError(f"{seen}, which looks like {first}, not {si}", _all_in(sensor, unit), place, origin, more)
 
@@ -362,7 +376,7 @@ def _check_acc(
                 "every reading of acc has the length 1: each was divided by its own length, and shows a direction only",
                 column="acc_x",
                 remedy="Export the readings themselves. For a filter, which takes directions too: "
-                + _map(_all_in("acc", "g"), origin),
+                + place.mapped(_in_units(_all_in("acc", "g"), origin)),
             )
         raise _one_of("acc", f"at rest the norm of acc is {norm:.4g}", units, place, origin)
     if without_gravity(acc, gravity):
@@ -402,7 +416,7 @@ def _check_gyr(
                 f"{who} at {ratio:.3g} of the rate in gyr, with rows {float(np.median(np.diff(t))):.3g} s apart: "
                 f"{other[0]}, not in s",
                 column="t",
-                remedy=f"Use --map {other[1]}, or {shlex.quote(f't={column}[s]')} if it is s.",
+                remedy=_time_from(other[1], column, place),
             )
         if ratio < _OTHER_UNIT:
             size, words, unit = min(GYR_UNITS, key=lambda known: abs(np.log(max(ratio, 1e-9) / (0.9 * known[0]))))
@@ -538,7 +552,6 @@ def _milligauss_or_counts(
     return [unit for unit in units if unit[2] == "mG" or (whole and _EARTH[0] <= size / unit[0] <= _EARTH[1])]
 
 
-def _map(units: Mapping[str, str], origin: Mapping[str, str]) -> str:
-    return "--map " + shlex.quote(
-        ",".join(f"{column}={origin.get(column, column)}[{unit}]" for column, unit in units.items())
-    )
+def _in_units(units: Mapping[str, str], origin: Mapping[str, str]) -> dict[str, str]:
+    """Return the mapping that reads columns of the log in these units."""
+    return {column: f"{origin.get(column, column)}[{unit}]" for column, unit in units.items()}

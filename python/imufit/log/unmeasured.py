@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from imufit.log.columns import GROUPS, LARGEST, LARGEST_COVARIATE, SENSORS, SMALLEST, UNITS
 from imufit.log.place import Place
+from imufit.remedy import Remedy, when_read
 
 Array = NDArray[np.float64]
 
@@ -114,13 +115,13 @@ class Unmeasured:
             return
         target, seen = min(many.items(), key=lambda item: item[1].first[0][0])
         row, value = seen.first[0]
-        remedy = "Write NaN (or leave the cell empty) for a missing sample."
+        remedy = Remedy.of("Write NaN (or leave the cell empty) for a missing sample.")
         largest = LARGEST.get(target, LARGEST_COVARIATE)
         if np.isinf(value):
             problem = f"{value} is not a reading"
         elif target in LARGEST:
             problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that {target} can measure"
-            remedy += " Or is it another unit? --map takes it."
+            remedy += " Or is it another unit? " + when_read(Remedy("mapping=", "--map")) + " takes it."
         else:
             problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that is measured"
         raise self._place.error(problem, row=row, column=seen.name, remedy=remedy)

@@ -61,7 +61,7 @@ def open_unpacked(path: Path) -> CsvSource | TranscriptSource:
         source = open_text(file)
     except InputError as error:
         raise InputError(
-            error.problem, file=path, row=error.row, column=error.column, line=error.line, remedy=error.remedy
+            error.problem, file=path, row=error.row, column=error.column, line=error.line, remedy=error.advice
         ) from None
     except (zlib.error, EOFError, OSError, ValueError) as error:
         raise damaged(path, error) from None

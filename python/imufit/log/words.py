@@ -345,6 +345,21 @@ def _close(name: str) -> str | None:
     return None
 
 
+def one_of(wanted: str, names: Iterable[str]) -> str:
+    """Say which of the given names is most like the wanted one, and which there are.
+
+    Parameters
+    ----------
+    wanted : str
+        Name that is not known.
+    names : iterable of str
+        Those that are.
+    """
+    names = list(names)
+    near = nearest(wanted, names)
+    return f"{f'Did you mean {near[0]}? ' if near else ''}Use one of {', '.join(names)}."
+
+
 def nearest(wanted: str, names: Iterable[str], n: int = 1) -> list[str]:
     """Return those of the given names that are most like the wanted one, best first, at most n."""
     names = list(names)

@@ -12,6 +12,7 @@ from imufit import _imufit
 from imufit.errors import InputError
 from imufit.model.effect import registered, run_effects
 from imufit.printable import NAME, printable
+from imufit.remedy import command
 from imufit.results import EffectCard, Result, Table
 
 if TYPE_CHECKING:
@@ -80,7 +81,8 @@ def find_effect(effect_id: str) -> _imufit.Effect:
     effect = known.get(effect_id) or (_imufit.find_effect(effect_id) if COLUMN in effect_id else None)
     if effect is None:
         near = difflib.get_close_matches(effect_id, list(effects()), n=1, cutoff=0.4)
-        remedy = f"Did you mean {near[0]}?" if near else "imufit explain lists all effects."
+        every = command("explain", "imufit.catalogue()") + " lists all effects."
+        remedy = f"Did you mean {near[0]}?" if near else every
         raise InputError(f"there is no effect {effect_id}", remedy=remedy)
     return effect
 

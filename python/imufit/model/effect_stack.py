@@ -356,7 +356,7 @@ class EffectStack:
             )
             held.check_complete()
         except InputError as error:
-            raise InputError(error.problem, file=path, remedy=error.remedy) from None
+            raise InputError(error.problem, file=path, remedy=error.advice) from None
         return model
 
     def _repr_html_(self) -> str:

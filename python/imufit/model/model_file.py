@@ -109,7 +109,7 @@ class ModelFile:
                 _limits(document.get("limits", {})),
             )
         except InputError as error:
-            raise InputError(error.problem, file=file, remedy=error.remedy) from None
+            raise InputError(error.problem, file=file, remedy=error.advice) from None
 
     def check_complete(self) -> None:
         """Refuse a model of which something is missing, or may be missing, and one in other units.

@@ -26,8 +26,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
+from imufit.errors import InputError
 from imufit.filters import ALL, AttitudeFilter, Smoother
 from imufit.log import Log
+from imufit.log.words import one_of
 from imufit.progress import Progress, silent
 from imufit.replaying.angle_table import angle_table
 from imufit.replaying.clipped import ranges
@@ -447,7 +449,7 @@ def _choose(filters: Sequence[str] | None, sensors: Mapping[str, Array | None]) 
 def _made(name: str, arguments: Mapping[str, Any], settings: Mapping[str, float]) -> AttitudeFilter | Smoother:
     kinds: dict[str, type[AttitudeFilter | Smoother]] = {**ALL, Smoother.name: Smoother}
     if name not in kinds:
-        raise ValueError(f"filter {name!r} is unknown: use one of {', '.join(kinds)}")
+        raise InputError(f"filter {name!r} is unknown", remedy=one_of(name, kinds))
     around = {**arguments, **arguments["rules"], **settings}
     del around["rules"]
     return kinds[name](**around)

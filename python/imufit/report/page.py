@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from imufit.figures import quantity
+from imufit.remedy import command
 from imufit.report.inline_svg import inline_svg
 from imufit.results.comparison import MOST_PANELS, Panel, drawn_panels
 from imufit.results.diagnosis import VERDICTS
@@ -163,11 +164,12 @@ def _fitted(ladder: Ladder | None, addition: Addition | None) -> dict[str, Any] 
 def _next_step(diagnosis: Diagnosis | None, ladder: Ladder | None) -> str:
     """Return what to do after reading the page."""
     if diagnosis is None:
-        return "Ask which effect is missing: `imufit diagnose`."
+        return f"Ask which effect is missing: `{command('diagnose')}`."
     found = "; ".join(str(item) for item in diagnosis.unexplained)
     rivals = " and ".join(diagnosis.ambiguous_with)
+    add = command("add", "Fit.add")
     steps = {
-        "missing": f"Add {diagnosis.best} with `imufit add`, or let `imufit ladder` go on until nothing is missing.",
+        "missing": f"Add {diagnosis.best} with `{add}`, or let `{command('ladder')}` go on until nothing is missing.",
         "unknown": f"Find what couples in here: {found}." if found else "Look at the worst segments.",
         "ambiguous": f"Record a log with another motion or temperature profile, so that {rivals} can be told apart.",
         "adequate": "Use the model as it stands. Record another log of this sensor to check it."

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from imufit.errors import InputError
+from imufit.remedy import mapped, template, when_read
 from imufit.rests.poses import Pose
 
 
@@ -36,12 +37,10 @@ def check_unit(poses: Sequence[Pose], gravity: float, file: object) -> None:
     if counts is not None:
         looks = f"{unit} or raw counts of {counts}LSB/g" if unit else f"raw counts of {counts}LSB/g"
         unit = unit or f"{counts}LSB/g"
-    axes = ",".join(f"acc_{axis}=acc_{axis}[{unit}]" for axis in "xyz")
-    remedy = (
-        f"It looks like {looks}: map it, e.g. --map {axes}."
-        if unit
-        else "Give the unit in the mapping, e.g. --map acc_x=NAME[g]."
-    )
+    remedy = "Give the unit in the mapping, e.g. " + when_read(template("acc")) + "."
+    if unit:
+        columns = {f"acc_{axis}": f"acc_{axis}[{unit}]" for axis in "xyz"}
+        remedy = f"It looks like {looks}: map it, e.g. " + when_read(mapped(columns)) + "."
     raise InputError(
         f"the accelerometer reads {length:.4g} at rest where gravity is {gravity:.4g} m/s²",
         file=str(file),

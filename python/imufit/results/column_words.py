@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.figures import quantity
+from imufit.remedy import Remedy, mapped, when_read
 from imufit.results.fault_words import AXES, UNITS, Words
 
 Array = NDArray[np.float64]
@@ -17,8 +18,10 @@ Unit = tuple[str, str]
 """What a unit is called, and how a mapping writes it."""
 
 
-def _declare(columns: Sequence[str], unit: str) -> str:
-    return "--map '" + ",".join(f"{column}={column}[{unit}]" for column in columns) + "'"
+def _declare(columns: Sequence[str], units: Sequence[str]) -> Remedy:
+    """Name the mapping that declares the unit of columns: the first one, or else another."""
+    first, *others = (mapped({column: f"{column}[{unit}]" for column in columns}) for unit in units)
+    return sum(("; or " + other for other in others), when_read(first))
 
 
 def wrong_unit(sensor: str, axes: str, ratio: float, units: Sequence[Unit]) -> Words:
@@ -40,36 +43,38 @@ def wrong_unit(sensor: str, axes: str, ratio: float, units: Sequence[Unit]) -> W
     if not units:
         return (
             f"{name} reads {size}{where}: no sensor is wrong by so much, and no known unit gives this factor.",
-            f"Find the unit. Until then: {_declare(columns, f'*{1.0 / ratio:.6g}')}.",
+            "Find the unit. Until then: " + _declare(columns, [f"*{1.0 / ratio:.6g}"]) + ".",
         )
     kinds = ", or ".join(words for words, _ in units)
-    remedies = "; or ".join(_declare(columns, unit) for _, unit in units)
-    return f"{name} reads {size}{where}, which looks like {kinds}.", f"Declare the unit: {remedies}."
+    remedy = "Declare the unit: " + _declare(columns, [unit for _, unit in units]) + "."
+    return f"{name} reads {size}{where}, which looks like {kinds}.", remedy
 
 
 def field_in_another_unit(size: float, units: Sequence[Unit]) -> Words:
     """Say that the field which the magnetometer shows is of a size that is not on earth."""
     kinds = ", or ".join(words for words, _ in units)
-    remedies = "; or ".join(_declare([f"mag_{axis}" for axis in AXES], unit) for _, unit in units)
     return (
         f"The field that turns in mag has a magnitude of {size:.4g}, and no such field in uT is on earth: it looks "
         f"like {kinds}.",
-        f"Declare the unit: {remedies}.",
+        "Declare the unit: " + _declare([f"mag_{axis}" for axis in AXES], [unit for _, unit in units]) + ".",
     )
 
 
 def exchanged(pairs: Sequence[tuple[str, str]]) -> Words:
     """Say that columns of two sensors are exchanged."""
     names = " and ".join(f"{one} with {other}" for one, other in pairs)
-    mapping = ",".join(f"{one}={other},{other}={one}" for one, other in pairs)
-    return f"Columns are exchanged between sensors: {names}.", f"Exchange them back: --map '{mapping}'."
+    mapping = {target: source for one, other in pairs for target, source in ((one, other), (other, one))}
+    return (
+        f"Columns are exchanged between sensors: {names}.",
+        "Exchange them back: " + when_read(mapped(mapping)) + ".",
+    )
 
 
 def positions(unit: str) -> Words:
     """Say that the reference's positions are in another unit of length."""
     return (
         f"The accelerations along the path of ref_p fit acc only if the positions are in {unit}, not m.",
-        f"Declare the unit: {_declare([f'ref_p{axis}' for axis in AXES], unit)}.",
+        "Declare the unit: " + _declare([f"ref_p{axis}" for axis in AXES], [unit]) + ".",
     )
 
 
@@ -155,7 +160,7 @@ def angle_in_degrees(factor: float, sign: int, zero: int) -> Words:
     unit = "deg" if not zero else f"deg - {zero}" if zero > 0 else f"deg + {-zero}"
     return (
         f"ref_angle turns {factor:.4g} times as far as the gyroscope: it is in degrees{way}{where}.",
-        f"Declare the unit: --map 'ref_angle={'-' if sign < 0 else ''}ref_angle[{unit}]'.",
+        "Declare the unit: " + when_read(mapped({"ref_angle": f"{'-' if sign < 0 else ''}ref_angle[{unit}]"})) + ".",
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from imufit.figures import quantity
+from imufit.remedy import Remedy
 from imufit.results.json_value import json_value
 from imufit.results.part import Part
 from imufit.results.table import Table
@@ -31,8 +32,8 @@ class DataFault(Part):
         Rows concerned.
     evidence : str
         What shows it, in a sentence with figures.
-    remedy : str
-        What to do about it, in a sentence.
+    advice : str or Remedy
+        What to do about it, in a sentence: in the words of Python and in those of the command line.
     left_out : bool
         True if the samples concerned were left out of the evidence; what is said of the log rests on the others.
     false_readings : bool
@@ -54,7 +55,7 @@ class DataFault(Part):
     t_end: float
     rows: int
     evidence: str
-    remedy: str
+    advice: str | Remedy
     left_out: bool = False
     false_readings: bool = False
     spoils: bool = False
@@ -63,9 +64,20 @@ class DataFault(Part):
     file: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of one fault; the key ``file`` only where there are several logs."""
+        """JSON of one fault, its remedy in the shell's words; the key ``file`` only where there are several logs."""
         names = [name for name in self.__dataclass_fields__ if name != "file" or self.file is not None]
-        return {name: json_value(getattr(self, name)) for name in names}
+        values = {"remedy" if name == "advice" else name: json_value(getattr(self, name)) for name in names}
+        return values | {"remedy": self.shell_remedy}
+
+    @property
+    def remedy(self) -> str:
+        """What to do about it, in Python; in the words of the command line where that is running."""
+        return str(self.advice)
+
+    @property
+    def shell_remedy(self) -> str:
+        """What to do about it, in the words of the command line."""
+        return Remedy.of(self.advice).shell
 
     @property
     def sentence(self) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from imufit.figures import quantity
 from imufit.log.columns import SENSOR_NAMES
+from imufit.remedy import Remedy, mapped, option, when_read
 
 Array = NDArray[np.float64]
 
@@ -19,7 +20,7 @@ AXES: Final = "xyz"
 PARTS: Final = "wxyz"
 UNITS: Final = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
 
-Words = tuple[str, str]
+Words = tuple[str, str | Remedy]
 """Evidence and remedy."""
 
 
@@ -39,18 +40,20 @@ def changed(change: Words, left: Sequence[str], alike: Words | None) -> Words:
 
 def mount(sensors: Sequence[str], matrix: Array, excited: str) -> Words:
     """Say that all sensors are turned alike; one that is excited stands for the others."""
-    turned_back = ",".join(mapping(sensor, matrix) for sensor in sensors)
+    turned_back = {target: source for sensor in sensors for target, source in mapping(sensor, matrix).items()}
     return (
         "The axes of every sensor are turned against the body that the reference describes: "
         f"{_shown(excited, matrix)}, and so on.",
-        f"Turn them back with --map '{turned_back}', or multiply the reference from the right by a turn of "
-        f"{_turn(matrix.T)}.",
+        "Turn them back with "
+        + when_read(mapped(turned_back))
+        + f", or multiply the reference from the right by a turn of {_turn(matrix.T)}.",
     )
 
 
 def frame(name: str, declared: str) -> Words:
     """Say that the reference is in another frame."""
-    return f"The reference is in the frame {name}, not {declared} as the log says.", f'Declare frame = "{name}".'
+    text = f"The reference is in the frame {name}, not {declared} as the log says."
+    return text, "Declare the frame: " + when_read(option("frame", name)) + "."
 
 
 def quaternion(places: Sequence[int], signs: Sequence[float]) -> Words:
@@ -76,15 +79,15 @@ def quaternion(places: Sequence[int], signs: Sequence[float]) -> Words:
         other = ""
     to_do = [*(["Put the scalar first"] if last else [])]
     to_do += ["conjugate it" if len(turned) == 3 else f"turn the sign of {' and '.join(turned)}"] if turned else []
-    said = [
-        f"ref_q{part}={'-' if sign < 0.0 else ''}ref_q{PARTS[place]}"
+    said = {
+        f"ref_q{part}": f"{'-' if sign < 0.0 else ''}ref_q{PARTS[place]}"
         for part, place, sign in zip(PARTS, places, signs, strict=True)
         if sign < 0.0 or PARTS[place] != part
-    ]
+    }
     remedy = " and ".join(to_do)
     return (
         f"The reference attitude {', and '.join(each for each in (last, other) if each)}.",
-        f"{remedy[0].upper()}{remedy[1:]}: --map {','.join(said)}.",
+        f"{remedy[0].upper()}{remedy[1:]}: " + when_read(mapped(said)) + ".",
     )
 
 
@@ -93,11 +96,11 @@ def clock(factor: float) -> Words:
     size = f"{factor:g} times as long as" if factor > 1.0 else f"1/{1.0 / factor:g} of what"
     return (
         f"The clock is at another rate: by the turns of the reference, the steps between rows are {size} t says.",
-        f"Put t right: --map 't=t[*{factor:g}]'.",
+        "Put t right: " + when_read(mapped({"t": f"t[*{factor:g}]"})) + ".",
     )
 
 
-def axes(sensor: str, matrix: Array, left: str, other: str) -> Words:
+def axes(sensor: str, matrix: Array, left: str, other: str | Remedy | None) -> Words:
     """Say which axes of a sensor are exchanged or turned round; `other` is another remedy."""
     if np.array_equal(matrix, -np.eye(3)):
         what = f"{sensor} reads the opposite of what it should on every axis"
@@ -107,7 +110,8 @@ def axes(sensor: str, matrix: Array, left: str, other: str) -> Words:
         handed = "" if np.linalg.det(matrix) > 0.0 else " (a left-handed set of axes)"
         name = SENSOR_NAMES[sensor]
         what = f"The axes of the {name} are exchanged or turned round{handed}: {_shown(sensor, matrix)}"
-    remedy = f"Put them right with --map '{mapping(sensor, matrix)}'{', or: ' + other if other else '.'}"
+    remedy = "Put them right with " + when_read(mapped(mapping(sensor, matrix)))
+    remedy += "." if other is None else ", or: " + other
     return f"{what}. Read so, the residual falls {left}.", remedy
 
 
@@ -117,8 +121,8 @@ def _shown(sensor: str, matrix: Array) -> str:
     return ", ".join(f"{sensor}_{AXES[i]} shows {_signed(matrix[i], '')}" for i in other)
 
 
-def mapping(sensor: str, matrix: Array) -> str:
-    """Return the mapping of columns that undoes a signed permutation, such as ``gyr_x=gyr_y,gyr_y=gyr_x``.
+def mapping(sensor: str, matrix: Array) -> dict[str, str]:
+    """Return the mapping of columns that undoes a signed permutation, such as gyr_x from gyr_y and gyr_y from gyr_x.
 
     Parameters
     ----------
@@ -129,7 +133,7 @@ def mapping(sensor: str, matrix: Array) -> str:
     """
     back = matrix.T
     other = [i for i in range(3) if not np.array_equal(back[i], np.eye(3)[i])]
-    return ",".join(f"{sensor}_{AXES[i]}={_signed(back[i], f'{sensor}_')}" for i in other)
+    return {f"{sensor}_{AXES[i]}": _signed(back[i], f"{sensor}_") for i in other}
 
 
 def _turn(matrix: Array) -> str:
@@ -153,23 +157,29 @@ def _signed(row: Array, prefix: str) -> str:
 
 def late(lag: float, correlation: float, declared: float, path: Path | None) -> Words:
     """Say that the reference's stamps are late by a lag, s, and how well the rates agree then and as declared."""
-    log = "LOG" if path is None else shlex.quote(str(path))
     return (
         f"The reference is {abs(lag):.2f} s {'late' if lag > 0.0 else 'early'} against the sensors (correlation of "
         f"the rates {correlation:.2f}, {declared:.2f} as declared).",
-        f"Shift the reference: imufit join {log} {log} --lag {lag:.4f} -o joined.parquet",
+        "Shift the reference: " + _joined(path, lag),
     )
 
 
 def skew(lag: float, rate: float, correlation: float, declared: float, path: Path | None) -> Words:
     """Say that the reference's clock runs at another rate, from a lag on, s, and how well the rates agree then."""
-    log = "LOG" if path is None else shlex.quote(str(path))
     return (
         f"The clock of the reference runs {100.0 * abs(rate):.3g} % {'fast' if rate > 0.0 else 'slow'} against the "
         f"sensors' (correlation of the rates {correlation:.2f}, {declared:.2f} as declared).",
-        f"Put the reference on their clock: imufit join {log} {log} --lag {lag:.4f} --skew {1e6 * rate:.0f} "
-        "-o joined.parquet",
+        "Put the reference on their clock: " + _joined(path, lag, rate),
     )
+
+
+def _joined(path: Path | None, lag: float, rate: float | None = None) -> Remedy:
+    """Name the call that joins a log with itself: its reference is moved by a lag, s, and a rate of its clock."""
+    python, shell = ("log", "LOG") if path is None else (repr(str(path)), shlex.quote(str(path)))
+    known = Remedy(f"imufit.join({python}, {python}, lag={lag:.4f}", f"imufit join {shell} {shell} --lag {lag:.4f}")
+    if rate is not None:
+        known += Remedy(f", skew={rate:.6f}", f" --skew {1e6 * rate:.0f}")
+    return known + Remedy(").log", " -o joined.parquet")
 
 
 def another_motion(declared: float, lags: Sequence[tuple[float, float]], *, fits: bool) -> Words:
@@ -181,7 +191,8 @@ def another_motion(declared: float, lags: Sequence[tuple[float, float]], *, fits
             f"not one lag alone puts them together, but each of {shown} as well as the other: the motion repeats "
             "itself, or the reference was put together from another recording."
         )
-        return text, "Look whether it is the right file; where the lag is known, imufit join LOG LOG --lag S moves it."
+        moved = Remedy("imufit.join(log, log, lag=S).log", "imufit join LOG LOG --lag S -o joined.parquet")
+        return text, "Look whether it is the right file; where the lag is known, " + moved + " moves it."
     text = (
         "ref_q belongs to another motion: its rates and those of the gyroscope have nothing in common at any time "
         f"(correlation {declared:.2f} as declared{f', at best after a lag of {shown}' if shown else ''})."

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from imufit.printable import NAME, printable
+from imufit.remedy import Remedy
 from imufit.results.result import LONGEST, Result, shortened
 from imufit.results.table import Table
 
@@ -41,6 +42,8 @@ def _shown(value: Any, quoted: bool = False) -> str:  # noqa: PLR0911  one for e
             return f"{value:.6g}"
         case None | int() | np.bool_() | np.integer():
             return str(value)
+        case Remedy():
+            return _shown(str(value), quoted)
         case Part() | Result():
             return repr(value)
         case np.ndarray():

@@ -7,6 +7,7 @@ from typing import Final
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.log.words import one_of
 
 RANGE: Final = 1000.0
 """The search covers the start over and times this factor."""
@@ -40,7 +41,7 @@ def starts(filter_name: str, names: Sequence[str] = ()) -> dict[str, float]:
     """
     descriptions = _imufit.filter_descriptions()
     if filter_name not in descriptions:
-        raise InputError(f"filter {filter_name!r} is unknown: use one of {', '.join(descriptions)}")
+        raise InputError(f"filter {filter_name!r} is unknown", remedy=one_of(filter_name, descriptions))
     settings = descriptions[filter_name]["settings"]
     known = {
         name: settings[name]["default"] or value

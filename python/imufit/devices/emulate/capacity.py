@@ -9,6 +9,7 @@ import numpy as np
 from imufit.devices.emulate.device import Device
 from imufit.devices.emulate.form import Binary, Text, cell
 from imufit.errors import InputError
+from imufit.remedy import keyword, option
 
 BITS = 10
 """Bits of the line for a byte: start, eight, stop."""
@@ -57,7 +58,10 @@ class Load:
         """
         rate = float(np.floor((baud / BITS - self.a_second) / self.a_row))
         if rate < 1.0:
-            raise InputError(f"a line of {baud} baud carries not one sample a second", remedy="Give a higher --baud.")
+            raise InputError(
+                f"a line of {baud} baud carries not one sample a second",
+                remedy="Give a higher " + keyword("baud") + ".",
+            )
         return rate
 
 
@@ -112,5 +116,8 @@ def check(load: Load, rate: float, baud: int) -> None:
         raise InputError(
             f"{rate:g} samples a second are {load.bytes_a_second(rate):.0f} bytes a second, but a line of {baud} baud "
             f"carries {baud / BITS:.0f}",
-            remedy=f"Use --rate {load.highest_rate(baud):g}, which is the highest that fits, or --rate max.",
+            remedy="Use "
+            + option("rate", load.highest_rate(baud), shell=f"{load.highest_rate(baud):g}")
+            + ", which is the highest that fits, or "
+            + option("rate", "max"),
         )

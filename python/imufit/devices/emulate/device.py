@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from imufit.devices.chips import mpu6050
 from imufit.devices.emulate.source import FULL, SENSORS, Source
 from imufit.errors import InputError
+from imufit.remedy import option
 
 Array = NDArray[np.float64]
 Channel = tuple[str, float, float, float]
@@ -80,7 +81,7 @@ def _needs(source: Source, device: str, sensors: Sequence[str]) -> None:
         if sensor not in source.groups:
             raise InputError(
                 f"{source.name} has no {SENSORS[sensor][0]}, which a device {device} sends",
-                remedy="Use --device floats, which sends what there is.",
+                remedy="Use " + option("device", "floats") + ", which sends what there is.",
             )
 
 

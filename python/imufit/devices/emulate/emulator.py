@@ -25,6 +25,7 @@ from imufit.devices.emulate.source import Effects, Source, open_source
 from imufit.devices.emulate.transmission import DRAINED, Parts, Transmission
 from imufit.errors import InputError
 from imufit.log import Log
+from imufit.remedy import keyword, option
 
 PROBE = 5.0
 """Length (s) of a scenario by which the load of the line is judged."""
@@ -118,7 +119,7 @@ class Emulator:
         if not hurry > 0.0:
             raise InputError(f"the speed is {speed}", remedy="Give a number above 0, or max.")
         if rate == "max" and baud is None:
-            raise InputError("the highest rate depends on the line", remedy="Give --baud as well.")
+            raise InputError("the highest rate depends on the line", remedy="Give " + keyword("baud") + " as well.")
         if duration is not None and not duration > 0.0:
             raise InputError(f"the duration is {duration} s", remedy="Give a number above 0.")
         ticks = clock or Clock()
@@ -139,7 +140,8 @@ class Emulator:
         unplugged = any(fault.kind == "unplug" for fault in planned) or (fault_rates or {}).get("unplug", 0.0) > 0.0
         if unplugged and on == "pty" and link is None:
             raise InputError(
-                "an unplugged pty comes back by another name", remedy="Give --link PATH, or use --on socket://..."
+                "an unplugged pty comes back by another name",
+                remedy="Give " + keyword("link") + " a path, or use " + option("on", "socket://127.0.0.1:5000"),
             )
         self.source: Source = opened
         self._wait = on != "pty" if wait is None else wait

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.devices.emulate.device import Device
 from imufit.errors import InputError
+from imufit.remedy import option
 
 Array = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ class Binary:
         if len(announcement) > LONGEST:
             raise InputError(
                 f"{len(device.columns)} columns cannot be announced in a frame of {LONGEST} bytes",
-                remedy="Use --form text, or a log with fewer columns.",
+                remedy="Use " + option("form", "text") + ", or a log with fewer columns.",
             )
 
     def announce(self) -> bytes:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Protocol
 
 from imufit.errors import InputError
+from imufit.remedy import keyword
 
 SETTLING = 0.1
 """Time (s) that a reader gets before anything is sent: pyserial throws away what is there when it opens a port."""
@@ -82,7 +83,10 @@ class Pty:
 
     def __init__(self, link: Path | None = None) -> None:
         if link is not None and os.path.lexists(link) and not link.is_symlink():
-            raise InputError(f"{str(link)!r} exists and is no link", remedy="Give --link a path that is free.")
+            raise InputError(
+                f"{str(link)!r} exists and is no link",
+                remedy="Give " + keyword("link") + " a path that is free.",
+            )
         self._link, self._master, self._name, self._since = link, -1, "", float("inf")
 
     @property
@@ -289,5 +293,5 @@ def line_at(on: str, link: Path | None = None) -> Pty | Socket:
     if host not in ("127.0.0.1", "localhost"):
         raise InputError(f"{host} is not this machine", remedy="Use socket://127.0.0.1:PORT.")
     if link is not None:
-        raise InputError("a socket has no link", remedy="Leave out --link: its port stays the same.")
+        raise InputError("a socket has no link", remedy="Leave out " + keyword("link") + ": its port stays the same.")
     return Socket(int(port))

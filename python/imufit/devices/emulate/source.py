@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.lab.simulate import SCENARIOS, Noise, simulate
 from imufit.log import Log, parse_mapping, read
+from imufit.remedy import keyword
 
 Array = NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float] | None]
@@ -79,7 +80,10 @@ class Source:
         """
         t = np.arange(int(np.floor(self.t[-1] * rate)) + 1) / rate
         if len(t) < 2:
-            raise InputError(f"{self.name} has less than two rows at {rate:g} Hz", remedy="Give a higher --rate.")
+            raise InputError(
+                f"{self.name} has less than two rows at {rate:g} Hz",
+                remedy="Give a higher " + keyword("rate") + ".",
+            )
         groups = {
             name: {column: self._moved(values, t, self.share(name) < FULL) for column, values in columns.items()}
             for name, columns in self.groups.items()

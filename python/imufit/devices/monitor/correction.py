@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.log import Log
 from imufit.log.columns import GROUPS
+from imufit.remedy import command
 
 if TYPE_CHECKING:
     from imufit.loop import SensorModel
@@ -47,7 +48,9 @@ class LiveCorrection:
             if effect.reference_part is None and effect.reach != "row":
                 raise InputError(
                     f"{effect.id} needs {LACKING[effect.reach]}, which live rows do not have",
-                    remedy="Take a model without it here, or record and use imufit apply.",
+                    remedy="Take a model without it here, or record and use "
+                    + command("apply", "SensorModel.apply")
+                    + ".",
                 )
             if "temp" in effect.centred_columns and not self._warmth_known:
                 raise InputError(

@@ -49,7 +49,7 @@ class Columns:
             raise InputError(
                 f"no log can be made of what the device{who} sends: {error.problem}",
                 column=error.column,
-                remedy=error.remedy,
+                remedy=error.advice,
             ) from None
         if "pose" in self._places:
             raise InputError("the device sends a column pose, which is text in a log", remedy="Name it otherwise.")

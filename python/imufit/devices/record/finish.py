@@ -22,6 +22,7 @@ from imufit.log.assemble import group_fields
 from imufit.log.metadata import read_sidecar, sidecar_path
 from imufit.log.place import Place
 from imufit.log.writer import write_rows
+from imufit.remedy import Remedy
 from imufit.results import Recording, RecordingClock, RecordingGap
 
 Array = NDArray[np.float64]
@@ -302,7 +303,11 @@ def check_target(log: Path, force: bool) -> None:
     if not log.parent.is_dir():
         raise InputError(f"the directory {log.parent} does not exist", file=log, remedy="Make it first.")
     if log.exists() and not force:
-        raise InputError("this log is there already", file=log, remedy="Take another name, or --force to overwrite it.")
+        raise InputError(
+            "this log is there already",
+            file=log,
+            remedy="Take another name, or " + Remedy("force=True", "--force") + " to overwrite it.",
+        )
     older = read_sidecar(log)
     if older and log.suffix.lower() != ".parquet":
         from imufit.log.metadata import KNOWN  # noqa: PLC0415

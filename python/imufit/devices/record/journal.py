@@ -17,6 +17,7 @@ from imufit.devices.record.reception import Reception
 from imufit.devices.record.rig import Rig
 from imufit.errors import InputError
 from imufit.log.metadata import Frame
+from imufit.remedy import Remedy, recovering
 
 EVERY: Final = 0.2
 """Time after which rows are written, s: with the time that reading and writing take, a crash costs less than 0.25 s."""
@@ -81,7 +82,7 @@ class Journal:
                 raise InputError(
                     "an earlier recording left this part",
                     file=left,
-                    remedy=f"Run imufit recover {left} first, or delete it.",
+                    remedy="Run " + recovering(left) + " first, or delete it.",
                 )
         self._parts = [self._made(1)]
         self._beginning: BeginningFile | None = None
@@ -192,7 +193,9 @@ class Journal:
                 raise InputError(
                     "the device sends ref_angle itself",
                     column="ref_angle",
-                    remedy="Record without --angle and --axis, and name rig_axis in the metadata.",
+                    remedy="Record without "
+                    + Remedy("rig", "--angle and --axis")
+                    + ", and name rig_axis in the metadata.",
                 )
             if self._parts[-1].announced is not None:
                 self._parts.append(self._made(len(self._parts) + 1))

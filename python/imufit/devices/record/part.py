@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from imufit.devices.record.arrived import Announced, Arrived
 from imufit.errors import InputError
+from imufit.remedy import command
 
 try:
     import fcntl
@@ -315,7 +316,9 @@ def _read(path: Path, data: Any, size: int) -> Part | None:
         if stream is None and _is_cut_off(path, size):
             return None
         raise InputError(
-            "this is no part of a recording", file=path, remedy="imufit record writes LOG.part while it runs."
+            "this is no part of a recording",
+            file=path,
+            remedy=command("record", "imufit.devices.record.record") + " writes LOG.part while it runs.",
         )
     try:
         about = json.loads(metadata[_KEY])

@@ -13,6 +13,7 @@ from imufit import _imufit
 from imufit.devices.record.arrived import FORMS, Arrived, Chunk, of_frames, of_lines
 from imufit.devices.record.transport import Line
 from imufit.errors import InputError
+from imufit.remedy import keyword, option
 
 PAUSE: Final = (0.006, 0.012)
 """Shortest and longest wait between two reads, s: irregular, so that no rate of a device falls in step with it."""
@@ -182,12 +183,11 @@ class Reception:
         """Why nothing could be decoded so far; empty if something was."""
         frames, lines = self._frames.counts(), self._lines.counts()
         said = self._doubtful[-1] if self._doubtful else ""
+        header = option("header", "t_ms,acc_x,...")
         reasons = {
             "": frames["samples"] or lines["samples"],
             "nothing came from the device": not self._bytes,
-            "rows of numbers came, but no header that names them: give one with --header t_ms,acc_x,...": lines[
-                "unexplained"
-            ],
+            f"rows of numbers came, but no header that names them: give one, {header}": lines["unexplained"],
             f"{frames['unexplained']} samples came, but no announcement that says what they hold": frames[
                 "unexplained"
             ],
@@ -197,7 +197,7 @@ class Reception:
             and said,
         }
         otherwise = (
-            f"{self._bytes} bytes came, but no whole frame and no rows under a header: check --baud, "
+            f"{self._bytes} bytes came, but no whole frame and no rows under a header: check {keyword('baud')} "
             "and that the device speaks the wire protocol"
         )
         return next((reason for reason, holds in reasons.items() if holds), otherwise)

@@ -18,6 +18,7 @@ from imufit.devices.record.signals import requests_to_end
 from imufit.devices.record.transport import Line
 from imufit.errors import InputError
 from imufit.log.metadata import Frame
+from imufit.remedy import recovering
 from imufit.results import Recording
 
 Watch = Callable[[Reception, list[Arrived], list[str]], None]
@@ -174,10 +175,10 @@ def _finished(
     except InputError as error:
         raise InputError(
             f"{stop}{journal.n} rows are safe in {part_path(path)}, but no log was made of them: {error.problem}",
-            remedy=f"Make room, then run imufit recover {part_path(path)}.",
+            remedy="Make room, then run " + recovering(part_path(path)),
         ) from None
     if problem is not None:
-        raise InputError(f"{stop}the {recording.n} rows before that are in {path}", remedy=problem.remedy)
+        raise InputError(f"{stop}the {recording.n} rows before that are in {path}", remedy=problem.advice)
     return recording
 
 

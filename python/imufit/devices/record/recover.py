@@ -16,6 +16,7 @@ from imufit.devices.record.reception import PAUSE, Reception
 from imufit.devices.record.recorder import converted
 from imufit.devices.record.transport import Line
 from imufit.errors import InputError
+from imufit.remedy import recovering
 from imufit.results import Recording
 
 PATIENCE: Final = 5.0
@@ -99,7 +100,7 @@ def _explain(begun: Beginning, wanted: Path, port: str | None) -> None:
         raise InputError(
             f"{waiting} samples are in it, but the recording was killed before the device said what they hold",
             file=beginning_path(wanted),
-            remedy=f"Plug the device in, and run imufit recover {wanted} --port PORT: it is asked.",
+            remedy="Plug the device in, and run " + recovering(wanted, "PORT") + ": it is asked.",
         )
     told = {"counts": counts, "now": last.arrival, "lost_since": None, "texts": [(last.arrival, t) for t in texts]}
     kept = [part.where(part.opening <= last.opening) for part in rows]

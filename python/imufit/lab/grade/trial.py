@@ -13,6 +13,7 @@ from imufit.lab.grade.puzzle import Puzzle
 from imufit.lab.grade.sets import draw
 from imufit.lab.simulate import Simulation
 from imufit.loop import SensorModel
+from imufit.remedy import Remedy
 from imufit.results import Diagnosis, Ladder
 from imufit.results.part import Part
 from imufit.verbs import ladder
@@ -87,8 +88,12 @@ class Trial(Part):
         said = " ".join(filter(None, [self.answer.verdict, ", ".join(self.answer.named), first]))
         climbed = f"; ladder + {' + '.join(self.answer.steps)} -> {self.answer.end}" if self.answer.steps else ""
         rivals = f" (like {', '.join(self.rivals)})" if self.rivals else ""
+        again = Remedy(
+            f"imufit.lab.grade.trial({self.blind_set!r}, {self.seed})",
+            f"--set {self.blind_set} --seed {self.seed} --logs 1",
+        )
         return (
-            f"{', '.join(self.marks.faults) or 'right'}: --set {self.blind_set} --seed {self.seed} --logs 1: "
+            f"{', '.join(self.marks.faults) or 'right'}: {again}: "
             f"{self.scenario}, {self.kind}, size {self.size:.2f}{rivals}; answer {said}{climbed}"
         )
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from imufit.errors import InputError
 from imufit.lab.simulate.environment import stream
 from imufit.lab.simulate.injections import injection
 from imufit.lab.simulate.scenarios import SCENARIOS
@@ -14,6 +15,7 @@ from imufit.lab.simulate.separation import APART, Separation
 from imufit.lab.simulate.simulation import Simulation, simulate
 from imufit.lab.simulate.size import SIZES
 from imufit.lab.simulate.study import Study
+from imufit.log.words import one_of
 
 COLUMNS = ("motor_current", "vbat")
 """Covariates that every log with a hidden effect has, so that their presence tells nothing."""
@@ -110,7 +112,7 @@ def hidden(
         If no candidate is distinguishable in this log with this size, or as `simulate`.
     """
     if scenario not in SCENARIOS:
-        raise ValueError(f"unknown scenario {scenario!r}: use one of {', '.join(OBSERVABLE)}")
+        raise InputError(f"unknown scenario {scenario!r}", remedy=one_of(scenario, OBSERVABLE))
     if scenario not in OBSERVABLE:
         raise ValueError(f"{scenario} shows no effect apart from all others: use one of {', '.join(OBSERVABLE)}")
     rng = stream(seed, f"hidden {scenario}")

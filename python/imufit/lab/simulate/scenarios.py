@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from imufit.errors import InputError
 from imufit.lab.simulate.environment import north_and_down
 from imufit.lab.simulate.machine_tool import MACHINE_TOOL
 from imufit.lab.simulate.motion import Array, Cruise, Product, Signal, Sinusoids, Steps, Sum
@@ -15,6 +16,7 @@ from imufit.lab.simulate.robot_arm import ROBOT_ARM
 from imufit.lab.simulate.scenario import Plan, Scenario
 from imufit.lab.simulate.six_sides import SIX_SIDES
 from imufit.lab.simulate.truth import Fixed, Joint, Legs, Trajectory, rotation_from_vector
+from imufit.log.words import one_of
 
 X, Y, Z = np.eye(3)
 LABELS = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -226,5 +228,5 @@ SCENARIOS: Mapping[str, Scenario] = {
 def build(name: str, rng: np.random.Generator, duration: float, frame: str = "NED", rig_axis: int = 0) -> Trajectory:
     """Return the motion of scenario `name` for about `duration` (s); it can be evaluated before and after that too."""
     if name not in SCENARIOS:
-        raise ValueError(f"unknown scenario {name!r}: use one of {', '.join(SCENARIOS)}")
+        raise InputError(f"unknown scenario {name!r}", remedy=one_of(name, SCENARIOS))
     return SCENARIOS[name].build(Plan(rng, duration, frame, rig_axis))
