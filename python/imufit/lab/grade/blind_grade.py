@@ -16,7 +16,7 @@ from imufit.results.part import Part
 
 MARKS = ("named", "wrong", "missed", "alarm", "single", "needless", "covariate")
 WITHIN = 0.10
-"""Share of itself by which an expected drop may differ from the realised one to count as foretold."""
+"""Share of itself by which an expected drop may differ from the realised one to count as predicted."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -89,10 +89,10 @@ class BlindGrade(Part):
             for row in rows
         )
         head = ("set", ">logs", *(f">{mark}" for mark in asked))
-        ends = ("set", ">over true noise, median", ">worst", ">95 % intervals that cover", ">drops foretold")
+        ends = ("set", ">over true noise, median", ">worst", ">95 % intervals that cover", ">drops predicted")
         return (
             Table("Blind logs: how many of how many, % (95 % interval)", head, marks),
-            Table("End of the ladder: residual, parameters, drops of the error foretold within 10 %", ends, end),
+            Table("End of the ladder: residual, parameters, drops of the error predicted within 10 %", ends, end),
         )
 
     def lines(self) -> list[str]:
@@ -133,7 +133,7 @@ def share(values: Iterable[bool]) -> dict[str, float]:
 
 
 def figures(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Return error at the end over the true noise (median, worst), coverage, and share of drops foretold.
+    """Return error at the end over the true noise (median, worst), coverage, and share of drops predicted.
 
     Parameters
     ----------
