@@ -10,7 +10,7 @@ from imufit.printable import NAME, printable
 
 
 class InputError(ValueError):
-    """Input that cannot be used, told in one line.
+    """Input that cannot be used, reported in one line.
 
     The message reads ``file: row R, column C: problem. Remedy.``, with the parts that apply. Rows are counted from 0
     and are data rows as in the table; for text files the line of the file (counted from 1) stands behind it, as in

@@ -35,7 +35,7 @@ FRAMES: Final = ("NED", "ENU", "NWU")
 
 
 class AttitudeFilter:
-    """What all filters have in common.
+    """The common part of all filters.
 
     Parameters
     ----------

@@ -248,7 +248,7 @@ def allan(log: AnyLog, *, progress: Progress | None = None) -> Allan:
     Raises
     ------
     InputError
-        There is no rest that is long enough.
+        A rest that is long enough is missing.
     """
     from imufit.allan_deviation import allan  # noqa: PLC0415  only needed here
 

@@ -7,7 +7,7 @@ The first line of a file that imufit writes is therefore ``last = "[end]"``, and
     complete = true
 
 Without them such a file is refused. Values may be edited by hand: nothing counts or sums them. A file that was written
-by hand needs neither, but has to end with a whole line; whether all is in it is for its reader to tell.
+by hand needs neither, but has to end with a whole line; its reader checks that it is complete.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LAST = "last"
 END = "end"
 """Table at the end of a file that is whole."""
 COMPLETE = {"complete": True}
-"""What stands in it."""
+"""Its content."""
 MARK = [f"[{END}]", "complete=true"]
 """The last two lines, without spaces."""
 AGAIN = "Copy or save it again."
@@ -73,8 +73,8 @@ def read_toml(path: str | Path, what: str) -> tuple[dict[str, Any], bool]:
     Raises
     ------
     InputError
-        The file cannot be read, is no TOML, holds nothing, or ends within the mark; or it has no mark and ends within a
-        line, of which nobody can tell whether it is whole.
+        The file cannot be read, is not TOML, holds nothing, or ends within the mark; or it has no mark and ends within
+        a line, which may be incomplete.
     """
     file = Path(path)
     try:

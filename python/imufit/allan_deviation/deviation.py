@@ -54,7 +54,7 @@ def allan(log: Log, sensors: tuple[str, ...] = ("acc", "gyr", "mag"), progress: 
     found: dict[str, Samples] = {}
     for name in sensors:
         if name not in UNITS:
-            raise ValueError(f"{name!r} is no sensor: use acc, gyr or mag")
+            raise ValueError(f"{name!r} is not a sensor: use acc, gyr or mag")
         readings = getattr(rest, name)
         samples = None if readings is None else even_samples(rest.t, readings)
         if samples is not None and samples.longest >= 2 * _LONGEST:

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MOTION_ERROR = 0.04
-"""Standard error of the bias (m/s^2) beyond which a motion told nothing."""
+"""Standard error of the bias (m/s^2) beyond which a motion is not informative."""
 MOTION_TIME = 30.0
-"""Shortest motion (s) from which scale and bias are told."""
+"""Shortest motion (s) from which scale and bias are determined."""
 MOTION_SHARE = 0.1
 """Share of the motion's accelerations that may pass for a bias."""
 MOTION_GROUPS = 20
-"""Stretches of time that are left out in turn where there are no poses."""
+"""Stretches of time that are left out in turn if poses are missing."""
 ENTANGLED = 0.9
 """Correlation beyond which two parameters are named."""
 ASTRAY = 0.02
@@ -36,7 +36,7 @@ ASTRAY = 0.02
 
 @dataclass(frozen=True)
 class Targets:
-    """What the ideal sensor reads in each pose.
+    """Ideal reading of each pose.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     Raises
     ------
     InputError
-        The poses do not tell the parameters.
+        The poses do not determine the parameters.
     """
     readings, variances = _stack(poses)
     aims = targets
@@ -217,7 +217,7 @@ def fit_magnitude(
     Raises
     ------
     InputError
-        The poses do not tell the parameters.
+        The poses do not determine the parameters.
     """
     readings, variances = _stack(poses)
     directions = readings / np.linalg.norm(readings, axis=1)[:, None]
@@ -309,9 +309,7 @@ def _weak_axes(poses: Sequence[Pose]) -> list[str]:
         have = [side for side in (f"+{axis}", f"-{axis}") if side in sides]
         if len(have) == 1:
             missing = "-" if have[0][0] == "+" else "+"
-            remarks.append(
-                f"{missing}{axis} never pointed up: scale and bias of {axis} are told apart by the other poses only."
-            )
+            remarks.append(f"{missing}{axis} never pointed up: only the other poses separate scale and bias of {axis}.")
         elif len(have) == 2 and sides.count(have[0]) == sides.count(have[1]) == 1:
             remarks.append(f"The scale of {axis} rests on two poses.")
     if len(remarks) == 3 and all("rests on two" in remark for remark in remarks):
@@ -379,7 +377,7 @@ def _entangled(correlation: Array, elements: int) -> list[str]:
     scales = (0, 4, 8) if elements == 9 else (0, 1, 2)
     shares = [float(correlation[scale, elements + k]) for k, scale in enumerate(scales)]
     return [
-        f"Scale and bias of {axis} are hard to tell apart here (correlation {share:+.2f}): add poses with {axis} "
+        f"Scale and bias of {axis} are hardly separated here (correlation {share:+.2f}): add poses with {axis} "
         "up and down."
         for axis, share in zip(AXES, shares, strict=True)
         if abs(share) > ENTANGLED

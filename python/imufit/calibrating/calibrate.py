@@ -58,7 +58,7 @@ def calibrate(
     Raises
     ------
     InputError
-        The logs do not tell a calibration; the message says what is missing.
+        The logs do not determine a calibration; the message names the missing poses.
     """
     given = [logs] if not isinstance(logs, Sequence) else list(logs)
     if cost is not None and cost not in COSTS:
@@ -66,7 +66,7 @@ def calibrate(
     if unknown := [name for name in sensors if name not in ("acc", "gyr", "mag")]:
         raise InputError(f"the sensor {unknown[0]!r} is unknown", remedy="Use acc, gyr or mag.")
     if not given:
-        raise InputError("there is no log to calibrate from")
+        raise InputError("a log to calibrate from is missing")
     wanted = [name for name in sensors if any(getattr(log, name) is not None for log in given)]
     if not wanted:
         columns = " nor ".join(f"{name}_x {name}_y {name}_z" for name in sensors)
@@ -129,7 +129,7 @@ class _Session:
             raise failures[0]
         if failures and cost is not None and "acc" not in sensors:
             raise failures[0]
-        # What was left out is told once, below.
+        # Left-out stretches are named once, below.
         self.notes += [f"Not calibrated: {error.problem.split(' (pose ')[0]}." for error in failures]
         self._name_left_out()
         effects = {effect: values for sensor in sensors.values() for effect, values in sensor.effects.items()}
@@ -176,8 +176,8 @@ class _Session:
         if cost is None and not self.labelled and strewn and len(usable) >= 7:
             result = accelerometer.fit_magnitude(usable, self.gravity, temperature, misalignment=False)
             self.notes.append(
-                "The poses lie along the axes, but were not laid on a table: lengths tell scale and bias; misalignment "
-                "needs nine attitudes, some of them oblique."
+                "The poses lie along the axes, but were not laid on a table: lengths determine scale and bias; "
+                "misalignment needs nine attitudes, some of them oblique."
             )
         self._say_of_poses(flips)
         return result, temperature
@@ -193,7 +193,7 @@ class _Session:
         self.notes[:0] = flips
 
     def _cost(self, poses: Sequence[Pose]) -> str:
-        """Vector where directions are known; else by what the poses can tell."""
+        """Vector where directions are known; else by the number of poses."""
         if self.labelled or all(pose.attitude is not None for pose in poses):
             return "vector"
         if distinct(np.array([pose.direction for pose in poses])) < checks.UNKNOWNS["magnitude"]:

@@ -1,4 +1,4 @@
-"""Checks of poses before a fit: labels, and whether they can tell the parameters."""
+"""Checks of poses before a fit: labels, and whether they determine the parameters."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def check_labels(poses: Sequence[Pose], file: object) -> tuple[list[Pose], list[
 
 
 def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
-    """Refuse poses that cannot tell the parameters of a cost.
+    """Refuse poses that do not determine the parameters of a cost.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
 
 
 def too_few_positions(poses: Sequence[Pose], error: InputError, file: object) -> InputError:
-    """Make the error for poses whose equations do not tell the unknowns.
+    """Make the error for poses whose equations do not determine the unknowns.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ NEARLY = 5.0
 
 @dataclass(frozen=True)
 class Advice:
-    """What to tell the person now.
+    """Instruction for the user now.
 
     Attributes
     ----------

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 @click.option("--hold", type=Real(min=0.0, min_open=True), metavar="S", help="Shortest pose, s (default 0.6).")
 @click.option("--live", "port", metavar="PORT", help="Guide through a calibration of the device there.")
 @click.option("--baud", type=Whole(min=1), metavar="BAUD", help="Bits per second of PORT (default 115200).")
-@click.option("--form", type=OneOf("form", ("auto", "binary", "text")), help="What PORT sends (default auto).")
+@click.option("--form", type=OneOf("form", ("auto", "binary", "text")), help="Form that PORT sends (default auto).")
 @click.option("--header", metavar="NAMES", help="Columns of text without a header, such as t_ms,acc_x,acc_y,acc_z.")
 @click.option(
     "--keep",
@@ -122,7 +122,7 @@ def calibrate(
 
 
 def _place_of(keep: Path | None, model: Path | None) -> Path:
-    """Return where the log goes: where told, or beside the model by a name that is free."""
+    """Return where the log goes: where stated, or beside the model by a name that is free."""
     if keep is not None:
         return keep
     if model is None:

@@ -61,7 +61,9 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
     metavar="PATH",
     help="Symbolic link to the pty, which stays the same when the device is unplugged.",
 )
-@click.option("--device", type=OneOf("device", DEVICES), default="floats", show_default=True, help="What it sends.")
+@click.option(
+    "--device", type=OneOf("device", DEVICES), default="floats", show_default=True, help="Form of the samples."
+)
 @click.option("--form", type=OneOf("form", FORMS), default="binary", show_default=True, help="Frames or lines of text.")
 @click.option("--rate", type=NumberOr("max"), metavar="HZ|max", help="Samples a second; max: what --baud carries.")
 @click.option("--duration", type=Real(min=0.0, min_open=True), metavar="S", help="Time until it ends, s.")
@@ -69,7 +71,7 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "--speed", type=NumberOr("max"), default=1.0, metavar="X|max", help="Times faster than real; max: as it is read."
 )
-@click.option("--baud", type=Whole(min=300), metavar="BAUD", help="What the line carries, bits a second.")
+@click.option("--baud", type=Whole(min=300), metavar="BAUD", help="Capacity of the line, bits a second.")
 @click.option("--tick", type=Whole(1, 10**9), default=1000, metavar="NS", help="Tick of its clock, ns (1000).")
 @click.option("--clock-drift", type=Real(), default=0.0, metavar="PPM", help="By how much its clock goes fast.")
 @click.option("--clock-jitter", type=Real(min=0.0), default=0.0, metavar="S", help="Noise of its stamps, s.")
@@ -79,11 +81,9 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
     "faults",
     multiple=True,
     metavar="KIND@S[:LENGTH]",
-    help=f"What goes wrong when: {', '.join(KINDS)}. Repeatable.",
+    help=f"A fault and its time: {', '.join(KINDS)}. Repeatable.",
 )
-@click.option(
-    "--fault-rate", "fault_rates", multiple=True, metavar="KIND=PER_S", help="What goes wrong by chance. Repeatable."
-)
+@click.option("--fault-rate", "fault_rates", multiple=True, metavar="KIND=PER_S", help="A random fault. Repeatable.")
 @click.option(
     "--effect",
     "effects",
@@ -140,7 +140,8 @@ def emulate(
         **options,
     )
     with LifeLine() as life, engine.running(device, life):
-        # Whoever waits for the port reads one line; with the JSON on standard output it stands on standard error.
+        # A program that waits for the port reads one line; with the JSON on standard output it stands on standard
+        # error.
         click.echo(device.port, err=str(json_file) == "-")
         sys.stdout.flush()
     found = device.summary()

@@ -430,7 +430,7 @@ def data_sheet_errors(seed: int) -> dict[str, dict[str, float] | None]:
 def running(device: Emulator, watch: Callable[[int, str], None]) -> Iterator[None]:
     """Let a device run until it has sent everything or is asked to end, also where Ctrl-C is ignored at the start.
 
-    `watch` is told the samples so far, and whether anybody reads them.
+    `watch` receives the samples so far, and whether a reader is there.
     """
     from imufit.devices.record.signals import requests_to_end  # noqa: PLC0415
 
@@ -438,7 +438,7 @@ def running(device: Emulator, watch: Callable[[int, str], None]) -> Iterator[Non
         yield
         while not device.join(0.1) and not asked():
             told = device.summary()
-            watch(told["samples"], "nobody reads" if told["samples"] and told["unread"] == told["samples"] else "")
+            watch(told["samples"], "not read" if told["samples"] and told["unread"] == told["samples"] else "")
 
 
 def unseal(path: Path) -> Truth:
@@ -447,7 +447,7 @@ def unseal(path: Path) -> Truth:
     Raises
     ------
     InputError
-        There is no sealed truth beside the log, or it is damaged.
+        The sealed truth beside the log is missing or damaged.
     """
     from imufit.errors import InputError  # noqa: PLC0415
     from imufit.lab.simulate import unseal  # noqa: PLC0415

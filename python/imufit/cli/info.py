@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @json_option
 @verbose_option
 def info(log: Path, *, reading: Reading, quick: bool, json_file: Path | None, verbose: bool) -> None:
-    """Tell what is in LOG, and which effects it can and cannot show.
+    """List the contents of LOG, and the effects that it can and cannot show.
 
     An effect can be shown if its typical size stands out from the noise of this log: its parameters' standard errors
     follow from the log's own normal equations. Without a reference attitude the rests stand in for one.

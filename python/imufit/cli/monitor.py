@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 @effects_from_option
 @frame_option
 @duration_option
-@click.option("--plain", is_flag=True, help="Lines of numbers instead of a table; so it is where there is no terminal.")
+@click.option("--plain", is_flag=True, help="Lines of numbers instead of a table; also without a terminal.")
 @click.option(
     "--updates",
     type=Real(min=0.1, max=20.0),

@@ -12,7 +12,7 @@ from click.shell_completion import CompletionItem
 from imufit.cli.names import unknown
 
 SUMMARIES: Final = {
-    "info": "What is in a log: rates, gaps, rests, reference, and the effects that it can show.",
+    "info": "The contents of a log: rates, gaps, rests, reference, and the effects that it can show.",
     "plot": "Readings, reference and rests of a log over time, as a figure.",
     "calibrate": "Calibrate accelerometer, gyro and magnetometer.",
     "compare": "Where the model fails: by channel, segment and covariate.",
@@ -24,7 +24,7 @@ SUMMARIES: Final = {
     "export": "A model as C, Arduino sketch, Python for imufusion or ahrs, JSON.",
     "explain": "An effect's card; without EFFECT the catalogue.",
     "simulate": "A synthetic log, on request with a hidden effect.",
-    "reveal": "What was done to a simulated log; grades an answer.",
+    "reveal": "The truth of a simulated log; grades an answer.",
     "grade": "The blind protocol: how often the answer is right.",
     "replay": "Attitude for every row, its error, and the methods' tilt beside each other.",
     "tune": "Gains of a filter: by its error, or without reference by its predictions.",
@@ -37,7 +37,7 @@ SUMMARIES: Final = {
     "emulate": "A device without hardware: a scenario or a log on a pty or socket.",
     "demo": "The whole loop on a log with a hidden effect.",
 }
-"""What each command does, in the order of the loop; the command ``info`` stands in ``imufit.cli.info`` by that name."""
+"""The purpose of each command, in the order of the loop; ``imufit.cli.info`` has the command ``info``."""
 
 
 class OnDemand(MutableMapping[str, click.Command]):

@@ -1,4 +1,4 @@
-"""What the commands print and write."""
+"""Output of the commands, printed and written."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Output:
 
     @cached_property
     def _console(self) -> Console:
-        """What prints: made when there is something to say, an input that is refused does not wait for it."""
+        """The printer: made when there is something to say, an input that is refused does not wait for it."""
         from rich.console import Console  # noqa: PLC0415
 
         class Piped(Console):

@@ -1,4 +1,4 @@
-"""What a model is worth to an attitude filter, and what limits the filter then: calibration, environment or filter.
+"""Benefit of a model to an attitude filter, and the filter's remaining limit: calibration, environment or filter.
 
 The filter runs over the readings as they are and over those with the model's effects taken out. The error
 ``e = q_est * q_ref^-1`` is split into heading and inclination (seen in the reference frame), and each is held against

@@ -1,4 +1,4 @@
-"""What the reader should know about the figures of a log: what it is judged by, its noise, and what it cannot tell."""
+"""Notes on the figures of a log: its evidence, its noise, and its limits."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _of_rows(evidence: LogEvidence) -> list[str]:
 
 
 def _of_rests(evidence: LogEvidence, passes: RestPasses) -> list[str]:
-    """Return what a log without a reference is judged by, and what it cannot tell."""
+    """Return the evidence of a log without a reference, and its limits."""
     rests = passes.rests
     told = []
     if rests.rests:

@@ -57,7 +57,7 @@ def calibrate_live(
     cost, sensors, settings
         As for `imufit.calibrating.calibrate`; ``hold`` is 2 s for the person unless given.
     rests : int
-        Good rests that are wanted, the six sides among them: rounds of quarter turns tell the gyro's misalignment.
+        Good rests that are wanted, the six sides among them: rounds of quarter turns determine the gyro's misalignment.
     give_up : float
         Time without a new side or direction after which it ends, s.
     show : callable
@@ -71,8 +71,8 @@ def calibrate_live(
     Raises
     ------
     InputError
-        The port cannot be opened, the log is in the way, it was stopped or given up, or the log does not tell a
-        calibration; what was recorded is kept.
+        The port cannot be opened, the log is in the way, it was stopped or given up, or the log does not determine a
+        calibration; the recorded rows are kept.
     """
     looked = _Looking(Wizard(sensors, rests, settings), LiveConverter(mapping), give_up, show)
     record(
@@ -89,7 +89,7 @@ def calibrate_live(
         why = f"given up after {give_up:g} s without anything new" if looked.is_late() else "stopped"
         raise InputError(
             f"{why}: {looked.wizard.wanted} missing",
-            remedy=f"What came is in {keep}: imufit calibrate {keep} makes of it what it can.",
+            remedy=f"The received rows are in {keep}: imufit calibrate {keep} makes of it what it can.",
         )
     log = read(keep)
     return calibrate(log, cost, sensors=sensors, settings=settings), log

@@ -54,7 +54,7 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
     ]
     if len(close) < 2:
         return []
-    # What else is missing would be charged to the one that stands in for it best.
+    # Another missing effect would be charged to the effect that replaces it best.
     others = fit.model
     for slot, item in items.items():
         if item.status == Status.PASSED and slot not in in_its_place:
@@ -62,7 +62,8 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
     without = tried(fit, others)
     evidence = _guarded(without, {slot: tried(fit, others.with_effect(ids[slot])) for slot in close})
     most = max(evidence.values())
-    # Where columns say all, a fit tells by the error alone: freedom alone does not tell one cause from another.
+    # If columns hold all information, a fit decides by the error alone: freedom alone does not separate one cause from
+    # another.
     equal = {slot for slot in close if np.isfinite(evidence[slot]) and not _curved(analysis, slot)}
     return [(slot, (most if slot in equal else ln) - without.ln_evidence) for slot, ln in evidence.items()]
 

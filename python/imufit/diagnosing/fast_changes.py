@@ -1,4 +1,4 @@
-"""What a residual does within blocks, where their means do not show it: tones and hops."""
+"""Changes of a residual within blocks, which the blocks' means do not show: tones and hops."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ ALIKE = 0.3
 FEWEST = 8
 """Hops, up and down in turn, that chance does not make."""
 FEWEST_WINDOWS = 60
-"""Fewer windows tell nothing."""
+"""Fewer windows are not informative."""
 STAYING = 0.7
 """Part of the size of the hops by which the levels between them differ."""
 SURE = 8.0
@@ -52,8 +52,8 @@ class Hops:
 def hops(t: Array, residual: Array) -> Hops | None:
     """Find whether a residual hops between two levels.
 
-    Noise of any colour has differences of all sizes, a burst of noise has hops of all sizes, and a zero that wanders
-    does not come back by what it went.
+    Noise of any colour has differences of all sizes, a burst of noise has jumps of all sizes, and a bias random walk
+    does not return to its earlier value.
 
     Parameters
     ----------

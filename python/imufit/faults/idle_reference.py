@@ -49,7 +49,7 @@ def idle_faults(turning: Turning, facts: _imufit.Facts) -> list[DataFault]:
         return []
     angle = np.concatenate((np.zeros((1, 3)), np.cumsum(turning.read, axis=0)))
     meanwhile = np.linalg.norm(angle[long[:, 1] - 1] - angle[long[:, 0]], axis=1)
-    # What a step of the reference shows at least, and what noise adds up to over a pause.
+    # Smallest rotation in a step of the reference, and the sum of noise over a pause.
     steps = np.linalg.norm(turning.turned[number[1:] != number[:-1]], axis=1)
     least = max(0.05 * float(np.median(steps)), MOVED * _noise(turning) * float(np.sqrt(np.median(np.diff(long)))))
     moving = meanwhile > least

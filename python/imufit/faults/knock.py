@@ -7,8 +7,8 @@ instant is a knock. It is named if
 
 - it is significant by the delete-block jackknife, all instants counted that were tried (Hotelling's T^2, as for
   effects);
-- it explains nearly all of what a free value in each block would: neither a value that wanders, nor a line taken for a
-  step (which explains three quarters of it).
+- it explains nearly all of what a free value in each block would: neither a random walk, nor a line mistaken for a step
+  (which explains three quarters of it).
 """
 
 from __future__ import annotations

@@ -149,7 +149,7 @@ class Samples:
         mean = turned.mean(axis=0)
         normal = np.block([[np.eye(3), mean], [mean.T, np.eye(3)]])
         right = np.concatenate([np.einsum("nij,nj->ni", turned, readings).mean(axis=0), readings.mean(axis=0)])
-        # Where the turns do not tell field and iron apart, the smallest of both.
+        # Where the turns do not separate field and iron, the smallest of both.
         return np.asarray(np.linalg.lstsq(normal, right, rcond=1e-3)[0][:3])
 
     def with_own_field(self, matrix: Array) -> Samples:

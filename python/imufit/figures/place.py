@@ -58,7 +58,7 @@ class Drawing:
 
     @property
     def result(self) -> Figure | Axes | list[Axes]:
-        """What ``plot`` returns: its own figure, else the Axes."""
+        """The value of ``plot``: its own figure, else the Axes."""
         if self.own:
             return self.root
         return self.axes[0] if len(self.axes) == 1 else self.axes

@@ -1,4 +1,4 @@
-"""Which format a file is of: by its content first, by its suffix where the content does not tell."""
+"""Which format a file is of: by its content first, by its suffix where the content does not decide."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Format:
     extra : str or None
         The optional dependency of imufit that reads it; None where what imufit always needs does.
     by_suffix : bool
-        Whether a file that its content does not tell is one by its suffix; not where others use the suffix as well.
+        Whether the suffix decides if the content does not; not where others use the suffix as well.
     """
 
     name: str

@@ -120,7 +120,7 @@ def _elements(body: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
             start = at + 8
             end = start + (length if kind == _MATRIX else -(-length // 8) * 8)
         if kind not in _NUMBERS and kind != _MATRIX:
-            raise ValueError(f"there is no kind {kind} of element")
+            raise ValueError(f"unknown kind {kind} of element")
         if start + length > len(body):
             raise ValueError("an element is longer than its variable")
         yield kind, body[start : start + length]

@@ -141,7 +141,7 @@ class _Drawn:
             if name not in numbers - {"t"}:
                 near = nearest(name, numbers - {"t"})
                 raise InputError(
-                    "there is no such column of numbers",
+                    "the log has no such column of numbers",
                     file=log.path,
                     column=name,
                     remedy=f"Did you mean {near[0]}?" if near else "imufit info lists the columns.",
@@ -182,7 +182,7 @@ class _Drawn:
             return
         course = reference_course(t, q)
         middle = 0.5 * (t[1:] + t[:-1])
-        # Over a gap nobody knows the rate.
+        # Over a gap the rate is unknown.
         self._rates.add(middle[~course.gap], UNITS["gyr"][1] * course.rate[~course.gap])
 
     def panels(self) -> list[PanelLines]:

@@ -126,7 +126,7 @@ def _off_vertical(log: Log) -> float:
     """Angle between the mean specific force in the reference frame and its vertical axis, rad; NaN without any.
 
     A quaternion with its scalar misplaced is, up to constant turns of body and frame, the inverse of the right one (an
-    orthogonal map of determinant -1): the rates are the same, and only gravity tells them apart.
+    orthogonal map of determinant -1): the rates are the same, and only gravity separates them.
     """
     if log.acc is None or log.ref_q is None:
         return float("nan")

@@ -220,7 +220,7 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
         raise _unrelated(best.traces, *logs)
     if second is None and found.unrelated:
         raise InputError(
-            f"the motion that both recordings saw is too short or too uniform to tell the lag: correlation "
+            f"the motion that both recordings saw is too short or too uniform to determine the lag: correlation "
             f"{best.traces.correlation:.3f} over {best.traces.overlap:.1f} s",
             file=logs[0].path or "log",
             remedy="Move the sensor for longer, once as at no other time, or give the lag with --lag.",
@@ -255,7 +255,7 @@ def _unrelated(traces: RateTrace, log: Log, reference: Log) -> InputError:
 
 
 def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, mount: Array | None) -> Log:
-    """Lay the rows of both in the order of the sensor's clock; without a mount there is no attitude."""
+    """Lay the rows of both in the order of the sensor's clock; without a mount the attitude is omitted."""
     t_ref = aligned.on_sensor_clock(reference.t[rows], float(reference.t[rows[0]]))
     within = (t_ref >= log.t[0]) & (t_ref <= log.t[-1])
     between = Stretches.between_gaps(t_ref).seen(log.t, log.t)

@@ -23,7 +23,7 @@ SAME: Final = 0.5
 FEW: Final = 100
 """Blocks of the attitude, of 1.5 s each, by which several lags are refined before the likeliest one is by all."""
 SURE: Final = 7.0
-"""Log odds from which on an alignment is believed: one in a thousand is wrong. They count against all alignments that
+"""Log odds from which on an alignment is accepted: one in a thousand is wrong. They count against all alignments that
 were tried, of unrelated recordings, and against the second one."""
 
 

@@ -31,7 +31,7 @@ def number_from_text(cell: Any, *, truth: bool = False) -> float:
     Raises
     ------
     ValueError
-        The cell is no number.
+        The cell is not a number.
     """
     if cell is None:
         return float("nan")
@@ -128,7 +128,7 @@ def checked_attitude(q: NDArray[np.float64], start: int, place: Place) -> NDArra
 
 
 def checked_labels(cells: NDArray[np.object_]) -> NDArray[np.object_]:
-    """Text column with None where there is no text."""
+    """Text column with None where the text is missing."""
     labels = np.empty(len(cells), dtype=object)
     labels[:] = [None if _absent(cell) else str(cell) for cell in cells]
     return labels

@@ -36,7 +36,7 @@ def recording_of_folder(path: Path) -> Recording:
     Raises
     ------
     InputError
-        There is no table in it, or more than can be held in memory.
+        A table is missing in it, or it exceeds the memory.
     """
     files = sorted(file for file in path.iterdir() if file.is_file() and file.suffix.lower() in TEXT_SUFFIXES)
     return _recording(path, "folder of text files", files)

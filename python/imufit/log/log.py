@@ -72,13 +72,13 @@ class Log:
     covariates : mapping of (n,) arrays, optional
         Other numeric columns by name.
     labels : mapping of sequences of str or None, optional
-        Other text columns by name, None where there is no text.
+        Other text columns by name, None where the text is missing.
     metadata : Metadata or mapping, optional
         Frame, gravity, field, rig axis, noise.
     path : Path, optional
         File that the log was read from.
     notes : tuple of str
-        What reading noticed or changed.
+        Findings and changes of the reader.
     ref_q : (n, 4) array, optional
         `attitude` under the name of its columns.
     **more
@@ -545,7 +545,7 @@ class Chunk:
 
 @runtime_checkable
 class LogSource(Protocol):
-    """What a log in memory and a log on disk have in common."""
+    """The common part of a log in memory and a log on disk."""
 
     @property
     def n(self) -> int:
@@ -569,7 +569,7 @@ class LogSource(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What reading noticed or changed."""
+        """Findings and changes of the reader."""
         ...
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:

@@ -39,7 +39,7 @@ class Maker:
     counter : str
         Column that counts the samples, for a file whose rate is known.
     instance : str
-        Column that tells sensors of one kind apart whose rows take turns.
+        Column that separates sensors of one kind whose rows alternate.
     source : str
         Where the layout is documented.
     """

@@ -44,7 +44,7 @@ _BROKEN: Final = (
     TypeError,
     KeyError,
 )
-"""What the readers of archives and arrays raise about damaged bytes."""
+"""Errors of the readers of archives and arrays about damaged bytes."""
 _UNKNOWN: Final = (NotImplementedError, RuntimeError)
 """... and about a compression, a version or an encryption that they do not know."""
 

@@ -1,4 +1,4 @@
-"""What a person says about a file that is read as a log: columns, frame, noise, and what to leave out."""
+"""A user's options for a file that is read as a log: columns, frame, noise, and what to leave out."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Reading:
         Raises
         ------
         InputError
-            There is no such column, or the mapping makes it.
+            The column is missing, or the mapping makes it.
         """
         shown = {printable(name, NAME): name for name in names}
         known = dict.fromkeys([*shown, *targets])

@@ -66,7 +66,7 @@ class SomeRows:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What reading noticed or changed, and which rows these are."""
+        """Findings and changes of the reader, and the rows."""
         return (*self._log.notes, *([self._note] if self._note else []))
 
     def pieces(self) -> Iterator[Log]:

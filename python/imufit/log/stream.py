@@ -71,7 +71,7 @@ class LogStream:
     def of_source(
         cls, source: Source, metadata: Metadata, mapping: Mapping[str, str] | None = None, clock: Clock = "open"
     ) -> Self:
-        """Make the log of a source that is no file.
+        """Make the log of a source that is not a file.
 
         Parameters
         ----------
@@ -182,7 +182,7 @@ class LogStream:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What reading noticed or changed, in the rows that have been read so far."""
+        """Findings and changes of the reader, in the rows read so far."""
         return (*self._notes, *self._unmeasured.notes)
 
     def pieces(self) -> Iterator[Log]:
@@ -221,7 +221,7 @@ class LogStream:
 
     @property
     def size(self) -> int:
-        """Bytes that the whole log would take in memory, told by rows and columns."""
+        """Bytes that the whole log would take in memory, computed from rows and columns."""
         text = sum(column.name in self._source.text for column in self._plan.columns)
         numbers = len(self._plan.columns) - text
         if "ref_angle" in self._columns and self._metadata.rig_axis is not None:
@@ -291,7 +291,7 @@ class _Left:
 
     @property
     def clues(self) -> tuple[str, ...]:
-        """What its maker is known by."""
+        """Marks of its maker."""
         return self._source.clues
 
     def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
@@ -317,8 +317,8 @@ def open_log(
     mapping : mapping, optional
         Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
     stream : bool, optional
-        Whether to leave the log on disk; None does so if it would take more than 200 MB of memory, which its rows and
-        columns tell.
+        Whether to leave the log on disk; None does so if it would take more than 200 MB of memory, by its rows and
+        columns.
     frame, noise, drop
         As for `read`.
     """

@@ -312,7 +312,9 @@ class TimeScan:
             digit = float(np.spacing(np.float32(stamp)))
             different = np.unique(stamps)
             if different.size > 1 and digit > 0.5 * float(np.median(np.diff(different))):
-                problem += f": t is in single precision (float32), which tells times of this size only to {digit:g} s"
+                problem += (
+                    f": t is in single precision (float32), which resolves times of this size only to {digit:g} s"
+                )
                 remedy = "Write t as float64, or subtract the first time before it is rounded; record or export again."
         return self._place.error(problem, row=row, column="t", remedy=remedy)
 

@@ -177,7 +177,7 @@ def check_units(
         except OtherUnitError as other:
             others.append(other)
     if others:
-        # all of it in one mapping, so that nobody is asked twice
+        # all of it in one mapping, so that the question comes once
         units = {column: unit for other in others for column, unit in other.units.items()}
         others_words = "".join(other.otherwise for other in others)
         raise OtherUnitError(others[0].problem, units, place, origin, others_words)
@@ -530,7 +530,7 @@ def _check_mag(mag: Array, metadata: Metadata, place: Place, origin: Mapping[str
 def _milligauss_or_counts(
     mag: Array, size: float, told: float, milligauss: tuple[float, str, str]
 ) -> list[tuple[float, str, str]]:
-    """Units of about ten to the uT: by the field that is told, or by whole numbers."""
+    """Units of about ten to the uT: by the stated field, or by whole numbers."""
     units = [(10.0, *milligauss[1:]), *_COUNTS]
     if told > 0.0:
         return _nearest(size / told, units, math.inf)

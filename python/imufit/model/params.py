@@ -85,7 +85,7 @@ class ModelParams(Params):
         Raises
         ------
         KeyError
-            There is no such parameter.
+            The parameter is unknown.
         """
         plain = super().__getitem__(key)
         return ModelParameter(**{item.name: getattr(plain, item.name) for item in fields(Parameter)}, model=self._model)

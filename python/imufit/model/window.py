@@ -1,4 +1,4 @@
-"""What the function of a user's effect is asked about: rows of a log."""
+"""The argument of a user's effect: rows of a log."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class Addition(Plotted, Result):
 
     @property
     def warning(self) -> str:
-        """What to know where the drop was not the expected one; else empty."""
+        """A note if the drop was not the expected one; else empty."""
         return surprise(self.before, self.expected, self.after)
 
     def to_dict(self) -> dict[str, Any]:

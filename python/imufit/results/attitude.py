@@ -57,7 +57,7 @@ class AttitudeBins(Part):
     centre : (k,) array
         Mean of the quantity in each bin, ascending.
     before, after : (k,) arrays
-        RMS error of each bin, deg; `after` is `before` where there is no model.
+        RMS error of each bin, deg; `after` is `before` without a model.
     """
 
     part: str
@@ -70,7 +70,7 @@ class AttitudeBins(Part):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AttitudeComparison(Plotted, Part):
-    """What a model is worth to an attitude filter, and what limits the filter then.
+    """The benefit of a model to an attitude filter, and the remaining limit of the filter.
 
     Attributes
     ----------

@@ -198,7 +198,7 @@ class Comparison(Plotted, Result):
     sensors : dict
         Ratio by sensor.
     attitude : AttitudeComparison or None
-        How far an attitude filter is off, where the log allows to tell.
+        How far an attitude filter is off, where the log determines this.
     where : tuple of Where
         Covariates that explain the excess, largest share first.
     panels : tuple of Panel
@@ -321,7 +321,7 @@ class Comparison(Plotted, Result):
             (item.channel, item.covariate, quantity.share(item.share), quantity.span(item.t_start, item.t_end))
             for item in self.where[:limit]
         )
-        return Table("What the excess depends on", ("channel", "covariate", ">share", ">mostly at"), rows)
+        return Table("Dependences of the excess", ("channel", "covariate", ">share", ">mostly at"), rows)
 
     def segment_table(self, limit: int = 5) -> Table:
         """Worst segments.

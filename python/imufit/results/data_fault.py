@@ -15,7 +15,7 @@ from imufit.results.table import Table
 
 @dataclass(frozen=True, repr=False)
 class DataFault(Part):
-    """Something wrong with the data that is no effect of the sensor.
+    """A fault of the data, which is not an effect of the sensor.
 
     Attributes
     ----------

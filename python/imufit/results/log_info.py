@@ -1,4 +1,4 @@
-"""What is in a log, and what it can show."""
+"""The contents of a log, and the effects that it can show."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SERIES_NAMES: Final = {
     "ref_p": "reference position",
     "ref_angle": "commanded angle",
 }
-"""What the series of a log are called."""
+"""Names of the series of a log."""
 SHOWN_GAPS: Final = 10
 """Gaps that are printed; the JSON has up to a thousand of each series."""
 LABELS: Final = 8
@@ -238,7 +238,7 @@ class RestInfo(Part):
 
 @dataclass(frozen=True, repr=False)
 class ReferenceInfo(Part):
-    """What the readings of a log can be held against.
+    """The references of a log.
 
     Attributes
     ----------
@@ -259,7 +259,7 @@ class ReferenceInfo(Part):
     position : bool
         Whether the position is there, too.
     attitude_noise : float or None
-        Noise of one sample of the attitude, rad, as far as its fast changes tell.
+        Noise of one sample of the attitude, rad, as far as its fast changes show.
     position_noise : float or None
         The same of the position, m.
     labels : tuple of str
@@ -326,7 +326,7 @@ class ReferenceInfo(Part):
 
 @dataclass(frozen=True, repr=False)
 class LogInfo(Result):
-    """What is in a log, and what it can show.
+    """The contents of a log, and the effects that it can show.
 
     Attributes
     ----------
@@ -506,7 +506,7 @@ class LogInfo(Result):
         return [*kept, *(() if self.refusal else (unseen_table(self.effects),)), self.column_table()]
 
     def alike(self) -> list[str]:
-        """Return which effects the log cannot tell apart, a sentence for each group."""
+        """Return which effects the log does not separate, a sentence for each group."""
         return alike(self.effects)
 
     def remarks(self) -> list[str]:

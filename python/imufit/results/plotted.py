@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Plotted:
-    """What can be drawn, on a figure of its own or where its user says."""
+    """A result that can be drawn, on a figure of its own or on given axes."""
 
     def _drawn(self, ax: Place | None) -> Drawing:
         """Draw it, see :mod:`imufit.figures.place`."""

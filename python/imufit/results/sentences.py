@@ -75,7 +75,7 @@ def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: in
     untold : int
         Number of effects that only a reference would show.
     spoilt : bool
-        The logs differ so much that there is no answer for all of them.
+        The logs differ so much that an answer for all of them does not exist.
     """
     adequate = found.verdict == "adequate"
     text = _adequate(found, ratio, untold) if adequate else _missing(found, best)
@@ -91,7 +91,7 @@ def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: in
 
 
 def _adequate(found: Diagnosis, ratio: float, untold: int) -> str:
-    """Say that nothing is missing, as far as the logs can tell."""
+    """Say that nothing is missing, as far as the logs show."""
     if "rests" in found.evidence:
         text = "Nothing that this log can show without a reference attitude is missing"
         if ratio > OFF_FLOOR:
@@ -102,7 +102,7 @@ def _adequate(found: Diagnosis, ratio: float, untold: int) -> str:
             f"No effect is missing for certain, but the residual stands at {ratio:.2f} times the noise: the noise is "
             "stronger or more coloured than stated, or something is left that goes with nothing in the log."
         )
-    return "Nothing that this log can show is missing: the residual is at its noise floor as far as can be told."
+    return "Nothing that this log can show is missing: the residual is at its noise floor as far as the log shows."
 
 
 def _missing(found: Diagnosis, best: Candidate | None) -> str:
@@ -164,7 +164,7 @@ def unshown(effect: str, reason: str) -> str:
 
 
 def experiment(cards: Sequence[EffectCard]) -> str:
-    """Say what would separate candidates that this log cannot tell apart."""
+    """Say what would separate candidates that this log does not separate."""
     parts = [f"for {card.id}, {card.confirm}" for card in cards if card.confirm]
     if not parts:
         return "Record a log with another motion, in more attitudes and over a wider range of temperature."

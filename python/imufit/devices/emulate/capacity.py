@@ -19,7 +19,7 @@ LATEST = np.uint32(0xFFFFFFFF)
 
 @dataclass(frozen=True)
 class Load:
-    """What a device puts on its line.
+    """The load of a device on its line.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ def check(load: Load, rate: float, baud: int) -> None:
     Raises
     ------
     InputError
-        Tells the highest rate that fits.
+        States the highest rate that fits.
     """
     if load.bytes_a_second(rate) > baud / BITS:
         raise InputError(

@@ -123,7 +123,7 @@ class Emulator:
             raise InputError(f"the duration is {duration} s", remedy="Give a number above 0.")
         ticks = clock or Clock()
         opened_at = partial(open_source, source, device=device, effects=effects, seed=seed, mapping=tuple(mapping))
-        # What the line carries in a second of the device.
+        # Capacity of the line in a second of the device.
         carried = None if baud is None else int(baud / (hurry if np.isfinite(hurry) else 1.0))
         if carried is not None and (rate == "max" or np.isfinite(hurry)):
             short = opened_at(rate=None if rate == "max" else rate, duration=PROBE)
@@ -164,11 +164,11 @@ class Emulator:
 
     @property
     def port(self) -> str:
-        """What a reader opens: path of the pty or its link, or URL of the socket."""
+        """Name that a reader opens: path of the pty or its link, or URL of the socket."""
         return self._line.address
 
     def open(self) -> Self:
-        """Plug it in without switching it on, so that `port` can be told."""
+        """Plug it in without switching it on, so that `port` can be printed."""
         self._line.open()
         return self
 
@@ -203,7 +203,7 @@ class Emulator:
     def _run_beside(self) -> None:
         try:
             self.run()
-        except BaseException as error:  # told when the context is left
+        except BaseException as error:  # raised when the context is left
             self._error = error
 
     def __enter__(self) -> Self:

@@ -21,7 +21,7 @@ LONGEST = 1024
 
 
 class Form(Protocol):
-    """What turns rows into bytes.
+    """The encoder of rows into bytes.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class Text:
         return (",".join([time, *self._device.columns]) + "\r\n").encode()
 
     def asks(self, said: bytes) -> bool:
-        """Return False: a sketch that prints text listens to nobody."""
+        """Return False: a sketch that prints text does not read the line."""
         return False
 
     def rows(self, stamps: NDArray[np.uint32], values: Array) -> tuple[bytes, NDArray[np.uint64]]:

@@ -31,7 +31,7 @@ class Line(Protocol):
 
     @property
     def address(self) -> str:
-        """What a reader opens."""
+        """Name that a reader opens."""
 
     def open(self) -> None:
         """Plug in: from now on a reader can open it."""
@@ -82,7 +82,7 @@ class Pty:
 
     def __init__(self, link: Path | None = None) -> None:
         if link is not None and os.path.lexists(link) and not link.is_symlink():
-            raise InputError(f"{str(link)!r} exists and is no link", remedy="Give --link a path that is free.")
+            raise InputError(f"{str(link)!r} exists and is not a link", remedy="Give --link a path that is free.")
         self._link, self._master, self._name, self._since = link, -1, "", float("inf")
 
     @property
@@ -95,7 +95,7 @@ class Pty:
         self._master, slave = os.openpty()
         tty.setraw(slave)
         self._name = os.ttyname(slave)
-        # With no reader the master is hung up, which tells when there is one.
+        # With no reader the master is hung up, which shows when a reader opens it.
         os.close(slave)
         os.set_blocking(self._master, False)
         self._since = float("inf")
@@ -135,7 +135,7 @@ class Pty:
         """Return what the reader has said since this was last asked."""
         try:
             return os.read(self._master, HEARD)
-        except OSError:  # nothing, or nobody
+        except OSError:  # nothing, or not read
             return b""
 
     def drain(self, patience: float) -> None:

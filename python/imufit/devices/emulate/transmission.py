@@ -36,7 +36,7 @@ PULLED = 0.3
 
 @dataclass(frozen=True)
 class Parts:
-    """What a run is made of.
+    """The parts of a run.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Transmission:
             self._is.pace.rest(0.0)
 
     def run(self) -> None:
-        """Send until the source ends or it is told to stop."""
+        """Send until the source ends or the run is stopped."""
         course, pace, schedule = self._is.course, self._is.pace, self._is.schedule
         pace.begin()
         while not self._stop.is_set() and self._row < course.total:

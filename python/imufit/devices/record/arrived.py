@@ -36,7 +36,7 @@ class Chunk:
 
 @dataclass(frozen=True)
 class Announced:
-    """What a device says of its rows.
+    """A device's announcement of its rows.
 
     Attributes
     ----------

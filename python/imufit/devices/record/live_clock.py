@@ -21,7 +21,7 @@ EACH: Final = 4
 """Arrivals kept after which the drift is fitted anew."""
 SLEW: Final = 0.001
 """Share of the time that passes by which the offset is set right, so that no step is off by more."""
-_SETTLED: Final = 2.0  # of arrivals before a drift is believed, s
+_SETTLED: Final = 2.0  # of arrivals before a drift is accepted, s
 
 
 class LiveClock:

@@ -1,4 +1,4 @@
-"""What is written while a recording runs: append-only, so that a crash leaves all but the last quarter of a second."""
+"""The file of a running recording: append-only, so that a crash leaves all but the last quarter of a second."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class PartFile:
         Parameters
         ----------
         rows : Arrived or None
-            At least one row; None for a batch that only tells.
+            At least one row; None for a batch of notes only.
         told : mapping
             What is known now: plain values.
 
@@ -230,7 +230,7 @@ def _schema(announced: Announced) -> Any:
 
 @dataclass(frozen=True)
 class Part:
-    """What a part holds.
+    """The content of a part.
 
     Attributes
     ----------
@@ -243,7 +243,7 @@ class Part:
     n : int
         Rows of whole batches.
     told : list of dict
-        What each batch told.
+        The notes of each batch.
     dropped : int
         Bytes behind the last whole batch.
     """
@@ -291,7 +291,7 @@ def read_part(path: Path) -> Part | None:
     Raises
     ------
     InputError
-        This is no part of a recording, or a recording is still running.
+        The file is not a part of a recording, or a recording is still running.
     """
     with path.open("rb") as file:
         if fcntl is not None:
@@ -315,7 +315,7 @@ def _read(path: Path, data: Any, size: int) -> Part | None:
         if stream is None and _is_cut_off(path, size):
             return None
         raise InputError(
-            "this is no part of a recording", file=path, remedy="imufit record writes LOG.part while it runs."
+            "this is not a part of a recording", file=path, remedy="imufit record writes LOG.part while it runs."
         )
     try:
         about = json.loads(metadata[_KEY])
@@ -326,7 +326,7 @@ def _read(path: Path, data: Any, size: int) -> Part | None:
                 file=path,
                 remedy="Use the imufit that recorded it.",
             )
-        # What the end of a recording computes with; it fails here, where the file is named.
+        # The input of the end of a recording; it fails here, where the file is named.
         datetime.fromisoformat(about["utc"])
         float(about["monotonic"])
         said = about.pop("announced")
@@ -356,7 +356,7 @@ def _is_cut_off(path: Path, size: int) -> bool:
 
 @dataclass(frozen=True)
 class _Batch:
-    """A whole batch: its columns, what it tells, and where it ends."""
+    """A whole batch: its columns, its notes, and its end."""
 
     n: int
     rows: dict[str, Any] | None

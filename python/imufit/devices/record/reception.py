@@ -117,7 +117,7 @@ class Reception:
     def finish(self) -> list[Arrived]:
         """Nothing more is read: return samples that still wait for an announcement, if there ever was one.
 
-        Half a frame that is left is no damage: it is this end that cuts it.
+        A remaining half frame is not damage: it is this end that cuts it.
         """
         self.chunk = None
         if self.form is not None:

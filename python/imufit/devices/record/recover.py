@@ -1,4 +1,4 @@
-"""What a crash left of a recording becomes a log."""
+"""The part left by a crash becomes a log."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ def recover(
     Raises
     ------
     InputError
-        There is no part, nothing whole is in it, nothing tells what its samples hold, a recording is still writing it,
-        or the log cannot be written.
+        The part is missing, nothing whole is in it, the columns of its samples are unknown, a recording is still
+        writing it, or the log cannot be written.
     """
     file = Path(file)
     found = re.fullmatch(r"(.+)\.part\d*", file.name)
@@ -67,7 +67,7 @@ def recover(
     parts = parts_of(wanted)
     if not parts and not first.exists():
         raise InputError(
-            f"there is no {part_path(wanted)}", file=file, remedy="Name the .part file that the recording left."
+            f"{part_path(wanted)} does not exist", file=file, remedy="Name the .part file that the recording left."
         )
     target = wanted if log is None else Path(log)
     check_target(target, force)

@@ -36,7 +36,7 @@ class Rig:
         Commanded angle when the recording begins, rad.
     typed : callable
         Gives the angles that were commanded since it was last asked, rad; `MOVING` while the rig moves. It must not
-        wait. It is told whether rows have come: before that an angle has no place in the recording, and is not used.
+        wait. It receives whether rows have come: before that an angle has no place in the recording, and is not used.
     """
 
     axis: Literal["x", "y", "z"]
@@ -71,7 +71,7 @@ class TypedAngles:
     Parameters
     ----------
     say : callable
-        Tells the operator what was understood.
+        Reports the understood angle to the operator.
     file : int, optional
         File descriptor of the terminal; standard input if None.
     """
@@ -133,5 +133,5 @@ def _ours(file: int) -> bool:
     try:
         return not os.isatty(file) or os.tcgetpgrp(file) == os.getpgrp()
     except OSError:
-        # Not the terminal that controls this process: reading it stops nobody.
+        # Not the terminal that controls this process: reading it blocks nothing.
         return True

@@ -37,8 +37,8 @@ _WINDOW: Final = 2.0  # over which the rate is taken, s
 class StatusLine:
     """Called as a recording's `watch`; a context manager that takes the line away again.
 
-    Where no person is looking (standard error is no terminal) there is no line; messages of the device are printed in
-    either case.
+    Where no person is looking (standard error is not a terminal) the line is omitted; messages of the device are
+    printed in either case.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ class BlindGrade(Part):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> BlindGrade:
-        """Return what `to_dict` told, also after a way through JSON.
+        """Return the grade of a `to_dict`, also after JSON.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ def _ratio(ratio: float | None) -> str:
 
 
 def _rightly_stopped(trial: Trial) -> bool:
-    """Return whether the ladder rightly left something in the residual: what it cannot tell, or does not know."""
+    """Return whether the ladder rightly left something in the residual: rivals, or an effect outside the catalogue."""
     return trial.answer.end in ("ambiguous", "unknown") and not trial.marks.faults
 
 

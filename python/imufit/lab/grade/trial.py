@@ -33,7 +33,7 @@ class Trial(Part):
     size : float
         Root mean square of the smallest injected effect over the white noise of its sensor; 0 with none.
     rivals : tuple of str
-        Effects that really cannot be told from it in this log.
+        Effects that this log does not separate from it.
     answer : Answer
         What the ladder said.
     marks : Marks
@@ -71,7 +71,7 @@ class Trial(Part):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Trial:
-        """Return the trial that `to_dict` told, also after a way through JSON.
+        """Return the trial of a `to_dict`, also after JSON.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What was done to a simulated log, and how it is kept beside the log without being read by accident."""
+"""The truth of a simulated log, kept beside the log without being read by accident."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEADER = "imufit sealed truth, format 1: what was done to this log; `imufit reve
 
 @dataclass(frozen=True)
 class Truth:
-    """What a simulated log holds.
+    """The content of a simulated log.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ def unseal(log_path: str | Path) -> Truth:
     """
     path = sealed_path(log_path)
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: there is no sealed truth beside this log")
+        raise FileNotFoundError(f"{path}: the sealed truth beside this log is missing")
     try:
         header, *lines = path.read_text(encoding="utf-8").splitlines() or [""]
         if not header.startswith("imufit sealed truth, format 1"):
