@@ -122,7 +122,7 @@ def in_words(parameters: tuple[Parameter, ...], limit: int = 3) -> str:
     shown = [
         f"{p.name} {quantity.with_error(p.value, CHANCE * p.standard_error, p.unit)}" for p in parameters if p in chosen
     ]
-    return ", ".join(shown) or "not told"
+    return ", ".join(shown) or "not determined"
 
 
 def answer(verdict: str, best: str | None, rivals: tuple[str, ...]) -> str:

@@ -413,7 +413,7 @@ def test_unusable_log_gets_its_own_message(log, cost, words):
 def test_unknown_cost_and_sensor_are_refused():
     refused(six(), "the cost 'length' is unknown", "length")
     refused(six(), "the sensor 'baro' is unknown", sensors=["baro"])
-    refused([], "there is no log")
+    refused([], "a log to calibrate from is missing")
 
 
 # Logs as they come.

@@ -269,8 +269,12 @@ def test_the_command_prints_within_eighty_columns(
     assert max(map(len, printed.splitlines())) <= 80
     # no cell of a table is cut
     assert "…" not in printed
-    assert printed.index("It can show") < printed.index("Samples in time") < printed.index("What this log can show")
-    assert printed.index("What this log can show") < printed.index("Columns")
+    assert (
+        printed.index("It can show")
+        < printed.index("Samples in time")
+        < printed.index("Effects that this log can show")
+    )
+    assert printed.index("Effects that this log can show") < printed.index("Columns")
     assert json.loads((tmp_path / "info.json").read_text())["motion"]["force_rms"] > 0.0
 
 

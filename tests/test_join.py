@@ -129,7 +129,7 @@ def test_attitudes_are_read_as_others_write_them() -> None:
     [
         ("euler", ("a", "b", "c"), "not a kind of attitude"),
         ("euler-ZYX", ("a", "b"), "has 3 columns, 2 were named"),
-        ("euler-ZYX", ("a", "b", "yaw"), "there is no such column"),
+        ("euler-ZYX", ("a", "b", "yaw"), "the file has no such column"),
         ("quaternion", ("a", "b", "c", "a"), "does not have unit length in 3 of 3 rows"),
         ("matrix", ("a",) * 9, "not a rotation"),
     ],
@@ -156,7 +156,7 @@ def test_the_command_joins_euler_angles_of_another_file(tmp_path: Path, capsys: 
     assert answer["lag"] == pytest.approx(one.lag, abs=0.01)
     assert imufit.read(tmp_path / "log.parquet").n == answer["rows"]
     assert main(["join", *arguments[::-1][2:], *arguments[2:]]) == 2
-    assert "there is no sensor" in capsys.readouterr().err
+    assert "the file has no sensor" in capsys.readouterr().err
 
 
 def test_a_phone_and_cameras_in_their_native_files_become_one_log(

@@ -141,7 +141,7 @@ def test_archive_of_an_unknown_kind_is_told_from_a_damaged_one(
         (b'{"gyr_range": 1' + b"0" * 5000 + b"}", "not valid JSON"),
         (b'{"mag_reference": [1' + b"0" * 400 + b", 2, 3]}", "mag_reference is an integer of more than 64 bits"),
         (b'{"mag_reference": [1e300, 2, 3]}', "not three numbers"),
-        (b'{"gravity": 1e-300}', "is no gravity"),
+        (b'{"gravity": 1e-300}', "is not a gravity"),
         (b'{"noise": {"acc": 1e300}}', "no sensor has such a standard deviation"),
         (b'{"sensor": "\xff\xfe"}', "not valid JSON"),
     ],

@@ -352,7 +352,10 @@ def test_why_nothing_was_recorded_is_said(pty, tmp_path, sent, said):
 @pytest.mark.parametrize(
     ("port", "said"),
     [
-        ("/dev/no_such_port", "there is no port /dev/no_such_port. (Ports here|There is no serial port)"),
+        (
+            "/dev/no_such_port",
+            "the port /dev/no_such_port does not exist. (Ports here|This machine has no serial port)",
+        ),
         ("/dev/null", "cannot be opened"),
         ("socket://127.0.0.1:9", "Start what is to listen there first"),
         ("sockets://127.0.0.1:9", "Write socket://HOST:PORT"),

@@ -41,18 +41,18 @@ LIMITS = 0.5
 CALMEST = 0.25
 UNITS = {"angular_rate": "deg/s", "acceleration": "m/s²", "field_disturbance": "%", "time": "s"}
 CAUSES = {
-    "angular_rate": ("filter", "errors of the rate, of its timing or of the filter's gains come with rotation"),
+    "angular_rate": ("filter", "errors of the rate, of its timing or of the filter's gains appear with rotation"),
     "acceleration": ("filter", "specific force is not gravity while the body accelerates"),
-    "field_disturbance": ("environment", "the field is disturbed where the body is"),
-    "drift": ("filter", "it grows with time: nothing holds it"),
-    "constant": ("calibration", "it is constant: a bias, a mount or a field direction"),
+    "field_disturbance": ("environment", "the magnetic field is disturbed at the body's place"),
+    "drift": ("filter", "the error grows with time, without a correction"),
+    "constant": ("calibration", "a bias, a mount or a field direction is a constant error"),
 }
 
 
 def attitude_comparison(
     model: EffectStack, log: LogSource, filter_name: str = FILTER, progress: Progress = silent
 ) -> AttitudeComparison | None:
-    """Run a filter over a log without and with a model applied, and say what its error goes with.
+    """Run a filter over a log without and with a model applied, and name the quantity that its error depends on.
 
     Parameters
     ----------
@@ -287,10 +287,11 @@ def _limit(
     larger = "heading" if now["heading"] >= now["inclination"] else "inclination"
     causes = [d for d in dependences if d.part == larger and d.share >= LIMITS]
     if not causes:
-        return "undecided", f"{text} What is left goes with nothing that was looked at alone."
+        return "undecided", f"{text} The remaining error does not correlate with any single quantity tested."
     cause = causes[0]
     limit, why = CAUSES[cause.quantity]
     where = {"filter": "the filter", "environment": "the environment", "calibration": "calibration"}[limit]
     what = cause.quantity.replace("_", " ")
+    dependence = "is constant" if cause.quantity == "constant" else f"depends on the {what}"
     share = f"{100.0 * cause.share:.0f} %"
-    return limit, f"{text} {share} of the {larger}'s mean square goes with {what}: {where} limits it, since {why}."
+    return limit, f"{text} {share} of the {larger}'s mean square error {dependence}. The limit is {where}: {why}."

@@ -32,7 +32,7 @@ _SYNC: Final = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 _SEARCHED: Final = 200_000
 """Bytes in which messages are looked for behind a damaged one: several sectors of a memory card."""
 _ROW: Final = 6
-"""Readings in a row that are no accident: one in 256 bytes looks like the beginning of one."""
+"""Readings in a row that are not an accident: one in 256 bytes looks like the beginning of one."""
 _LONGEST: Final = 10_000
 """Bytes of a message, more than any of PX4's; pyulog takes longer ones for damage."""
 _FLAG: Final = 11

@@ -90,7 +90,7 @@ def open_source(path: Path) -> Source:
         The file is missing, empty, damaged or of no known format.
     """
     if not path.exists():
-        raise InputError(f"missing file {path}", file=path, remedy="Check the name.")
+        raise InputError(f"the file {path} does not exist", file=path, remedy="Check the name.")
     try:
         suffix = "" if path.is_dir() else path.suffix.lower()
         if not path.is_dir() and path.stat().st_size == 0:

@@ -156,7 +156,7 @@ def load_effects(path: str | Path) -> list[str]:
     """
     file = Path(path)
     if not file.is_file():
-        raise InputError(f"missing file {file}", file=file, remedy="Check the name.")
+        raise InputError(f"the file {file} does not exist", file=file, remedy="Check the name.")
     before = set(registered())
     run_effects(file)
     added = [effect_id for effect_id in registered() if effect_id not in before]

@@ -95,14 +95,14 @@ def _adequate(found: Diagnosis, ratio: float, untold: int) -> str:
     if "rests" in found.evidence:
         text = "Nothing that this log can show without a reference attitude is missing"
         if ratio > OFF_FLOOR:
-            return f"{text}: what is left stands at {ratio:.1f} times the noise, but no effect lowers that for certain."
-        return f"{text}; {untold} effects it cannot show at all." if untold else f"{text}."
+            return f"{text}: the residual stands at {ratio:.1f} times the noise, but no effect lowers it for certain."
+        return f"{text}. This log cannot show {untold} effects." if untold else f"{text}."
     if ratio > OFF_FLOOR:
         return (
             f"No effect is missing for certain, but the residual stands at {ratio:.2f} times the noise: the noise is "
-            "stronger or more coloured than stated, or something is left that goes with nothing in the log."
+            "stronger or more coloured than stated, or the log does not contain the cause of the residual."
         )
-    return "Nothing that this log can show is missing: the residual is at its noise floor as far as the log shows."
+    return "Nothing that this log can show is missing: the residual is at its noise floor."
 
 
 def _missing(found: Diagnosis, best: Candidate | None) -> str:
@@ -117,7 +117,7 @@ def _missing(found: Diagnosis, best: Candidate | None) -> str:
         doubtful = next((candidate for candidate in found.candidates if candidate.status in DOUBTS), None)
         if doubtful is not None and not left and best is None:
             text += f" {doubtful.effect} comes nearest, but {DOUBTS[doubtful.status]}."
-        return text if best is None else f"{text} {best.effect} would take a part of it, but not most."
+        return text if best is None else f"{text} {best.effect} would explain a part of it, but not most."
     if found.verdict == "ambiguous":
         rivals = " or ".join(found.ambiguous_with)
         return (
@@ -129,7 +129,7 @@ def _missing(found: Diagnosis, best: Candidate | None) -> str:
 
 
 def spoilt(faults: Sequence[DataFault]) -> str:
-    """Say which faults of the data have to be put right before any effect can be judged."""
+    """Say which faults of the data must be corrected before any effect can be judged."""
     said = " ".join(fault.sentence for fault in faults)
     kinds = ", ".join(dict.fromkeys(fault.fault for fault in faults))
     logs = ", ".join(dict.fromkeys(fault.file for fault in faults if fault.file is not None))
