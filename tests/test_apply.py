@@ -202,7 +202,9 @@ def test_no_reference_is_needed_and_effects_of_the_reference_are_named_as_left_a
     corrected = model.apply(recorded)
     assert np.array_equal(corrected.mag, recorded.mag)
     assert np.allclose(corrected.gyr, recorded.gyr - [0.1, 0.0, 0.0], rtol=0, atol=1e-15)
-    assert corrected.notes == ("ref.delay and mag.field_reference left alone: of the reference, not of the readings",)
+    assert corrected.notes == (
+        "ref.delay and mag.field_reference left unchanged: an effect of the reference, not of the readings",
+    )
 
 
 def test_temperatures_count_from_the_mean_of_the_fitted_log():

@@ -309,7 +309,7 @@ def test_unknown_suffix_missing_file_directory(tmp_path: Path) -> None:
     assert message(tmp_path / "b.csv") == f"b.csv: the file {tmp_path / 'b.csv'} does not exist. Check the name."
     (tmp_path / "c.csv").mkdir()
     assert message(tmp_path / "c.csv") == (
-        "c.csv: the folder of text files holds no table. Name a file that holds samples."
+        "c.csv: the folder of text files does not hold a table. Name a file that holds samples."
     )
 
 

@@ -104,7 +104,7 @@ def test_switch_is_a_covariate_of_ones_and_zeros(tmp_path: Path) -> None:
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_array_that_an_archive_holds_twice_is_not_chosen_in_silence(tmp_path: Path) -> None:
     path = npz(tmp_path / "a.npz", *COLUMNS.items(), ("acc_x", COLUMNS["acc_y"]))
-    assert message(path) == "a.npz: column acc_x: the array is there twice. Save each array once."
+    assert message(path) == "a.npz: column acc_x: the array is stored twice. Save each array once."
 
 
 @pytest.mark.parametrize("first", [True, False])
@@ -128,7 +128,7 @@ def test_archive_of_an_unknown_kind_is_told_from_a_damaged_one(
         data[place : place + 2] = struct.pack("<H", value)
     path.write_bytes(data)
     said = message(path)
-    assert "encrypted, or of a kind that is not known" in said
+    assert "encrypted, or of an unknown kind" in said
     assert "numpy.savez" in said
 
 

@@ -88,9 +88,9 @@ def read_toml(path: str | Path, what: str) -> tuple[dict[str, Any], bool]:
     if document.pop(LAST, None) is not None and not marked:
         raise InputError("the file is cut off: its last lines are missing", file=file, remedy=AGAIN)
     if marked and document.pop(END) != COMPLETE:
-        raise InputError("the file is cut off: its table [end] does not say complete = true", file=file, remedy=AGAIN)
+        raise InputError("the file is cut off: its table [end] does not hold complete = true", file=file, remedy=AGAIN)
     if marked and _last_lines(text) != MARK:
-        raise InputError("something stands behind the table [end]", file=file, remedy="Move [end] to the end.")
+        raise InputError("text follows the table [end]", file=file, remedy="Move [end] to the end.")
     if not marked and not text.endswith("\n"):
         raise InputError("the last line does not end: the file may be cut off", file=file, remedy=HOW_TO_END)
     return document, marked

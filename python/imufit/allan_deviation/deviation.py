@@ -61,7 +61,7 @@ def allan(log: Log, sensors: tuple[str, ...] = ("acc", "gyr", "mag"), progress: 
             found[name] = samples
     if not found:
         raise InputError(
-            "no sensor has readings enough for an Allan deviation",
+            "the sensors have too few readings for an Allan deviation",
             file=log.path or "log",
             remedy="Record the sensor lying still for at least some seconds.",
         )

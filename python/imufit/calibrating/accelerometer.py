@@ -178,8 +178,7 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
         extras["placement_deg"] = float(np.degrees(solution["excess"] / gravity))
         if solution["freedom"] < 1:
             remarks.append(
-                f"No pose is to spare that would show how well they were laid: {extras['placement_deg']:.1f} deg is "
-                "taken for the standard errors. Record all six sides."
+                f"The poses are too few to show how well they were laid: {extras['placement_deg']:.1f} deg is assumed in the standard errors. Record all six sides."
             )
         elif extras["placement_deg"] > 0.3:
             remarks.append(
@@ -192,7 +191,7 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     remarks += _weak_axes(poses)
     if rms(lengths - gravity) > 1.5 * rms(np.linalg.norm(readings, axis=1) - gravity) + 0.01:
         remarks.append(
-            "The lengths got worse: a tilted table or a crooked side passes for misalignment. Record one log with the "
+            "The error of the lengths grew: a tilted table or a crooked side is mistaken for misalignment. Record one log with the "
             "gyro, so that headings are known, or nine attitudes for --cost magnitude."
         )
     return _result("vector", readings, solution, gravity, lengths, residuals, remarks, extras, chosen)
@@ -240,7 +239,7 @@ def fit_magnitude(
     solution = solve(*chosen)
     if solution["freedom"] < 1:
         remarks.append(
-            "No pose is to spare: the standard errors know the sensor's noise only, and nothing could be left out."
+            "The poses are just enough: the standard errors contain the sensor's noise only, and no pose could be left out."
         )
     residuals = np.abs(solution["residuals"][:, 0])
     lengths = gravity + solution["residuals"][:, 0]
@@ -267,7 +266,7 @@ def fit_motion(acc: Array, gravity: float) -> SensorCalibration:
     groups = np.floor(np.arange(len(acc)) * MOTION_GROUPS / len(acc))
     solution = _imufit.magnitude_calibration(np.ascontiguousarray(acc), groups, gravity, misalignment=False)
     if max(solution["bias_error"]) > MOTION_ERROR:
-        raise InputError("the motion's accelerations hide gravity")
+        raise InputError("accelerations of the motion exceed gravity")
     lengths = gravity + solution["residuals"][:, 0]
     result = _result(
         "magnitude",
@@ -278,7 +277,7 @@ def fit_motion(acc: Array, gravity: float) -> SensorCalibration:
         np.zeros(0),
         [
             "The sensor never rested: scale and bias come from the length of the specific force while it was turned. "
-            "A hand's accelerations make that weaker than rests; record six sides at rest."
+            "Accelerations of the motion make this fit weaker than rests; record six sides at rest."
         ],
         {"misaligned": False, "from_motion": True},
         (False, False),

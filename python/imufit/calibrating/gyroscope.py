@@ -59,7 +59,7 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
         errors["gyr.bias_temperature"] = named(slope[1])
     nothing = np.zeros((3, 3))
     if told is None:
-        remarks.append("Fewer than three turns between rests: the gyro's scale and misalignment stay as they are.")
+        remarks.append("Fewer than three turns between rests: the gyro's scale and misalignment stay unchanged.")
         return SensorCalibration(
             "gyr", "rest", np.eye(3), np.ones(3), -bias, nothing, np.zeros(3), bias_error, "rad/s",
             np.nan, np.nan, np.nan, "rad", np.zeros(0), 1.0, np.eye(3), 0.0, len(rests), effects, errors,
@@ -88,7 +88,7 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
     before, after = rms(told["before"]), rms(told["residuals"][:, 0])
     worse = held_out > before
     if told["freedom"] < 1.0:
-        remarks.append(f"{len(told['before'])} turns have no equation to spare: nothing checks the gyro's calibration.")
+        remarks.append(f"{len(told['before'])} turns are just enough: the gyro's calibration cannot be checked.")
     if worse:
         remarks.append("The turns do not support a scale or misalignment of the gyro: only its bias is kept.")
     else:

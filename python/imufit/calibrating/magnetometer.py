@@ -64,7 +64,7 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
     remarks = []
     if not given:
         remarks.append(
-            f"The field's strength is not known (metadata mag_reference): lengths are brought to their mean, "
+            f"The field's strength is not known (metadata mag_reference): lengths are scaled to their mean, "
             f"{field:.1f} µT, and the scale common to the three axes is not calibrated."
         )
     try:
@@ -103,7 +103,7 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
     held_out = solution["held_out_length"] - field
     bias_error = np.array(solution["bias_error"])
     if np.any(bias_error > 0.1 * field):
-        remarks.append("Some attitudes are missing: the hard iron is known to no better than a tenth of the field.")
+        remarks.append("Some attitudes are missing: the hard iron is uncertain by a tenth of the field or more.")
     return SensorCalibration(
         sensor="mag",
         cost="magnitude",

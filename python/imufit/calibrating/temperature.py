@@ -87,7 +87,7 @@ class Temperature:
         if self.confounded > CONFOUNDED:
             share = f"{100 * self.confounded:.0f} %"
             return (False, False), [
-                f"{shown}, but {share} of that goes with the pose: temperature and pose are confounded, and scale or "
+                f"{shown}, but {share} of that depends on the pose: temperature and pose are confounded, and scale or "
                 "misalignment may hide a temperature effect. Take all sides cold, then all sides warm."
             ]
         if to_spare < 4:

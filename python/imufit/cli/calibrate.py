@@ -126,7 +126,7 @@ def _place_of(keep: Path | None, model: Path | None) -> Path:
     if keep is not None:
         return keep
     if model is None:
-        raise click.UsageError("what PORT sends has to be kept: name a model with -o, or a log with --keep")
+        raise click.UsageError("the rows of PORT must be kept: name a model with -o, or a log with --keep")
     path, number = model.with_suffix(".parquet"), 1
     while path.exists():
         number += 1

@@ -102,7 +102,7 @@ def monitor(
                 kept.append((last.t, last.angles))
     if last is not None:
         if not last.n:
-            raise click.UsageError(f"nothing came that could be shown: {last.trouble}")
+            raise click.UsageError(f"the device sent nothing that could be shown: {last.trouble}")
         out.json(last.to_dict())
         if plot_file is not None:
             out.plot(plot_file, _figure(kept))

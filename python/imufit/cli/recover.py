@@ -16,7 +16,7 @@ from imufit.cli.output import Output
 @click.option(
     "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="LOG", help="Log to write; without it the one meant to be."
 )
-@click.option("--port", metavar="PORT", help="The device, to ask what samples hold that came before it said so.")
+@click.option("--port", metavar="PORT", help="The device, to request the columns of samples before its announcement.")
 @click.option("--force", is_flag=True, help="Overwrite LOG if it is there already.")
 @click.option("--keep", is_flag=True, help="Keep the .part files.")
 @json_option

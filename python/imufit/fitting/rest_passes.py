@@ -63,7 +63,7 @@ class RestPasses(Passes):
         self.rests = rests = read_rests(log, self.covariates)
         if not rests.sensors:
             raise InputError(
-                "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz), and too few rests to do without",
+                "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz), and too few rests to replace it",
                 file=log.path,
                 remedy=(
                     "Add the reference, or ref_angle with the metadata rig_axis; or record the sensor lying still in "

@@ -63,7 +63,7 @@ def check_elements(path: Path, data: bytes) -> None:
                 raise ValueError("a packed variable is not whole")
             body = body[8 : 8 + inner]
         if kind != _MATRIX:
-            raise ValueError("something stands between the variables")
+            raise ValueError("extra bytes stand between the variables")
         _check_matrix(memoryview(body), order, 0)
         at += 8 + length
 

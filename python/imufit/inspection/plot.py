@@ -93,7 +93,7 @@ def drawing(
     panels = drawn.panels()
     if not panels:
         what = "a reference" if show == "reference" else "readings"
-        raise InputError(f"there is nothing to draw: no {what.removeprefix('a ')} in this part", file=log.path)
+        raise InputError(f"nothing can be drawn: no {what.removeprefix('a ')} in this part", file=log.path)
     # Rests of stretches of a long log would be shaded in these alone.
     spans = rests_of(part).spans if judged_rows(part) is part else ()
     rests = [(max(a, low), min(b, high)) for a, b in spans if a < high and b > low]

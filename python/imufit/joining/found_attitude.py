@@ -94,7 +94,7 @@ def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | Non
     if not ways:
         held = ", ".join(list(reference.covariates)[:12]) or "none"
         raise InputError(
-            f"no columns look like an attitude; there are {held}",
+            f"no columns have the names of an attitude; the columns are {held}",
             file=file,
             remedy=f"Name them with --attitude {KINDS}.",
         )

@@ -238,7 +238,7 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
 
 def _apart(reference: Log) -> InputError:
     return InputError(
-        "the recordings have no few seconds of motion in common that no gap interrupts",
+        "the recordings share less than a few seconds of motion without a gap",
         file=reference.path or "reference",
         remedy="Record sensor and reference at the same time, and turn the sensor.",
     )

@@ -127,7 +127,7 @@ def read_layout(path: Path) -> Layout:
     lines[0] = lines[0].removeprefix("\ufeff")
     table = [i for i, line in enumerate(lines) if not is_comment(line)]
     if not table:
-        raise InputError("the file holds no table", file=path, remedy="A header and rows are wanted.")
+        raise InputError("the file does not hold a table", file=path, remedy="A header and rows are wanted.")
     separator, width = _separator([lines[i] for i in table])
     decimal = _decimal([lines[i] for i in table], separator)
     if decimal == ",":

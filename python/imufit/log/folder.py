@@ -102,7 +102,7 @@ def _recording(path: Path, form: str, files: list[Path]) -> Recording:
     if len(files) > MOST_FILES:
         notes.append(f"{path.name}: {len(files) - MOST_FILES} of {len(files)} text files left out")
     if not tables:
-        raise InputError(f"the {form} holds no table", file=path, remedy="Name a file that holds samples.")
+        raise InputError(f"the {form} does not hold a table", file=path, remedy="Name a file that holds samples.")
     return Recording(form, tuple(tables), tuple(notes), clues=tuple(clues))
 
 

@@ -176,7 +176,7 @@ class Log:
         for name, cells in [*self.labels.items(), *([("pose", self.pose)] if self.pose is not None else [])]:
             if cells.shape != (t.size,):
                 raise InputError(
-                    f"the array has shape {cells.shape}, but ({t.size},) is wanted", file="log", column=name
+                    f"the array has shape {cells.shape}, but ({t.size},) is required", file="log", column=name
                 )
 
     @property
@@ -274,7 +274,7 @@ class Log:
         """
         mask = np.asarray(mask)
         if mask.dtype != np.bool_ or mask.shape != (self.n,):
-            raise ValueError(f"mask has shape {mask.shape} and type {mask.dtype}; ({self.n},) and bool are wanted")
+            raise ValueError(f"mask has shape {mask.shape} and type {mask.dtype}; ({self.n},) and bool are required")
         return self._picked(mask)
 
     def _picked(self, key: Any) -> Self:

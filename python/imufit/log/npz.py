@@ -99,7 +99,7 @@ class NpzSource:
 
     def _unknown(self, error: Exception) -> InputError:
         return InputError(
-            f"the archive is encrypted, or of a kind that is not known ({error})",
+            f"the archive is encrypted, or of an unknown kind ({error})",
             file=self._path,
             remedy="Write it with numpy.savez or numpy.savez_compressed.",
         )
@@ -107,7 +107,7 @@ class NpzSource:
     def _add(self, entry: str, file: IO[bytes], lengths: dict[str, int]) -> None:
         name = entry.removesuffix(".npy")
         if name in lengths or (name == _METADATA and self.embedded):
-            raise InputError("the array is there twice", file=self._path, column=name, remedy="Save each array once.")
+            raise InputError("the array is stored twice", file=self._path, column=name, remedy="Save each array once.")
         shape, fortran, dtype = _header(file)
         if dtype.kind not in "fiubUS":
             kind = "Python objects" if dtype.hasobject else f"values of type {dtype}"

@@ -96,7 +96,9 @@ def open_source(path: Path) -> Source:
         if not path.is_dir() and path.stat().st_size == 0:
             raise InputError("the file is empty (0 bytes)", file=path, remedy="Record or copy it again.")
         if re.fullmatch(r"\.part\d*", suffix):
-            raise InputError("this is what a recording wrote while it ran", file=path, remedy=f"imufit recover {path}")
+            raise InputError(
+                "this is the part of a running or killed recording", file=path, remedy=f"imufit recover {path}"
+            )
         if suffix in _ARRAYS:
             return _ARRAYS[suffix](path)
         if (found := _recording(path)) is not None:

@@ -252,7 +252,7 @@ def _check_affine(effect_id: str, affine: str, stage: str, parameters: set[str],
     own_stage, names = AFFINE[affine]
     if needs:
         raise InputError(
-            f"effect {effect_id}: what needs a column is not a constant {affine}", remedy="Leave affine out."
+            f"effect {effect_id}: an effect with a column is not a constant {affine}", remedy="Leave affine out."
         )
     if stage != own_stage:
         raise InputError(f"effect {effect_id}: affine {affine} at stage {stage}", remedy=f"Use stage {own_stage}.")

@@ -251,7 +251,7 @@ def _pose(found: Any, log: Log, labels: Array | None, *, index: int, number: int
 
 def _flaw(kind: str, value: float, hold: float) -> str:
     if kind == "short":
-        return f"still for {value:.1f} s, {hold:.1f} s are asked for: too short"
+        return f"still for {value:.1f} s, {hold:.1f} s are required: too short"
     if kind == "crept":
         return f"moved by {np.degrees(value):.1f} deg while it should have been still"
     return f"not still: the readings scatter by {value:.2g} m/s²"

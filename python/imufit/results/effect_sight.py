@@ -120,11 +120,11 @@ class EffectSight(Part):
 
     def __str__(self) -> str:
         if self.shown == "no":
-            return f"{self.effect} cannot be seen: {self.reason}"
+            return f"{self.effect} is not visible: {self.reason}"
         like = f"; it looks like {', '.join(self.like)}" if self.like else ""
         start = f"from {self.smallest} on" if self.parameters else "by the readings themselves"
         only = f"; {self.reason}" if self.reason else ""
-        return f"{self.effect} can be seen {start}{only}{like}"
+        return f"{self.effect} is visible {start}{only}{like}"
 
 
 def sizes(values: Sequence[tuple[float, str]]) -> str:
@@ -161,7 +161,7 @@ def seen_table(effects: Sequence[EffectSight]) -> Table:
         (item.effect, item.smallest if item.parameters else "its end shows", item.typical, item.reason)
         for item in shown
     )
-    return Table("Effects that this log can show", ("effect", ">seen from", ">typical", "but"), rows)
+    return Table("Effects that this log can show", ("effect", ">visible from", ">typical", "but"), rows)
 
 
 def open_table(effects: Sequence[EffectSight]) -> Table:
@@ -173,7 +173,7 @@ def open_table(effects: Sequence[EffectSight]) -> Table:
         All of them.
     """
     rows = tuple((item.effect, item.smallest, item.reason) for item in effects if item.open and item.shown != "no")
-    return Table("Dependences that it can show on its own columns", ("effect", ">seen from", "but"), rows)
+    return Table("Dependences that it can show on its own columns", ("effect", ">visible from", "but"), rows)
 
 
 def weak_table(effects: Sequence[EffectSight]) -> Table:
@@ -186,7 +186,9 @@ def weak_table(effects: Sequence[EffectSight]) -> Table:
     """
     weak = sorted((item for item in effects if item.weak), key=lambda item: -item.clearness)
     rows = tuple((item.effect, item.smallest, item.typical, item.reason) for item in weak)
-    return Table("Effects that it would show only in unusual sizes", ("effect", ">seen from", ">typical", "why"), rows)
+    return Table(
+        "Effects that it would show only in unusual sizes", ("effect", ">visible from", ">typical", "why"), rows
+    )
 
 
 def unseen_table(effects: Sequence[EffectSight]) -> Table:

@@ -291,7 +291,7 @@ class ReferenceInfo(Part):
         if self.rate is not None:
             parts.append(f"{self.rate:.4g} Hz")
         if self.exact is not None:
-            parts.append(f"{quantity.share(self.exact)} of these rows measured, the others filled in")
+            parts.append(f"{quantity.share(self.exact)} of these rows measured, the others interpolated")
         gaps = "gap" if self.gap_count == 1 else "gaps"
         parts.append(f"{self.gap_count} {gaps}, the longest {self.longest_gap:.3g} s" if self.gap_count else "no gap")
         parts.append("with position" if self.position else "without position")

@@ -146,7 +146,7 @@ def trials(
     needs = _imufit.filter_descriptions()[filter_name]["needs"]
     for sensor in needs:
         if around.sensors[sensor] is None:
-            raise InputError(f"{filter_name} needs {sensor}, which is not there", file=log.path or "log")
+            raise InputError(f"{filter_name} needs {sensor}, which the log does not have", file=log.path or "log")
     referenced = log.ref_q is not None and bool(log.has_reference.any())
     chosen: Criterion = criterion or ("error" if referenced else "prediction")
     if chosen == "error" and not referenced:

@@ -103,7 +103,7 @@ def tune(
     held = dict(fixed or {})
     begin = {name: value for name, value in begin.items() if name not in held}
     if not begin:
-        raise InputError(f"every gain of {filter_name} is fixed: nothing is left to tune")
+        raise InputError(f"every gain of {filter_name} is fixed: no gain remains to tune")
     ready = trials(log, filter_name, by, metric, horizon, held, rules)
     notes: list[str] = []
     if ready.criterion == "prediction" and not gains:
@@ -188,7 +188,7 @@ def _that_matter(ready: Trials, begin: dict[str, float], notes: list[str]) -> di
     kept = {name: begin[name] for name, value in zip(begin, values[1:], strict=True) if value != values[0]}
     idle = [name for name in begin if name not in kept]
     if idle and kept:
-        notes.append(f"{', '.join(idle)} changes nothing on this log and was left alone.")
+        notes.append(f"{', '.join(idle)} changes nothing on this log and was left unchanged.")
     return kept or begin
 
 

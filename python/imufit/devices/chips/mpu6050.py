@@ -220,7 +220,7 @@ def decode(
     try:
         acc, gyr, temp, acc_clipped, gyr_clipped = _imufit.mpu6050_decode(whole, int(afs_sel), int(fs_sel), temperature)
     except InputError as error:
-        remedy = "Pass whole frames; or partial=True, and what is left over before the next burst."
+        remedy = "Pass whole frames; or partial=True, and the remainder before the next burst."
         raise InputError(error.problem.rstrip("."), row=whole.size // size, remedy=remedy) from None
     return Frames(
         acc,

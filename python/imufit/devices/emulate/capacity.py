@@ -57,7 +57,9 @@ class Load:
         """
         rate = float(np.floor((baud / BITS - self.a_second) / self.a_row))
         if rate < 1.0:
-            raise InputError(f"a line of {baud} baud carries not one sample a second", remedy="Give a higher --baud.")
+            raise InputError(
+                f"a line of {baud} baud carries less than one sample a second", remedy="Give a higher --baud."
+            )
         return rate
 
 

@@ -139,7 +139,7 @@ class Emulator:
         unplugged = any(fault.kind == "unplug" for fault in planned) or (fault_rates or {}).get("unplug", 0.0) > 0.0
         if unplugged and on == "pty" and link is None:
             raise InputError(
-                "an unplugged pty comes back by another name", remedy="Give --link PATH, or use --on socket://..."
+                "an unplugged pty returns with another name", remedy="Give --link PATH, or use --on socket://..."
             )
         self.source: Source = opened
         self._wait = on != "pty" if wait is None else wait

@@ -199,7 +199,7 @@ class Socket:
         except OSError as error:
             server.close()
             raise InputError(
-                f"port {self._port} cannot be had: {error.strerror}", remedy="Use another one, or 0 for a free one."
+                f"port {self._port} cannot be opened: {error.strerror}", remedy="Use another one, or 0 for a free one."
             ) from error
         server.listen(1)
         server.setblocking(False)

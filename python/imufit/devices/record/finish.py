@@ -302,7 +302,7 @@ def check_target(log: Path, force: bool) -> None:
     if not log.parent.is_dir():
         raise InputError(f"the directory {log.parent} does not exist", file=log, remedy="Make it first.")
     if log.exists() and not force:
-        raise InputError("this log is there already", file=log, remedy="Take another name, or --force to overwrite it.")
+        raise InputError("this log exists already", file=log, remedy="Take another name, or --force to overwrite it.")
     older = read_sidecar(log)
     if older and log.suffix.lower() != ".parquet":
         from imufit.log.metadata import KNOWN  # noqa: PLC0415
@@ -333,7 +333,7 @@ def unreadable(path: Path, n: int) -> str:
     try:
         found = LogStream(path).n
     except InputError as error:
-        return f"the log is written, but reading it says: {error}"
+        return f"the log is written, but reading it fails: {error}"
     if found != n:
         raise InputError(f"{found} rows stand in the log, but {n} were recorded", file=path)
     return ""

@@ -188,17 +188,15 @@ class Reception:
             "rows of numbers came, but no header that names them: give one with --header t_ms,acc_x,...": lines[
                 "unexplained"
             ],
-            f"{frames['unexplained']} samples came, but no announcement that says what they hold": frames[
-                "unexplained"
-            ],
+            f"{frames['unexplained']} samples came, but no announcement of their columns": frames["unexplained"],
             "the device announced itself, but sent no sample": self._frames.announcement() is not None,
-            f"no row and no frame came, but the device says {said[:80]!r}": said.isascii()
+            f"no row and no frame came, but the device reports {said[:80]!r}": said.isascii()
             and said.isprintable()
             and said,
         }
         otherwise = (
             f"{self._bytes} bytes came, but no whole frame and no rows under a header: check --baud, "
-            "and that the device speaks the wire protocol"
+            "and that the device uses the wire protocol"
         )
         return next((reason for reason, holds in reasons.items() if holds), otherwise)
 

@@ -97,9 +97,9 @@ def _explain(begun: Beginning, wanted: Path, port: str | None) -> None:
     rows += reception.finish()
     if not rows and (waiting := reception.unexplained):
         raise InputError(
-            f"{waiting} samples are in it, but the recording was killed before the device said what they hold",
+            f"{waiting} samples are in it, but the recording was killed before the device announced their columns",
             file=beginning_path(wanted),
-            remedy=f"Plug the device in, and run imufit recover {wanted} --port PORT: it is asked.",
+            remedy=f"Plug the device in, and run imufit recover {wanted} --port PORT.",
         )
     told = {"counts": counts, "now": last.arrival, "lost_since": None, "texts": [(last.arrival, t) for t in texts]}
     kept = [part.where(part.opening <= last.opening) for part in rows]

@@ -118,9 +118,7 @@ def clock_of(blocks: Iterable[Arrived]) -> Clock:
     device, arrival, segment, start = (np.concatenate(values) for values in zip(*kept, strict=True))
     fit = fit_clock(device, arrival, segment, start)
     if fit.alien:
-        notes.append(
-            "the rows came at another pace than their time states: the device's seconds were taken as they are"
-        )
+        notes.append("the rows came at another rate than their time states: the device's seconds were used unchanged")
     return Clock(unit, fit, tuple(notes))
 
 

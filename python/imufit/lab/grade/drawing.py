@@ -109,7 +109,7 @@ def drawn(
     found = parameters_of(study, effect, size, rng, only)
     distances = Separation(study, setting.columns).distances(effect, found, beside, least=TOLD)
     if distances[""] < TOLD:
-        raise ImpossibleError(f"{effect} is too small to be seen in this log")
+        raise ImpossibleError(f"{effect} is too small to be visible in this log")
     return Drawn(effect, found, distances)
 
 

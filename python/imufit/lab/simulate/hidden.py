@@ -131,7 +131,7 @@ def hidden(
                 named = label if isinstance(label, str) else ""
                 truth = replace(simulation.truth, label=named)
                 return replace(simulation, truth=truth), truth
-    raise ValueError(f"no effect of size {label} is separated from all others in this log: ask for a larger size")
+    raise ValueError(f"no effect of size {label} is separated from all others in this log: choose a larger size")
 
 
 def _with_columns(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -240,7 +240,7 @@ def injection(effect: str) -> Injection:
     sensor = prefix.removesuffix(".column")
     if column and sensor in SENSORS and sensor != prefix:
         if (named := effect_of_column(sensor, column)) != effect:
-            raise ValueError(f"the effect of {column} on {sensor} has a name of its own: {named}")
+            raise ValueError(f"the effect of {column} on {sensor} has a separate name: {named}")
         typical = {"acc": 0.1, "gyr": 5e-3, "mag": 1.0}[sensor]
         apply = disturbance_of(sensor, lambda s, p: times(s.covariates[column], p))
         return Injection(effect, three(typical), (sensor,), "disturbance", apply, column=column)
