@@ -191,8 +191,8 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     remarks += _weak_axes(poses)
     if rms(lengths - gravity) > 1.5 * rms(np.linalg.norm(readings, axis=1) - gravity) + 0.01:
         remarks.append(
-            "The error of the lengths grew: a tilted table or a crooked side is mistaken for misalignment. Record one log with the "
-            "gyro, so that headings are known, or nine attitudes for --cost magnitude."
+            "The error of the lengths grew: a tilted table or a crooked side is mistaken for misalignment. "
+            "Record one log with the gyro, so that headings are known, or nine attitudes for --cost magnitude."
         )
     return _result("vector", readings, solution, gravity, lengths, residuals, remarks, extras, chosen)
 
@@ -239,7 +239,8 @@ def fit_magnitude(
     solution = solve(*chosen)
     if solution["freedom"] < 1:
         remarks.append(
-            "The poses are just enough: the standard errors contain the sensor's noise only, and no pose could be left out."
+            "The poses are just enough: the standard errors contain the sensor's noise only, and no pose could be "
+            "left out."
         )
     residuals = np.abs(solution["residuals"][:, 0])
     lengths = gravity + solution["residuals"][:, 0]

@@ -208,7 +208,8 @@ class Passes:
     def _motionless(self, names: Sequence[str]) -> InputError:
         """Make the error for a log whose readings have no noise at all."""
         return InputError(
-            f"no effect can be judged, because no reading of {' or '.join(names)} ever changes: without noise a deviation cannot be weighed",
+            f"no effect can be judged, because no reading of {' or '.join(names)} ever changes: without noise a "
+            "deviation cannot be weighed",
             file=self.log.path,
             remedy="Record the readings with all their digits, while the sensor turns.",
         )

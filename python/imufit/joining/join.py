@@ -156,7 +156,7 @@ def _join_positions(log: Log, reference: Log, lag: float | None, skew: float | N
     if turned_over is not None and likelier and not (turned_over.unrelated or turned_over.ambiguous):
         raise InputError(
             f"the z axis of the positions points {'up' if up[2] < 0.0 else 'down'}, and frame "
-            f"{reference.metadata.frame} says otherwise",
+            f"{reference.metadata.frame} has the opposite direction",
             file=reference.path or "reference",
             column="ref_pz",
             remedy=f"Name the frame: --frame {'ENU' if up[2] < 0.0 else 'NED'}.",
