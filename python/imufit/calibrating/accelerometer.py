@@ -178,7 +178,8 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
         extras["placement_deg"] = float(np.degrees(solution["excess"] / gravity))
         if solution["freedom"] < 1:
             remarks.append(
-                f"The poses are too few to show how well they were laid: {extras['placement_deg']:.1f} deg is assumed in the standard errors. Record all six sides."
+                f"The poses are too few to show how well they were laid: {extras['placement_deg']:.1f} deg is "
+                "assumed in the standard errors. Record all six sides."
             )
         elif extras["placement_deg"] > 0.3:
             remarks.append(
