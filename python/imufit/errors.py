@@ -1,4 +1,4 @@
-"""The one exception that unusable input raises: it says what is wrong, where, and what to do."""
+"""The one exception that unusable input raises: it states what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class InputError(ValueError):
         return " ".join(text.split())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle with all parts, so that the error survives the way back from a worker process."""
+        """Pickle with all parts, so that the error returns unchanged from a worker process."""
         where: dict[str, Any] = {
             "file": self.file,
             "row": self.row,

@@ -48,7 +48,7 @@ def printable(text: str, most: int = MESSAGE, keep: str = "") -> str:
 
 
 def _shortened(text: str, most: int) -> str:
-    """Cut out of the middle: a message says at its end what to do."""
+    """Cut out of the middle: a message has its remedy at its end."""
     if len(text) <= most:
         return text
     head = 2 * most // 3

@@ -180,7 +180,7 @@ def calibrate(
     Raises
     ------
     InputError
-        The logs leave a calibration open; the message says what is missing.
+        The logs leave a calibration open; the message states what is missing.
     """
     from imufit.calibrating import calibrate  # noqa: PLC0415  only needed here
 

@@ -62,7 +62,7 @@ def whole_file(path: str | Path) -> Iterator[IO[bytes]]:
             os.fsync(file.fileno())
         new.replace(target)
     except OSError as error:
-        # of the two names only the one that the user gave says anything
+        # of the two names only the one that the user gave is informative
         if error.filename not in (None, str(new), new):
             raise
         raise type(error)(error.errno, error.strerror or str(error), str(path)) from None

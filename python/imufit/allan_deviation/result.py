@@ -297,7 +297,7 @@ class Allan(Plotted, Result):
         return allan_figure(list(self.channels.values()), ax)
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return [self.sentence, *self.remarks]
 
 

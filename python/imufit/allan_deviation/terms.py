@@ -180,7 +180,7 @@ def _fit(tau: Array, variance: Array, rows: NDArray[np.intp], freedom: Callable[
     misfit = float(np.sum(freedoms * (over - 1.0 - np.log(over))))
     left = max(1, len(rows) - int(np.count_nonzero(squares)))
     probability = float(gammaincc(0.5 * left, 0.5 * misfit))
-    # Where the terms do not describe the curve its misfit says how sure they are.
+    # If the terms do not fit the curve, the misfit determines their uncertainty.
     inflation = np.sqrt(max(1.0, misfit / left))
     errors = level * inflation * _errors(whitening @ design, squares)
     squares = level * squares

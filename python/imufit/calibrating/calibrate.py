@@ -42,7 +42,7 @@ def calibrate(
     logs : Log or sequence of Log
         Of one sensor; several add up.
     cost : str, optional
-        ``vector``: the named side points up exactly (or the log's reference attitude says how), 12 unknowns.
+        ``vector``: the named side points up exactly (or in the direction of the log's reference attitude), 12 unknowns.
         ``magnitude``: only the length of gravity is known, 9 unknowns, at least nine different poses. Without it the
         vector cost where poses are labelled, have a reference or lie along the axes, else the magnitude cost.
     sensors : sequence of str
@@ -87,7 +87,7 @@ def calibrate(
 
 
 class _Session:
-    """One calibration in the making: what was found, and what is to be said of it."""
+    """One calibration in the making: what was found, and notes on it."""
 
     def __init__(
         self, logs: Sequence[Log], found: Sequence[Found], gravity: float, settings: Mapping[str, float]
@@ -106,7 +106,7 @@ class _Session:
         return [pose for pose in self.poses if pose.used]
 
     def calibrated(self, cost: str | None, wanted: Sequence[str]) -> Calibration:
-        """Calibrate sensor after sensor; only what was asked for alone may fail."""
+        """Calibrate sensor after sensor; only what was requested alone may fail."""
         sensors: dict[str, SensorCalibration] = {}
         failures: list[InputError] = []
         temperature: Temperature | None = None
@@ -247,7 +247,7 @@ class _Session:
         for index, (log, found) in enumerate(zip(self.logs, self.found, strict=True)):
             if log.gyr is None or log.acc is None:
                 continue
-            # A rest without a label says nothing of the accelerometer, but a turn may begin or end there.
+            # A rest without a label is not informative about the accelerometer, but a turn may begin or end there.
             every = find_poses(log, index, settings=self.settings, labelled_only=False) if found.labelled else found
             resting = [pose for pose in every.poses if pose.used]
             if resting:

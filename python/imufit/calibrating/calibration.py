@@ -1,4 +1,4 @@
-"""The result of a calibration: a sensor model, what each pose says of it, and a verdict in words."""
+"""The result of a calibration: a sensor model, the residual of each pose, and a verdict in words."""
 
 from __future__ import annotations
 
@@ -410,5 +410,5 @@ class Calibration(Result):
         ).result
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return [self.verdict]

@@ -79,7 +79,7 @@ def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
     Raises
     ------
     InputError
-        Says what is missing.
+        States what is missing.
     """
     count = distinct(np.array([pose.direction for pose in poses]))
     same = [f"{a.number} and {b.number} ({a.name})" for a, b in repeated(poses)]

@@ -46,7 +46,7 @@ class Advice:
 
 
 class PoseGuide:
-    """Says, sample after sample, which side comes next, whether the sensor is still enough, and when it is done.
+    """States, sample after sample, which side comes next, whether the sensor is still enough, and when it is done.
 
     Parameters
     ----------

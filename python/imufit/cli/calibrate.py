@@ -81,7 +81,7 @@ def calibrate(
     """Calibrate a sensor from one or several LOGs of it, or a running device with --live PORT.
 
     The accelerometer from poses at rest (labelled in the column `pose`, or found), the gyro from the rests and the
-    turns between them, the magnetometer from free rotation. On a running device the terminal says which side to lay
+    turns between them, the magnetometer from free rotation. On a running device the terminal states which side to lay
     up next; nothing has to be pressed, and what came is kept as a log.
     """
     out = Output(json_file)

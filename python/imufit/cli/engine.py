@@ -162,7 +162,7 @@ def load_effects(path: Path) -> None:
     Raises
     ------
     InputError
-        The file cannot be run; the message says why.
+        The file cannot be run; the message states why.
     """
     import imufit  # noqa: PLC0415
     from imufit.errors import InputError  # noqa: PLC0415
@@ -403,7 +403,7 @@ def emulator(
     Raises
     ------
     InputError
-        It cannot be emulated; the message says why.
+        It cannot be emulated; the message states why.
     """
     from imufit.devices.emulate import Clock, Emulator, parse_fault_rate  # noqa: PLC0415
     from imufit.errors import InputError  # noqa: PLC0415

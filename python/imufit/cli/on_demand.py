@@ -1,4 +1,4 @@
-"""The commands of the program: each is imported when it is first asked for, so that `imufit --help` is quick."""
+"""The commands of the program: each is imported when it is first used, so that `imufit --help` is quick."""
 
 from __future__ import annotations
 

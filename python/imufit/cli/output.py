@@ -45,7 +45,7 @@ def _harmless(text: str) -> str:
 
 
 class Output:
-    """Standard output for people, and the files that were asked for.
+    """Standard output for people, and the files that were requested.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class Output:
         self._console.print(rich_table)
 
     def _blocks(self, table: Table, limit: int | None) -> None:
-        """Print each row as a block: its first cell, then a line for each other cell that says something."""
+        """Print each row as a block: its first cell, then a line for each other non-empty cell."""
         from rich.table import Table as RichTable  # noqa: PLC0415
         from rich.text import Text  # noqa: PLC0415
 
@@ -152,7 +152,7 @@ class Output:
             self.table(table)
 
     def json(self, value: Mapping[str, Any] | list[Any]) -> None:
-        """Write the JSON, if it was asked for."""
+        """Write the JSON, if it was requested."""
         if self._json_file is None:
             return
         text = json.dumps(value, indent=2, allow_nan=False) + "\n"

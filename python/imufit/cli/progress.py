@@ -101,7 +101,7 @@ class ProgressBar:
             self._show()
 
     def _show(self) -> None:
-        """Renew what the bar says."""
+        """Renew the text of the bar."""
         if self._bar is None or self._task is None or self._closed:
             return
         known = self._counted and self._share > 0.0

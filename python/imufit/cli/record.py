@@ -49,7 +49,7 @@ def record(
 ) -> None:
     """Record the device on PORT until Ctrl-C: /dev/ttyUSB0, COM3, a pseudo-terminal or socket://HOST:PORT.
 
-    The device speaks the wire protocol, binary or text. While it runs, rows go to LOG.part; `imufit recover` makes a
+    The device uses the wire protocol, binary or text. While it runs, rows go to LOG.part; `imufit recover` makes a
     log of it after a crash. A line that is lost is opened again, and the gap is marked.
     """
     keep_inputs([], [output, json_file])

@@ -92,7 +92,7 @@ def attitude_comparison(
         if kept.sum() < MIN_ROWS:
             return None
     before, after = ({part: e[kept] for part, e in errors.items()} for errors in (before, after))
-    # A sensor whose readings stand in other rows than the reference says nothing of these.
+    # A sensor whose readings stand in other rows than the reference is not informative about these.
     quantities = {name: x[kept] for name, x in _quantities(log).items() if np.isfinite(x[kept]).any()}
     tilts = [v[kept] for v in _tilts(run, filter_name)]
     dependences = sorted(
@@ -277,7 +277,7 @@ def _bins(before: dict[str, Array], after: dict[str, Array], quantities: dict[st
 def _limit(
     name: str, before: dict[str, float], after: dict[str, float] | None, dependences: list[AttitudeDependence]
 ) -> tuple[str, str]:
-    """Return what limits the filter and the sentence that says so."""
+    """Return the limit of the filter and its sentence."""
     text = f"The attitude of {name} is off by {before['total']:.2f} deg"
     now = before
     if after is not None:

@@ -27,7 +27,7 @@ def notes(evidence: LogEvidence) -> tuple[str, ...]:
 
 
 def _of_rows(evidence: LogEvidence) -> list[str]:
-    """Return what is to be said of a log with a reference."""
+    """Return notes on a log with a reference."""
     log, facts = evidence.surveyed.log, evidence.facts
     out = [*evidence.passes.empty]
     stated = log.metadata.noise

@@ -16,7 +16,7 @@ from imufit.log import Log, read
 from imufit.rests.poses import SIDES
 
 PATIENCE: Final = 300.0
-"""Time without anything new after which a live calibration is given up, s."""
+"""Time without anything new after which a live calibration ends, s."""
 
 
 def calibrate_live(
@@ -37,7 +37,7 @@ def calibrate_live(
     """Guide a person through a calibration of a running device.
 
     The six sides are wanted, in any order, and free rotation if there is a magnetometer. Everything that comes is
-    recorded as `imufit.devices.record.record` does, and stays if this is stopped by Ctrl-C, given up or killed; the
+    recorded as `imufit.devices.record.record` does, and stays if this is stopped by Ctrl-C, ended or killed; the
     log is calibrated as `imufit.calibrating.calibrate` does.
 
     Parameters
@@ -71,7 +71,7 @@ def calibrate_live(
     Raises
     ------
     InputError
-        The port cannot be opened, the log is in the way, it was stopped or given up, or the log does not determine a
+        The port cannot be opened, the log is in the way, it was stopped or ended, or the log does not determine a
         calibration; the recorded rows are kept.
     """
     looked = _Looking(Wizard(sensors, rests, settings), LiveConverter(mapping), give_up, show)
@@ -96,7 +96,7 @@ def calibrate_live(
 
 
 class _Looking:
-    """Feeds the wizard with what is recorded, and says when it is over."""
+    """Feeds the wizard with the recorded rows, and reports the end."""
 
     def __init__(self, wizard: Wizard, converter: LiveConverter, give_up: float, show: Callable[[Stage], None]) -> None:
         self.wizard = wizard

@@ -1,6 +1,6 @@
 """Gain and offset of each sensor of a model: corrected = A raw + b, with A = C diag(K).
 
-The model says raw = (I + E) x + bias, hence A = (I + E)^-1 and b = -A bias.
+The model states raw = (I + E) x + bias, hence A = (I + E)^-1 and b = -A bias.
 C has ones on its diagonal, K is the diagonal of A.
 """
 
@@ -71,7 +71,7 @@ class Affine:
     Attributes
     ----------
     sensors : dict of str to SensorAffine
-        ``acc``, ``gyr``, ``mag``; identity where the model says nothing.
+        ``acc``, ``gyr``, ``mag``; identity without such effects in the model.
     on_temperature : tuple of str
         Lines on the drift with temperature, which is left out.
     left_out : tuple of str

@@ -422,7 +422,7 @@ def _view(sensor: str, rows: Samples) -> tuple[Array, Array] | None:
 def _match(sensor: str, rows: Samples, matrices: Array, field_estimated: bool) -> Match:
     """Return how well a sensor fits with that of some permutations of its axes which leaves least, and any factor."""
     if sensor == "mag" and field_estimated:
-        # Axes that are put right give another field.
+        # Axes that are corrected give another field.
         fits = [_fits(_view(sensor, rows.with_own_field(matrix)), OWN) for matrix in matrices]
         share, ratio = np.concatenate(fits, axis=1)
     else:

@@ -1,7 +1,7 @@
 """A reference that was computed from the readings it is to judge.
 
 A filter turns by each reading of the gyroscope, noise included, and adds a part of what accelerometer and magnetometer
-show as its error. An instrument of its own knows nothing of that noise: what it turns by differs from any mean of two
+show as its error. A separate instrument does not contain that noise: what it turns by differs from any mean of two
 readings by at least 0.7 times the part of them that their neighbours do not foretell. Less than that is only left where
 the reference was made of the readings.
 """

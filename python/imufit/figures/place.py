@@ -1,4 +1,4 @@
-"""Where a figure is drawn: on a figure of its own, or where its user says.
+"""Where a figure is drawn: on a figure of its own, or on given Axes.
 
 The rule of ``ax`` for every ``plot`` of this package:
 

@@ -108,7 +108,7 @@ class FittedStack(Plotted, Result):
         return self._analysis
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the evidence, which the logs give again when it is asked for."""
+        """Everything but the evidence, which the logs give again when it is requested."""
         kept = self._analysis if isinstance(self._analysis, KeptAnalysis) else KeptAnalysis.of(self._analysis)
         return {**self.__dict__, "_analysis": kept}
 
@@ -329,7 +329,7 @@ class FittedStack(Plotted, Result):
         return drawn_parameters(self.parameters, ax)
 
     def sentences(self) -> list[str]:
-        """Return what the fit says: its effects, and how far its residual is above the noise floor."""
+        """Return the fit as text: its effects, and how far its residual is above the noise floor."""
         stack = " + ".join(self.model.effects) or "the ideal sensor"
         return [f"{stack}: {self.ratio:.3f} times the noise floor (held out)"]
 

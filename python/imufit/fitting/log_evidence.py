@@ -124,7 +124,7 @@ class LogEvidence:
         return self if isinstance(self.passes, RestPasses) else self._whitened(step)
 
     def _whitened(self, step: Array) -> LogEvidence:
-        """Return evidence that stands in for its whitened form, whitened; `step` leaves only its noise."""
+        """Return evidence that replaces its whitened form, whitened; `step` leaves only its noise."""
         passes, facts = self.passes, self.facts
         filters = passes.autocovariance(self.raw, facts, step).filters()
         if not any(filters):
@@ -149,7 +149,7 @@ class LogEvidence:
     def ln_smoothing(self, counts: Sequence[int]) -> float:
         """Log of what the effects raise the density of so many samples by as they smooth the noise of the reference.
 
-        A sensor that is called sluggish or weak leaves less of that noise in the residual, whatever it is. The log
+        A sensor that is called low-passed or weak leaves less of that noise in the residual, whatever it is. The log
         density of a sample changes by half the part of its variance that is left out.
 
         Parameters

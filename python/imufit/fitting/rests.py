@@ -284,7 +284,7 @@ def _as_they_scatter(
 ) -> tuple[list[Pose], float]:
     """Return rests and the gyroscope's noise, rad/s, no quieter than successive stretches of one rest differ.
 
-    Noise that is coloured does not average out as fast as the readings' own scatter says.
+    Noise that is coloured does not average out as fast as the readings' own scatter implies.
     """
     if not poses:
         return [], gyr_noise

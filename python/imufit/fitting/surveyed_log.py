@@ -133,7 +133,7 @@ def survey(
     surveys = [each.survey() for each in passes]
     facts = [found for found, _ in surveys]
     ranges = _ranges(passes)
-    # A log that never comes to the end of the range says nothing of it: there the model's is the one to go by.
+    # A log that never comes to the end of the range is not informative about it: there the model's is the one to go by.
     facts = [each.with_ranges(**{**_ranges_of(model), **ranges}) for each in facts]
     faults = [data_faults(each, found, ranges) for each, found in zip(passes, facts, strict=True)]
     if keep_constants and model.constants:

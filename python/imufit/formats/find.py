@@ -85,7 +85,7 @@ def format_of(path: Path) -> Format | None:
         with path.open("rb") as file:
             head = file.read(_HEAD)
     except OSError:
-        return None  # whoever opens it next says why it cannot be read
+        return None  # the next reader reports why it cannot be read
     for form in FORMATS:
         if form.recognises(head, path):
             return form

@@ -28,7 +28,7 @@ _STEP: Final = 1 << 20
 
 
 def check_elements(path: Path, data: bytes) -> None:
-    """Check that the file is built as the format says, and does not unpack to more than readings can.
+    """Check that the file is built as the format states, and does not unpack to more than readings can.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ _DEFINITIONS: Final = frozenset(b"BFIMPQ")
 _STARTS: Final = frozenset(b"ALC")
 """Kinds of which the first ends the definitions."""
 _SYNC: Final = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
-"""Mark that the recorder writes twice a second for whoever has to begin in the middle."""
+"""Mark that the recorder writes twice a second for a reader that has to begin in the middle."""
 _SEARCHED: Final = 200_000
 """Bytes in which messages are looked for behind a damaged one: several sectors of a memory card."""
 _ROW: Final = 6

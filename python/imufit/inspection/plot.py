@@ -1,4 +1,4 @@
-"""Readings of a log over time, what its reference says they should be, and its rests, as a figure."""
+"""Readings of a log over time, the ideal readings of its reference, and its rests, as a figure."""
 
 from __future__ import annotations
 

@@ -190,6 +190,6 @@ def _angles(reference: Log, names: Sequence[str]) -> Iterator[tuple[str, tuple[s
 
 
 def _unit(reference: Log, names: Collection[str]) -> str:
-    """Return the mark of degrees where a name says so, or an angle exceeds a whole turn in rad."""
+    """Return the mark of degrees where a name states this, or an angle exceeds a whole turn in rad."""
     largest = max(float(np.nanmax(np.abs(reference.covariates[name]))) for name in names)
     return "[deg]" if largest > WHOLE_TURN or any("deg" in name.lower() for name in names) else ""

@@ -48,7 +48,7 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class Likeliest:
-    """The likeliest alignment and what speaks against it.
+    """The likeliest alignment and the evidence against it.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def likeliest(
 
 
 def of_these(found: Sequence[Placed], search: LagSearch) -> Likeliest:
-    """Return the likeliest of some alignments, one at least, and what speaks against it."""
+    """Return the likeliest of some alignments, one at least, and the evidence against it."""
     best, *others = sorted(found, key=lambda each: -each.traces.gain)
     second = min(others, key=lambda each: each.traces.left, default=None)
     next_gain = max((each.traces.gain for each in others), default=0.0)

@@ -47,7 +47,7 @@ def number_from_text(cell: Any, *, truth: bool = False) -> float:
 
 
 def is_truth(cell: Any) -> bool:
-    """Whether a cell says true or false."""
+    """Whether a cell states true or false."""
     return str(cell).strip().lower() in _BOOLEAN
 
 
@@ -96,7 +96,7 @@ def checked_attitude(q: NDArray[np.float64], start: int, place: Place) -> NDArra
     Returns
     -------
     (n, 4) array
-        Unit quaternions. Norms up to 1e-3 off one are set right; beyond, it is an error.
+        Unit quaternions. Norms up to 1e-3 off one are corrected; beyond, it is an error.
     """
     missing = np.isnan(q)
     half = np.flatnonzero(missing.any(axis=1) & ~missing.all(axis=1))

@@ -52,7 +52,7 @@ UNITS: Final = {
 """Unit of each column that has a fixed one."""
 
 LARGEST: Final[dict[str, float]] = {
-    # ns since 1970 are 2e18; check_units says so with the mapping, so they must come through
+    # ns since 1970 are 2e18; check_units states this with the mapping, so they must come through
     "t": 1e19,
     # m/s^2; the most robust shock sensors end at 2e5 g. Raw counts of 24 bits come through, for check_units to name.
     **dict.fromkeys(GROUPS["acc"], 1e7),

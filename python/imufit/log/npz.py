@@ -35,7 +35,7 @@ _BROKEN: Final = (
     EOFError,
     ValueError,
     OSError,
-    # what the header of an array says is read as Python: too deep, too large, no literal
+    # the header of an array is read as Python: too deep, too large, no literal
     SyntaxError,
     tokenize.TokenError,
     MemoryError,

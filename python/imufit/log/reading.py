@@ -20,7 +20,7 @@ _VALUE = re.compile(r"(?P<number>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 
 @dataclass(frozen=True)
 class Reading:
-    """How a file is to be read, where the file does not say so itself or says it wrongly.
+    """How a file is to be read, where the file does not state it or states it wrongly.
 
     Parameters
     ----------

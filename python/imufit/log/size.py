@@ -37,7 +37,7 @@ def rows_at_once(row_bytes: int) -> int:
 
 
 def size_in_words(size: float) -> str:
-    """Bytes as a person says them, such as ``3.1 GB``.
+    """Bytes in readable form, such as ``3.1 GB``.
 
     Parameters
     ----------

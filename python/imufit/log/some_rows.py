@@ -27,7 +27,7 @@ class SomeRows:
     spans : sequence of (int, int)
         Stretches of its rows, ascending.
     note : str
-        What is to be said of it; empty for nothing.
+        Notes on it; empty for nothing.
 
     Raises
     ------

@@ -60,7 +60,7 @@ class LogStream:
     ) -> None:
         file = Path(path)
         source = open_source(file)
-        # what says of itself that it is a log may have rows as far apart as it says
+        # a source that states that it is a log may have rows as far apart as stated
         is_log = bool(source.embedded) or sidecar_path(file).is_file()
         reading = Reading(mapping, frame, noise or {}, (drop,) if isinstance(drop, str) else tuple(drop))
         stated = {**source.embedded, **read_sidecar(file)}
@@ -82,7 +82,7 @@ class LogStream:
         mapping : mapping, optional
             Source text for target columns.
         clock : "open" or "a log's"
-            Whether the source says of itself that it is a log, so that its time is in seconds.
+            Whether the source states that it is a log, so that its time is in seconds.
         """
         log = cls.__new__(cls)
         log._begin(source, None, metadata, {}, clock, Reading(mapping), bare=False)
@@ -243,7 +243,7 @@ class LogStream:
         Raises
         ------
         InputError
-            It is too large for that; the message says how to take a part of it.
+            It is too large for that; the message states how to take a part of it.
         """
         made = self.size + self.n * more
         held, kept = HELD * gigabytes, KEPT * gigabytes

@@ -25,7 +25,7 @@ LEAST_STEP: Final = 1e-6
 """Mean time from row to row, s, below which no sensor samples: the fastest accelerometers give 1e5 samples a second."""
 SLOWEST_STEP: Final = 2.0
 """Median time from row to row, s, from which a clock that was not stated is taken for one of another unit: at 0.5 Hz a
-hand turns a sensor over between two samples. A log of rests may be as slow, and then says so."""
+hand turns a sensor over between two samples. A log of rests may be as slow, and then has metadata."""
 _ROWS_OF_A_CLOCK: Final = 20
 """Rows from which on the steps of a clock are judged."""
 HEAD: Final = 200_000

@@ -110,6 +110,6 @@ def damaged(path: Path, error: Exception) -> InputError:
     path : Path
         Archive.
     error : Exception
-        What its library says.
+        The error of its library.
     """
     return InputError(f"the file is cut off, damaged or encrypted ({error})", file=path, remedy="Copy it again.")

@@ -63,7 +63,7 @@ class ModelParameter(Parameter):
 
 
 class ModelParams(Params):
-    """Parameters of a model by ``EFFECT.PARAM``, as they are whenever they are asked for.
+    """Parameters of a model by ``EFFECT.PARAM``, as they are whenever they are requested.
 
     Parameters
     ----------

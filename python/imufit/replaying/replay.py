@@ -325,7 +325,7 @@ def replay(
     Raises
     ------
     ValueError
-        An unknown filter or setting, or a filter without its sensor; the message says which and what to do.
+        An unknown filter or setting, or a filter without its sensor; the message states which and what to do.
 
     Notes
     -----

@@ -25,7 +25,7 @@ class Stream:
     """Several filters at once on a live stream of rows.
 
     The same compiled step as in `imufit.replaying.replay`: with the same settings and initial attitude the results are
-    equal bit by bit, however the rows are cut. A stream knows nothing of the rows to come, so that the rules
+    equal bit by bit, however the rows are cut. A stream does not have the rows to come, so that the rules
     `max_gap`, `acc_range` and `gyr_range` are those of the settings and not taken from the whole log.
 
     Parameters

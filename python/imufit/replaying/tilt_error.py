@@ -103,7 +103,7 @@ class TiltReference:
     def angle(self) -> Array:
         """Return the angle to draw, (n,), rad: about the rig's axis from the first row, or of z from the vertical.
 
-        For a log with `ref_angle` that column is to be preferred, as it knows its zero.
+        For a log with `ref_angle` that column is to be preferred, as it has an absolute zero.
         """
         if self.kind == "inclination":
             return inclination_of_z(self.q, self.up)

@@ -108,5 +108,5 @@ class Addition(Plotted, Result):
         return (parameter_table(self.parameters, "Parameters of the new model"),)
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return [self.sentence, self.warning]

@@ -89,7 +89,7 @@ def quaternion(places: Sequence[int], signs: Sequence[float]) -> Words:
 
 
 def clock(factor: float) -> Words:
-    """Say that the time that passed is a multiple of what `t` says."""
+    """Say that the true time is a multiple of `t`."""
     size = f"{factor:g} times as long as" if factor > 1.0 else f"1/{1.0 / factor:g} as long as"
     return (
         f"The clock is at another rate: by the turns of the reference, the steps between rows are {size} in t.",

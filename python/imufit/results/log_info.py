@@ -510,7 +510,7 @@ class LogInfo(Result):
         return alike(self.effects)
 
     def remarks(self) -> list[str]:
-        """Return what reading noticed, and what is to be said of the figures."""
+        """Return what reading noticed, and notes on the figures."""
         said = dict.fromkeys(note.rstrip(".") for note in (*self.contents.notes, *self.notes))
         return [f"Note: {note}." for note in said]
 

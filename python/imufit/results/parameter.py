@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 UNTOLD = 10.0
-"""A parameter whose standard error is this many typical sizes is one that the log says nothing about."""
+"""A parameter whose standard error is this many typical sizes is one that the log is not informative about."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -25,7 +25,7 @@ class Plotted:
     def plot(self, ax: Place) -> Axes | list[Axes]: ...
 
     def plot(self, ax: Place | None = None) -> Figure | Axes | list[Axes]:
-        """Draw this, on a new figure or where `ax` says.
+        """Draw this, on a new figure or where `ax` states.
 
         Parameters
         ----------

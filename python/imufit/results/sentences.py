@@ -151,7 +151,7 @@ def _with_disagreements(text: str, found: Sequence[Disagreement], *, spoilt: boo
 
 
 def _differences(found: Sequence[Disagreement]) -> str:
-    """Say what each log says; of two that differ from each other it is said once."""
+    """State the values of each log; of two that differ from each other once."""
     first = found[0]
     if len(found) == 2 and found[1].value == first.others:
         return str(first).replace("the others", found[1].file)

@@ -242,7 +242,7 @@ class TiltComparison(Result):
         return f"{what}: {counts}"
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return list(self.notes)
 
 

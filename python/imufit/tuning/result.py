@@ -201,7 +201,7 @@ class Tuning(Plotted, Result):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Notes, and what the gains' tolerance says."""
+        """Notes, and a note on the gains' tolerance."""
         remarks = list(self.notes)
         for gain in self.gains:
             if gain.edge is not None:
@@ -310,7 +310,7 @@ class Tuning(Plotted, Result):
         return gain_figure(self.map, self.gains, self.rival, f"{self.metric} {self.criterion}, deg", ax)
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return [self.sentence, *self.remarks]
 
 

@@ -208,7 +208,7 @@ def decode(
     Raises
     ------
     InputError
-        No bytes, a range that does not exist, or a burst that ends within a frame; the message says where.
+        No bytes, a range that does not exist, or a burst that ends within a frame; the message states where.
     """
     for name, value in (("afs_sel", afs_sel), ("fs_sel", fs_sel)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value <= 3:

@@ -31,7 +31,7 @@ PROBE = 5.0
 
 
 class Emulator:
-    """A device without hardware: it speaks the wire protocol, or text, on a pty or a socket.
+    """A device without hardware: it uses the wire protocol, or text, on a pty or a socket.
 
     As a context it runs in a thread from entering to leaving; `run` runs it here.
 
@@ -222,7 +222,7 @@ class Emulator:
 
     @property
     def sent(self) -> pa.Table:
-        """Samples so far with what became of each, as `Sent` says; of a run that keeps them in memory."""
+        """Samples so far with the fate of each, as in `Sent`; of a run that keeps them in memory."""
         return self._sent.table()
 
     def summary(self) -> dict[str, Any]:

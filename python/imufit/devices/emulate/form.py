@@ -44,10 +44,10 @@ class Form(Protocol):
     sequence: int
 
     def announce(self) -> bytes:
-        """Return what says what rows hold."""
+        """Return the announcement of the rows' columns."""
 
     def asks(self, said: bytes) -> bool:
-        """Return whether a reader asks for the announcement.
+        """Return whether a reader requests the announcement.
 
         Parameters
         ----------

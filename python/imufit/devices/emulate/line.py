@@ -56,7 +56,7 @@ class Line(Protocol):
         """
 
     def heard(self) -> bytes:
-        """Return what the reader has said since this was last asked."""
+        """Return the bytes of the reader since the last call."""
 
     def drain(self, patience: float) -> None:
         """Wait until the reader has read what was written, for at most `patience` (s)."""
@@ -132,7 +132,7 @@ class Pty:
         return self.write(data, 0.0)
 
     def heard(self) -> bytes:
-        """Return what the reader has said since this was last asked."""
+        """Return the bytes of the reader since the last call."""
         try:
             return os.read(self._master, HEARD)
         except OSError:  # nothing, or not read
@@ -223,12 +223,12 @@ class Socket:
         return self._reader is not None and time.monotonic() - self._since >= SETTLING
 
     def heard(self) -> bytes:
-        """Return what the reader has said since this was last asked."""
+        """Return the bytes of the reader since the last call."""
         said, self._heard = self._heard, b""
         return said
 
     def _left(self, reader: socket.socket) -> bool:
-        """Return whether the reader has closed its end; the last of what it says is kept until it is asked for."""
+        """Return whether the reader has closed its end; its last bytes are kept until requested."""
         try:
             while data := reader.recv(HEARD):
                 self._heard = (self._heard + data)[-HEARD:]

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 ROWS = 1024
 """Samples written at a time at most."""
 PATIENCE = 1.0
-"""Time (s) for which a reader may be busy before samples are given up, as they are by the buffers of a real port."""
+"""Time (s) for which a reader may be busy before samples are discarded, as they are by the buffers of a real port."""
 LEAVE = 0.05
 """Longest wait (s) without looking whether the reader has gone."""
 DRAINED = 2.0
@@ -41,7 +41,7 @@ class Parts:
     Attributes
     ----------
     device, form, clock, line, pace, course, schedule, sent :
-        Each as its class says.
+        See their classes.
     rng : numpy.random.Generator
         Of jitter and damage.
     """
@@ -185,7 +185,7 @@ class Transmission:
                 self._reset(float(t[0]), fault.length)
 
     def _announce(self) -> None:
-        """Say what the samples hold, to whoever listens."""
+        """Announce the columns of the samples."""
         data = self._form.announce()
         self.counts["announcements"] += 1
         greeted = self._greeted or not self._form.greets

@@ -27,7 +27,7 @@ class Columns:
     Parameters
     ----------
     announced : Announced
-        What the device says.
+        The device's announcement.
     mapping : mapping, optional
         Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
 

@@ -132,7 +132,7 @@ class PartFile:
         Parameters
         ----------
         announced : Announced
-            What the device says.
+            The device's announcement.
         about : mapping
             What else has to be known to make a log of them: plain values.
         """
@@ -237,7 +237,7 @@ class Part:
     path : Path
         The file.
     announced : Announced
-        What the device says.
+        The device's announcement.
     about : dict
         What else was written at its beginning.
     n : int

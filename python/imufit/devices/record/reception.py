@@ -18,9 +18,9 @@ PAUSE: Final = (0.006, 0.012)
 """Shortest and longest wait between two reads, s: irregular, so that no rate of a device falls in step with it."""
 
 ASK_EVERY: Final = 0.1
-"""Time between two requests to a device that has not said yet what its samples hold, s."""
+"""Time between two requests to a device that has not announced its columns yet, s."""
 ASK_FOR: Final = 1.0
-"""Time for which it is asked after the line was opened, s: then it announces itself by itself, or speaks no frames."""
+"""Time for requests after the line was opened, s: then the device announces itself anyway, or sends no frames."""
 _DOUBTFUL: Final = 50
 
 
@@ -154,13 +154,13 @@ class Reception:
         place = (batch["feed"] - np.uint64(self._first_feed)).astype(np.intp)
         arrival, opening = np.array(self._feeds[: int(place[-1]) + 1]).T
         rows = of_frames(batch, arrival[place], opening[place].astype(np.uint32))
-        # Rows come in order: nothing before the last one is asked for again.
+        # Rows come in order: nothing before the last one is requested again.
         del self._feeds[: int(place[-1])]
         self._first_feed += int(place[-1])
         return rows
 
     def take_texts(self) -> list[str]:
-        """Messages of the device since this was last asked."""
+        """Messages of the device since the last call."""
         texts, self._texts = self._texts, []
         return texts
 
@@ -174,7 +174,7 @@ class Reception:
 
     @property
     def unexplained(self) -> int:
-        """Samples that were given up since nothing said what they hold, also where no form is known."""
+        """Samples that were discarded since their columns were unknown, also where no form is known."""
         return int(self._frames.counts()["unexplained"])
 
     @property

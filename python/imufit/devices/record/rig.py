@@ -35,7 +35,7 @@ class Rig:
     angle : float
         Commanded angle when the recording begins, rad.
     typed : callable
-        Gives the angles that were commanded since it was last asked, rad; `MOVING` while the rig moves. It must not
+        Gives the angles that were commanded since the last call, rad; `MOVING` while the rig moves. It must not
         wait. It receives whether rows have come: before that an angle has no place in the recording, and is not used.
     """
 
@@ -82,7 +82,7 @@ class TypedAngles:
         self._held = b""
 
     def __call__(self, rows_came: bool = True) -> list[float]:
-        """Angles since this was last asked, rad; `MOVING` while the rig moves. None before rows have come."""
+        """Angles since the last call, rad; `MOVING` while the rig moves. None before rows have come."""
         angles: list[float] = []
         for line in self._lines():
             if not rows_came:

@@ -130,7 +130,7 @@ class StatusLine:
                 self._attitude = None
             try:
                 batch = self._converter.batch(part)
-            except InputError:  # the recording itself says so
+            except InputError:  # the recording itself states this
                 return
             if self._attitude is None:
                 sensors = self._converter.names

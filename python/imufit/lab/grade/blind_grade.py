@@ -58,7 +58,7 @@ class BlindGrade(Part):
         return tuple(trial for trial in self.trials if trial.marks.faults)
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row per set: how many logs, and for each mark asked for the count, of how many, share and interval."""
+        """One row per set: how many logs, and for each mark requested the count, of how many, share and interval."""
         return [
             {"set": name, "logs": len(trials), **counts(trials), **figures(trials)}
             for name in SETS
@@ -104,7 +104,7 @@ class BlindGrade(Part):
 
 
 def counts(trials: Sequence[Trial]) -> dict[str, dict[str, float]]:
-    """Return count, number, share and 95 % interval of each mark that was asked for.
+    """Return count, number, share and 95 % interval of each mark that was requested.
 
     Parameters
     ----------

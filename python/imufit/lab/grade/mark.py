@@ -83,7 +83,7 @@ class Marks(Part):
         return tuple(words.get(name, name) for name in found)
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON: those that were asked for."""
+        """JSON: those that were requested."""
         return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) is not None}
 
 

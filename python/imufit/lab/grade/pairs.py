@@ -135,7 +135,7 @@ PAIRS: Mapping[str, Pair] = {
         (_LIVELY, _with(sensors=("gyr", "temp"))),
         (_LIVELY, _plain),
     ),
-    "slow motion: late against sluggish": Pair(
+    "slow motion: delay against low-pass": Pair(
         ("acc.delay", _ALL),
         ("acc.lowpass", _ALL),
         (("turntable",), _plain),

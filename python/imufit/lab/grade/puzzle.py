@@ -19,7 +19,7 @@ class Puzzle:
     Attributes
     ----------
     question : str
-        What is asked of the answer.
+        The question.
     kind : str
         What makes this log differ from others of its set: the effect, the pair, the kind of noise.
     simulation : Simulation

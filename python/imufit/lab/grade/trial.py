@@ -35,7 +35,7 @@ class Trial(Part):
     rivals : tuple of str
         Effects that this log does not separate from it.
     answer : Answer
-        What the ladder said.
+        The ladder's answer.
     marks : Marks
         What is right and wrong in that.
     ratio_start, ratio_end : float
@@ -151,7 +151,7 @@ def judged(puzzle: Puzzle, result: Ladder, blind_set: str = "", seed: int = 0) -
 
 
 def answer_of(result: Ladder) -> Answer:
-    """Return what the ladder said, without the figures."""
+    """Return the ladder's answer, without the figures."""
     first = result.first or result.diagnosis
     return Answer(
         verdict=first.verdict,
@@ -175,7 +175,7 @@ def true_ratio(puzzle: Puzzle, result: Ladder) -> float:
     Parameters
     ----------
     puzzle : Puzzle
-        Knows the noise.
+        Holds the noise.
     result : Ladder
         The ladder on its log.
     """

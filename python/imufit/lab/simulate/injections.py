@@ -1,7 +1,7 @@
 """Every effect, done physically: what it does to the setup of sensors, body, rig and reference.
 
-An entry of `INJECTIONS` says which parameters an effect has, how large they typically are, which sensors see it, and at
-which stage of the measurement it acts. A further effect is one more entry.
+An entry of `INJECTIONS` states which parameters an effect has, how large they typically are, which sensors see it, and
+at which stage of the measurement it acts. A further effect is one more entry.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ class Truth:
     scenario, seed : the motion and its random seed.
     effects : each injected effect with its parameters, SI units; empty = the sensors are perfect but for noise.
     sizes : for each effect, its root mean square over the white noise of the sensor that it affects most.
-    label : the name of the size that was asked for, such as "large"; empty where the parameters were given.
+    label : the name of the size that was requested, such as "large"; empty where the parameters were given.
     faults : faults of the data that were put in.
     """
 
