@@ -21,7 +21,7 @@ PAGES = [
     ROOT / "firmware" / "README.md",
     *sorted((ROOT / "docs").glob("*.md")),
 ]
-MODULES = sorted((ROOT / "python" / "imufit").rglob("*.py"))
+MODULES = [*sorted((ROOT / "python" / "imufit").rglob("*.py")), *sorted((ROOT / "examples").rglob("*.py"))]
 CARDS = sorted((ROOT / "rust" / "model" / "src").rglob("*.rs"))
 
 WRONG = re.compile(
