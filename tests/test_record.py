@@ -336,7 +336,7 @@ def test_text_without_a_header_takes_the_one_that_is_given(pty, tmp_path):
         (b"", "nothing came from the device"),
         (b"\x99" * 3000, "3000 bytes came, but no whole frame and no rows under a header: check --baud"),
         (text_rows(range(9)), "no header that names them: give one with --header"),
-        (b"no sensor on the bus\n" * 3, "the device says 'no sensor on the bus'"),
+        (b"no sensor on the bus\n" * 3, "the device reports 'no sensor on the bus'"),
         (Sender().samples(range(7)), "7 samples came, but no announcement"),
         (Sender().announce(), "announced itself, but sent no sample"),
     ],
