@@ -287,7 +287,7 @@ def test_the_command_corrects_a_log_and_says_what_it_left_alone(tmp_path, capsys
     arguments = ["apply", str(tmp_path / "m.toml"), str(tmp_path / "in.parquet"), "-o", str(tmp_path / "out.parquet")]
     assert main(arguments) == 0
     said = capsys.readouterr().out
-    assert "ref.delay left alone" in said
+    assert "ref.delay left unchanged" in said
     assert "wrote" in said
     assert max(off(read(tmp_path / "out.parquet"), truth).values()) < 1e-9
     assert main([*arguments, "--json", "-"]) == 0

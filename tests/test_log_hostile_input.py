@@ -164,7 +164,7 @@ def test_schema_that_is_no_utf8_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.parquet"
     pq.write_table(pa.table(COLUMNS), path)
     path.write_bytes(path.read_bytes().replace(b"gyr_y", b"gy\xff\xfey"))
-    assert "no UTF-8" in message(path)
+    assert "not UTF-8" in message(path)
 
 
 def test_clock_of_a_transcript_counts_on_past_midnight(tmp_path: Path) -> None:

@@ -22,7 +22,6 @@ PAGES = [
     *sorted((ROOT / "docs").glob("*.md")),
 ]
 MODULES = [*sorted((ROOT / "python" / "imufit").rglob("*.py")), *sorted((ROOT / "examples").rglob("*.py"))]
-CARDS = sorted((ROOT / "rust" / "model" / "src").rglob("*.rs"))
 
 WRONG = re.compile(
     r"\b(?:is|are|was|were) no (?!longer\b|more\b|less\b|larger\b|smaller\b|later\b|earlier\b|wider\b)"
