@@ -370,7 +370,7 @@ def test_a_port_that_cannot_be_opened_is_said(tmp_path, port, said):
 def test_nothing_is_overwritten(pty, tmp_path):
     log, part = tmp_path / "a.parquet", tmp_path / "a.parquet.part"
     log.write_text("precious")
-    with pytest.raises(InputError, match="there already"):
+    with pytest.raises(InputError, match="exists already"):
         record(pty.port, log, duration=0.1)
     log.unlink()
     part.write_text("precious")
