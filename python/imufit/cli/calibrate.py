@@ -51,10 +51,10 @@ if TYPE_CHECKING:
     "--keep",
     type=OutputFile(LOG_ENDINGS),
     metavar="LOG",
-    help="Where to keep what PORT sent (default: beside the model, .parquet).",
+    help="Log that keeps the rows of PORT (default: beside the model, .parquet).",
 )
 @click.option(
-    "--rests", type=Whole(min=6), metavar="N", help="Good rests wanted of PORT, the six sides among them (6)."
+    "--rests", type=Whole(min=6), metavar="N", help="Good rests required of PORT, the six sides among them (6)."
 )
 @click.option(
     "--give-up",
@@ -82,7 +82,7 @@ def calibrate(
 
     The accelerometer from poses at rest (labelled in the column `pose`, or found), the gyro from the rests and the
     turns between them, the magnetometer from free rotation. On a running device the terminal states which side to lay
-    up next; nothing has to be pressed, and what came is kept as a log.
+    up next; a key press is not needed, and the rows are kept as a log.
     """
     out = Output(json_file)
     settings = {} if hold is None else {"hold": hold}

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     help="Repeatable; without it triad, mahony, hybrid with a magnetometer, else accel, gyro, complementary, kalman.",
 )
 @click.option(
-    "--model", "model_file", type=EXISTING, metavar="MODEL", help="Take its effects out of the readings first."
+    "--model", "model_file", type=EXISTING, metavar="MODEL", help="Remove its effects from the readings first."
 )
 @effects_from_option
 @frame_option

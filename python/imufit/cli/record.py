@@ -27,7 +27,7 @@ from imufit.cli.reading import map_option
     "Enter; type only Enter while the rig moves.",
 )
 @click.option("--axis", type=OneOf("axis", ("x", "y", "z")), help="Body axis about which the rig turns.")
-@click.option("--force", is_flag=True, help="Overwrite LOG if it is there already.")
+@click.option("--force", is_flag=True, help="Overwrite LOG if it exists already.")
 @click.option("--quiet", is_flag=True, help="No status line and no messages of the device.")
 @json_option
 def record(
