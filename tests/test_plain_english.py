@@ -21,7 +21,8 @@ PAGES = [
     ROOT / "firmware" / "README.md",
     *sorted((ROOT / "docs").glob("*.md")),
 ]
-MODULES = [*sorted((ROOT / "python" / "imufit").rglob("*.py")), *sorted((ROOT / "examples").rglob("*.py"))]
+FOLDERS = (ROOT / "python" / "imufit", ROOT / "examples", ROOT / "benches", ROOT / "docs")
+MODULES = [file for folder in FOLDERS for file in sorted(folder.rglob("*.py"))]
 
 WRONG = re.compile(
     r"\b(?:is|are|was|were) no (?!longer\b|more\b|less\b|larger\b|smaller\b|later\b|earlier\b|wider\b)"
