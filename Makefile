@@ -11,7 +11,7 @@ CARGO_FLAGS := --workspace --release
 SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-rust test-python fuzz audit lint docs wheel bench clean
+.PHONY: help build quick demo test test-rust test-python fuzz audit lint docs wheel bench clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -25,6 +25,9 @@ $(USED): $(DEPENDENCIES) $(SOURCES)
 	@echo 'make: builds the Rust core and installs imufit without development tools into $(VENV) (some minutes)'
 	. $(BIN)/activate && PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --quiet
 	touch $@
+
+quick: $(DEPENDENCIES) ## After an edit of Rust: build only what changed, with little optimisation, for tests
+	. $(BIN)/activate && PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --profile dev --quiet
 
 demo: $(USED) ## The whole loop on a log with a hidden effect; report in demo/
 	$(BIN)/imufit demo -o demo

@@ -83,7 +83,7 @@ def test_a_column_that_cannot_be_read_is_left_out(folder: Path, command: str, ca
         (("--drop", "tmep"), "Did you mean temp?"),
         (("--drop", "mag", "--noise", "gir=1"), "Did you mean gyr?"),
         (("--drop", "mag", "--noise", "gyr=1[uT]"), "the noise of gyr: [uT] is a unit of magnetic flux density"),
-        (("--drop", "mag", "--frame", "XYZ"), "'XYZ' is not one of"),
+        (("--drop", "mag", "--frame", "XYZ"), "unknown frame 'XYZ'"),
     ],
 )
 def test_an_option_that_cannot_be_is_refused(

@@ -459,13 +459,6 @@ CLOCK = (
         mapping=False,
     ),
     _clock(
-        "t_dates",
-        "t as date and time of day",
-        s.text(s.dates),
-        ("date*", "time of day", "not a number", "clock"),
-        mapping=False,
-    ),
-    _clock(
         "t_back", "the clock set back by 0.5 s once", s.clock_steps_back, ("before", "back*", "increas*"), mapping=False
     ),
     _clock(
@@ -716,6 +709,7 @@ HARMLESS = (
     _harmless("sign_flips", "signs of whole quaternions flip", s.sign_flips),
     _harmless("rows_dropped", "one row in twenty lost, t right", s.rows_dropped),
     _harmless("t_epoch", "t in s since 1970", s.clock(lambda t: t + s.EPOCH)),
+    _harmless("t_dates", "t as date and time of day", s.text(s.dates)),
     _harmless("t_late_start", "t begins at 1000 s", s.clock(lambda t: t + 1000.0)),
     _harmless(
         "columns_reversed",

@@ -150,9 +150,7 @@ def refine(
         if sums is None:
             return None
         # Blocks scatter by more than their samples do (White 1980): what the samples seem to say counts for less.
-        meat = sums.scores.T @ sums.scores / sums.variance
-        inflation = max(1.0, float(np.mean(np.diag(meat)[:2] / np.diag(sums.information)[:2])))
-        variance = inflation * sums.variance
+        variance = sums.variance * sums.scatter(free)
         # A Cauchy prior as the normal one of the same pull: a clock of a crystal is held, one that is far off is not.
         held = 2.0 / (USUAL_SKEW**2 + rate**2)
         prior = np.concatenate(([0.0, held], np.full(9, LARGEST_ERROR**-2)))
@@ -269,27 +267,46 @@ def _errors(sensor: Course, reference: Course, blocks: _Blocks, guess: _Guess) -
 
 @dataclass(frozen=True)
 class _Sums:
-    """Normal equations of all blocks: information, scores by block, and the variance of what is left, rad^2."""
+    """Normal equations by block: information (b, 11, 11), scores (b, 11), and the variance of what is left, rad^2."""
 
-    information: Array
+    blocks: Array
     scores: Array
     variance: float
 
+    @property
+    def information(self) -> Array:
+        """Sum over the blocks, (11, 11)."""
+        return np.asarray(self.blocks.sum(axis=0))
+
+    def scatter(self, free: NDArray[np.bool_]) -> float:
+        """Return the variance of lag and skew between blocks over that within them, 1 at least.
+
+        It is that at the solution without a prior of the clocks: at the guess, a clock that is fast would scatter too.
+        """
+        information = self.information
+        held = self.variance * np.concatenate(([0.0, 0.0], np.full(9, LARGEST_ERROR**-2)))
+        normal = (information + np.diag(held))[np.ix_(free, free)]
+        step = np.zeros(11)
+        # Where nothing moves, the least of all steps does.
+        step[free] = -np.linalg.lstsq(normal, self.scores.sum(axis=0)[free])[0]
+        left = self.scores + self.blocks @ step
+        sizes = np.sum(left[:, :2] ** 2, axis=0) / (self.variance * np.maximum(np.diag(information)[:2], 1e-300))
+        return max(1.0, float(np.mean(sizes)))
+
 
 def _sums(sensor: Course, reference: Course, blocks: _Blocks, guess: _Guess) -> _Sums | None:
-    information, scores, variances = np.zeros((11, 11)), [], []
+    products, freedom = [], []
     for _, some in blocks.pieces():
         found = _errors(sensor, reference, some, guess)
         left = found.left(np.concatenate((found.error[..., None], found.columns), axis=3))
-        products = left.transpose(0, 2, 1) @ left
-        information += products[:, 1:, 1:].sum(axis=0)
-        scores.append(products[:, 1:, 0])
-        variances.append(products[:, 0, 0] / (3 * found.samples - 6))
-    if not any(map(len, scores)):
+        products.append(left.transpose(0, 2, 1) @ left)
+        freedom.append(3 * found.samples - 6)
+    if not any(map(len, products)):
         return None
+    sums = np.concatenate(products)
     # The median of the blocks: a few bad ones do not widen the errors of all.
-    variance = max(float(np.median(np.concatenate(variances))), 1e-20)
-    return _Sums(information, np.concatenate(scores), variance)
+    variance = max(float(np.median(sums[:, 0, 0] / np.concatenate(freedom))), 1e-20)
+    return _Sums(sums[:, 1:, 1:], sums[:, 1:, 0], variance)
 
 
 def _wild(sensor: Course, reference: Course, blocks: _Blocks, guess: _Guess) -> NDArray[np.bool_]:

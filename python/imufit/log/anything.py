@@ -19,6 +19,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+class LogHolder(Protocol):
+    """What gives a log when asked: a simulation."""
+
+    def to_log(self) -> Log:
+        """Give the log."""
+        ...
+
+
 class ArrowTable(Protocol):
     """A table that offers Arrow's stream: polars, pyarrow, duckdb, a log itself."""
 
@@ -27,7 +35,7 @@ class ArrowTable(Protocol):
         ...
 
 
-AnyLog: TypeAlias = "LogSource | str | PathLike[str] | pd.DataFrame | ArrowTable | Mapping[str, Any]"
+AnyLog: TypeAlias = "LogSource | LogHolder | str | PathLike[str] | pd.DataFrame | ArrowTable | Mapping[str, Any]"
 AnyLogs: TypeAlias = "AnyLog | Sequence[AnyLog]"
 
 
@@ -36,10 +44,10 @@ def log_of(given: AnyLog) -> LogSource:
 
     Parameters
     ----------
-    given : Log, LogStream, str, Path, DataFrame or mapping
-        A log is returned as it is. A file is opened and stays on the disk. The columns of a table are recognised as
-        those of a file are. A mapping holds arrays: either columns of a table (``acc_x``) or the arrays of
-        :class:`imufit.Log` (``acc`` of shape (n, 3)).
+    given : Log, LogStream, Simulation, str, Path, DataFrame or mapping
+        A log is returned as it is, that of a simulation is made. A file is opened and stays on the disk. The columns
+        of a table are recognised as those of a file are. A mapping holds arrays: either columns of a table
+        (``acc_x``) or the arrays of :class:`imufit.Log` (``acc`` of shape (n, 3)).
 
     Raises
     ------
@@ -52,6 +60,8 @@ def log_of(given: AnyLog) -> LogSource:
         return _log_of_arrays(given)
     if isinstance(given, LogSource):
         return given
+    if hasattr(given, "to_log"):
+        return given.to_log()
     import pandas as pd  # noqa: PLC0415  heavy, and only needed here
 
     if isinstance(given, pd.DataFrame):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from imufit.errors import InputError
 from imufit.results.parameter import Parameter, by_effect, drawn_parameters, parameter_frame, parameter_table
 from imufit.results.plotted import Plotted
+from imufit.results.result import LONGEST, shortened
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,4 +81,4 @@ class Params(Plotted, Mapping[str, Parameter]):
         return str(parameter_table(self.values()))
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}([{', '.join(map(repr, self))}])"
+        return shortened(f"{type(self).__name__}([{', '.join(map(repr, self))}])", LONGEST)
