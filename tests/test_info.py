@@ -270,7 +270,9 @@ def test_the_command_prints_within_eighty_columns(
     # no cell of a table is cut
     assert "…" not in printed
     assert (
-        printed.index("It can show") < printed.index("Samples in time") < printed.index("Effects that it cannot show")
+        printed.index("The log can show")
+        < printed.index("Samples in time")
+        < printed.index("Effects that it cannot show")
     )
     assert printed.index("Effects that it cannot show") < printed.index("Columns")
     assert "Effects that this log can show" not in printed

@@ -175,10 +175,9 @@ class Where(Part):
         return json_fields(self)
 
     def __str__(self) -> str:
-        return (
-            f"{self.channel} depends on {self.covariate}: {quantity.share(self.share)} of its excess, "
-            f"most of it at {quantity.span(self.t_start, self.t_end)}"
-        )
+        dependence = "is constant" if self.covariate == "constant" else f"depends on {self.covariate}"
+        span = quantity.span(self.t_start, self.t_end)
+        return f"{quantity.share(self.share)} of the excess of {self.channel} {dependence}, most of it at {span}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -219,4 +219,4 @@ def alike(effects: Sequence[EffectSight]) -> list[str]:
         tuple(sorted((item.effect, *item.like))) for item in effects if item.like and item.shown != "no"
     )
     largest = [group for group in groups if not any(set(group) < set(other) for other in groups)]
-    return [f"It does not separate {', '.join(group[:-1])} and {group[-1]}." for group in largest]
+    return [f"The log does not separate {', '.join(group[:-1])} and {group[-1]}." for group in largest]

@@ -171,7 +171,9 @@ class MotionInfo(Part):
         if axes:
             parts.append(f"Rates in deg/s: {', '.join(axes)}.")
         if self.force_rms is not None:
-            parts.append(f"The specific force is off gravity's length by {self.force_rms:.3g} m/s² (RMS).")
+            parts.append(
+                f"The magnitude of the specific force differs from gravity by {self.force_rms:.3g} m/s² (RMS)."
+            )
         return " ".join(parts)
 
     def to_dict(self) -> dict[str, Any]:
@@ -215,12 +217,12 @@ class RestInfo(Part):
         if self.reason:
             return f"Rests: {self.reason}."
         if not self.count:
-            return "It never rests."
+            return "The log never rests."
         poses = "pose" if self.directions == 1 else "different poses"
         if self.count == 1:
-            return f"It rests once, for {self.longest:.3g} s."
+            return f"The log rests once, for {self.longest:.3g} s."
         return (
-            f"It rests {self.count} times in {self.directions} {poses}, {self.total:.3g} s in all, "
+            f"The log rests {self.count} times in {self.directions} {poses}, {self.total:.3g} s in all, "
             f"at the longest {self.longest:.3g} s."
         )
 
@@ -436,15 +438,15 @@ class LogInfo(Result):
         if not self.effects:
             return ""
         if self.refusal:
-            return f"It can show no effect: {self.refusal}. {self.remedy}".rstrip()
+            return f"The log cannot show an effect: {self.refusal}. {self.remedy}".rstrip()
         named = [item for item in self.effects if not item.open]
         shown = sum(item.shown != "no" for item in named)
-        by = "Without a reference attitude it" if self.judged_by == "rests" else "It"
-        return f"{by} can show {shown} of {len(named)} effects in the sizes that sensors usually have."
+        by = "Without a reference attitude the log" if self.judged_by == "rests" else "The log"
+        return f"{by} can show {shown} of {len(named)} effects at their typical sizes."
 
     def sentences(self) -> list[str]:
         """Return rows, what it can show, reference, motion, rests, and what is not there."""
-        missing = f"Not in it: {self.contents.missing_words}." if self.contents.missing else ""
+        missing = f"Missing: {self.contents.missing_words}." if self.contents.missing else ""
         said = (self.sentence, self.verdict, self.reference.sentence, self.motion.sentence, self.rests.sentence)
         return [text for text in (*said, missing) if text]
 

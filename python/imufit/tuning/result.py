@@ -237,8 +237,10 @@ class Tuning(Plotted, Result):
             ]
             limits.append(f"{gain.name} " + " or ".join(side for side in sides if side))
         if not limits:
-            return f"It beats {name} ({quantity.number(error)} deg) whichever gain is wrong by up to 10 000 times."
-        return f"It loses to {name} ({quantity.number(error)} deg) only with {'; '.join(limits)}."
+            return (
+                f"The filter beats {name} ({quantity.number(error)} deg) whichever gain is wrong by up to 10 000 times."
+            )
+        return f"The filter loses to {name} ({quantity.number(error)} deg) only with {'; '.join(limits)}."
 
     def tables(self) -> list[Table]:
         """Gains, values, and the map as tables."""
