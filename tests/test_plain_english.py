@@ -24,6 +24,7 @@ PAGES = [
 ]
 FOLDERS = (ROOT / "python" / "imufit", ROOT / "examples", ROOT / "benches", ROOT / "docs")
 MODULES = [file for folder in FOLDERS for file in sorted(folder.rglob("*.py"))]
+CARDS = sorted((ROOT / "rust" / "model" / "src" / "effects").glob("*.rs"))
 
 WRONG = re.compile(
     r"\b(?:is|are|was|were) no (?!longer\b|more\b|less\b|larger\b|smaller\b|later\b|earlier\b|wider\b)"
@@ -38,6 +39,8 @@ LONGEST = 30
 """Words in a sentence of a page: at most thirty (Cutts, Oxford Guide to Plain English, advises 15 to 20
 on average)."""
 
+QUOTED = re.compile(r'"((?:[^"\\]|\\.)*)"')
+"""A string of a Rust file, on one line as the texts of the cards are."""
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 FORMULA = re.compile(r"\$\$.*?\$\$", re.DOTALL)
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
@@ -152,6 +155,19 @@ def test_comments_are_in_plain_english() -> None:
         for fault in faults(text)
     ]
     assert not found, f"{len(found)}\n" + "\n".join(found)
+
+
+def test_effect_cards_are_in_plain_english() -> None:
+    found = [
+        f"{file.relative_to(ROOT)}:{number}: {fault}"
+        for file in CARDS
+        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1)
+        if not line.strip().startswith("//")
+        for text in QUOTED.findall(line)
+        for fault in faults(text)
+    ]
+    assert CARDS
+    assert not found, "\n" + "\n".join(found)
 
 
 @pytest.mark.parametrize(
