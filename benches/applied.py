@@ -1,4 +1,4 @@
-"""What a sensor's model is worth on a trial that had no part in it: the attitude error of a filter with and without it.
+"""Benefit of a sensor's model on a trial outside of its fit: the attitude error of a filter with and without it.
 
 Imported by `benches/recordings.py`. For each trial the model holds the effects that the ladder found on more than half
 of the other trials, fitted to all of these at once. Zeros, mounts, tables and drives, which are one recording's, are
@@ -103,7 +103,7 @@ class Others:
 def applied(folder: Path, parts: Mapping[Part, Values], trials: Sequence[Trial]) -> Iterator[Applied]:
     """Try the model of the other trials on each trial.
 
-    Without a magnetometer nothing tells the heading: there the inclination is judged.
+    Without a magnetometer the heading is not observable: there the inclination is judged.
     """
     others = Others(folder, parts)
     for trial in trials:

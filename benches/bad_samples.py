@@ -1,8 +1,8 @@
-"""What bad samples leave of a filter's attitude 20 s later, on seeds that no test has; writes into docs/reliability.md.
+"""Attitude error of a filter 20 s after bad samples, on seeds outside the tests; writes into docs/reliability.md.
 
 Every filter that holds on to a vector replays a motion by hand (`moving` in tests/test_mekf.py) with and without bad
 samples of one sensor: one, two, or those of a second (all the same, noise, zeros), of each size in
-tests/test_bad_samples.py. What counts is the largest angle between both attitudes from 20 s after the last bad sample
+tests/test_bad_samples.py. The measure is the largest angle between both attitudes from 20 s after the last bad sample
 on; of the vertical where nothing shows the heading.
 
 Run: ``python benches/bad_samples.py [--seeds N] [--first SEED] [--write]``. With `--write` the table goes between the

@@ -1,4 +1,4 @@
-"""The blind protocol at full length, its power curve, and the page that tells both.
+"""The blind protocol at full length, its power curve, and the page with both.
 
 Every set of `imufit.grade` with as many logs as acceptance asks for (or `--logs` of each), then the same effects at
 growing sizes. Fresh seeds unless `--seed` is given. Without `--write` the tables go to standard output only; with it

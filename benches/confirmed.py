@@ -1,4 +1,4 @@
-"""What the ladder finds on parts of recordings of one sensor, and whether each effect has its size on the other parts.
+"""Findings of the ladder on parts of one sensor's recordings, and the size of each effect on the other parts.
 
 Imported by `benches/recordings.py`. An effect that was found on one part is fitted to every other part within the whole
 model of the part that shows it best, on another recording with zeros of its own. How much of the effect the other part
@@ -147,7 +147,7 @@ def ratio(part: str, here: Sequence[Parameter], there: Sequence[Parameter]) -> R
 
 
 def fitted(model: SensorModel, there: Fit) -> tuple[Parameter, ...]:
-    """Fit a model to the logs of another fit, from the model's values on; empty where they cannot tell of it."""
+    """Fit a model to the logs of another fit, from the model's values on; empty where they do not determine it."""
     if any(there.analysis.refusal(effect) for effect, _ in model.stack()):
         return ()
     return Fit(*there.analysis.solved_for(model, there.own, only=())).parameters

@@ -1,4 +1,4 @@
-"""What imufit answers to other makers' files (tests/foreign_files.py); writes into docs/foreign_files.md.
+"""Answers of imufit to other makers' files (tests/foreign_files.py); writes into docs/foreign_files.md.
 
 Run: ``IMUFIT_DATA=... python benches/foreign_files.py [--write]``. It takes half a minute on one core.
 """

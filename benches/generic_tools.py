@@ -170,7 +170,7 @@ def main() -> None:
     lines = [
         f"{given.logs} logs of each set, seeds from {given.seed} on.",
         "",
-        "| set | tool | right | names what is not there | CPU time a log |",
+        "| set | tool | right | false names | CPU time a log |",
         "|---|---|---:|---:|---:|",
     ]
     for name in SETS:

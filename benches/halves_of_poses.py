@@ -19,7 +19,7 @@ from imufit.results import Parameter
 ENOUGH = 9
 """Poses that the length of gravity needs for scale, misalignment and bias."""
 WITH = {"acc": ("acc",), "gyr": ("acc", "gyr"), "mag": ("mag",)}
-"""What is calibrated along: a gyro is held against gravity."""
+"""Sensors calibrated along: a gyro is held against gravity."""
 
 
 @dataclass(frozen=True)

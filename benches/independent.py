@@ -177,9 +177,9 @@ def size(which: str, logs: list[Judged]) -> str:
 
 
 def section(found: list[Judged]) -> str:
-    sizes = "; ".join(size(name, logs) for name, logs in by_set(found).items())
+    sizes = ". ".join(size(name, logs) for name, logs in by_set(found).items())
     parts = [
-        f"Logs of each set, of as many as a full run has: {sizes}. {platform.machine()}, "
+        f"Logs of each set, of as many as a full run has. {sizes}. {platform.machine()}, "
         f"CPython {platform.python_version()}.",
         markdown(set_table(found)),
     ]

@@ -33,7 +33,7 @@ LIMIT_S, PART = 0.002, 0.1
 
 
 class Outcome(NamedTuple):
-    """What came of a pair: the answer, and the error of the lag in the middle of what both saw, s."""
+    """Result of a pair: the answer, and the error of the lag in the middle of what both saw, s."""
 
     kind: str
     motion: str

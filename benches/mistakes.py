@@ -1,4 +1,4 @@
-"""What `imufit diagnose` answers to logs that people spoilt (tests/mistakes); writes into docs/faults.md.
+"""Answers of `imufit diagnose` to logs with common mistakes (tests/mistakes); writes into docs/faults.md.
 
 Run: ``python benches/mistakes.py [--logs N] [--seed FIRST] [--processes P] [--rows ID,ID,...] [--recordings N]
 [--keep DIR] [--list FILE] [--write]``. A log takes three seconds; all rows on three simulated logs and the recordings
@@ -83,7 +83,7 @@ def table(rows: list[Mistake], found: list[Judgement]) -> Table:
                 f"{other or ''}",
             )
         )
-    header = ("mistake", "group", "asked of the answer", ">right", ">believed", ">wrong MISSING", ">other")
+    header = ("mistake", "group", "required answer", ">right", ">unnoticed", ">wrong MISSING", ">other")
     return Table("", header, tuple(lines))
 
 
@@ -96,7 +96,7 @@ def summary(found: list[Judgement], sounds: list[Sound], answers: list[Answer]) 
         clean = [answer for sound, answer in zip(sounds, answers, strict=True) if sound.real is real]
         named = sum(bool(answer.faults) or answer.code != 0 for answer in clean)
         lines.append(
-            f"In {words}: right in {sum(each.right for each in own)} of {len(own)}, believed "
+            f"In {words}: right in {sum(each.right for each in own)} of {len(own)}, unnoticed "
             f"{kinds[Kind.BELIEVED]}, wrong MISSING {kinds[Kind.WRONG_MISSING]}. Before they were spoilt, faults were "
             f"named in {named} of {len(clean)}."
         )

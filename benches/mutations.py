@@ -120,7 +120,7 @@ def summary(run: dict[str, Any]) -> str:
         markdown(table(answers)),
     ]
     if failed:
-        lines += ["", "What failed:", ""]
+        lines += ["", "Failures:", ""]
         lines += [f"- {len(each)} x {name} ({place or 'no place'})" for name, place, each in classes(failed)]
     return "\n".join(lines)
 

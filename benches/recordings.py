@@ -1,4 +1,4 @@
-"""What imufit finds in real recordings, and whether other parts of them confirm it; writes docs/recordings.md.
+"""Findings of imufit in real recordings, and their confirmation by other parts; writes docs/recordings.md.
 
 Each sensor of the recordings is asked on several parts (halves of a recording, stretches of a flight, groups of short
 recordings): the ladder climbs each part alone, and every effect it finds is looked up on the others (`confirmed.py`).
@@ -96,7 +96,7 @@ APPLIED = {
     "aircraft, IMU and magnetometer": ("flight",),
     "phone in the hand, Nexus 5": ("phone",),
 }
-"""Sensors, and whose parts tell of their models."""
+"""Sensors, and the owners of the parts that test their models."""
 RESTS = tuple(
     f"mpu6050_hmc5883l/set-2_unmoved-with-{name}.parquet"
     for name in ("x-pointing-forward-10min", "z-pointing-front-and-x-up", "z-pointing-front-and-y-down")
@@ -122,7 +122,7 @@ def in_words(parameters: tuple[Parameter, ...], limit: int = 3) -> str:
     shown = [
         f"{p.name} {quantity.with_error(p.value, CHANCE * p.standard_error, p.unit)}" for p in parameters if p in chosen
     ]
-    return ", ".join(shown) or "not told"
+    return ", ".join(shown) or "not determined"
 
 
 def answer(verdict: str, best: str | None, rivals: tuple[str, ...]) -> str:
@@ -269,12 +269,12 @@ def summary(rows: dict[str, list[list[str]]]) -> list[tuple[str, ...]]:
 
 
 def counted(rows: dict[str, list[list[str]]]) -> str:
-    """Say of how many effects other parts tell, and how many they confirm."""
+    """State how many effects other parts determine, and how many they confirm."""
     answers = Counter(row[5] for row in rows["effects"])
     first = Counter(row[5] for row in rows["effects"] if row[6] != "-")
     told, ends = answers["yes"] + answers["no"], Counter(row[5].split()[0] for row in rows["parts"])
     return (
-        f"Other parts can tell of {told} of the {answers.total()} effects above: {answers['yes']} of them "
+        f"Other parts determine {told} of the {answers.total()} effects above: {answers['yes']} of them "
         f"({100.0 * answers['yes'] / max(told, 1):.0f} %) are confirmed, {answers['no']} are not. Of those that are "
         f"the first answer of some part, {first['yes']} are confirmed and {first['no']} are not. The ladders end as "
         f"{', '.join(f'`{end}` ({n})' for end, n in ends.most_common())}."

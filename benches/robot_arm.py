@@ -32,7 +32,7 @@ BUFFERED = 2.0
 """Time (s) at the beginning of a recording whose times are not those of the samples."""
 PAPER: dict[str, Any] = runpy.run_path(str(ROOT / "examples" / "paper_c_hybrid.py"))
 MEASURES = {"total": 3, "lag ms": 4, "start": 6, "stop": 7}
-"""Which of the example's measures are told, and where they stand there."""
+"""The reported measures of the example, and their places there."""
 
 
 def read(path: Path) -> Log:
@@ -50,10 +50,10 @@ def with_reference(log: Log) -> Log:
 
 
 def with_field_north(log: Log) -> Log:
-    """Return a log told in NED with the horizontal part of its mean field as north, as the equations want it."""
+    """Return a log in NED with the horizontal part of its mean field as north, as the equations want it."""
     field = estimate_mag_reference(log)
     if field is None or log.metadata.frame != "NWU" or log.ref_q is None:
-        raise SystemExit("a recording of the robot arm is told in NWU and has a field")
+        raise SystemExit("a recording of the robot arm is in NWU and has a field")
     azimuth = np.arctan2(field[1], field[0])
     turn = Rotation.from_euler("X", np.pi) * Rotation.from_euler("Z", -azimuth)
     turned = (turn * Rotation.from_quat(log.ref_q[:, [1, 2, 3, 0]])).as_quat()[:, [3, 0, 1, 2]]

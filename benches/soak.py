@@ -132,7 +132,7 @@ def main() -> None:
         ("filtered", given.rows, f"{given.rows:,} rows through every filter in chunks of {CHUNK:,}"),
     )
     rows = []
-    # What goes on in real time leaves most of a core.
+    # A real-time run leaves most of a core.
     with ThreadPoolExecutor(3) as pool:
         for held, (_, _, words) in zip(pool.map(lambda work: apart(*work[:2]), works), works, strict=True):
             early = held[len(held) // 10]

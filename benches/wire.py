@@ -85,7 +85,7 @@ def by_numpy(stream: bytes) -> Array:
     begins = np.concatenate([[0], ends[:-1] + 1])
     whole = begins[ends - begins == LENGTH + 1]
     frames = data[whole[:, None] + np.arange(LENGTH + 1)].T.copy()
-    # The byte that tells the next end of a run stands where a 0 was.
+    # The byte that encodes the next end of a run stands where a 0 was.
     following = frames[0].astype(np.int64)
     check = np.full(len(whole), 0xFFFF, np.uint16)
     body = np.empty((LENGTH, len(whole)), np.uint8)

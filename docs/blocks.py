@@ -29,7 +29,7 @@ WIDTH = "118"
 
 @dataclass(frozen=True)
 class Block:
-    """A block that is run, the line it starts in, and what it should print (None = not told)."""
+    """A block that is run, the line it starts in, and what it should print (None = not stated)."""
 
     language: str
     code: str

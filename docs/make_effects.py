@@ -17,12 +17,12 @@ SENSORS = {
 }
 HEAD = """# Effects
 
-Written by `python docs/make_effects.py` from the cards that the effects carry: do not edit. `imufit explain EFFECT`
+`python docs/make_effects.py` writes this page from the effects' cards: do not edit. `imufit explain EFFECT`
 prints the same.
 
 `f` is the specific force, `omega` the angular rate, `m` the magnetic flux density, all in the body frame; `temp` is the
-sensor's temperature. Typical sizes are those of low-cost sensors, in SI units; they decide where a log does not, and an
-effect more than 21 times as large is turned down as implausible unless nothing at all is left beside it.
+sensor's temperature. Typical sizes are those of low-cost sensors, in SI units, and are the prior of an effect's size.
+An effect more than 21 times as large is rejected as implausible, unless it explains the whole residual.
 """
 
 

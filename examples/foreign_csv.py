@@ -41,7 +41,7 @@ def foreign_file(path: Path) -> None:
 
 
 def log_of(path: Path) -> imufit.Log:
-    """Read it; the table's Euler angles become the reference attitude and are no covariates any more."""
+    """Read it; the table's Euler angles become the reference attitude and are not covariates any more."""
     log = imufit.read(path, mapping=MAPPING)
     angles = np.stack([log.covariates[name] for name in ANGLES], axis=1)
     others = {name: column for name, column in log.covariates.items() if name not in ANGLES}

@@ -19,7 +19,7 @@ import numpy as np
     typical=0.01,
     axes="z",
     needs=["fan_current"],
-    explanation="vibration of the fan, whose current tells how hard it runs, is rectified by gyro z",
+    explanation="vibration of the fan, which grows with its current, is rectified by gyro z",
     mistaken_for="gyr.bias_temperature, since the fan starts when it gets warm",
     confirm="let the sensor lie still and switch the fan on and off",
 )

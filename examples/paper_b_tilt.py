@@ -285,7 +285,7 @@ def loop_figure(before: dict[float, np.ndarray], after: dict[float, np.ndarray])
     axes.axhline(0.03, color=GREY, linestyle="--", linewidth=1)
     axes.set_xticks(range(3), [f"{angle:g} deg" for angle in SD])
     axes.set_ylabel("RMSE of the tilt, deg")
-    title(axes, "What no filter removes goes when the sensor's model is complete")
+    title(axes, "A complete sensor model removes the error that no filter removes")
     axes.legend(frameon=False, fontsize=9, loc="upper left")
     tidy(axes)
     return figure
@@ -369,8 +369,8 @@ def main(folder: str | None = None, seeds: str = "1") -> None:
     print_colour()
     print_experiments()
     small, wide = imufit.ladder(small_tilts(1)), imufit.ladder(sweep(1))
-    print_ladder("What the small tilts say", small)
-    print_ladder("What a wide sweep says", wide)
+    print_ladder("Ladder on the small tilts", small)
+    print_ladder("Ladder on a wide sweep", wide)
     after = {angle: corrected(wide.fit.model, angle, HELD_OUT) for angle in SD}
     print_corrected(before, after, small, wide)
     if folder is None:

@@ -30,7 +30,7 @@ from scipy.spatial.transform import Rotation
 RATE, DURATION = 100.0, 60.0
 LOW_PASS = {"acc.lowpass": {"tau": 1 / (2 * np.pi * 44.0)}, "gyr.lowpass": {"tau": 1 / (2 * np.pi * 42.0)}}
 GYRO_BIAS = {"gyr.bias": dict(zip("xyz", np.radians([0.2, -0.3, 0.15]).tolist(), strict=True))}
-"""What a kelvin or two make of a gyroscope's zero after it was taken off at rest."""
+"""Change of a gyroscope's bias by a kelvin or two after its correction at rest."""
 
 SETS = {"figure 3": PAPER_C_GAINS["figure_3"], "figure 4": PAPER_C_GAINS["figure_4"]}
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
@@ -159,8 +159,8 @@ FILTERS = {
 def attitudes(seed: int, *, at_joint: bool = False, arm_known: bool = False) -> dict[str, np.ndarray]:
     """Return the attitude (n, 4) by every method, all started at TRIAD's attitude.
 
-    With `arm_known` the filters are told where on the arm the accelerometer sits; `WHOLE`, which is none of the
-    library's, cannot be told.
+    With `arm_known` the filters get the accelerometer's place on the arm as a setting; `WHOLE`, which is not
+    the library's, has no such setting.
     """
     log = swung(seed, at_joint=at_joint)
     rules = dict(zip(("lever_x", "lever_y", "lever_z"), ARM, strict=True)) if arm_known else {}
@@ -239,7 +239,7 @@ def total(log: imufit.Log, q: np.ndarray) -> float:
 def by_reading(seed: int) -> dict[str, dict[str, tuple[float, float]]]:
     """Return for each reading of the equations and each set of gains the total errors of Mahony and the driven hybrid.
 
-    The hybrid shares what is wrong with the gains and with the rate. What is wrong with the field it does not share: it
+    The hybrid shares what is wrong with the gains and with the rate. It does not share errors of the field: it
     takes TRIAD's attitude instead.
     """
     log = swung(seed)
@@ -265,7 +265,7 @@ def driven(log: imufit.Log, gains: dict[str, float], reading: Reading) -> np.nda
 
 
 def as_published(mahony: tuple[float, float], hybrid: tuple[float, float], triad: float) -> bool:
-    """Return whether total errors with the gains of figures 3 and 4 come as the paper tells them.
+    """Return whether total errors with the gains of figures 3 and 4 come as in the paper.
 
     Figure 3: the hybrid is more accurate than TRIAD, Mahony is the worst of the three. Figure 4: Mahony improves.
     """
@@ -340,7 +340,7 @@ def dynamics_figure(seeds: tuple[int, ...]):
         range(len(names)), [name.replace(", ", "\n").replace(" driven", "\ndriven") for name in names], fontsize=8
     )
     axes.set_ylabel("total error, RMS, deg")
-    title(axes, "What TRIAD and the hybrid have in common is the acceleration of the arm's end")
+    title(axes, "The error common to TRIAD and the hybrid is the acceleration of the arm's end")
     figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     tidy(axes)
     return figure

@@ -222,8 +222,8 @@ def test_command(capsys, tmp_path):
     [
         ("[kalmann]\nacc_noise = 1.0\n", "Did you mean kalman"),
         ("[kalman]\nacc_nois = 1.0\n", "Did you mean acc_noise"),
-        ('[kalman]\nacc_noise = "1"\n', "no number"),
-        ("kalman = 3\n", "no table"),
+        ('[kalman]\nacc_noise = "1"\n', "not a number"),
+        ("kalman = 3\n", "not a table"),
         ("[kalman\n", "not valid TOML"),
     ],
 )

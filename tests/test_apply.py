@@ -202,7 +202,9 @@ def test_no_reference_is_needed_and_effects_of_the_reference_are_named_as_left_a
     corrected = model.apply(recorded)
     assert np.array_equal(corrected.mag, recorded.mag)
     assert np.allclose(corrected.gyr, recorded.gyr - [0.1, 0.0, 0.0], rtol=0, atol=1e-15)
-    assert corrected.notes == ("ref.delay and mag.field_reference left alone: of the reference, not of the readings",)
+    assert corrected.notes == (
+        "ref.delay and mag.field_reference left unchanged: an effect of the reference, not of the readings",
+    )
 
 
 def test_temperatures_count_from_the_mean_of_the_fitted_log():
@@ -285,7 +287,7 @@ def test_the_command_corrects_a_log_and_says_what_it_left_alone(tmp_path, capsys
     arguments = ["apply", str(tmp_path / "m.toml"), str(tmp_path / "in.parquet"), "-o", str(tmp_path / "out.parquet")]
     assert main(arguments) == 0
     said = capsys.readouterr().out
-    assert "ref.delay left alone" in said
+    assert "ref.delay left unchanged" in said
     assert "wrote" in said
     assert max(off(read(tmp_path / "out.parquet"), truth).values()) < 1e-9
     assert main([*arguments, "--json", "-"]) == 0

@@ -39,7 +39,7 @@ def test_a_disturbed_field_is_the_environment():
     found = attitude_comparison(SensorModel(), replace(log, mag=mag), "mahony")
     assert "field_disturbance" in quantities(found, "heading")
     assert found.limit == "environment"
-    assert "the environment limits it" in found.sentence
+    assert "The limit is the environment" in found.sentence
 
 
 def test_a_bias_of_the_accelerometer_is_constant_in_the_body():

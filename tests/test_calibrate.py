@@ -413,7 +413,7 @@ def test_unusable_log_gets_its_own_message(log, cost, words):
 def test_unknown_cost_and_sensor_are_refused():
     refused(six(), "the cost 'length' is unknown", "length")
     refused(six(), "the sensor 'baro' is unknown", sensors=["baro"])
-    refused([], "there is no log")
+    refused([], "a log to calibrate from is missing")
 
 
 # Logs as they come.
@@ -583,7 +583,7 @@ def test_four_poses_of_unknown_placement_do_not_pretend_to_precision():
         sensor = typical(seed)
         where = course(["+x", "-x", "+y", "+z"], hold=1.0, placement=0.5, seed=seed)
         result = calibrate(log_of(sensor, where, seed, names="acc pose"))
-        assert "No pose is to spare" in result.verdict
+        assert "too few to show how well they were laid" in result.verdict
         values.append(pulls(result, sensor, *ACC))
     assert np.mean(np.abs(values) < 2.0) > 0.9
     assert np.max(np.abs(values)) < 5.0

@@ -190,9 +190,9 @@ def test_stopped_calibration_keeps_what_came(device, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--live", "/dev/nowhere", "-o", "m.toml"], "there is no port /dev/nowhere"),
+        (["--live", "/dev/nowhere", "-o", "m.toml"], "the port /dev/nowhere does not exist"),
         (["--live", "/dev/nowhere"], "name a model with -o, or a log with --keep"),
-        (["--live", "/dev/nowhere", "--keep", "old.csv"], "there already"),
+        (["--live", "/dev/nowhere", "--keep", "old.csv"], "exists already"),
         (["--live", "/dev/nowhere", "old.csv", "-o", "m.toml"], "either a LOG or a device"),
         (["--live", "/dev/nowhere", "--rests", "5", "-o", "m.toml"], "--rests"),
         (["old.csv", "--baud", "9600"], "--baud is for --live"),

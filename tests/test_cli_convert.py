@@ -61,7 +61,7 @@ def test_what_was_read_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert ["acc_y", "m/s^2", "9", "0", "0.04", "0.08"] in words
     assert ["vbat", "9", "3.7", "3.7", "3.7"] in words
     assert ["pose", "+z", "9"] in words
-    assert "Not in it: gyroscope, magnetometer, temperature, reference attitude." in out
+    assert "Missing: gyroscope, magnetometer, temperature, reference attitude." in out
 
 
 def test_unusable_text_leaves_no_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

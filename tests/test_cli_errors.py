@@ -60,7 +60,7 @@ def fails(capsys, *arguments, code=2):
         (["replay", "LOG", "--set", "calman.acc_noise=1"], "did you mean kalman?"),
         (["replay", "LOG", "--set", "kalman.accnoise=1"], "did you mean acc_noise"),
         (["replay", "LOG", "--set", "kalman.zzz=1"], "acc_noise"),
-        (["replay", "LOG", "--set", "kalman.acc_noise=much"], "'much' is no number"),
+        (["replay", "LOG", "--set", "kalman.acc_noise=much"], "'much' is not a number"),
         (["replay", "LOG", "--set", "accel.a=1"], "accel has no settings"),
         (["replay", "LOG", "--band", "0"], "--band"),
         (["replay", "LOG", "--band", "inf"], "--band"),

@@ -302,7 +302,7 @@ def test_before_expected_and_after_agree(answered):
     ("effect", "problem"),
     [
         ("gyr.bias", "gyr.bias is in the model already"),
-        ("gyr.biass", "there is no effect gyr.biass.*Did you mean gyr.bias"),
+        ("gyr.biass", "unknown effect gyr.biass.*Did you mean gyr.bias"),
         ("acc.column:fan", "acc.column:fan cannot be added: the log has no column fan"),
     ],
 )

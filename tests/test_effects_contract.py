@@ -190,7 +190,7 @@ def test_a_trait_that_the_columns_bear_out_is_kept(checked, user_effect):
         ({"affine": "cubic"}, "affine is 'cubic'"),
         ({"affine": "offset"}, "affine offset has other parameters. Call them x, y, z"),
         ({"affine": "scale"}, "affine scale at stage offset. Use stage gain"),
-        ({"affine": "offset", "needs": ["fan"]}, "what needs a column is not a constant offset"),
+        ({"affine": "offset", "needs": ["fan"]}, "an effect with a column is not a constant offset"),
     ],
 )
 def test_a_trait_that_cannot_be_is_refused_in_words(user_effect, wrong, said):

@@ -196,7 +196,7 @@ def test_link_points_to_the_terminal_that_is_there_now(tmp_path):
         assert str(link.readlink()).startswith("/dev/")
     assert not link.is_symlink()
     link.write_text("mine")
-    with pytest.raises(InputError, match="is no link"):
+    with pytest.raises(InputError, match="is not a link"):
         Emulator(walk(), link=link)
     assert link.read_text() == "mine"
 

@@ -59,7 +59,7 @@ class Motion:
 
 
 def turn_behind(name: str, motion: Motion) -> float:
-    """How far a filter is behind by its equations: Madgwick's (42) takes a row with the attitude of the row before."""
+    """Lag of a filter by its own equations: Madgwick's (42) compares a row with the attitude of the row before."""
     return float(np.linalg.norm(motion.gyr, axis=1).max() * np.diff(motion.t).max()) if name == "madgwick" else 0.0
 
 

@@ -269,11 +269,15 @@ def test_the_command_prints_within_eighty_columns(
     assert max(map(len, printed.splitlines())) <= 80
     # no cell of a table is cut
     assert "…" not in printed
-    assert printed.index("It can show") < printed.index("Samples in time") < printed.index("What it cannot show")
-    assert printed.index("What it cannot show") < printed.index("Columns")
-    assert "What this log can show" not in printed
+    assert (
+        printed.index("The log can show")
+        < printed.index("Samples in time")
+        < printed.index("Effects that it cannot show")
+    )
+    assert printed.index("Effects that it cannot show") < printed.index("Columns")
+    assert "Effects that this log can show" not in printed
     assert main(["info", str(tmp_path / "log.parquet"), "-v"]) == 0
-    assert "What this log can show" in capsys.readouterr().out
+    assert "Effects that this log can show" in capsys.readouterr().out
     assert json.loads((tmp_path / "info.json").read_text())["motion"]["force_rms"] > 0.0
 
 

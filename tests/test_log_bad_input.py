@@ -227,7 +227,7 @@ def test_no_time(tmp_path: Path, suffix: str) -> None:
 
 def test_no_sensor(tmp_path: Path) -> None:
     df = frame()[["t"]].assign(vbat=1.0)
-    assert "there is no sensor" in message(save(df, tmp_path / "a.parquet"))
+    assert "the file has no sensor" in message(save(df, tmp_path / "a.parquet"))
 
 
 def test_column_that_is_there_twice(tmp_path: Path) -> None:
@@ -306,13 +306,13 @@ def test_binary_content_in_csv(tmp_path: Path) -> None:
 def test_unknown_suffix_missing_file_directory(tmp_path: Path) -> None:
     (tmp_path / "a.doc").write_bytes(b"\xd0\xcf\x11\xe0\x00\x00\x06\x00")
     assert message(tmp_path / "a.doc") == (
-        "a.doc: the suffix .doc is not a log's, and the file is no text. Logs are .parquet, .npz, .csv, .txt, .tsv, "
+        "a.doc: the suffix .doc is not a log's, and the file is not text. Logs are .parquet, .npz, .csv, .txt, .tsv, "
         ".dat, .log: export it as text, of which imufit.read makes a log."
     )
-    assert message(tmp_path / "b.csv") == f"b.csv: there is no file {tmp_path / 'b.csv'}. Check the name."
+    assert message(tmp_path / "b.csv") == f"b.csv: the file {tmp_path / 'b.csv'} does not exist. Check the name."
     (tmp_path / "c.csv").mkdir()
     assert message(tmp_path / "c.csv") == (
-        "c.csv: the folder of text files holds no table. Name a file that holds samples."
+        "c.csv: the folder of text files does not hold a table. Name a file that holds samples."
     )
 
 

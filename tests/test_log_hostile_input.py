@@ -104,7 +104,7 @@ def test_switch_is_a_covariate_of_ones_and_zeros(tmp_path: Path) -> None:
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_array_that_an_archive_holds_twice_is_not_chosen_in_silence(tmp_path: Path) -> None:
     path = npz(tmp_path / "a.npz", *COLUMNS.items(), ("acc_x", COLUMNS["acc_y"]))
-    assert message(path) == "a.npz: column acc_x: the array is there twice. Save each array once."
+    assert message(path) == "a.npz: column acc_x: the array is stored twice. Save each array once."
 
 
 @pytest.mark.parametrize("first", [True, False])
@@ -128,7 +128,7 @@ def test_archive_of_an_unknown_kind_is_told_from_a_damaged_one(
         data[place : place + 2] = struct.pack("<H", value)
     path.write_bytes(data)
     said = message(path)
-    assert "encrypted, or of a kind that is not known" in said
+    assert "encrypted, or of an unknown kind" in said
     assert "numpy.savez" in said
 
 
@@ -141,7 +141,7 @@ def test_archive_of_an_unknown_kind_is_told_from_a_damaged_one(
         (b'{"gyr_range": 1' + b"0" * 5000 + b"}", "not valid JSON"),
         (b'{"mag_reference": [1' + b"0" * 400 + b", 2, 3]}", "mag_reference is an integer of more than 64 bits"),
         (b'{"mag_reference": [1e300, 2, 3]}', "not three numbers"),
-        (b'{"gravity": 1e-300}', "is no gravity"),
+        (b'{"gravity": 1e-300}', "is not a gravity"),
         (b'{"noise": {"acc": 1e300}}', "no sensor has such a standard deviation"),
         (b'{"sensor": "\xff\xfe"}', "not valid JSON"),
     ],
@@ -164,7 +164,7 @@ def test_schema_that_is_no_utf8_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.parquet"
     pq.write_table(pa.table(COLUMNS), path)
     path.write_bytes(path.read_bytes().replace(b"gyr_y", b"gy\xff\xfey"))
-    assert "no UTF-8" in message(path)
+    assert "not UTF-8" in message(path)
 
 
 def test_clock_of_a_transcript_counts_on_past_midnight(tmp_path: Path) -> None:

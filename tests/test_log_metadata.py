@@ -39,14 +39,18 @@ def test_other_toml_file_is_not_overwritten(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("frame", "FRD", "a.parquet: column frame: metadata frame is 'FRD', which is no frame. Write NED, ENU or NWU."),
-        ("gravity", "x", "metadata gravity is 'x', which is no gravity in m/s^2. Write a number such as 9.80665."),
+        (
+            "frame",
+            "FRD",
+            "a.parquet: column frame: metadata frame is 'FRD', which is not a frame. Write NED, ENU or NWU.",
+        ),
+        ("gravity", "x", "metadata gravity is 'x', which is not a gravity in m/s^2. Write a number such as 9.80665."),
         ("gravity", True, "metadata gravity is True"),
         ("gravity", 981, "metadata gravity is 981"),
         ("mag_reference", [1, 2], "metadata mag_reference is [1, 2], not three numbers. Write [x, y, z] in uT"),
         ("mag_reference", [1, 2, "z"], "not three numbers"),
         ("mag_reference", 5, "not three numbers"),
-        ("rig_axis", "w", "metadata rig_axis is 'w', which is no body axis."),
+        ("rig_axis", "w", "metadata rig_axis is 'w', which is not a body axis."),
         ("sensor", 5, "metadata sensor is 5, not text."),
         ("noise", 0.1, "metadata noise is 0.1, not a table."),
         ("noise", {"temp": 0.1}, "metadata noise names the sensor 'temp'."),

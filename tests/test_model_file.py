@@ -118,9 +118,9 @@ def test_a_value_may_be_edited_by_hand(model, tmp_path):
         ("y = 1.25e-05\n", "", r"parameter y of gyr\.bias is missing.*Otherwise write y = VALUE in rad/s"),
         ('[parameters."gyr.bias"]', '[other."gyr.bias"]', r"parameter x of gyr\.bias is missing"),
         ("\n[end]\ncomplete = true\n", "", "its last lines are missing.*Copy or save"),
-        ("complete = true", "complete = 1.5", r"cut off: its table \[end\] does not say complete"),
-        ("complete = true\n", 'complete = true\n[units."gyr.scale"]\nx = "1"\n', r"behind the table \[end\].*Move"),
-        ("effects = [", "effect = [", "effects is no list"),
+        ("complete = true", "complete = 1.5", r"cut off: its table \[end\] does not hold complete"),
+        ("complete = true\n", 'complete = true\n[units."gyr.scale"]\nx = "1"\n', r"follows the table \[end\].*Move"),
+        ("effects = [", "effect = [", "effects is not a list"),
         ('[parameters."gyr.bias"]\nx =', '[parameters]\n"gyr.bias" = 3\n[x]\nx =', "is 3, not a table"),
         (
             "temperature_mean = 22.55",

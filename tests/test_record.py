@@ -336,7 +336,7 @@ def test_text_without_a_header_takes_the_one_that_is_given(pty, tmp_path):
         (b"", "nothing came from the device"),
         (b"\x99" * 3000, "3000 bytes came, but no whole frame and no rows under a header: check baud"),
         (text_rows(range(9)), "no header that names them: give one, header='t_ms"),
-        (b"no sensor on the bus\n" * 3, "the device says 'no sensor on the bus'"),
+        (b"no sensor on the bus\n" * 3, "the device reports 'no sensor on the bus'"),
         (Sender().samples(range(7)), "7 samples came, but no announcement"),
         (Sender().announce(), "announced itself, but sent no sample"),
     ],
@@ -352,7 +352,10 @@ def test_why_nothing_was_recorded_is_said(pty, tmp_path, sent, said):
 @pytest.mark.parametrize(
     ("port", "said"),
     [
-        ("/dev/no_such_port", "there is no port /dev/no_such_port. (Ports here|There is no serial port)"),
+        (
+            "/dev/no_such_port",
+            "the port /dev/no_such_port does not exist. (Ports here|This machine has no serial port)",
+        ),
         ("/dev/null", "cannot be opened"),
         ("socket://127.0.0.1:9", "Start what is to listen there first"),
         ("sockets://127.0.0.1:9", "Write socket://HOST:PORT"),
@@ -367,7 +370,7 @@ def test_a_port_that_cannot_be_opened_is_said(tmp_path, port, said):
 def test_nothing_is_overwritten(pty, tmp_path):
     log, part = tmp_path / "a.parquet", tmp_path / "a.parquet.part"
     log.write_text("precious")
-    with pytest.raises(InputError, match="there already"):
+    with pytest.raises(InputError, match="exists already"):
         record(pty.port, log, duration=0.1)
     log.unlink()
     part.write_text("precious")

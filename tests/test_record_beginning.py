@@ -84,6 +84,6 @@ def test_without_an_announcement_the_remedy_names_the_device(tmp_path):
 def test_a_file_of_another_kind_is_refused_and_stays(tmp_path):
     path = beginning_path(tmp_path / "a.parquet")
     path.write_bytes(b"PAR1 and so on")
-    with pytest.raises(InputError, match="no bytes that a recording began with"):
+    with pytest.raises(InputError, match="does not hold the first bytes of a recording"):
         recover(path)
     assert path.read_bytes() == b"PAR1 and so on"

@@ -157,7 +157,7 @@ def test_other_columns_go_to_another_part_and_all_of_them_to_the_log(tmp_path, s
     (gap,) = result.gaps
     assert (gap.reason, gap.t_start, gap.t_end) == ("reset", pytest.approx(0.19), pytest.approx(0.5))
     assert log.metadata.extra["recording"]["gaps"] == [gap.to_dict()]
-    with pytest.raises(InputError, match="is there already"):
+    with pytest.raises(InputError, match="exists already"):
         recover(log_path)
 
 
@@ -184,8 +184,8 @@ def test_a_file_of_another_kind_in_the_place_of_the_sidecar_is_not_overwritten(t
         (b"", "no whole batch"),
         (BYTES[:700], "no whole batch"),
         (BYTES[: ENDS[0] - 1], "no whole batch"),
-        (b"t,acc_x\n1,2\n", "no part of a recording"),
-        (b"PAR1 and so on", "no part of a recording"),
+        (b"t,acc_x\n1,2\n", "not a part of a recording"),
+        (b"PAR1 and so on", "not a part of a recording"),
     ],
 )
 def test_what_holds_nothing_is_refused_and_stays(tmp_path, content, said):
@@ -197,7 +197,7 @@ def test_what_holds_nothing_is_refused_and_stays(tmp_path, content, said):
 
 
 def test_what_is_not_there_is_said(tmp_path):
-    with pytest.raises(InputError, match=r"there is no .*walk\.parquet\.part"):
+    with pytest.raises(InputError, match=r"walk\.parquet\.part does not exist"):
         recover(tmp_path / "walk.parquet")
 
 

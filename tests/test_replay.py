@@ -161,7 +161,7 @@ def test_what_cannot_be_replayed_is_refused() -> None:
         replay(Log.from_arrays(log.t, mag=np.ones((log.n, 3))))
     with pytest.raises(ValueError, match="is unknown"):
         replay(log, ["nonsense"])
-    with pytest.raises(ValueError, match="no such filter"):
+    with pytest.raises(ValueError, match="the filter is unknown"):
         replay(log, settings={"mahonny": {}})
     with pytest.raises(ValueError, match="no reference attitude"):
         replay(log, initial="reference")

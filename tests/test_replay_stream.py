@@ -90,7 +90,7 @@ def test_a_stream_starts_where_it_is_told() -> None:
 
 
 def test_what_a_stream_cannot_take_is_refused() -> None:
-    with pytest.raises(ValueError, match="'baro' is no sensor: use acc, gyr, mag"):
+    with pytest.raises(ValueError, match="'baro' is not a sensor: use acc, gyr, mag"):
         Stream(["gyro"], ["gyr", "baro"])
     with pytest.raises(ValueError, match="settings for 'kalmann'"):
         Stream(["gyro"], settings={"kalmann": {}})

@@ -190,7 +190,7 @@ def test_figures_survive_results_without_numbers():
 def test_a_parameter_that_the_log_does_not_tell_is_not_shown_as_a_number():
     scale = [Parameter("gyr.scale", "x", 0.012, 0.001, "1", 0.03), Parameter("gyr.scale", "y", 0.0, 9.0, "1", 0.03)]
     assert [parameter.told for parameter in scale] == [True, False]
-    assert [row[2] for row in parameter_table(scale).rows] == ["1.20 ± 0.10 %", "not told"]
-    assert str(scale[1]) == "gyr.scale y = not told"
+    assert [row[2] for row in parameter_table(scale).rows] == ["1.20 ± 0.10 %", "not determined"]
+    assert str(scale[1]) == "gyr.scale y = not determined"
     own = Parameter("mag.mine", "k", 1.0, 1e9, "uT", None)
     assert own.told, "without a typical size nobody knows how much is too much"

@@ -249,7 +249,7 @@ def test_commands_take_several_logs(capsys, tmp_path):
     model = tmp_path / "model.toml"
     code, out, err = run(capsys, "fit", *paths, "--effects", "gyr.bias", "-o", model)
     assert (code, err) == (0, [])
-    assert "What each log has for itself" in out
+    assert "Each log's own parameters" in out
     code, out, err = run(capsys, "ladder", *paths, "--model", model, "--html", tmp_path / "page.html")
     assert (code, err) == (0, [])
     assert "c.parquet" in out.split("Without")[0]

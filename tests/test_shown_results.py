@@ -184,7 +184,7 @@ def test_a_parameter_that_the_log_does_not_tell_has_words_and_no_point():
     untold = imufit.Parameter("acc.scale", "y", 0.0, 9.0, "1", 0.02)
     fit = dataclasses.replace(addition(), parameters=(told, untold))
     (axes,) = fit.plot().axes
-    assert [text.get_text() for text in axes.texts] == [told.shown, "not told"]
+    assert [text.get_text() for text in axes.texts] == [told.shown, "not determined"]
     assert axes.get_xlim()[1] < 10.0
 
 

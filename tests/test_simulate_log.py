@@ -172,7 +172,7 @@ def test_nothing_is_hidden_only_when_that_is_asked_for():
 def test_hidden_draws_from_the_given_candidates():
     _, truth = hidden("handheld", 3, "large", candidates=["acc.lever_arm"], duration=30.0)
     assert list(truth.effects) == ["acc.lever_arm"]
-    with pytest.raises(ValueError, match="can be told from all others"):
+    with pytest.raises(ValueError, match="is separated from all others"):
         hidden("handheld", 3, "small", candidates=["acc.lowpass"], duration=30.0)
 
 

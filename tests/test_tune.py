@@ -180,8 +180,8 @@ def test_the_search_finds_a_valley_between_the_points_of_the_grid():
         ({"filter_name": "mahony", "gains": ("k_q",)}, "no setting 'k_q'"),
         ({"filter_name": "kalman", "gains": ("adaptive",)}, "is 0 by default"),
         ({"filter_name": "mahony", "map_of": ("k_p", "k_1")}, "the map is over gains"),
-        ({"filter_name": "mahony", "horizon": 0.0}, "no time for a prediction"),
-        ({"filter_name": "complementary", "fixed": {"time_constant": 1.0}}, "nothing is left to tune"),
+        ({"filter_name": "mahony", "horizon": 0.0}, "not a time for a prediction"),
+        ({"filter_name": "complementary", "fixed": {"time_constant": 1.0}}, "no gain remains to tune"),
     ],
 )
 def test_what_cannot_be_tuned_is_refused(log, arguments, said):

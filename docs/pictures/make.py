@@ -44,7 +44,7 @@ SENSOR = {
     "gyr.scale": {"x": 0.01, "y": -0.01, "z": 0.02},
     "mag.hard_iron": {"x": 20.0, "y": -10.0, "z": 5.0},
 }
-"""What docs/calibration.md puts into its sensor."""
+"""Errors of the sensor in docs/calibration.md."""
 
 
 def ladder() -> imufit.Ladder:

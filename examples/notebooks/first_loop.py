@@ -1,11 +1,11 @@
 # %% [markdown]
 # # The first loop
 #
-# An inertial sensor reads something else than physics says. *Which* physical effect is behind the difference? This
-# notebook asks once around the loop: compare, diagnose, add, look again.
+# An inertial sensor reads with errors. *Which* physical effect causes the error? This notebook runs the loop once:
+# compare, diagnose, add, compare again.
 #
-# The log here is simulated: a sensor in a hand for one minute, beside a reference that knows its attitude and position.
-# One effect was put in. Take `imufit.read("your_log.parquet")` instead for a log of your own.
+# The log here is simulated: a hand-held sensor for one minute, with a reference of its attitude and position. The
+# simulation has one effect. Use `imufit.read("your_log.parquet")` for a log of your own.
 # %%
 import imufit
 
@@ -19,15 +19,15 @@ log.plot(begin=0.0, end=20.0)
 # %% [markdown]
 # ## Where does the ideal sensor fail?
 #
-# The ideal sensor has no effect at all: its readings follow from the reference. Held against the log it leaves a
-# residual. A residual of 1.0 times the noise floor would be nothing but noise.
+# The ideal sensor is a model without effects: its readings follow from the reference. The difference to the log is the
+# residual. A residual of 1.0 times the noise floor is noise only.
 # %%
 fit = imufit.fit(log)
 comparison = fit.compare()
 comparison.sensors
 # %% [markdown]
 # Gyroscope and magnetometer are at their noise; the accelerometer is not. Each panel below shows the mean residual of
-# one channel against something that may cause it, worst first. The grey band is the noise of one sample.
+# one channel over a possible cause, the largest first. The grey band is the noise of one sample.
 # %%
 comparison.plot()
 # %% [markdown]
@@ -40,34 +40,34 @@ diagnosis.plot()
 # %%
 print(diagnosis.sentence)
 # %% [markdown]
-# What is this effect? Its card tells the physics, what it is mistaken for, and the experiment that confirms it.
+# What is this effect? Its card states the physics, what it is mistaken for, and the experiment that confirms it.
 # %%
 imufit.explain(diagnosis.best)
 # %% [markdown]
 # ## Add it
 #
-# The step tells the error before, the error that was expected, and the error that came out, on data that the fit has
-# not seen.
+# The step states the error before, the error that was expected, and the error after, on data that the
+# fit did not use.
 # %%
 addition = fit.add(diagnosis.best)
 addition
 # %%
 addition.plot()
 # %% [markdown]
-# The lever arm that was put in is 20 mm along x. The fitted value agrees with it within its standard error.
+# The simulated lever arm is 20 mm along x. The fitted value agrees with it within its standard error.
 #
 # ## Is anything else missing?
 # %%
 addition.fit.diagnose().verdict
 # %% [markdown]
-# No: what is left is noise, as far as this log can tell. `imufit.ladder` repeats these steps until nothing is missing.
+# No: the residual is noise, as far as this log shows. `imufit.ladder` repeats these steps until nothing is missing.
 # %%
 ladder = imufit.ladder(log)
 ladder.plot()
 # %% [markdown]
 # ## Use the model
 #
-# `save` writes the model to a file, `apply` takes its effects out of any log of this sensor, also without a reference.
+# `save` writes the model to a file. `apply` removes its effects from any log of this sensor, also without a reference.
 # Every result has `to_dict()`, `to_dataframe()` and `plot()`; `plot(ax=...)` draws on Axes of yours.
 # %%
 import matplotlib.pyplot as plt

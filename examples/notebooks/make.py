@@ -31,7 +31,7 @@ METADATA = {
     "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
     "language_info": {"name": "python"},
 }
-"""What is stored of the kernel: nothing of the machine that ran the notebook."""
+"""Metadata of the kernel: nothing of the machine that ran the notebook."""
 
 
 def sources() -> dict[str, Path]:

@@ -1,10 +1,10 @@
 # %% [markdown]
 # # An effect of your own
 #
-# The catalogue holds the effects that inertial sensors usually have. Your rig may have one that nobody else has. It
-# takes about ten lines, and it is fitted, ranked and explained like the built-in ones.
+# The catalogue holds the effects that inertial sensors usually have. Your rig may have one that is not among them. An
+# effect takes about ten lines, and is fitted, ranked and explained like the built-in ones.
 #
-# The story here: a cooling fan stands beside the sensor. Its vibration shifts the zero of the gyroscope's z axis, and
+# In this example a cooling fan stands beside the sensor. Its vibration shifts the bias of the gyroscope's z axis, and
 # the log holds the current of the fan.
 # %%
 from dataclasses import replace
@@ -25,8 +25,8 @@ log.plot(columns=["fan_current"], end=40.0)
 # %% [markdown]
 # ## Without the effect
 #
-# The loop sees that something is missing. A straight line in the column `fan_current` helps, and that is a hint and not
-# an explanation.
+# The loop reports a missing effect. A linear dependence on the column `fan_current` reduces the residual, which is a
+# hint and not an explanation.
 # %%
 before = imufit.diagnose(log)
 print(before.sentence)
@@ -34,7 +34,7 @@ print(before.sentence)
 # ## The effect
 #
 # An effect returns the derivative of the reading with respect to each of its parameters. Here the reading grows in
-# proportion to the current, along z alone. The words stand on its card.
+# proportion to the current, along z alone. The texts appear on its card.
 # %% [source]
 from own_effect import fan
 
@@ -42,7 +42,7 @@ from own_effect import fan
 imufit.explain("gyr.fan")
 # %% [markdown]
 # `needs` names the columns without which the effect cannot be tested; `typical` is its usual size in the unit of the
-# parameter, which tells the loop what is plausible.
+# parameter, which sets the loop's range of plausible values.
 #
 # ## With the effect
 # %%

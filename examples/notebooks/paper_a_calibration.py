@@ -1,14 +1,14 @@
 # %% [markdown]
 # # Paper A: six positions on a table
 #
-# An accelerometer is laid on each of its six sides. At rest it should read gravity and nothing else; twelve parameters
-# make it do so:
+# An accelerometer is laid on each of its six sides. At rest a correct accelerometer reads gravity alone.
+# Twelve parameters correct the readings:
 #
 # corrected = C K reading + b, with the scale K (3), the misalignment C (6) and the bias b (3).
 #
-# The paper publishes the twelve parameters of an LIS3L06AL and the means of the readings before and after, but no
-# readings. They are simulated here from these parameters, with noise and the steps of 12 bits. The signs of the six
-# misalignments did not survive in the paper's text; one choice is taken here.
+# The paper publishes the twelve parameters of an LIS3L06AL and the means of the readings before and after, but not the
+# readings. This notebook simulates the readings from the parameters, with noise and the steps of 12 bits. The signs of
+# the six misalignments are lost in the paper's text; the notebook assumes one choice.
 # %%
 import imufit
 import numpy as np
@@ -20,7 +20,7 @@ correction(signs).round(4)
 # %% [markdown]
 # ## The recording
 #
-# Five seconds on each side at 100 Hz. The label `pose` says which axis of the body points up.
+# Five seconds on each side at 100 Hz. The label `pose` states the body axis that points up.
 # %%
 t, readings, labels = simulate(correction(signs), noise, np.random.default_rng(1))
 log = imufit.Log.from_arrays(t, acc=readings * G, pose=labels.tolist())
@@ -28,17 +28,18 @@ log
 # %% [markdown]
 # ## Calibrate
 #
-# The cost `vector` holds each mean reading against the direction that its label tells. Without labels the cost
-# `magnitude` holds only the length against gravity.
+# The cost `vector` compares each mean reading with the direction of its label. Without labels the cost
+# `magnitude` compares only the length with gravity.
 # %%
 calibration = imufit.calibrate(log, "vector")
 calibration
 # %%
 calibration.plot(log)
 # %% [markdown]
-# Grey: how far the length of the mean reading was from gravity. Blue: what is left of each side after the calibration.
+# Grey: how far the length of the mean reading was from gravity. Blue: the residual of each side after the
+# calibration.
 #
-# ## Beside the paper
+# ## Comparison with the paper
 # %%
 table_3(signs, noise)
 # %%
@@ -46,7 +47,7 @@ parameters(signs, noise)
 # %% [markdown]
 # ## Are the standard errors right?
 #
-# If they are, 95 % of the parameters lie within two of them. Thirty recordings, each with other noise and another
+# If so, 95 % of the parameters are within two standard errors. Thirty recordings, each with other noise and another
 # choice of the signs:
 # %%
 import itertools

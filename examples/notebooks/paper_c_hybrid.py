@@ -1,12 +1,12 @@
 # %% [markdown]
 # # Paper C: TRIAD, Mahony or both?
 #
-# A GY-86 on a robot arm that swings back and forth. TRIAD makes an attitude of each row from two vectors, gravity and
-# the magnetic field. Mahony's filter integrates the gyroscope and lets the vectors pull slowly. The paper's hybrid
-# drives Mahony's filter by TRIAD. The claim: the hybrid follows as fast as TRIAD and is better where the arm starts and
-# stops, and plain Mahony is the worst.
+# A GY-86 on a robot arm that swings back and forth. TRIAD computes an attitude of each row from two vectors, gravity
+# and the magnetic field. Mahony's filter integrates the gyroscope with a slow correction by the vectors. The paper's
+# hybrid drives Mahony's filter by TRIAD. The claim: the hybrid follows as fast as TRIAD and is better where the arm
+# starts and stops, and plain Mahony is the worst.
 #
-# The paper shows two figures and no numbers. Here the experiment is simulated and measured.
+# The paper shows two figures without numbers. This notebook simulates the experiment and measures the filters.
 # %%
 import imufit
 import pandas as pd
@@ -17,7 +17,7 @@ log
 # %% [markdown]
 # ## The filters by themselves
 #
-# `imufit.replay` runs filters over a log and holds them against its reference.
+# `imufit.replay` runs filters over a log and compares them with its reference.
 # %%
 replay = imufit.replay(log, ["triad", "mahony", "hybrid", "mekf"])
 replay
@@ -36,16 +36,16 @@ pd.DataFrame(SETS)
 found = measured((1,))
 pd.DataFrame({name: values.mean(axis=0) for name, values in found.items()}, index=COLUMNS).T.round(2)
 # %% [markdown]
-# With the equations as they are proven, Mahony and the hybrid are the same filter to two digits, and both are better
-# than TRIAD. The published picture comes out if the *whole* field is compared with the horizontal vector [1 0 0], as
-# the printed equations say; the table calls that "Mahony, whole field".
+# With the proven equations Mahony and the hybrid are the same filter to two digits, and both are better than TRIAD. The
+# published result follows if the *whole* field is compared with the horizontal vector [1 0 0], as in the printed
+# equations. The table calls this filter "Mahony, whole field".
 # %%
 redrawn(1, "figure 3")
 # %% [markdown]
-# ## What is left
+# ## The remaining error
 #
-# All of these take the specific force for gravity. At the end of an arm that starts and stops this is wrong by the
-# acceleration of the arm's end. Told where on the arm the sensor sits, the filters lose most of their error:
+# All of these filters take the specific force as gravity. At the end of an arm that starts and stops the error is the
+# acceleration of the arm's end. With the sensor's place on the arm as a setting, most of the error disappears:
 # %%
 dynamics_figure((1,))
 # %% [markdown]
@@ -57,4 +57,4 @@ tuning()
 # %%
 tuning().plot()
 # %% [markdown]
-# `docs/hybrid.md` has the whole story, and what real recordings say.
+# `docs/hybrid.md` has the details, and results of real recordings.

@@ -1,4 +1,4 @@
-"""The one exception that unusable input raises: it says what is wrong, where, and what to do."""
+"""The one exception that unusable input raises: it states what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from imufit.remedy import Remedy
 
 
 class InputError(ValueError):
-    """Input that cannot be used, told in one line.
+    """Input that cannot be used, reported in one line.
 
     The message reads ``file: row R, column C: problem. Remedy.``, with the parts that apply. Rows are counted from 0
     and are data rows as in the table; for text files the line of the file (counted from 1) stands behind it, as in
@@ -90,7 +90,7 @@ class InputError(ValueError):
         return " ".join(text.split())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle with all parts, so that the error survives the way back from a worker process."""
+        """Pickle with all parts, so that the error returns unchanged from a worker process."""
         where: dict[str, Any] = {
             "file": self.file,
             "row": self.row,

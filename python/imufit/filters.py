@@ -35,7 +35,7 @@ FRAMES: Final = ("NED", "ENU", "NWU")
 
 
 class AttitudeFilter:
-    """What all filters have in common.
+    """The common part of all filters.
 
     Parameters
     ----------
@@ -432,12 +432,12 @@ def _rows(name: str, given: ArrayLike | None, *, one: bool = False) -> Array | N
     if one and array.shape == (3,):
         array = array[None, :]
     elif one or array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"{name} has shape {array.shape}, but {wanted} is wanted", remedy="Rows are samples.")
+        raise InputError(f"{name} has shape {array.shape}, but {wanted} is required", remedy="Rows are samples.")
     return array
 
 
 def _quaternion(initial: ArrayLike | Rotation) -> Array:
     first = initial.as_quat()[..., [3, 0, 1, 2]] if isinstance(initial, Rotation) else np.asarray(initial, np.float64)
     if first.shape != (4,):
-        raise InputError(f"the initial attitude has shape {first.shape}, but (4,) is wanted: scalar first")
+        raise InputError(f"the initial attitude has shape {first.shape}, but (4,) is required: scalar first")
     return first

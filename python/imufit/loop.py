@@ -94,7 +94,7 @@ class SensorModel(EffectStack):
     def apply(self, log: AnyLog) -> Log:
         """Correct a log's readings: take out what the model's effects added to them.
 
-        No reference is needed. What effects read of the motion is taken from the corrected readings themselves: an
+        No reference is needed. Effects take the motion from the corrected readings themselves: an
         effect of one sensor on another uses the other one corrected, held or interpolated where that one is slower, and
         derivatives come from local polynomials. ``ref.alignment``, the mount of the sensor on the body that the
         reference describes, turns the corrected readings into the axes of that body. The other effects of the
@@ -170,8 +170,8 @@ class Fit(FittedStack):
         Parameters
         ----------
         log : Log, str, Path, DataFrame or mapping of arrays, optional
-            With reference attitude; default: the log of the fit, if it is one. What each of several logs has for itself
-            (its bias) is its own in a log of the fit, and the mean in any other.
+            With reference attitude; default: the log of the fit, if it is one. A log's own parameters (its bias) are
+            its own in a log of the fit, and the mean in any other.
         progress : callable, optional
             Called with (rows done, rows in all, what is being done).
 
@@ -201,7 +201,7 @@ class Fit(FittedStack):
         """
         tell = progress or silent
         fit = self.on(_opened(log), tell)
-        tell(0, 1, f"step 1: what is missing on top of {' + '.join(fit.model.effects) or 'the ideal sensor'}")
+        tell(0, 1, f"step 1: effects missing in {' + '.join(fit.model.effects) or 'the ideal sensor'}")
         return diagnose(fit)
 
     def add(self, effect: str | Function, log: AnyLogs | None = None, progress: Progress | None = None) -> Addition:

@@ -1,7 +1,7 @@
 """Text that others wrote, such as names in a file: made harmless and bounded before a person sees it.
 
-A terminal obeys control characters, and text with marks of direction reads as something else than it is. Whoever sends
-a log decides what its columns are called; what is shown of it must be only text, and no more of it than can be read.
+A terminal obeys control characters, and text with marks of direction reads as something else than it is. The sender of
+a log decides the names of its columns; what is shown of it must be only text, and no more of it than can be read.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def printable(text: str, most: int = MESSAGE, keep: str = "") -> str:
 
 
 def _shortened(text: str, most: int) -> str:
-    """Cut out of the middle: a message says at its end what to do."""
+    """Cut out of the middle: a message has its remedy at its end."""
     if len(text) <= most:
         return text
     head = 2 * most // 3

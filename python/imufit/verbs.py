@@ -180,7 +180,7 @@ def calibrate(
     Raises
     ------
     InputError
-        The logs leave a calibration open; the message says what is missing.
+        The logs leave a calibration open; the message states what is missing.
     """
     from imufit.calibrating import calibrate  # noqa: PLC0415  only needed here
 
@@ -248,7 +248,7 @@ def allan(log: AnyLog, *, progress: Progress | None = None) -> Allan:
     Raises
     ------
     InputError
-        There is no rest that is long enough.
+        A rest that is long enough is missing.
     """
     from imufit.allan_deviation import allan  # noqa: PLC0415  only needed here
 

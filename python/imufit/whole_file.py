@@ -1,7 +1,7 @@
 """Files that are written whole or not at all: every file that imufit writes goes this way.
 
-What is written goes to a new file in the same folder, which takes the place of the old one when it is complete and on
-the disk. Whoever reads finds the old file or the new one, never a part; an error, a full disk or a crash leaves the old
+Output goes to a new file in the same folder, which takes the place of the old one when it is complete and on
+the disk. A reader finds the old file or the new one, never a part; an error, a full disk or a crash leaves the old
 one as it was. The name of the new file cannot be foreseen and nothing may stand there yet, so that no link leads the
 writing elsewhere. Nothing is ever written through a hard link: its other names keep what they held.
 """
@@ -62,7 +62,7 @@ def whole_file(path: str | Path) -> Iterator[IO[bytes]]:
             os.fsync(file.fileno())
         new.replace(target)
     except OSError as error:
-        # of the two names only the one that the user gave says anything
+        # of the two names only the one that the user gave is informative
         if error.filename not in (None, str(new), new):
             raise
         raise type(error)(error.errno, error.strerror or str(error), str(path)) from None
@@ -109,7 +109,7 @@ def identity(path: Path) -> tuple[int, int] | Path:
 
 
 def _target(path: Path) -> Path | None:
-    """Return the file that is to be replaced, at the end of all links; None for what is no file and stays in place."""
+    """Return the file to be replaced, at the end of all links; None for anything that is not a file and stays."""
     try:
         # The system follows the links, and refuses those that it takes for a trap in a folder of everybody.
         if not stat.S_ISREG(path.stat().st_mode):

@@ -7,7 +7,7 @@ The first line of a file that imufit writes is therefore ``last = "[end]"``, and
     complete = true
 
 Without them such a file is refused. Values may be edited by hand: nothing counts or sums them. A file that was written
-by hand needs neither, but has to end with a whole line; whether all is in it is for its reader to tell.
+by hand needs neither, but has to end with a whole line; its reader checks that it is complete.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LAST = "last"
 END = "end"
 """Table at the end of a file that is whole."""
 COMPLETE = {"complete": True}
-"""What stands in it."""
+"""Its content."""
 MARK = [f"[{END}]", "complete=true"]
 """The last two lines, without spaces."""
 AGAIN = "Copy or save it again."
@@ -73,8 +73,8 @@ def read_toml(path: str | Path, what: str) -> tuple[dict[str, Any], bool]:
     Raises
     ------
     InputError
-        The file cannot be read, is no TOML, holds nothing, or ends within the mark; or it has no mark and ends within a
-        line, of which nobody can tell whether it is whole.
+        The file cannot be read, is not TOML, holds nothing, or ends within the mark; or it has no mark and ends within
+        a line, which may be incomplete.
     """
     file = Path(path)
     try:
@@ -88,9 +88,9 @@ def read_toml(path: str | Path, what: str) -> tuple[dict[str, Any], bool]:
     if document.pop(LAST, None) is not None and not marked:
         raise InputError("the file is cut off: its last lines are missing", file=file, remedy=AGAIN)
     if marked and document.pop(END) != COMPLETE:
-        raise InputError("the file is cut off: its table [end] does not say complete = true", file=file, remedy=AGAIN)
+        raise InputError("the file is cut off: its table [end] does not hold complete = true", file=file, remedy=AGAIN)
     if marked and _last_lines(text) != MARK:
-        raise InputError("something stands behind the table [end]", file=file, remedy="Move [end] to the end.")
+        raise InputError("text follows the table [end]", file=file, remedy="Move [end] to the end.")
     if not marked and not text.endswith("\n"):
         raise InputError("the last line does not end: the file may be cut off", file=file, remedy=HOW_TO_END)
     return document, marked

@@ -675,8 +675,10 @@ NAMES = (
         mapping=True,
     ),
     _names("time_named", "time stamps in the column time", s.renamed({"t": "time"}), ("time",), mapping=True),
-    _names("header_g", "acc in g, told in the header", s.renamed(IN_G, acc=1 / s.G), ("[g]", "in g"), mapping=True),
-    _names("header_dps", "gyr in deg/s, told in the header", s.renamed(IN_DPS, gyr=1 / DPS), ("deg/s",), mapping=True),
+    _names("header_g", "acc in g, stated in the header", s.renamed(IN_G, acc=1 / s.G), ("[g]", "in g"), mapping=True),
+    _names(
+        "header_dps", "gyr in deg/s, stated in the header", s.renamed(IN_DPS, gyr=1 / DPS), ("deg/s",), mapping=True
+    ),
     _names(
         "decimal_commas",
         "semicolons between cells, decimal commas",

@@ -54,14 +54,14 @@ def allan(log: Log, sensors: tuple[str, ...] = ("acc", "gyr", "mag"), progress: 
     found: dict[str, Samples] = {}
     for name in sensors:
         if name not in UNITS:
-            raise ValueError(f"{name!r} is no sensor: use acc, gyr or mag")
+            raise ValueError(f"{name!r} is not a sensor: use acc, gyr or mag")
         readings = getattr(rest, name)
         samples = None if readings is None else even_samples(rest.t, readings)
         if samples is not None and samples.longest >= 2 * _LONGEST:
             found[name] = samples
     if not found:
         raise InputError(
-            "no sensor has readings enough for an Allan deviation",
+            "the sensors have too few readings for an Allan deviation",
             file=log.path or "log",
             remedy="Record the sensor lying still for at least some seconds.",
         )

@@ -15,7 +15,7 @@ def filter_noise(found: Allan) -> dict[str, dict[str, float]]:
     A filter's noise density is the random walk N of the integral (IEEE Std 952): the variance of the integral grows by
     N^2 in a second. That is 1/sqrt(2) of the one-sided density in data sheets. Where a filter wants the noise of an
     angle instead of that of the readings, the accelerometer's N is divided by gravity and the magnetometer's by the
-    length of the field. What the log does not show is left at the filter's default.
+    length of the field. A figure that the log does not show keeps the filter's default.
 
     These are the noises of a sensor at rest. In motion the specific force is not gravity, and `acc_noise` has to be
     larger: `imufit.tune` finds out how much.

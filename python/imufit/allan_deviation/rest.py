@@ -26,9 +26,7 @@ def longest_rest(log: Log) -> tuple[Log, str]:
         The sensors never rested.
     """
     if log.acc is None:
-        return log, (
-            "Without an accelerometer nobody can tell whether the log rests: it is taken to. Motion shows as a hump."
-        )
+        return log, ("Without an accelerometer a rest cannot be detected: it is taken to. Motion shows as a hump.")
     rests = [
         (log.t[last] - log.t[first], first, last)
         for first, last in _joined([pose["rows"] for pose in _poses(log)], log)

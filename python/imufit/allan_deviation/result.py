@@ -1,4 +1,4 @@
-"""What an Allan deviation tells of each channel."""
+"""Noise figures of each channel, from its Allan deviation."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Channel(Part):
     n : int
         Readings.
     scatter : float
-        Standard deviation of one reading without what wanders slowly: the noise of one sample.
+        Standard deviation of one reading without slow drift: the noise of one sample.
     tau : (k,) array
         Averaging times, s.
     deviation : (k,) array
@@ -87,7 +87,7 @@ class Channel(Part):
 
     @property
     def noise_density(self) -> float | None:
-        """One-sided noise density as data sheets tell it, unit/sqrt(Hz): sqrt(2) N; None where it is not visible."""
+        """One-sided noise density as in data sheets, unit/sqrt(Hz): sqrt(2) N; None where it is not visible."""
         value = self.terms["white"].value
         return None if value is None else float(np.sqrt(2.0) * value)
 
@@ -207,7 +207,7 @@ class Allan(Plotted, Result):
 
     @property
     def sentence(self) -> str:
-        """What was measured, in one sentence."""
+        """The measurement in one sentence."""
         return f"Allan deviation over {self.duration:.1f} s at rest, {self.rows} rows."
 
     @property
@@ -218,7 +218,7 @@ class Allan(Plotted, Result):
         if hidden:
             remarks.append(
                 f"No bias instability in {', '.join(hidden)}: the curve has no floor within {self.duration:.0f} s. "
-                "What is printed is the most it can be (95 %); a longer log at rest shows it."
+                "The printed value is an upper limit (95 %); a longer log at rest shows it."
             )
         late = [
             name
@@ -297,7 +297,7 @@ class Allan(Plotted, Result):
         return allan_figure(list(self.channels.values()), ax)
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return [self.sentence, *self.remarks]
 
 

@@ -5,7 +5,7 @@ r"""The usual terms of an Allan variance, fitted together to the whole curve.
 (IEEE Std 952-1997, annex C) with quantisation Q, random walk N of the integral, bias instability B and random walk K of
 the bias. The squares are found by weighted least squares that cannot go negative (Lawson and Hanson). The weights
 come from the equivalent degrees of freedom under the kind of noise that dominates each averaging time, as the fit
-itself tells it; both are repeated until they agree. Only averaging times an octave apart are fitted: those in between
+determines it; both are repeated until they agree. Only averaging times an octave apart are fitted: those in between
 repeat what these say, and the correlation of those an octave apart is taken into account.
 """
 
@@ -37,7 +37,7 @@ _SURE = 3.0
 _BOUND = 1.645
 """One-sided 95 % of a normal distribution."""
 _ACCEPTED = 1e-6
-"""A misfit less probable than this is no fit: the sensor's filter or noise of another colour shapes the curve."""
+"""A misfit less probable than this rejects the fit: the sensor's filter or noise of another colour shapes the curve."""
 _LEAST = 4
 """Octaves that a fit needs."""
 _FOOT = 1
@@ -180,7 +180,7 @@ def _fit(tau: Array, variance: Array, rows: NDArray[np.intp], freedom: Callable[
     misfit = float(np.sum(freedoms * (over - 1.0 - np.log(over))))
     left = max(1, len(rows) - int(np.count_nonzero(squares)))
     probability = float(gammaincc(0.5 * left, 0.5 * misfit))
-    # Where the terms do not describe the curve its misfit says how sure they are.
+    # If the terms do not fit the curve, the misfit determines their uncertainty.
     inflation = np.sqrt(max(1.0, misfit / left))
     errors = level * inflation * _errors(whitening @ design, squares)
     squares = level * squares

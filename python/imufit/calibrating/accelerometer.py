@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MOTION_ERROR = 0.04
-"""Standard error of the bias (m/s^2) beyond which a motion told nothing."""
+"""Standard error of the bias (m/s^2) beyond which a motion is not informative."""
 MOTION_TIME = 30.0
-"""Shortest motion (s) from which scale and bias are told."""
+"""Shortest motion (s) from which scale and bias are determined."""
 MOTION_SHARE = 0.1
 """Share of the motion's accelerations that may pass for a bias."""
 MOTION_GROUPS = 20
-"""Stretches of time that are left out in turn where there are no poses."""
+"""Stretches of time that are left out in turn if poses are missing."""
 ENTANGLED = 0.9
 """Correlation beyond which two parameters are named."""
 ASTRAY = 0.02
@@ -37,7 +37,7 @@ ASTRAY = 0.02
 
 @dataclass(frozen=True)
 class Targets:
-    """What the ideal sensor reads in each pose.
+    """Ideal reading of each pose.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     Raises
     ------
     InputError
-        The poses do not tell the parameters.
+        The poses do not determine the parameters.
     """
     readings, variances = _stack(poses)
     aims = targets
@@ -179,8 +179,8 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
         extras["placement_deg"] = float(np.degrees(solution["excess"] / gravity))
         if solution["freedom"] < 1:
             remarks.append(
-                f"No pose is to spare that would show how well they were laid: {extras['placement_deg']:.1f} deg is "
-                "taken for the standard errors. Record all six sides."
+                f"The poses are too few to show how well they were laid: {extras['placement_deg']:.1f} deg is "
+                "assumed in the standard errors. Record all six sides."
             )
         elif extras["placement_deg"] > 0.3:
             remarks.append(
@@ -193,7 +193,7 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     remarks += _weak_axes(poses)
     if rms(lengths - gravity) > 1.5 * rms(np.linalg.norm(readings, axis=1) - gravity) + 0.01:
         remarks.append(
-            "The lengths got worse: a tilted table or a crooked side passes for misalignment. Record one log with the "
+            "The error of the lengths grew: a tilted table or a crooked side is mistaken for misalignment. Record one log with the "
             f"gyro, so that headings are known, or nine attitudes for {option('cost', 'magnitude')}."
         )
     return _result("vector", readings, solution, gravity, lengths, residuals, remarks, extras, chosen)
@@ -218,7 +218,7 @@ def fit_magnitude(
     Raises
     ------
     InputError
-        The poses do not tell the parameters.
+        The poses do not determine the parameters.
     """
     readings, variances = _stack(poses)
     directions = readings / np.linalg.norm(readings, axis=1)[:, None]
@@ -241,7 +241,8 @@ def fit_magnitude(
     solution = solve(*chosen)
     if solution["freedom"] < 1:
         remarks.append(
-            "No pose is to spare: the standard errors know the sensor's noise only, and nothing could be left out."
+            "The poses are just enough: the standard errors contain the sensor's noise only, and no pose could be "
+            "left out."
         )
     residuals = np.abs(solution["residuals"][:, 0])
     lengths = gravity + solution["residuals"][:, 0]
@@ -268,7 +269,7 @@ def fit_motion(acc: Array, gravity: float) -> SensorCalibration:
     groups = np.floor(np.arange(len(acc)) * MOTION_GROUPS / len(acc))
     solution = _imufit.magnitude_calibration(np.ascontiguousarray(acc), groups, gravity, misalignment=False)
     if max(solution["bias_error"]) > MOTION_ERROR:
-        raise InputError("the motion's accelerations hide gravity")
+        raise InputError("accelerations of the motion exceed gravity")
     lengths = gravity + solution["residuals"][:, 0]
     result = _result(
         "magnitude",
@@ -279,7 +280,7 @@ def fit_motion(acc: Array, gravity: float) -> SensorCalibration:
         np.zeros(0),
         [
             "The sensor never rested: scale and bias come from the length of the specific force while it was turned. "
-            "A hand's accelerations make that weaker than rests; record six sides at rest."
+            "Accelerations of the motion make this fit weaker than rests; record six sides at rest."
         ],
         {"misaligned": False, "from_motion": True},
         (False, False),
@@ -310,9 +311,7 @@ def _weak_axes(poses: Sequence[Pose]) -> list[str]:
         have = [side for side in (f"+{axis}", f"-{axis}") if side in sides]
         if len(have) == 1:
             missing = "-" if have[0][0] == "+" else "+"
-            remarks.append(
-                f"{missing}{axis} never pointed up: scale and bias of {axis} are told apart by the other poses only."
-            )
+            remarks.append(f"{missing}{axis} never pointed up: only the other poses separate scale and bias of {axis}.")
         elif len(have) == 2 and sides.count(have[0]) == sides.count(have[1]) == 1:
             remarks.append(f"The scale of {axis} rests on two poses.")
     if len(remarks) == 3 and all("rests on two" in remark for remark in remarks):
@@ -380,7 +379,7 @@ def _entangled(correlation: Array, elements: int) -> list[str]:
     scales = (0, 4, 8) if elements == 9 else (0, 1, 2)
     shares = [float(correlation[scale, elements + k]) for k, scale in enumerate(scales)]
     return [
-        f"Scale and bias of {axis} are hard to tell apart here (correlation {share:+.2f}): add poses with {axis} "
+        f"Scale and bias of {axis} are hardly separated here (correlation {share:+.2f}): add poses with {axis} "
         "up and down."
         for axis, share in zip(AXES, shares, strict=True)
         if abs(share) > ENTANGLED

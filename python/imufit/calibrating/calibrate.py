@@ -43,7 +43,7 @@ def calibrate(
     logs : Log or sequence of Log
         Of one sensor; several add up.
     cost : str, optional
-        ``vector``: the named side points up exactly (or the log's reference attitude says how), 12 unknowns.
+        ``vector``: the named side points up exactly (or in the direction of the log's reference attitude), 12 unknowns.
         ``magnitude``: only the length of gravity is known, 9 unknowns, at least nine different poses. Without it the
         vector cost where poses are labelled, have a reference or lie along the axes, else the magnitude cost.
     sensors : sequence of str
@@ -59,7 +59,7 @@ def calibrate(
     Raises
     ------
     InputError
-        The logs do not tell a calibration; the message says what is missing.
+        The logs do not determine a calibration; the message names the missing poses.
     """
     given = [logs] if not isinstance(logs, Sequence) else list(logs)
     if cost is not None and cost not in COSTS:
@@ -67,7 +67,7 @@ def calibrate(
     if unknown := [name for name in sensors if name not in ("acc", "gyr", "mag")]:
         raise InputError(f"the sensor {unknown[0]!r} is unknown", remedy="Use acc, gyr or mag.")
     if not given:
-        raise InputError("there is no log to calibrate from")
+        raise InputError("a log to calibrate from is missing")
     wanted = [name for name in sensors if any(getattr(log, name) is not None for log in given)]
     if not wanted:
         columns = " nor ".join(f"{name}_x {name}_y {name}_z" for name in sensors)
@@ -88,7 +88,7 @@ def calibrate(
 
 
 class _Session:
-    """One calibration in the making: what was found, and what is to be said of it."""
+    """One calibration in the making: what was found, and notes on it."""
 
     def __init__(
         self, logs: Sequence[Log], found: Sequence[Found], gravity: float, settings: Mapping[str, float]
@@ -107,7 +107,7 @@ class _Session:
         return [pose for pose in self.poses if pose.used]
 
     def calibrated(self, cost: str | None, wanted: Sequence[str]) -> Calibration:
-        """Calibrate sensor after sensor; only what was asked for alone may fail."""
+        """Calibrate sensor after sensor; only what was requested alone may fail."""
         sensors: dict[str, SensorCalibration] = {}
         failures: list[InputError] = []
         temperature: Temperature | None = None
@@ -130,7 +130,7 @@ class _Session:
             raise failures[0]
         if failures and cost is not None and "acc" not in sensors:
             raise failures[0]
-        # What was left out is told once, below.
+        # Left-out stretches are named once, below.
         self.notes += [f"Not calibrated: {error.problem.split(' (pose ')[0]}." for error in failures]
         self._name_left_out()
         effects = {effect: values for sensor in sensors.values() for effect, values in sensor.effects.items()}
@@ -177,8 +177,8 @@ class _Session:
         if cost is None and not self.labelled and strewn and len(usable) >= 7:
             result = accelerometer.fit_magnitude(usable, self.gravity, temperature, misalignment=False)
             self.notes.append(
-                "The poses lie along the axes, but were not laid on a table: lengths tell scale and bias; misalignment "
-                "needs nine attitudes, some of them oblique."
+                "The poses lie along the axes, but were not laid on a table: lengths determine scale and bias; "
+                "misalignment needs nine attitudes, some of them oblique."
             )
         self._say_of_poses(flips)
         return result, temperature
@@ -194,7 +194,7 @@ class _Session:
         self.notes[:0] = flips
 
     def _cost(self, poses: Sequence[Pose]) -> str:
-        """Vector where directions are known; else by what the poses can tell."""
+        """Vector where directions are known; else by the number of poses."""
         if self.labelled or all(pose.attitude is not None for pose in poses):
             return "vector"
         if distinct(np.array([pose.direction for pose in poses])) < checks.UNKNOWNS["magnitude"]:
@@ -248,7 +248,7 @@ class _Session:
         for index, (log, found) in enumerate(zip(self.logs, self.found, strict=True)):
             if log.gyr is None or log.acc is None:
                 continue
-            # A rest without a label says nothing of the accelerometer, but a turn may begin or end there.
+            # A rest without a label is not informative about the accelerometer, but a turn may begin or end there.
             every = find_poses(log, index, settings=self.settings, labelled_only=False) if found.labelled else found
             resting = [pose for pose in every.poses if pose.used]
             if resting:

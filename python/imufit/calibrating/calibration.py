@@ -1,4 +1,4 @@
-"""What a calibration found: a sensor model, what each pose says of it, and a verdict in words."""
+"""The result of a calibration: a sensor model, the residual of each pose, and a verdict in words."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ class Calibration(Result):
     model : SensorModel
         The same as effects, as the loop uses them.
     notes : tuple of str
-        What was left out or could not be told.
+        Left-out data and parameters that were not determined.
     gravity : float
         m/s^2.
     """
@@ -242,7 +242,7 @@ class Calibration(Result):
 
     @property
     def verdict(self) -> str:
-        """What the calibration is worth, in words."""
+        """The verdict on the calibration, in words."""
         lines = [sensor.sentence() for sensor in self.sensors.values()]
         lines += [remark for sensor in self.sensors.values() for remark in sensor.remarks]
         return " ".join([*lines, *self.notes])
@@ -336,13 +336,13 @@ class Calibration(Result):
                         f"{name}_{axis}",
                         f"{sensor.scale[i]:.5f} ± {sensor.scale_error[i]:.5f}"
                         if sensor.scale_error[i] > 0.0
-                        else "not told",
+                        else "not determined",
                         "  ".join(
                             f"{'xyz'[j]} {sensor.misalignment[i, j]:+.5f} ± {sensor.misalignment_error[i, j]:.5f}"
                             for j in range(3)
                             if j != i and sensor.misalignment_error[i, j] > 0.0
                         )
-                        or "not told",
+                        or "not determined",
                         quantity.with_error(float(sensor.bias[i]), float(sensor.bias_error[i]), sensor.unit),
                     )
                 )
@@ -410,5 +410,5 @@ class Calibration(Result):
         ).result
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return [self.verdict]

@@ -1,4 +1,4 @@
-"""Checks of poses before a fit: labels, and whether they can tell the parameters."""
+"""Checks of poses before a fit: labels, and whether they determine the parameters."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def check_labels(poses: Sequence[Pose], file: object) -> tuple[list[Pose], list[
 
 
 def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
-    """Refuse poses that cannot tell the parameters of a cost.
+    """Refuse poses that do not determine the parameters of a cost.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
     Raises
     ------
     InputError
-        Says what is missing.
+        States what is missing.
     """
     count = distinct(np.array([pose.direction for pose in poses]))
     same = [f"{a.number} and {b.number} ({a.name})" for a, b in repeated(poses)]
@@ -113,7 +113,7 @@ def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
 
 
 def too_few_positions(poses: Sequence[Pose], error: InputError, file: object) -> InputError:
-    """Make the error for poses whose equations do not tell the unknowns.
+    """Make the error for poses whose equations do not determine the unknowns.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ AGAIN: Final = 20
 
 
 class FreeTurning:
-    """Says how much of a free rotation was done: in how many directions of the body the field has pointed.
+    """States how much of a free rotation was done: in how many directions of the body the field has pointed.
 
     The middle of all readings is not known beforehand, since hard iron moves it: a sphere is laid through them.
     """

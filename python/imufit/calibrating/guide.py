@@ -19,7 +19,7 @@ NEARLY = 5.0
 
 @dataclass(frozen=True)
 class Advice:
-    """What to tell the person now.
+    """Instruction for the user now.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Advice:
 
 
 class PoseGuide:
-    """Says, sample after sample, which side comes next, whether the sensor is still enough, and when it is done.
+    """States, sample after sample, which side comes next, whether the sensor is still enough, and when it is done.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class PoseGuide:
             kind, value = flaw
             return None, {
                 "short": f"Too short: hold still for longer than {value:.1f} s.",
-                "crept": f"It moved by {np.degrees(value):.1f} deg: hold still.",
+                "crept": f"The sensor moved by {np.degrees(value):.1f} deg: hold still.",
             }.get(kind, "It shook: hold still.")
         axis = int(np.argmax(np.abs(mean)))
         side = ("+" if mean[axis] > 0.0 else "-") + "xyz"[axis]

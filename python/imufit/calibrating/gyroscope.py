@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LEAST_WAY = np.radians(20.0)
-"""Turns shorter than this (rad) tell less than the rests' own noise."""
+"""Turns shorter than this (rad) are less informative than the rests' own noise."""
 TOLD = 0.03
-"""Standard error of A's elements beyond which the turns did not tell them."""
+"""Standard error of A's elements beyond which the turns did not determine them."""
 
 
 def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibration | None:
-    """Calibrate the gyro: bias from the rests, scale and misalignment from the turns where they tell them.
+    """Calibrate the gyro: bias from the rests, scale and misalignment from the turns where they determine both.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
         errors["gyr.bias_temperature"] = named(slope[1])
     nothing = np.zeros((3, 3))
     if told is None:
-        remarks.append("Fewer than three turns between rests: the gyro's scale and misalignment stay as they are.")
+        remarks.append("Fewer than three turns between rests: the gyro's scale and misalignment stay unchanged.")
         return SensorCalibration(
             "gyr", "rest", np.eye(3), np.ones(3), -bias, nothing, np.zeros(3), bias_error, "rad/s",
             np.nan, np.nan, np.nan, "rad", np.zeros(0), 1.0, np.eye(3), 0.0, len(rests), effects, errors,
@@ -68,7 +68,7 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
     gain, gain_error = np.array(told["model_gain"]), np.array(told["model_gain_error"])
     unsure = [AXES[i] for i in range(3) if gain_error[i, i] > TOLD]
     open_elements = gain_error > TOLD
-    # What the turns leave open stays as the maker meant it: a guess must not get into the model.
+    # A parameter that the turns leave open keeps its nominal value: a guess must not get into the model.
     gain[open_elements], gain_error[open_elements] = 0.0, 0.0
     matrix = np.linalg.inv(np.eye(3) + gain)
     scale = np.diag(matrix)
@@ -78,17 +78,17 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
     loose = [name for name, left_open in off_diagonal(open_elements.astype(np.float64)).items() if left_open]
     if unsure:
         remarks.append(
-            f"The turns do not tell the gyro's scale of {', '.join(unsure)}: turn it about that axis while the axis is "
-            "level."
+            f"The turns do not determine the gyro's scale of {', '.join(unsure)}: turn it about that axis while "
+            "the axis is level."
         )
     if loose:
-        remarks.append(f"The turns do not tell the gyro's misalignment {' '.join(loose)}.")
+        remarks.append(f"The turns do not determine the gyro's misalignment {' '.join(loose)}.")
     remarks += [f"Negative scale: gyro axis {AXES[i]} is flipped." for i in range(3) if scale[i] < 0.0]
     held_out = rms(told["held_out"][:, 0])
     before, after = rms(told["before"]), rms(told["residuals"][:, 0])
     worse = held_out > before
     if told["freedom"] < 1.0:
-        remarks.append(f"{len(told['before'])} turns have no equation to spare: nothing checks the gyro's calibration.")
+        remarks.append(f"{len(told['before'])} turns are just enough: the gyro's calibration cannot be checked.")
     if worse:
         remarks.append("The turns do not support a scale or misalignment of the gyro: only its bias is kept.")
     else:
@@ -140,7 +140,7 @@ def _bias(rests: Sequence[Pose]) -> tuple[Array, Array, tuple[Array, Array] | No
     variances = np.array([pose.rate_variance for pose in rests])
     temperature = np.array([pose.temperature for pose in rests])
     count = len(rests)
-    # Rests weigh by their noise and by how the bias wanders from rest to rest.
+    # Rests weigh by their noise and by the random walk of the bias from rest to rest.
     wander = np.zeros(3)
     if count > 2:
         wander = np.maximum(np.var(rates, axis=0, ddof=1) - variances.mean(axis=0), 0.0)

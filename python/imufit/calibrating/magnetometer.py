@@ -64,7 +64,7 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
     remarks = []
     if not given:
         remarks.append(
-            f"The field's strength is not known (metadata mag_reference): lengths are brought to their mean, "
+            f"The field's strength is not known (metadata mag_reference): lengths are scaled to their mean, "
             f"{field:.1f} µT, and the scale common to the three axes is not calibrated."
         )
     try:
@@ -82,7 +82,9 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
         try:
             with_dip = _imufit.magnitude_calibration(readings, groups, field, up=ups)
         except InputError:
-            remarks.append("The dip could not be told: the magnetometer's rotation against the accelerometer is open.")
+            remarks.append(
+                "The dip could not be determined: the magnetometer's rotation against the accelerometer is open."
+            )
         else:
             missed = {key: rms(fit["held_out"][:, 0]) for key, fit in (("length", solution), ("dip", with_dip))}
             # The dip may cost the length a little; much means that "up" was not up.
@@ -92,8 +94,8 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
                 extras["dip"] = float(dip)
                 extras["dip_error_deg"] = _dip_errors(readings[quiet], ups[quiet], solution)
                 remarks.append(
-                    f"The field dips by {np.degrees(dip):.1f} deg; that it does so everywhere also told how the "
-                    "magnetometer sits against the accelerometer."
+                    f"The field dips by {np.degrees(dip):.1f} deg; the constant dip also determines the "
+                    "mount of the magnetometer against the accelerometer."
                 )
     gain, gain_error = np.array(solution["model_gain"]), np.array(solution["model_gain_error"])
     before = np.linalg.norm(readings, axis=1)
@@ -101,7 +103,7 @@ def fit_magnetometer(logs: Sequence[Log], acc: SensorCalibration | None, gravity
     held_out = solution["held_out_length"] - field
     bias_error = np.array(solution["bias_error"])
     if np.any(bias_error > 0.1 * field):
-        remarks.append("Some attitudes are missing: the hard iron is known to no better than a tenth of the field.")
+        remarks.append("Some attitudes are missing: the hard iron is uncertain by a tenth of the field or more.")
     return SensorCalibration(
         sensor="mag",
         cost="magnitude",
@@ -139,7 +141,7 @@ def _chosen(logs: Sequence[Log], acc: SensorCalibration | None, gravity: float) 
     readings: list[Array] = []
     ups: list[Array] = []
     sampled = [(log, np.flatnonzero(~np.isnan(log.mag).any(axis=1))) for log in logs if log.mag is not None]
-    # A log at rest has no size of its own: what counts as new is told by the one that was turned furthest.
+    # A log at rest has no size of its own: the sensor that was turned furthest decides what counts as new.
     size = max((_reach(log.mag[rows]) for log, rows in sampled if log.mag is not None and len(rows)), default=0.0)
     for log, rows in sampled:
         if log.mag is None or not len(rows):

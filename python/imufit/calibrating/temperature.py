@@ -1,4 +1,4 @@
-"""Whether poses at different temperatures tell how bias and scale depend on it."""
+"""Whether poses at different temperatures determine the dependence of bias and scale."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 ENOUGH = 3.0
 """Range of temperatures (K) below which nothing is asked."""
 CONFOUNDED = 0.8
-"""Share of the temperature's variance that the pose alone explains, beyond which the two cannot be told apart."""
+"""Share of the temperature's variance that the pose alone explains, beyond which the two cannot be separated."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Temperature:
         if self.confounded > CONFOUNDED:
             share = f"{100 * self.confounded:.0f} %"
             return (False, False), [
-                f"{shown}, but {share} of that goes with the pose: temperature and pose are confounded, and scale or "
+                f"{shown}, but {share} of that depends on the pose: temperature and pose are confounded, and scale or "
                 "misalignment may hide a temperature effect. Take all sides cold, then all sides warm."
             ]
         if to_spare < 4:

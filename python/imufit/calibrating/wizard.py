@@ -92,7 +92,7 @@ class Wizard:
 
     @property
     def wanted(self) -> str:
-        """What is still missing, in words; empty if nothing is."""
+        """The missing steps, in words; empty if nothing is missing."""
         if not self.sides_known:
             if self.guide.missing:
                 return f"sides {' '.join(self.guide.missing)}"

@@ -44,7 +44,7 @@ def allan(
     json_file: Path | None,
     plot_file: Path | None,
 ) -> None:
-    """Take the Allan deviation of LOG at rest and read the noise off it.
+    """Estimate the noise of LOG at rest from its Allan deviation.
 
     Of a log that moves only the longest rest is used.
     """

@@ -75,8 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 on success, 2 on unusable input or arguments, 130 when interrupted, 141 when nobody reads the output any
-        more, 1 on a fault of the program.
+        0 on success, 2 on unusable input or arguments, 130 when interrupted, 141 when the reader of the output has
+        gone, 1 on a fault of the program.
     """
     if _COMPLETE in os.environ:
         imufit.main(prog_name="imufit")
@@ -87,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 warnings.simplefilter("ignore")
             return _run(given)
     except BrokenPipeError:
-        # What is still to be flushed at the end goes nowhere.
+        # The remaining output is discarded at the end.
         for stream in (sys.stdout, sys.stderr):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
         return PIPE_CLOSED

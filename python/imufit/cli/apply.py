@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 )
 @json_option
 def apply(model: Path, log: Path, *, reading: Reading, output: Path, json_file: Path | None) -> None:
-    """Take the effects of MODEL out of the readings of LOG; rows and all other columns stay as they are."""
+    """Remove the effects of MODEL from the readings of LOG; rows and all other columns stay unchanged."""
     from imufit.figures import quantity  # noqa: PLC0415
     from imufit.results import Table  # noqa: PLC0415
 

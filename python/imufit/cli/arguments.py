@@ -80,7 +80,7 @@ class NamedFile(click.Path):
         """Return the path."""
         _check_name(self, value, param, ctx)
         if self.exists and not os.path.lexists(value) and (near := _neighbours(Path(value))):
-            self.fail(f"there is no {str(value)!r}: did you mean {' or '.join(near)}?", param, ctx)
+            self.fail(f"{str(value)!r} does not exist: did you mean {' or '.join(near)}?", param, ctx)
         return super().convert(value, param, ctx)
 
 

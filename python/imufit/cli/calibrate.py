@@ -45,16 +45,16 @@ if TYPE_CHECKING:
 @click.option("--hold", type=Real(min=0.0, min_open=True), metavar="S", help="Shortest pose, s (default 0.6).")
 @click.option("--live", "port", metavar="PORT", help="Guide through a calibration of the device there.")
 @click.option("--baud", type=Whole(min=1), metavar="BAUD", help="Bits per second of PORT (default 115200).")
-@click.option("--form", type=OneOf("form", ("auto", "binary", "text")), help="What PORT sends (default auto).")
+@click.option("--form", type=OneOf("form", ("auto", "binary", "text")), help="Form that PORT sends (default auto).")
 @click.option("--header", metavar="NAMES", help="Columns of text without a header, such as t_ms,acc_x,acc_y,acc_z.")
 @click.option(
     "--keep",
     type=OutputFile(LOG_ENDINGS),
     metavar="LOG",
-    help="Where to keep what PORT sent (default: beside the model, .parquet).",
+    help="Log that keeps the rows of PORT (default: beside the model, .parquet).",
 )
 @click.option(
-    "--rests", type=Whole(min=6), metavar="N", help="Good rests wanted of PORT, the six sides among them (6)."
+    "--rests", type=Whole(min=6), metavar="N", help="Good rests required of PORT, the six sides among them (6)."
 )
 @click.option(
     "--give-up",
@@ -81,8 +81,8 @@ def calibrate(
     """Calibrate a sensor from one or several LOGs of it, or a running device with --live PORT.
 
     The accelerometer from poses at rest (labelled in the column `pose`, or found), the gyro from the rests and the
-    turns between them, the magnetometer from free rotation. On a running device the terminal says which side to lay
-    up next; nothing has to be pressed, and what came is kept as a log.
+    turns between them, the magnetometer from free rotation. On a running device the terminal states which side to lay
+    up next; a key press is not needed, and the rows are kept as a log.
     """
     out = Output(json_file)
     settings = {} if hold is None else {"hold": hold}
@@ -122,11 +122,11 @@ def calibrate(
 
 
 def _place_of(keep: Path | None, model: Path | None) -> Path:
-    """Return where the log goes: where told, or beside the model by a name that is free."""
+    """Return where the log goes: where stated, or beside the model by a name that is free."""
     if keep is not None:
         return keep
     if model is None:
-        raise click.UsageError("what PORT sends has to be kept: name a model with -o, or a log with --keep")
+        raise click.UsageError("the rows of PORT must be kept: name a model with -o, or a log with --keep")
     path, number = model.with_suffix(".parquet"), 1
     while path.exists():
         number += 1

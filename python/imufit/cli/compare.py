@@ -34,7 +34,7 @@ def compare(
     plot_file: Path | None,
     verbose: bool,
 ) -> None:
-    """Hold the model against LOG: channel by channel, segment by segment, against every covariate."""
+    """Compare the model with LOG: channel by channel, segment by segment, over every covariate."""
     keep_inputs([log, model], [json_file, html_file, plot_file])
     output = Output(json_file)
     with ProgressBar() as progress:

@@ -65,7 +65,7 @@ def convert(
     out.say(f"{found.n} row{'' if found.n == 1 else 's'}{rate}.", bold=True)
     out.say(*(f"{note}." for note in found.notes))
     out.table(_table(found))
-    out.say(f"Not in it: {found.missing_words}." if found.missing else "")
+    out.say(f"Missing: {found.missing_words}." if found.missing else "")
     out.wrote(output)
     out.json({"log": str(output), **found.to_dict()})
 

@@ -33,7 +33,7 @@ def choice(diagnosis: Diagnosis) -> str | None:
     default="demo",
     show_default=True,
     metavar="DIR",
-    help="Where the log, report.html and ladder.png go.",
+    help="Directory of the log, report.html and ladder.png.",
 )
 @click.option(
     "--seed", type=Whole(min=0), default=3, show_default=True, help="Picks the effect, the motion, the noise."

@@ -42,13 +42,13 @@ def diagnose(
     plot_file: Path | None,
     verbose: bool,
 ) -> None:
-    """Say which effect is missing in the model of LOG, or that none is, or that this log cannot tell.
+    """Name the effect that is missing in the model of LOG, or state that none is, or that LOG does not determine it.
 
-    Several LOGs of one sensor are asked together: effects are the same in all of them, each has its own bias and mount,
-    and a log that disagrees is named.
+    Several LOGs of one sensor are diagnosed together: effects are the same in all of them, each has its own bias and
+    mount, and a log that disagrees is named.
 
     A LOG without reference attitude is judged by its rests, the turns between them and the length of the magnetic
-    field; six poses labelled in the column pose are enough. The answer says what that cannot tell.
+    field; six poses labelled in the column pose are enough. The answer lists the effects that such a log cannot show.
     """
     keep_inputs([*logs, model], [json_file, html_file, plot_file])
     output = Output(json_file)

@@ -54,14 +54,18 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
 @click.command()
 @click.argument("source", metavar="SCENARIO|LOG", shell_complete=complete_scenario_or_log)
 @reading_options
-@click.option("--on", default="pty", show_default=True, metavar="pty|socket://127.0.0.1:PORT", help="Where it is read.")
+@click.option(
+    "--on", default="pty", show_default=True, metavar="pty|socket://127.0.0.1:PORT", help="Port of the device."
+)
 @click.option(
     "--link",
     type=NamedFile(),
     metavar="PATH",
     help="Symbolic link to the pty, which stays the same when the device is unplugged.",
 )
-@click.option("--device", type=OneOf("device", DEVICES), default="floats", show_default=True, help="What it sends.")
+@click.option(
+    "--device", type=OneOf("device", DEVICES), default="floats", show_default=True, help="Form of the samples."
+)
 @click.option("--form", type=OneOf("form", FORMS), default="binary", show_default=True, help="Frames or lines of text.")
 @click.option("--rate", type=NumberOr("max"), metavar="HZ|max", help="Samples a second; max: what --baud carries.")
 @click.option("--duration", type=Real(min=0.0, min_open=True), metavar="S", help="Time until it ends, s.")
@@ -69,21 +73,19 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "--speed", type=NumberOr("max"), default=1.0, metavar="X|max", help="Times faster than real; max: as it is read."
 )
-@click.option("--baud", type=Whole(min=300), metavar="BAUD", help="What the line carries, bits a second.")
+@click.option("--baud", type=Whole(min=300), metavar="BAUD", help="Capacity of the line, bits a second.")
 @click.option("--tick", type=Whole(1, 10**9), default=1000, metavar="NS", help="Tick of its clock, ns (1000).")
-@click.option("--clock-drift", type=Real(), default=0.0, metavar="PPM", help="By how much its clock goes fast.")
+@click.option("--clock-drift", type=Real(), default=0.0, metavar="PPM", help="Rate by which its clock is fast.")
 @click.option("--clock-jitter", type=Real(min=0.0), default=0.0, metavar="S", help="Noise of its stamps, s.")
-@click.option("--clock-start", type=Whole(0, 2**32 - 1), default=0, metavar="TICKS", help="Where its clock begins.")
+@click.option("--clock-start", type=Whole(0, 2**32 - 1), default=0, metavar="TICKS", help="First tick of its clock.")
 @click.option(
     "--fault",
     "faults",
     multiple=True,
     metavar="KIND@S[:LENGTH]",
-    help=f"What goes wrong when: {', '.join(KINDS)}. Repeatable.",
+    help=f"A fault and its time: {', '.join(KINDS)}. Repeatable.",
 )
-@click.option(
-    "--fault-rate", "fault_rates", multiple=True, metavar="KIND=PER_S", help="What goes wrong by chance. Repeatable."
-)
+@click.option("--fault-rate", "fault_rates", multiple=True, metavar="KIND=PER_S", help="A random fault. Repeatable.")
 @click.option(
     "--effect",
     "effects",
@@ -95,12 +97,12 @@ class NumberOr(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "--data-sheet",
     is_flag=True,
-    help="Put in errors within the limits of the MPU-6050's data sheet, drawn by --seed; --effect goes before them.",
+    help="Put in errors within the limits of the MPU-6050's data sheet, drawn by --seed; --effect overrides them.",
 )
-@click.option("--seed", type=Whole(min=0), default=0, metavar="SEED", help="Seed of everything random.")
-@click.option("--wait/--no-wait", default=None, help="Switch it on when somebody reads (a socket) or at once (a pty).")
+@click.option("--seed", type=Whole(min=0), default=0, metavar="SEED", help="Seed of all random numbers.")
+@click.option("--wait/--no-wait", default=None, help="Start when the port is opened (a socket) or at once (a pty).")
 @click.option(
-    "--sent", type=OutputFile((".parquet",)), metavar="FILE", help="Keep every sample with what became of it, .parquet."
+    "--sent", type=OutputFile((".parquet",)), metavar="FILE", help="Keep every sample with its fate, .parquet."
 )
 @json_option
 def emulate(
@@ -119,7 +121,7 @@ def emulate(
     json_file: Path | None,
     **options: Any,
 ) -> None:
-    """Be a device that measures a SCENARIO of `imufit simulate`, or what a LOG holds.
+    """Emulate a device that measures a SCENARIO of `imufit simulate`, or the readings of a LOG.
 
     The first line on standard output is the port that `imufit record`, `imufit monitor` and `imufit calibrate --live`
     open. Ctrl-C ends it.
@@ -140,7 +142,8 @@ def emulate(
         **options,
     )
     with LifeLine() as life, engine.running(device, life):
-        # Whoever waits for the port reads one line; with the JSON on standard output it stands on standard error.
+        # A program that waits for the port reads one line; with the JSON on standard output it stands on standard
+        # error.
         click.echo(device.port, err=str(json_file) == "-")
         sys.stdout.flush()
     found = device.summary()

@@ -169,7 +169,7 @@ def load_effects(path: Path) -> None:
     Raises
     ------
     InputError
-        The file cannot be run; the message says why.
+        The file cannot be run; the message states why.
     """
     import imufit  # noqa: PLC0415
     from imufit.errors import InputError  # noqa: PLC0415
@@ -410,7 +410,7 @@ def emulator(
     Raises
     ------
     InputError
-        It cannot be emulated; the message says why.
+        It cannot be emulated; the message states why.
     """
     from imufit.devices.emulate import Clock, Emulator, parse_fault_rate  # noqa: PLC0415
     from imufit.errors import InputError  # noqa: PLC0415
@@ -437,7 +437,7 @@ def data_sheet_errors(seed: int) -> dict[str, dict[str, float] | None]:
 def running(device: Emulator, watch: Callable[[int, str], None]) -> Iterator[None]:
     """Let a device run until it has sent everything or is asked to end, also where Ctrl-C is ignored at the start.
 
-    `watch` is told the samples so far, and whether anybody reads them.
+    `watch` receives the samples so far, and whether a reader is there.
     """
     from imufit.devices.record.signals import requests_to_end  # noqa: PLC0415
 
@@ -445,7 +445,7 @@ def running(device: Emulator, watch: Callable[[int, str], None]) -> Iterator[Non
         yield
         while not device.join(0.1) and not asked():
             told = device.summary()
-            watch(told["samples"], "nobody reads" if told["samples"] and told["unread"] == told["samples"] else "")
+            watch(told["samples"], "not read" if told["samples"] and told["unread"] == told["samples"] else "")
 
 
 def unseal(path: Path) -> Truth:
@@ -454,7 +454,7 @@ def unseal(path: Path) -> Truth:
     Raises
     ------
     InputError
-        There is no sealed truth beside the log, or it is damaged.
+        The sealed truth beside the log is missing or damaged.
     """
     from imufit.errors import InputError  # noqa: PLC0415
     from imufit.lab.simulate import unseal  # noqa: PLC0415

@@ -17,7 +17,7 @@ from imufit.cli.output import Output
 @effects_from_option
 @json_option
 def explain(effect: str | None, *, json_file: Path | None) -> None:
-    """Explain EFFECT: physics, formula, typical size, signature, what it is mistaken for, what confirms it.
+    """Explain EFFECT: physics, formula, typical size, signature, similar effects, confirming experiment.
 
     Part of an id, such as acc or delay, lists the effects whose ids begin with that part, else those that hold it.
     """

@@ -29,7 +29,7 @@ from imufit.whole_file import write_text
 def export(model: Path, *, form: str, output: Path | None, json_file: Path | None) -> None:
     """Export gains and offsets of MODEL: corrected = A raw + b for each sensor.
 
-    Effects that are no constant gain or offset are named in a comment; `imufit apply` undoes them all.
+    A comment names the effects that are not a constant gain or offset; `imufit apply` undoes them all.
     """
     keep_inputs([model], [output, json_file])
     out = Output(json_file)

@@ -29,9 +29,9 @@ from imufit.cli.progress import ProgressBar
 @click.option("--processes", type=Whole(min=1), help="Logs at a time; one per processor without it.")
 @json_option
 def grade(*, sets: tuple[str, ...], logs: int, seed: int | None, processes: int | None, json_file: Path | None) -> None:
-    """Diagnose many simulated logs without knowing what was done to them, and mark the answers.
+    """Diagnose many simulated logs with hidden effects, and mark the answers.
 
-    Each log depends on its set and its seed alone: what failed is told with both, so that it can be repeated.
+    Each log depends on its set and its seed alone: a failure is reported with both, so that it can be repeated.
     """
     out = Output(json_file)
     first = secrets.randbelow(10**9) if seed is None else seed

@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 @click.command()
 @log_argument
-@click.option("--quick", is_flag=True, help="Leave out which effects the log can show, which takes most of the time.")
+@click.option("--quick", is_flag=True, help="Leave out the effects, which take most of the time.")
 @effects_from_option
 @json_option
 @verbose_option
 def info(log: Path, *, reading: Reading, quick: bool, json_file: Path | None, verbose: bool) -> None:
-    """Tell what is in LOG, and which effects it can and cannot show.
+    """List the contents of LOG, and the effects that it can and cannot show.
 
     An effect can be shown if its typical size stands out from the noise of this log: its parameters' standard errors
-    follow from the log's own normal equations. Without a reference attitude the rests stand in for one.
+    follow from the log's own normal equations. Without a reference attitude the rests replace it.
     """
     keep_inputs([log], [json_file])
     out = Output(json_file)

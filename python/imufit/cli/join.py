@@ -58,8 +58,8 @@ class AttitudeColumns(click.ParamType):  # type: ignore[type-arg]
     "where the axis is not known.",
 )
 @click.option("--inverse", is_flag=True, help="The attitude turns vectors of the reference frame into the body.")
-@click.option("--lag", type=float, metavar="S", help="Time by which the reference's stamps are late, if it is known.")
-@click.option("--skew", type=float, metavar="PPM", help="How much the reference's clock is fast, if it is known.")
+@click.option("--lag", type=float, metavar="S", help="Delay of the reference's stamps, if known.")
+@click.option("--skew", type=float, metavar="PPM", help="Rate by which the reference's clock is fast, if known.")
 @click.option("-o", "--output", type=OutputFile(LOG_ENDINGS), required=True, metavar="LOG", help="Log to write.")
 @json_option
 @plot_option
@@ -78,9 +78,9 @@ def join(
     json_file: Path | None,
     plot_file: Path | None,
 ) -> None:
-    """Lay the attitude, the angle or the positions of REFERENCE beside the readings of SENSOR, whose clock is another.
+    """Join the attitude, the angle or the positions of REFERENCE to the readings of SENSOR, with another clock.
 
-    The lag is found by the angular rates of both, whatever the axes of the sensor on the body are; then lag, skew and
+    The lag is found by the angular rates of both, with any axes of the sensor on the body; then lag, skew and
     mount are refined on the attitude. LOG has all rows of SENSOR and, in rows of their own, all samples of REFERENCE.
     """
     keep_inputs([sensor, reference], [output, json_file, plot_file])

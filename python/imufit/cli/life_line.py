@@ -18,7 +18,7 @@ _WINDOW: Final = 2.0
 
 
 class LifeLine:
-    """Tells seconds, samples, rate and how to stop on standard error; a context manager that ends the line."""
+    """Shows seconds, samples, rate and the key to stop on standard error; a context manager that ends the line."""
 
     def __init__(self) -> None:
         self._in_place = sys.stderr.isatty()

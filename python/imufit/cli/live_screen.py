@@ -1,4 +1,4 @@
-"""What a live calibration shows: a picture that changes on a terminal, plain lines elsewhere."""
+"""The display of a live calibration: a picture that changes on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 

@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     help="Repeatable; without it triad, mahony, hybrid with a magnetometer, else accel, gyro, complementary, kalman.",
 )
 @click.option(
-    "--model", "model_file", type=EXISTING, metavar="MODEL", help="Take its effects out of the readings first."
+    "--model", "model_file", type=EXISTING, metavar="MODEL", help="Remove its effects from the readings first."
 )
 @effects_from_option
 @frame_option
 @duration_option
-@click.option("--plain", is_flag=True, help="Lines of numbers instead of a table; so it is where there is no terminal.")
+@click.option("--plain", is_flag=True, help="Lines of numbers instead of a table; also without a terminal.")
 @click.option(
     "--updates",
     type=Real(min=0.1, max=20.0),
@@ -102,7 +102,7 @@ def monitor(
                 kept.append((last.t, last.angles))
     if last is not None:
         if not last.n:
-            raise click.UsageError(f"nothing came that could be shown: {last.trouble}")
+            raise click.UsageError(f"the device sent nothing that could be shown: {last.trouble}")
         out.json(last.to_dict())
         if plot_file is not None:
             out.plot(plot_file, _figure(kept))

@@ -1,4 +1,4 @@
-"""The commands of the program: each is imported when it is first asked for, so that `imufit --help` is quick."""
+"""The commands of the program: each is imported when it is first used, so that `imufit --help` is quick."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from click.shell_completion import CompletionItem
 from imufit.cli.names import unknown
 
 SUMMARIES: Final = {
-    "info": "What is in a log: rates, gaps, rests, reference, and the effects that it can show.",
+    "info": "The contents of a log: rates, gaps, rests, reference, and the effects that it can show.",
     "plot": "Readings, reference and rests of a log over time, as a figure.",
     "calibrate": "Calibrate accelerometer, gyro and magnetometer.",
     "compare": "Where the model fails: by channel, segment and covariate.",
-    "diagnose": "Which effect is missing, with its expected gain.",
+    "diagnose": "Name the missing effect, with its expected gain.",
     "add": "Add an effect, refit, show the error before, expected and after.",
     "ladder": "Repeat diagnose and add until nothing is missing.",
     "fit": "Fit a stack of effects.",
-    "apply": "A log with the model's effects taken out of its readings.",
+    "apply": "A log with the model's effects removed from its readings.",
     "export": "A model as C, Arduino sketch, Python for imufusion or ahrs, JSON.",
     "explain": "An effect's card; without EFFECT the catalogue.",
     "simulate": "A synthetic log, on request with a hidden effect.",
-    "reveal": "What was done to a simulated log; grades an answer.",
-    "grade": "The blind protocol: how often the answer is right.",
+    "reveal": "The truth of a simulated log; grades an answer.",
+    "grade": "The blind protocol: rate of right answers on hidden effects.",
     "replay": "Attitude for every row, its error, and the methods' tilt beside each other.",
     "tune": "Gains of a filter: by its error, or without reference by its predictions.",
     "allan": "Noise density, bias instability and random walk of sensors at rest.",
-    "convert": "Another maker's file, a text table or a serial transcript becomes a log.",
-    "join": "A sensor's log and somebody else's reference, on two clocks, become one log.",
-    "record": "From a serial device to a log that cannot be lost.",
+    "convert": "Convert another maker's file, a text table or a serial transcript to a log.",
+    "join": "Join a sensor's log and a reference on another clock to one log.",
+    "record": "Record a serial device to a log, safe against crashes.",
     "monitor": "Attitude of a running device by several filters at once.",
-    "recover": "A log of what a recording left that was killed or ran out of disk.",
+    "recover": "Make a log from the part of a recording that was killed or ran out of disk.",
     "emulate": "A device without hardware: a scenario or a log on a pty or socket.",
     "demo": "The whole loop on a log with a hidden effect.",
 }
-"""What each command does, in the order of the loop; the command ``info`` stands in ``imufit.cli.info`` by that name."""
+"""The purpose of each command, in the order of the loop; ``imufit.cli.info`` has the command ``info``."""
 
 
 class OnDemand(MutableMapping[str, click.Command]):

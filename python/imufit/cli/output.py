@@ -1,4 +1,4 @@
-"""What the commands print and write."""
+"""Output of the commands, printed and written."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _harmless(text: str) -> str:
 
 
 class Output:
-    """Standard output for people, and the files that were asked for.
+    """Standard output for people, and the files that were requested.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Output:
 
     @cached_property
     def _console(self) -> Console:
-        """What prints: made when there is something to say, an input that is refused does not wait for it."""
+        """The printer: made when there is something to say, an input that is refused does not wait for it."""
         from rich.console import Console  # noqa: PLC0415
 
         class Piped(Console):
@@ -131,7 +131,7 @@ class Output:
         self._console.print(rich_table)
 
     def _blocks(self, table: Table, limit: int | None) -> None:
-        """Print each row as a block: its first cell, then a line for each other cell that says something."""
+        """Print each row as a block: its first cell, then a line for each other non-empty cell."""
         from rich.table import Table as RichTable  # noqa: PLC0415
         from rich.text import Text  # noqa: PLC0415
 
@@ -152,7 +152,7 @@ class Output:
             self.table(table)
 
     def json(self, value: Mapping[str, Any] | list[Any]) -> None:
-        """Write the JSON, if it was asked for."""
+        """Write the JSON, if it was requested."""
         if self._json_file is None:
             return
         text = json.dumps(value, indent=2, allow_nan=False) + "\n"

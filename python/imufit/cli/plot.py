@@ -55,7 +55,7 @@ class ColumnNames(click.ParamType):  # type: ignore[type-arg]
     type=OneOf("part of the figure", ("readings", "reference", "both")),
     default="both",
     show_default=True,
-    help="What to draw: the readings, the reference's attitude and rates, or both.",
+    help="Parts to draw: the readings, the reference's attitude and rates, or both.",
 )
 @click.option("--rows", type=RowRange(), metavar="FIRST:STOP", help="Draw these rows alone, counted from 0.")
 @click.option("--from", "begin", type=Real(), metavar="S", help="Draw from this time on.")

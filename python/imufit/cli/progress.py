@@ -17,8 +17,8 @@ PATIENCE_S: Final = 2.0
 class ProgressBar:
     """Called by the library as ``progress(done, total, label)``; a context manager that takes the bar away again.
 
-    The bar tells the step, what is done within the step, and the time since the start. Where the calls count the
-    whole work, the bar tells the share that is done and the time left as well; else nobody can know these.
+    The bar shows the step, the progress within the step, and the time since the start. Where the calls count the
+    whole work, the bar shows the share done and the time left as well; else both are unknown.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class ProgressBar:
         if (done, total) == (0, 1):
             self._step, self._pass = label, ""
         else:
-            # What was counted to its end is over: the bar must not stand at 100 % while something else works on.
+            # A finished count is over: the bar must not stand at 100 % while something else works on.
             self._pass = label if self._counted or done < total else ""
             self._share = max(self._share, done / total)
         with self._lock:
@@ -101,7 +101,7 @@ class ProgressBar:
             self._show()
 
     def _show(self) -> None:
-        """Renew what the bar says."""
+        """Renew the text of the bar."""
         if self._bar is None or self._task is None or self._closed:
             return
         known = self._counted and self._share > 0.0

@@ -31,20 +31,20 @@ _DECLARATIONS = (
         "--frame",
         type=OneOf("frame", FRAMES, case_sensitive=False),
         metavar="|".join(FRAMES),
-        help="Frame of the reference attitude, whatever the file states.",
+        help="Frame of the reference attitude, overriding the file.",
     ),
     click.option(
         "--noise",
         multiple=True,
         metavar="SENSOR=VALUE",
-        help="White noise of one sample, whatever the file states: acc in m/s^2, gyr in rad/s, mag in uT, e.g. "
+        help="White noise of one sample, overriding the file: acc in m/s^2, gyr in rad/s, mag in uT, e.g. "
         "acc=0.02,gyr=0.05[deg/s]. Repeatable.",
     ),
     click.option(
         "--drop",
         multiple=True,
         metavar="COLUMN",
-        help="Leave this column out; acc, gyr, mag, ref_q and ref_p stand for all of theirs. Repeatable.",
+        help="Leave this column out; acc, gyr, mag, ref_q and ref_p stand for all of their columns. Repeatable.",
     ),
 )
 

@@ -27,7 +27,7 @@ from imufit.cli.reading import map_option
     "Enter; type only Enter while the rig moves.",
 )
 @click.option("--axis", type=OneOf("axis", ("x", "y", "z")), help="Body axis about which the rig turns.")
-@click.option("--force", is_flag=True, help="Overwrite LOG if it is there already.")
+@click.option("--force", is_flag=True, help="Overwrite LOG if it exists already.")
 @click.option("--quiet", is_flag=True, help="No status line and no messages of the device.")
 @json_option
 def record(
@@ -49,7 +49,7 @@ def record(
 ) -> None:
     """Record the device on PORT until Ctrl-C: /dev/ttyUSB0, COM3, a pseudo-terminal or socket://HOST:PORT.
 
-    The device speaks the wire protocol, binary or text. While it runs, rows go to LOG.part; `imufit recover` makes a
+    The device uses the wire protocol, binary or text. While it runs, rows go to LOG.part; `imufit recover` makes a
     log of it after a crash. A line that is lost is opened again, and the gap is marked.
     """
     keep_inputs([], [output, json_file])

@@ -14,16 +14,20 @@ from imufit.cli.output import Output
 @click.command()
 @click.argument("file", metavar="FILE", type=NamedFile())
 @click.option(
-    "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="LOG", help="Log to write; without it the one meant to be."
+    "-o",
+    "--output",
+    type=OutputFile(LOG_ENDINGS),
+    metavar="LOG",
+    help="Log to write (default: the name of the interrupted recording).",
 )
-@click.option("--port", metavar="PORT", help="The device, to ask what samples hold that came before it said so.")
-@click.option("--force", is_flag=True, help="Overwrite LOG if it is there already.")
+@click.option("--port", metavar="PORT", help="The device, to request the columns of samples before its announcement.")
+@click.option("--force", is_flag=True, help="Overwrite LOG if it exists already.")
 @click.option("--keep", is_flag=True, help="Keep the .part files.")
 @json_option
 def recover(
     file: Path, *, output: Path | None, port: str | None, force: bool, keep: bool, json_file: Path | None
 ) -> None:
-    """Make the log of FILE, a LOG.part that `imufit record` left. Every whole batch is saved."""
+    """Make the log of FILE, a LOG.part left by `imufit record`, with every whole batch."""
     keep_inputs([file], [output, json_file])
     out = Output(json_file)
     result = engine.recover(file, output, port=port, force=force, keep=keep)

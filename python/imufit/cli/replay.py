@@ -43,7 +43,7 @@ _MADE = 100
     help=f"Out of {', '.join(FILTERS)}. Repeatable; without it all that the log allows.",
 )
 @click.option(
-    "--model", "model_file", type=EXISTING, metavar="MODEL", help="Take its effects out of the readings first."
+    "--model", "model_file", type=EXISTING, metavar="MODEL", help="Remove its effects from the readings first."
 )
 @effects_from_option
 @set_option
@@ -52,7 +52,7 @@ _MADE = 100
     "settings_file",
     type=EXISTING,
     metavar="FILE.toml",
-    help="Settings as `imufit tune -o` and `imufit allan --settings` write them; --set goes before them.",
+    help="Settings as `imufit tune -o` and `imufit allan --settings` write them; --set overrides them.",
 )
 @click.option(
     "--band",
@@ -93,7 +93,7 @@ def replay(
 
     For a rig with one axis (metadata rig_axis) the error of the angle about that axis, else of the whole attitude and
     of the inclination: RMSE, offset, standard deviation, drift, noise density, settling time, gain on vibration, and
-    how the methods rank.
+    ranks of the methods.
     """
     keep_inputs([log, model_file, settings_file], [output, json_file, plot_file])
     names = tuple(dict.fromkeys(name for group in filters for name in group))

@@ -81,7 +81,7 @@ def read_answer(path: Path) -> dict[str, Any]:
     for key in ("candidates", "steps"):
         entries = answer.get(key, [])
         if not (isinstance(entries, list) and all(isinstance(entry, dict) and "effect" in entry for entry in entries)):
-            raise InputError("this is no list of effects", file=path, column=key, remedy=_AS_WRITTEN)
+            raise InputError("this is not a list of effects", file=path, column=key, remedy=_AS_WRITTEN)
     entries = [*answer.get("candidates", []), *answer.get("steps", [])]
     by_effect = answer.get("parameters") or {}
     tables = [by_effect, *(by_effect.values() if isinstance(by_effect, dict) else ())]
@@ -94,7 +94,7 @@ def read_answer(path: Path) -> dict[str, Any]:
             if not all(part is None or isinstance(part, int | float) for part in parts):
                 raise InputError("the parameter is not a number", file=path, column=name, remedy=_AS_WRITTEN)
     if not isinstance(answer.get("ambiguous_with") or [], list):
-        raise InputError("this is no list of effects", file=path, column="ambiguous_with", remedy=_AS_WRITTEN)
+        raise InputError("this is not a list of effects", file=path, column="ambiguous_with", remedy=_AS_WRITTEN)
     return answer
 
 
@@ -103,7 +103,7 @@ def read_answer(path: Path) -> dict[str, Any]:
 @click.option("--answer", type=EXISTING, metavar="JSON", help="Grade this JSON of `diagnose` or `ladder`.")
 @json_option
 def reveal(log: Path, *, answer: Path | None, json_file: Path | None) -> None:
-    """Tell what was done to the simulated LOG, and whether an answer was right."""
+    """Show the truth of the simulated LOG, and whether an answer was right."""
     from imufit.results import Table  # noqa: PLC0415
     from imufit.results.json_value import json_value  # noqa: PLC0415
 

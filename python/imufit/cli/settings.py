@@ -32,7 +32,7 @@ def settings_from(assignments: Sequence[str]) -> dict[str, dict[str, float]]:
     Raises
     ------
     click.UsageError
-        Not of that form, an unknown name (the known ones are told), or no finite number.
+        Not of that form, an unknown name (the message lists the known names), or not a finite number.
     """
     settings: dict[str, dict[str, float]] = {}
     for text in assignments:
@@ -54,6 +54,6 @@ def settings_from(assignments: Sequence[str]) -> dict[str, dict[str, float]]:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise click.UsageError(f"--set {text!r}: {number.strip()!r} is no number")
+            raise click.UsageError(f"--set {text!r}: {number.strip()!r} is not a number")
         settings.setdefault(group, {})[name] = value
     return settings

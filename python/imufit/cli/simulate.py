@@ -80,7 +80,7 @@ def chosen_effects(texts: Sequence[str]) -> dict[str, dict[str, float] | None]:
     shell_complete=complete_injection,
     help="Effect to put in, SI units; without values they are drawn. Repeatable.",
 )
-@click.option("--hidden", type=Whole(min=0), metavar="SEED", help="Let this seed pick the effect, untold.")
+@click.option("--hidden", type=Whole(min=0), metavar="SEED", help="Let this seed pick a hidden effect.")
 @click.option(
     "--fault",
     type=Known("fault", engine.faults),
@@ -112,7 +112,7 @@ def simulate(
 ) -> None:
     """Simulate a log of SCENARIO: turntable, arm, poses, six_sides, tilt, handheld, or of a machine tool, machine_...
 
-    What was done to it is kept sealed beside the log; `imufit reveal LOG` opens it.
+    The truth is kept sealed beside the log; `imufit reveal LOG` opens it.
     """
     if hidden is not None and effects:
         raise click.UsageError("--hidden picks the effect itself: leave out --effect")
@@ -132,7 +132,7 @@ def simulate(
     rows, span = len(simulation.t), float(simulation.t[-1] - simulation.t[0])
     out.say(f"{scenario}: {rows} rows over {span:.1f} s, frame {frame}.", bold=True)
     if hidden is not None:
-        out.say(f"What is wrong with the sensor is hidden; `imufit reveal {output}` tells.")
+        out.say(f"The sensor's error is hidden; `imufit reveal {output}` shows the truth.")
     else:
         out.say(f"Effects: {', '.join(chosen) or 'none'}.")
     if fault is not None:

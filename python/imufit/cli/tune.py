@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 @click.option(
     "--by",
     type=OneOf("criterion", ("error", "prediction")),
-    help="What is minimised; without it the error where LOG has a reference.",
+    help="The minimised error; without it the error where LOG has a reference.",
 )
 @click.option(
     "--metric",
@@ -76,7 +76,7 @@ def tune(
     json_file: Path | None,
     plot_file: Path | None,
 ) -> None:
-    """Tune the gains of a filter on LOG, judge them on data they were not tuned on, and tell how much they matter."""
+    """Tune the gains of a filter on LOG, judge them on data they were not tuned on, and measure their influence."""
     keep_inputs([log], [output, json_file, plot_file])
     settings = settings_from(assignments)
     out = Output(json_file)

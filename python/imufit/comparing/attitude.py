@@ -1,4 +1,4 @@
-"""What a model is worth to an attitude filter, and what limits the filter then: calibration, environment or filter.
+"""Benefit of a model to an attitude filter, and the filter's remaining limit: calibration, environment or filter.
 
 The filter runs over the readings as they are and over those with the model's effects taken out. The error
 ``e = q_est * q_ref^-1`` is split into heading and inclination (seen in the reference frame), and each is held against
@@ -41,18 +41,18 @@ LIMITS = 0.5
 CALMEST = 0.25
 UNITS = {"angular_rate": "deg/s", "acceleration": "m/s²", "field_disturbance": "%", "time": "s"}
 CAUSES = {
-    "angular_rate": ("filter", "errors of the rate, of its timing or of the filter's gains come with rotation"),
+    "angular_rate": ("filter", "errors of the rate, of its timing or of the filter's gains appear with rotation"),
     "acceleration": ("filter", "specific force is not gravity while the body accelerates"),
-    "field_disturbance": ("environment", "the field is disturbed where the body is"),
-    "drift": ("filter", "it grows with time: nothing holds it"),
-    "constant": ("calibration", "it is constant: a bias, a mount or a field direction"),
+    "field_disturbance": ("environment", "the magnetic field is disturbed at the body's place"),
+    "drift": ("filter", "the error grows with time, without a correction"),
+    "constant": ("calibration", "a bias, a mount or a field direction is a constant error"),
 }
 
 
 def attitude_comparison(
     model: EffectStack, log: LogSource, filter_name: str = FILTER, progress: Progress = silent
 ) -> AttitudeComparison | None:
-    """Run a filter over a log without and with a model applied, and say what its error goes with.
+    """Run a filter over a log without and with a model applied, and name the quantity that its error depends on.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def attitude_comparison(
         if kept.sum() < MIN_ROWS:
             return None
     before, after = ({part: e[kept] for part, e in errors.items()} for errors in (before, after))
-    # A sensor whose readings stand in other rows than the reference says nothing of these.
+    # A sensor whose readings stand in other rows than the reference is not informative about these.
     quantities = {name: x[kept] for name, x in _quantities(log).items() if np.isfinite(x[kept]).any()}
     tilts = [v[kept] for v in _tilts(run, filter_name)]
     dependences = sorted(
@@ -277,7 +277,7 @@ def _bins(before: dict[str, Array], after: dict[str, Array], quantities: dict[st
 def _limit(
     name: str, before: dict[str, float], after: dict[str, float] | None, dependences: list[AttitudeDependence]
 ) -> tuple[str, str]:
-    """Return what limits the filter and the sentence that says so."""
+    """Return the limit of the filter and its sentence."""
     text = f"The attitude of {name} is off by {before['total']:.2f} deg"
     now = before
     if after is not None:
@@ -287,10 +287,11 @@ def _limit(
     larger = "heading" if now["heading"] >= now["inclination"] else "inclination"
     causes = [d for d in dependences if d.part == larger and d.share >= LIMITS]
     if not causes:
-        return "undecided", f"{text} What is left goes with nothing that was looked at alone."
+        return "undecided", f"{text} The remaining error does not correlate with any single quantity tested."
     cause = causes[0]
     limit, why = CAUSES[cause.quantity]
     where = {"filter": "the filter", "environment": "the environment", "calibration": "calibration"}[limit]
     what = cause.quantity.replace("_", " ")
+    dependence = "is constant" if cause.quantity == "constant" else f"depends on the {what}"
     share = f"{100.0 * cause.share:.0f} %"
-    return limit, f"{text} {share} of the {larger}'s mean square goes with {what}: {where} limits it, since {why}."
+    return limit, f"{text} {share} of the {larger}'s mean square error {dependence}. The limit is {where}: {why}."

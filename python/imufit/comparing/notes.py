@@ -1,4 +1,4 @@
-"""What the reader should know about the figures of a log: what it is judged by, its noise, and what it cannot tell."""
+"""Notes on the figures of a log: its evidence, its noise, and its limits."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def notes(evidence: LogEvidence) -> tuple[str, ...]:
 
 
 def _of_rows(evidence: LogEvidence) -> list[str]:
-    """Return what is to be said of a log with a reference."""
+    """Return notes on a log with a reference."""
     log, facts = evidence.surveyed.log, evidence.facts
     out = [*evidence.passes.empty]
     stated = log.metadata.noise
@@ -37,19 +37,19 @@ def _of_rows(evidence: LogEvidence) -> list[str]:
             if not 1 / OFF_FLOOR < group / floor < OFF_FLOOR:
                 sensor = CHANNELS[index][:3]
                 out.append(
-                    f"The stated noise of {sensor} is {stated[sensor]:.3g} {UNITS[sensor]}; what no effect explains "
-                    f"here is {group:.3g} {UNITS[sensor]}."
+                    f"The stated noise of {sensor} is {stated[sensor]:.3g} {UNITS[sensor]}; the residual that "
+                    f"no effect explains is {group:.3g} {UNITS[sensor]}."
                 )
     for sensor, steps in zip(SENSOR_NAMES, facts.steps, strict=True):
         if any(steps):
             out.append(
                 f"Readings of {sensor} come in steps of {max(steps):.3g} {UNITS[sensor]}, coarse against the noise; "
-                "where they move, what rounding does to them is fitted along."
+                "in motion the rounding is fitted along."
             )
     if facts.field_estimated and "mag" in facts.sensors:
         out.append("The reference field was estimated from this log and is fitted along.")
     if evidence.passes.commanded is not None:
-        out.append("The reference is the attitude at ref_angle: ref_q is the same but for its noise.")
+        out.append("The reference is the attitude at ref_angle: ref_q differs from it only by noise.")
     coloured = sorted({CHANNELS[k][:3] for k, taps in enumerate(evidence.filters) if taps})
     if coloured:
         out.append(f"The residual noise of {', '.join(coloured)} is coloured; the fit whitens it.")
@@ -57,7 +57,7 @@ def _of_rows(evidence: LogEvidence) -> list[str]:
 
 
 def _of_rests(evidence: LogEvidence, passes: RestPasses) -> list[str]:
-    """Return what a log without a reference is judged by, and what it cannot tell."""
+    """Return the evidence of a log without a reference, and its limits."""
     rests = passes.rests
     told = []
     if rests.rests:
@@ -78,8 +78,8 @@ def _of_rests(evidence: LogEvidence, passes: RestPasses) -> list[str]:
     limits = []
     if "acc" in rests.sensors and not rests.labels:
         limits.append(
-            "Of acc.misalignment only the change of the angles between the axes shows at rest; how the sensor sits on "
-            "its body does not, nor whether the table is level."
+            "Of acc.misalignment only the change of the angles between the axes shows at rest; the mount of the "
+            "sensor and the level of the table do not."
         )
     if rests.rests and "gyr" in rests.sensors and not rests.turns:
         limits.append("Without turns between rests the gyroscope's scale and axes are not determined.")

@@ -1,4 +1,4 @@
-"""What a dependence that no effect explains is worth: its share of a residual's excess, and where in time it lies."""
+"""The weight of a dependence that no effect explains: its share of a residual's excess, and where in time it lies."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from imufit.remedy import Remedy
 from imufit.rests.poses import SIDES
 
 PATIENCE: Final = 300.0
-"""Time without anything new after which a live calibration is given up, s."""
+"""Time without anything new after which a live calibration ends, s."""
 
 
 def calibrate_live(
@@ -39,7 +39,7 @@ def calibrate_live(
     """Guide a person through a calibration of a running device.
 
     The six sides are wanted, in any order, and free rotation if there is a magnetometer. Everything that comes is
-    recorded as `imufit.devices.record.record` does, and stays if this is stopped by Ctrl-C, given up or killed; the
+    recorded as `imufit.devices.record.record` does, and stays if this is stopped by Ctrl-C, ended or killed; the
     log is calibrated as `imufit.calibrating.calibrate` does.
 
     Parameters
@@ -59,7 +59,7 @@ def calibrate_live(
     cost, sensors, settings
         As for `imufit.calibrating.calibrate`; ``hold`` is 2 s for the person unless given.
     rests : int
-        Good rests that are wanted, the six sides among them: rounds of quarter turns tell the gyro's misalignment.
+        Good rests that are wanted, the six sides among them: rounds of quarter turns determine the gyro's misalignment.
     give_up : float
         Time without a new side or direction after which it ends, s.
     show : callable
@@ -73,8 +73,8 @@ def calibrate_live(
     Raises
     ------
     InputError
-        The port cannot be opened, the log is in the way, it was stopped or given up, or the log does not tell a
-        calibration; what was recorded is kept.
+        The port cannot be opened, the log is in the way, it was stopped or ended, or the log does not determine a
+        calibration; the recorded rows are kept.
     """
     looked = _Looking(Wizard(sensors, rests, settings), LiveConverter(mapping), give_up, show)
     record(
@@ -91,7 +91,7 @@ def calibrate_live(
         why = f"given up after {give_up:g} s without anything new" if looked.is_late() else "stopped"
         raise InputError(
             f"{why}: {looked.wizard.wanted} missing",
-            remedy=f"What came is in {keep}: "
+            remedy=f"The received rows are in {keep}: "
             + Remedy(f"imufit.calibrate({str(keep)!r})", f"imufit calibrate {shlex.quote(str(keep))}")
             + " makes of it what it can.",
         )
@@ -100,7 +100,7 @@ def calibrate_live(
 
 
 class _Looking:
-    """Feeds the wizard with what is recorded, and says when it is over."""
+    """Feeds the wizard with the recorded rows, and reports the end."""
 
     def __init__(self, wizard: Wizard, converter: LiveConverter, give_up: float, show: Callable[[Stage], None]) -> None:
         self.wizard = wizard

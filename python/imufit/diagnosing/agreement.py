@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 
 def disagreements(analysis: Analysis, found: Sequence[_imufit.Disagreement]) -> tuple[Disagreement, ...]:
-    """Name logs and effects of what the evidence says of disagreeing logs.
+    """Name logs and effects of the disagreements in the evidence.
 
     Parameters
     ----------
     analysis : Analysis
         The evidence.
     found : sequence of _imufit.Disagreement
-        What it says: slot, log, parameters by that log and by the others.
+        The disagreements: slot, log, parameters by that log and by the others.
     """
     out = []
     for item in found:

@@ -1,6 +1,6 @@
 """Effects whose columns say little of their full size: a fit of each decides among them.
 
-A late sensor and a sluggish one have the same column, and columns taken at one point say little of a delay as long as
+A late sensor and a low-passed one have the same column, and columns at one point do not describe a delay as long as
 a turn takes, or of play in a drive.
 """
 
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 LESS = 0.01
 """Part of what the best fit takes off the square of the held-out error by which another may take off less: a late
-reference and a gyroscope that would have to be early and sluggish differ by 0.1 % where smoothing the reference's noise
+reference and a gyroscope that would have to be early and low-passed differ by 0.1 % where smoothing the reference's
+noise
 pays, a delay and a low-pass of a gyroscope by 0.3 %."""
 
 
@@ -54,7 +55,7 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
     ]
     if len(close) < 2:
         return []
-    # What else is missing would be charged to the one that stands in for it best.
+    # Another missing effect would be charged to the effect that replaces it best.
     others = fit.model
     for slot, item in items.items():
         if item.status == Status.PASSED and slot not in in_its_place:
@@ -62,7 +63,8 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
     without = tried(fit, others)
     evidence = _guarded(without, {slot: tried(fit, others.with_effect(ids[slot])) for slot in close})
     most = max(evidence.values())
-    # Where columns say all, a fit tells by the error alone: freedom alone does not tell one cause from another.
+    # If columns hold all information, a fit decides by the error alone: freedom alone does not separate one cause from
+    # another.
     equal = {slot for slot in close if np.isfinite(evidence[slot]) and not _curved(analysis, slot)}
     return [(slot, (most if slot in equal else ln) - without.ln_evidence) for slot, ln in evidence.items()]
 
@@ -112,7 +114,7 @@ def tried(fit: FittedStack, model: EffectStack) -> Tried:
     """Fit another stack, and return its log evidence around its best parameters.
 
     The reference may have lost fast motion or not: such a loss equals the difference, of second order, between a late
-    sensor and a sluggish one.
+    sensor and a low-passed one.
 
     Parameters
     ----------

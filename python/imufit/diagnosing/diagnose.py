@@ -70,7 +70,7 @@ def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
         return _spoilt(fit, faults)
     best = next((c for c in candidates if result.best is not None and c.effect == ids[result.best]), None)
     named = best.effect if best is not None and result.kind in (Kind.MISSING, Kind.AMBIGUOUS) else None
-    # What a filter of a sensor's own readings says is evidence neither for nor against this sensor.
+    # A filter of a sensor's own readings is evidence neither for nor against this sensor.
     open_to = {sensor for fault in faults for sensor in fault.spoils_sensors}
     adequate = result.kind == Kind.ADEQUATE
     if open_to and (adequate or (named is not None and open_to & set(analysis.candidates[named].sensors))):
@@ -209,7 +209,7 @@ def _needing_reference(fit: FittedStack) -> tuple[Candidate, ...]:
 
 
 def _notes(analysis: Analysis) -> tuple[str, ...]:
-    """Return what the reader should know of the logs; of several each note tells which of them it is about."""
+    """Return the notes on the logs; of several logs each note names its log."""
     if len(analysis.logs) == 1:
         return notes(analysis.logs[0])
     named = ((name_of(each.surveyed.log, k), each) for k, each in enumerate(analysis.logs))

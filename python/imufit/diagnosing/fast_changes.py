@@ -1,4 +1,4 @@
-"""What a residual does within blocks, where their means do not show it: tones and hops."""
+"""Changes of a residual within blocks, which the blocks' means do not show: tones and jumps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 MOST_ROWS = 1 << 18
 """Rows of a log that are looked at, from its start."""
 LEAST = 0.15
-"""RMS of a tone or of hops that counts, over that of the residual: smoothing of a reference leaves small peaks."""
+"""RMS of a tone or of jumps that counts, over that of the residual: smoothing of a reference leaves small peaks."""
 FASTEST = 0.1
 """Part of the sampling rate above which a tone may be shaking that no reference follows ..."""
 MOST_OF_IT = 0.7

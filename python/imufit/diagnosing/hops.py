@@ -1,4 +1,4 @@
-"""A residual that hops between two levels: a loose contact, popcorn noise."""
+"""A residual that jumps between two levels (random telegraph noise): a loose contact, popcorn noise."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ WINDOWS = (0.2, 0.4, 0.8)
 WINDOW_ROWS = 8
 """... at least so many rows."""
 CLEAR = 5.0
-"""Differences that are hops stand out of the usual ones this many times."""
+"""Differences that are jumps stand out of the usual ones this many times."""
 ALIKE = 0.3
-"""Hops differ from their middle size by no more than this part, half of them."""
+"""Jumps differ from their middle size by no more than this part, half of them."""
 FEWEST = 8
-"""Hops, up and down in turn, that chance does not make."""
+"""Jumps, up and down in turn, that chance does not make."""
 FEWEST_WINDOWS = 60
-"""Fewer windows tell nothing."""
+"""Fewer windows are not informative."""
 STAYING = 0.7
-"""Part of the size of the hops by which the levels between them differ."""
+"""Part of the size of the jumps by which the levels between them differ."""
 SURE = 8.0
-"""... and its standard errors: noise that is louder for a while hops, too, but stays nowhere."""
+"""... and its standard errors: noise that is louder for a while jumps, too, but does not stay on a level."""
 
 
 @dataclass(frozen=True)
 class Hops:
-    """Hops of a residual between two levels.
+    """Jumps of a residual between two levels.
 
     Attributes
     ----------
     size : float
         Difference of the levels.
     first : float
-        When the first hop comes, s.
+        When the first jump comes, s.
     count : int
-        Number of hops.
+        Number of jumps.
     upper : float
         Part of the time on the level that is rarer.
     """
@@ -50,10 +50,10 @@ class Hops:
 
 
 def hops(t: Array, residual: Array) -> Hops | None:
-    """Find whether a residual hops between two levels.
+    """Find whether a residual jumps between two levels.
 
-    Noise of any colour has differences of all sizes, a burst of noise has hops of all sizes, and a zero that wanders
-    does not come back by what it went.
+    Noise of any colour has differences of all sizes, a burst of noise has jumps of all sizes, and a bias random walk
+    does not return to its earlier value.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def hops(t: Array, residual: Array) -> Hops | None:
 
 
 def _stay(means: Array, peaks: list[int], size: float) -> bool:
-    """Return whether means stay on two levels between hops at these places, away from the hops themselves."""
+    """Return whether means stay on two levels between jumps at these places, away from the jumps themselves."""
     number = np.arange(len(means))
     middles = np.asarray(peaks) + 1
     away = np.min(np.abs(number[:, None] - middles), axis=1) > 1
@@ -84,12 +84,12 @@ def _stay(means: Array, peaks: list[int], size: float) -> bool:
 
 
 def _hops(t: Array, residual: Array, rows: int) -> Hops | None:
-    """Find hops between means of so many rows."""
+    """Find jumps between means of so many rows."""
     windows = len(t) // rows
     if windows < FEWEST_WINDOWS:
         return None
     means = residual[: windows * rows].reshape(windows, rows).mean(axis=1)
-    # The window between the two may hold the hop.
+    # The window between the two may hold the jump.
     change = means[2:] - means[:-2]
     usual = 1.4826 * float(np.median(np.abs(change)))
     high = np.abs(change) > CLEAR * usual

@@ -21,7 +21,7 @@ TOLD = 2.0
 
 
 def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
-    """Repeat diagnose and add until nothing is missing, or until the log cannot tell what is.
+    """Repeat diagnose and add until nothing is missing, or until the log does not determine the missing effect.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Climb:
     first : Diagnosis, optional
         What is missing there, if that is known.
     progress : callable, optional
-        Told of every step.
+        Called at every step.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Climb:
         self.tied: dict[str, tuple[str, ...]] = {}
 
     def up(self) -> None:
-        """Add what is missing, until nothing is or the log cannot tell what."""
+        """Add what is missing, until nothing is missing or the log does not determine it."""
         futile: set[str] = set()
         while len(self.steps) < MAX_STEPS:
             effect = next_effect(self.fit, self.diagnosis, futile)
@@ -113,7 +113,7 @@ class Climb:
             addition = self._add(effect, expected)
             lower = addition.after < addition.before
             if not (lower and (_told(addition) or _matters(addition))):
-                # What the evidence promised, the fit did not keep: the next one may.
+                # The fit did not confirm the evidence: the next one may.
                 futile.add(effect)
                 continue
             futile.clear()
@@ -146,7 +146,7 @@ class Climb:
     def _diagnose(self) -> Diagnosis:
         """Ask what is missing from the model so far."""
         on_top = self.steps[-1].effect if self.steps else "the model it starts from"
-        self._progress(0, 1, f"step {len(self.steps) + 1}: what is missing on top of {on_top}")
+        self._progress(0, 1, f"step {len(self.steps) + 1}: effects missing in {on_top}")
         return diagnose(self.fit)
 
     def _add(self, effect: str, expected: float | None = None) -> Addition:
@@ -185,7 +185,7 @@ def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] 
 
 
 def _beside_the_unsure(fit: FittedStack) -> str | None:
-    """Return what stands out once one of the effects that cannot be told apart is in the model, whichever it is."""
+    """Return what stands out once one of the tied effects is in the model, whichever it is."""
     analysis = fit.analysis
     model, candidates = list(analysis.fitted_slots), list(analysis.candidate_slots)
     while True:
@@ -198,7 +198,7 @@ def _beside_the_unsure(fit: FittedStack) -> str | None:
 
 
 def _told(addition: Addition) -> bool:
-    """Return whether the fit tells any parameter of what was added from zero."""
+    """Return whether any added parameter differs from zero in the fit."""
     return any(not abs(p.value) <= TOLD * p.standard_error for p in addition.parameters)
 
 

@@ -1,4 +1,4 @@
-"""What rows show, whatever the evidence says: noise far above the stated one, and a sensor that reads falsely."""
+"""Findings in the rows, beside the evidence: noise far above the stated one, and a sensor that reads falsely."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def seen_in_rows(analysis: Analysis) -> list[Seen]:
 def _above_stated_noise(evidence: LogEvidence) -> dict[int, float]:
     """Residual that no effect explains over the stated noise, by channel index, where that is far above one.
 
-    The noise of the reference counts as stated: nobody else knows it.
+    The noise of the reference counts as stated: no other rule uses it.
     """
     found = {}
     for index, channel in enumerate(CHANNELS):

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FEWEST_ROWS = 1000
-"""Fewer tell no tone from noise."""
+"""Fewer do not separate a tone from noise."""
 SLOWEST = 24
 """Periods in the log; the means of blocks show slower swings."""
 AROUND = ((64, 10), (256, 40), (1024, 160))
-"""To which line of the spectrum on each side how many lines tell the noise around: few where it still rises steeply."""
+"""Lines of the spectrum on each side that estimate the noise, up to which line: few where it still rises steeply."""
 
 STRETCH = 256
 """Samples of a stretch within which a moving tone counts as steady: at 200 Hz one that crosses the spectrum in a minute

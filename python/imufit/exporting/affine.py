@@ -1,6 +1,6 @@
 """Gain and offset of each sensor of a model: corrected = A raw + b, with A = C diag(K).
 
-The model says raw = (I + E) x + bias, hence A = (I + E)^-1 and b = -A bias.
+The model states raw = (I + E) x + bias, hence A = (I + E)^-1 and b = -A bias.
 C has ones on its diagonal, K is the diagonal of A.
 """
 
@@ -54,7 +54,7 @@ class SensorAffine:
 
     @property
     def scale(self) -> Array:
-        """(3,) K; ones where an axis of A has no part in its own reading, so that there is no such form."""
+        """(3,) K; ones where an axis of A has no part in its own reading, so that the form does not exist."""
         diagonal = np.diag(self.matrix)
         return diagonal.copy() if np.all(diagonal != 0.0) else np.ones(3)
 
@@ -71,11 +71,11 @@ class Affine:
     Attributes
     ----------
     sensors : dict of str to SensorAffine
-        ``acc``, ``gyr``, ``mag``; identity where the model says nothing.
+        ``acc``, ``gyr``, ``mag``; identity without such effects in the model.
     on_temperature : tuple of str
         Lines on the drift with temperature, which is left out.
     left_out : tuple of str
-        Ids of effects that are no constant gain or offset.
+        Ids of effects that are not a constant gain or offset.
     standard_errors : dict
         By effect and parameter, SI units.
     """
@@ -90,7 +90,7 @@ class Affine:
         lines = ["corrected = A raw + b for each sensor, from the sensor model of imufit."]
         lines += self.on_temperature
         if self.left_out:
-            lines.append(f"Not exported, as they are no constant gain or offset: {', '.join(self.left_out)}.")
+            lines.append(f"Not exported, since they are not a constant gain or offset: {', '.join(self.left_out)}.")
         # The id of a column's effect is whatever the column is called: it must not end the comment it stands in.
         return [" ".join(line.replace("*/", "* /").split()) for line in lines]
 

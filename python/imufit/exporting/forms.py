@@ -20,7 +20,7 @@ FORMS: Mapping[str, Callable[[Affine], str]] = {
     "ahrs": ahrs,
     "json": json_text,
 }
-"""What writes each form."""
+"""The writer of each form."""
 
 
 def export(model: SensorModel, form: str) -> str:
@@ -42,8 +42,8 @@ def export(model: SensorModel, form: str) -> str:
     Raises
     ------
     InputError
-        There is no such form, nothing to export, or a gain has no inverse.
+        The form is unknown, nothing is to be exported, or a gain cannot be inverted.
     """
     if form not in FORMS:
-        raise InputError(f"there is no form {form!r}", remedy=f"Use one of {', '.join(FORMS)}.")
+        raise InputError(f"the form {form!r} is unknown", remedy=f"Use one of {', '.join(FORMS)}.")
     return FORMS[form](affine(model))

@@ -1,6 +1,6 @@
 """Python for imufusion, the Python package of xio's Fusion.
 
-Its FusionModelInertial (FusionCalibrationInertial in older versions) says, in g and deg/s,
+Its FusionModelInertial (FusionCalibrationInertial in older versions) states, in g and deg/s,
 calibrated = misalignment diag(sensitivity) (uncalibrated - offset), and its FusionModelMagnetic
 calibrated = soft_iron (uncalibrated - hard_iron).
 """

@@ -1,8 +1,8 @@
-"""Faults of the data that are no effects of a sensor: wrong units and frames, turned axes, rows that cannot be.
+"""Faults of the data, which are not effects of a sensor: wrong units and frames, turned axes, rows that cannot be.
 
 Faults of rows (`imufit.faults.rows`) concern some samples, which are left out of the evidence where they are certain
 to be wrong. Others (`imufit.faults.frames`, `imufit.faults.late`) concern the whole log: nothing can be said of
-effects until they are put right.
+effects until they are corrected.
 """
 
 from imufit.faults.clipped import ClippedRows

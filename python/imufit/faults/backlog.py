@@ -64,7 +64,7 @@ def backlogs(chunk: Chunk) -> list[RowFault]:
         if spans and first - spans[-1][1] < 2 * ROWS:
             spans[-1][1] = stop + ROWS
         else:
-            # What leads up to the first fast rows of a log is part of the burst.
+            # The rows before the first fast rows of a log are part of the burst.
             spans.append([0 if row + first < 2 * ROWS else first, stop + ROWS])
     sensors = tuple(name for name in SENSORS if getattr(chunk.log, name) is not None)
     found = []

@@ -26,7 +26,7 @@ class ClippedRows:
     ends : mapping
         End of the range of each sensor that may have one, m/s^2 and rad/s.
     certain : collection of str
-        Sensors whose metadata tell it. Of the others the readings have to show that they are pinned there.
+        Sensors whose metadata state it. Of the others the readings have to show that they are pinned there.
     """
 
     def __init__(self, ends: Mapping[str, float], certain: Collection[str] = ()) -> None:

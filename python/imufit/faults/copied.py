@@ -39,7 +39,7 @@ def copied_faults(rows: Samples, facts: _imufit.Facts) -> list[DataFault]:
         known = np.isfinite(a) & np.isfinite(b)
         if np.count_nonzero(known) < ROWS or not np.array_equal(a[known], b[known]):
             continue
-        # A column of zeros, or one that does not move, is no copy of another such.
+        # A column of zeros, or one that does not move, is not a copy of another such column.
         if np.unique(a[known]).size < ROWS // 10:
             continue
         miss = {name: float(np.nanmean((columns[name][0] - columns[name][1]) ** 2)) for name in (one, other)}

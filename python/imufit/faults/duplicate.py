@@ -3,7 +3,7 @@
 Two stretches whose samples agree bit for bit, one after the other, are a copy if that cannot be chance. Coarse steps
 make single samples agree often, above all at rest or where a motion repeats itself: the chance is worked out from how
 often each sample of the block occurs in the rows around, and must be less than `CHANCE`; and the block must be
-`LONGER` times as long as chance agreements are in this log. A value that stands still is no copy.
+`LONGER` times as long as chance agreements are in this log. A constant value is not a copy.
 """
 
 from __future__ import annotations

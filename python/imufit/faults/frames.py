@@ -65,7 +65,7 @@ KINDS: Final = (
     "removed",
     "field",
 )
-"""What is named first where the log cannot tell."""
+"""The reading that is named first if the log does not decide."""
 SHOWN: Final = {"position": "units", "gravity": "metadata", "field": "metadata", "exchange": "axes"}
 """Kinds of faults that are called otherwise."""
 FRAMES: Final = ("NED", "ENU", "NWU")
@@ -329,7 +329,7 @@ def _columns(parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, missed:
 
 
 def _metadata(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> Iterator[Change]:
-    """Gravity and field that the metadata do not tell as the readings show them."""
+    """Gravity and field from the readings, where the metadata do not state them."""
     up = np.array(_imufit.frame_vectors(metadata.frame)["up"])
     if "acc" in facts.sensors:
         if abs(metadata.gravity - STANDARD_GRAVITY) > EARTHLY:
@@ -347,7 +347,7 @@ def _metadata(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> Iterat
 
 
 def _false_field(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> bool:
-    """Whether the field that is told has no size that a field has, while the readings have."""
+    """Whether the stated field has an impossible size, while the readings have a possible one."""
     told = metadata.mag_reference
     if told is None or "mag" not in facts.sensors:
         return False
@@ -373,7 +373,7 @@ def _without_gravity(rows: Samples, facts: _imufit.Facts, metadata: Metadata) ->
 
 
 def _field_of_another_size(rows: Samples, facts: _imufit.Facts) -> list[DataFault]:
-    """Name a magnetometer that turns in a field of a size that is not on earth, where nothing tells the field."""
+    """Name a magnetometer that turns in a field of impossible size, where the field is not stated."""
     if "mag" not in facts.sensors or not facts.field_estimated or _view("mag", rows) is None:
         return []
     size = float(np.linalg.norm(rows.own_field()))
@@ -422,7 +422,7 @@ def _view(sensor: str, rows: Samples) -> tuple[Array, Array] | None:
 def _match(sensor: str, rows: Samples, matrices: Array, field_estimated: bool) -> Match:
     """Return how well a sensor fits with that of some permutations of its axes which leaves least, and any factor."""
     if sensor == "mag" and field_estimated:
-        # Axes that are put right give another field.
+        # Axes that are corrected give another field.
         fits = [_fits(_view(sensor, rows.with_own_field(matrix)), OWN) for matrix in matrices]
         share, ratio = np.concatenate(fits, axis=1)
     else:

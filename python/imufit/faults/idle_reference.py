@@ -64,7 +64,7 @@ def _pauses(turning: Turning, q: Array) -> NDArray[np.intp] | None:
     angle = np.concatenate((np.zeros((1, 3)), np.cumsum(turning.read, axis=0)))
     meanwhile = np.linalg.norm(angle[long[:, 1]] - angle[long[:, 0]], axis=1)
     step = np.linalg.norm(turning.turned[long[:, 1] - 1], axis=1)
-    # What a step of the reference shows at least, and what noise adds up to over a pause.
+    # Smallest rotation in a step of the reference, and the sum of noise over a pause.
     least = max(0.05 * float(np.median(step)), MOVED * _noise(turning) * float(np.sqrt(np.median(np.diff(long)))))
     moving = meanwhile > least
     held = int(np.sum(np.diff(long[moving], axis=1)))

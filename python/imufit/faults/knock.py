@@ -1,14 +1,14 @@
 """A fault that happens in the course of a log: a mount that shifts.
 
 How the sensors are turned against the reference belongs to a set-up and is the same all along. The evidence is kept in
-blocks of time, so the turn can be asked for in every block. With the columns of the whole catalogue fitted along
+blocks of time, so the rotation can be estimated in every block. With the columns of the whole catalogue fitted along
 (nothing that an effect could explain is left), a turn that all sensors share and that differs before and after one
 instant is a knock. It is named if
 
 - it is significant by the delete-block jackknife, all instants counted that were tried (Hotelling's T^2, as for
   effects);
-- it explains nearly all of what a free value in each block would: neither a value that wanders, nor a line taken for a
-  step (which explains three quarters of it).
+- it explains nearly all of what a free value in each block would: neither a random walk, nor a line mistaken for a step
+  (which explains three quarters of it).
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ def _strange(turning: Turning, found: Likeliest | None, rows: Samples) -> bool:
         return False
     if found is not None and found.best.traces.correlation >= ONE_MOTION:
         return False
-    # Where gravity or the field turns as the reference says, the gyroscope is at fault.
+    # Where gravity or the field turns as the reference states, the gyroscope is at fault.
     return not any(_agreement(rows, sensor) >= ONE_MOTION for sensor in rows.readings if sensor != "gyr")
 
 

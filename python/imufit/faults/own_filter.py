@@ -1,7 +1,7 @@
 """A reference that was computed from the readings it is to judge.
 
 A filter turns by each reading of the gyroscope, noise included, and adds a part of what accelerometer and magnetometer
-show as its error. An instrument of its own knows nothing of that noise: what it turns by differs from any mean of two
+show as its error. A separate instrument does not contain that noise: what it turns by differs from any mean of two
 readings by at least 0.7 times the part of them that their neighbours do not foretell. Less than that is only left where
 the reference was made of the readings.
 """
@@ -24,7 +24,7 @@ from imufit.results.data_fault import DataFault
 Array = NDArray[np.float64]
 
 CLOSER: Final = 0.25
-"""What is left over what cannot be foretold, below which the reference follows the noise: no instrument leaves less
+"""Ratio of residual to unpredictable part below which the reference follows the noise: no instrument leaves less
 than 0.7, and a filter leaves rounding."""
 AROUND: Final = 8
 """Readings on either side that a reading is foretold from."""
@@ -61,7 +61,8 @@ def own_filter_faults(turning: Turning, facts: _imufit.Facts) -> list[DataFault]
     left = _left(rate - own, np.stack(columns, axis=-1))
     place = np.cumsum(known) - 1
     unforeseen = _unforeseen(turning.gyr[known][: place[at[-1]] + 1])[place[at]]
-    # Only what nobody could foretell says who followed it: readings that stand still are followed by every reference.
+    # Only the unpredictable part shows which reference followed it: readings that stand still are followed by every
+    # reference.
     telling = unforeseen >= np.nanmedian(unforeseen)
     innovation, missed = float(np.median(unforeseen[telling])), float(np.median(left[telling]))
     if not (innovation > 0.0 and missed < CLOSER * innovation):

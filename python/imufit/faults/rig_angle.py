@@ -22,7 +22,7 @@ PIECE: Final = 1.0
 PIECES: Final = 10
 """Pieces that show something."""
 TURNED: Final = 0.1
-"""RMS turn in a piece, rad, from which on an axis says something."""
+"""RMS turn in a piece, rad, from which on an axis is informative."""
 LEFT: Final = 0.2
 """Share of the turns' sum of squares that may be left."""
 NEAR: Final = 0.25

@@ -89,7 +89,7 @@ class RowFault:
 
     @property
     def kind(self) -> tuple[str, ...]:
-        """What stretches that belong together have in common: a block that comes twice does so in several sensors."""
+        """The common parts of stretches that belong together: a block that comes twice does so in several sensors."""
         return (self.fault,) if self.fault == "duplicate" else (self.fault, *self.sensors, self.axes)
 
 

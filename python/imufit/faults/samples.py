@@ -85,7 +85,7 @@ class Samples:
         return Samples(self.readings, {**self.ideal, **force}, self.attitude)
 
     def on_clock(self, factor: float, resting: Samples) -> Samples:
-        """Return the samples as they are if the time that passed is a multiple of what `t` says.
+        """Return the samples as they are if the time that passed is a multiple of `t`'s.
 
         Parameters
         ----------
@@ -149,11 +149,11 @@ class Samples:
         mean = turned.mean(axis=0)
         normal = np.block([[np.eye(3), mean], [mean.T, np.eye(3)]])
         right = np.concatenate([np.einsum("nij,nj->ni", turned, readings).mean(axis=0), readings.mean(axis=0)])
-        # Where the turns do not tell field and iron apart, the smallest of both.
+        # Where the turns do not separate field and iron, the smallest of both.
         return np.asarray(np.linalg.lstsq(normal, right, rcond=1e-3)[0][:3])
 
     def with_own_field(self, matrix: Array) -> Samples:
-        """Return the samples of the magnetometer, its axes put right, with the field that its readings then give.
+        """Return the samples of the magnetometer, its axes corrected, with the field that its readings then give.
 
         Parameters
         ----------

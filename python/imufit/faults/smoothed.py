@@ -1,6 +1,6 @@
 """A reference that lost fast motion by more than `ref.lowpass` can follow: it was smoothed before it was written.
 
-The map from the gyroscope's turning to the reference's is told by their spectra, band by band: where both see the same
+The spectra determine the map from the gyroscope's rotation to the reference's, band by band: where both see the same
 motion (coherence), the reference shows it at a gain. A sound reference has a gain of one in every band, a gyroscope
 with an error of scale another one in all of them. Of a smoothed reference the gain falls with the frequency.
 """
@@ -21,12 +21,12 @@ from imufit.results.data_fault import DataFault
 Array = NDArray[np.float64]
 
 SEGMENT: Final = 6.0
-"""Length of the segments that spectra are averaged over, s: the slowest motion told apart is a sixth of a hertz."""
+"""Length of the segments that spectra are averaged over, s: the slowest resolved motion is a sixth of a hertz."""
 LEAST_SEGMENTS: Final = 5
 BAND: Final = 1.25
 """Ratio of the ends of a band of frequencies."""
 COHERENT: Final = 0.5
-"""Coherence from which on a band tells a gain."""
+"""Coherence from which on a band determines a gain."""
 LOST: Final = 0.5
 """Gain below which a band is lost; to first order, as the effect sees it, none of a motion would be left soon after."""
 BEYOND: Final = 2e-4

@@ -23,7 +23,7 @@ APART: Final = 1.0
 JUMP: Final = 10.0
 """Times the largest other step by which the channel jumps to a stranger and back."""
 MOST: Final = 0.2
-"""Share of the rows above which values are no strangers."""
+"""Share of the rows above which values are not strangers."""
 ROWS: Final = 100
 """Rows by which the others are known."""
 

@@ -1,8 +1,9 @@
 """Values that stand still while the body moves.
 
 A sensor repeats a value for many reasons: it rests and its steps are coarse, it is read more often than it samples, its
-axis does not take part in the motion. So standing still alone is no fault. It is one where a value is repeated, bit for
-bit, at least `SAMPLES` times and for much longer than is usual in this log, while by the reference the reading should
+axis does not take part in the motion. So a constant value alone is not a fault. It is one where a value is repeated,
+bit for bit, at least `SAMPLES` times and for much longer than is usual in this log, while by the reference the reading
+should
 have changed by many times the steps and the noise of the channel, and by more than `MOVED`.
 """
 

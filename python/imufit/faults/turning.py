@@ -21,8 +21,7 @@ Array = NDArray[np.float64]
 Part = Mapping[str, Any]
 
 ROWS: Final = 200_000
-"""Rows of the beginning of a log that the reference is judged by: half an hour at 100 Hz. What a reference is like, it
-is all along."""
+"""Rows of the beginning of a log that the reference is judged by: half an hour at 100 Hz."""
 LEAST_SWING: Final = np.radians(30.0)
 """Angle that the gyroscope must have gone through about one axis before anything is said."""
 

@@ -13,7 +13,7 @@ from imufit.log.columns import SENSOR_NAMES
 
 
 class ChannelLike(Protocol):
-    """What one curve needs; `imufit.allan_deviation.Channel` has it."""
+    """The input of one curve; `imufit.allan_deviation.Channel` has it."""
 
     @property
     def name(self) -> str:

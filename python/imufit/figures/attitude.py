@@ -12,7 +12,7 @@ from imufit.figures import place, style
 
 
 class BinsLike(Protocol):
-    """What one panel needs; `imufit.results.AttitudeBins` has it."""
+    """The input of one panel; `imufit.results.AttitudeBins` has it."""
 
     @property
     def part(self) -> str:
@@ -57,7 +57,7 @@ def attitude_panels(bins: Sequence[BinsLike], sentence: str, ax: place.Place | N
         Grey: readings as they are; blue: with the model's effects taken out.
     """
     if not bins:
-        return place.empty("There is no attitude error to show.", ax)
+        return place.empty("An attitude error to show is missing.", ax)
     parts = list(dict.fromkeys(item.part for item in bins))
     columns = list(dict.fromkeys(item.quantity for item in bins))
     count = len(parts) * len(columns)

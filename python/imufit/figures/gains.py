@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class MapLike(Protocol):
-    """What the map needs; `imufit.tuning.GainMap` has it."""
+    """The input of the map; `imufit.tuning.GainMap` has it."""
 
     @property
     def names(self) -> tuple[str, str]:
@@ -35,7 +35,7 @@ class MapLike(Protocol):
 
 
 class GainLike(Protocol):
-    """What one line needs; `imufit.tuning.Gain` has it."""
+    """The input of one line; `imufit.tuning.Gain` has it."""
 
     @property
     def name(self) -> str:

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 class TraceLike(Protocol):
-    """What the figure needs; `imufit.joining.joined.RateTrace` has it."""
+    """The input of the figure; `imufit.joining.joined.RateTrace` has it."""
 
     @property
     def sensor_t(self) -> Array:

@@ -32,7 +32,7 @@ def parameter_sizes(
     shown : sequence of str
         (k,) values with their errors, as a person reads them.
     told : sequence of bool
-        (k,) whether the log tells the value; of others only the words are shown.
+        (k,) whether the log determines the value; of others only the words are shown.
     ax : Axes, Figure or SubFigure, optional
         Where to draw, see :mod:`imufit.figures.place`.
 

@@ -1,4 +1,4 @@
-"""Where a figure is drawn: on a figure of its own, or where its user says.
+"""Where a figure is drawn: on a figure of its own, or on given Axes.
 
 The rule of ``ax`` for every ``plot`` of this package:
 
@@ -58,7 +58,7 @@ class Drawing:
 
     @property
     def result(self) -> Figure | Axes | list[Axes]:
-        """What ``plot`` returns: its own figure, else the Axes."""
+        """The value of ``plot``: its own figure, else the Axes."""
         if self.own:
             return self.root
         return self.axes[0] if len(self.axes) == 1 else self.axes

@@ -27,7 +27,7 @@ ROBUST = 1.5
 
 @dataclass(frozen=True, eq=False)
 class PanelLines:
-    """What one panel shows.
+    """The content of one panel.
 
     Attributes
     ----------

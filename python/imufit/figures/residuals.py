@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class PanelLike(Protocol):
-    """What one panel needs; `imufit.results.Panel` has it."""
+    """The input of one panel; `imufit.results.Panel` has it."""
 
     @property
     def channel(self) -> str:
@@ -83,7 +83,7 @@ def residual_panels(
     """
     chosen = worst_first(panels)[:limit]
     if not chosen:
-        return place.empty("There is no residual to show against a covariate.", ax)
+        return place.empty("A residual to show against a covariate is missing.", ax)
     columns = min(columns, len(chosen))
     rows = -(-len(chosen) // columns)
 

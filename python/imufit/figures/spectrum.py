@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class SpectrumLike(Protocol):
-    """What one line needs; `imufit.results.Spectrum` has it."""
+    """The input of one line; `imufit.results.Spectrum` has it."""
 
     @property
     def channel(self) -> str:

@@ -1,4 +1,4 @@
-"""Colours that colour-blind readers tell apart (Okabe and Ito), and the look that all figures share."""
+"""Colours that colour-blind readers distinguish (Okabe and Ito), and the look that all figures share."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.backend_bases import RendererBase
 
-# Fonts that figures do not use are no concern of the reader.
+# Fonts that figures do not use do not concern the reader.
 logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
 
 BLUE = "#0072B2"
@@ -32,7 +32,7 @@ INK = "#222222"
 LETTER: Final = 0.55
 """Mean width of a letter of matplotlib's font over its size, measured over the titles of all figures."""
 PALETTE: Final = 256
-"""Colours of a picture in a notebook: as many as one byte tells, at a third of the bytes of all colours."""
+"""Colours of a picture in a notebook: as many as one byte encodes, at a third of the bytes of all colours."""
 
 AXES = {"x": BLUE, "y": VERMILION, "z": GREEN}
 LINES = {"x": "-", "y": "--", "z": "-."}

@@ -75,7 +75,7 @@ class Analysis:
     unnamed : tuple of str
         Effects that are always fitted along.
     candidates : dict of str to Effect
-        What else at least one log can tell of.
+        Further effects that at least one log can show.
     probes : tuple of str
         Dependences without a name that are asked about once nothing else explains more.
     found : dict of str to Found
@@ -106,7 +106,7 @@ class Analysis:
         logs : sequence of LogSource
             The logs.
         progress : callable
-            Told of the rows done.
+            Called with the rows done.
         keep_constants : bool
             Temperatures and covariates count from the means that the model was fitted with, not from these logs'.
         """
@@ -145,7 +145,7 @@ class Analysis:
         """Evidence of the same logs around other parameter values or another stack of effects.
 
         Without candidates, or with only some of them, it is quicker to take; lean, for the next iteration of a fit, it
-        does not tell the residual as it stands either, only whitened.
+        does not hold the residual itself either, only the whitened one.
         """
         surveyed = [each.surveyed for each in self.logs]
         fixed = {*model.effects, *self.unnamed}
@@ -201,7 +201,7 @@ class Analysis:
         return size + square + problem.ln_evidence(along, of.fitted_slots[:members], of.candidate_slots)
 
     def of_logs(self, chosen: Sequence[int]) -> Analysis:
-        """Return the same evidence of some of the logs alone; effects that none of them can tell of are left out."""
+        """Return the same evidence of some of the logs alone; effects that none of them can show are left out."""
         logs = [self.logs[k] for k in chosen]
         known = {key for each in logs for key in each.slots}
         effects = [key for key in self.model.effects if key in known]
@@ -237,13 +237,13 @@ class Analysis:
 
     @property
     def judged_by(self) -> str:
-        """What the logs are judged by: ``reference``, ``rests``, or ``reference and rests``."""
+        """The evidence of the logs: ``reference``, ``rests``, or ``reference and rests``."""
         kinds = {"rests" if isinstance(each.passes, RestPasses) else "reference" for each in self.logs}
         return " and ".join(sorted(kinds))
 
     @property
     def faults(self) -> tuple[DataFault, ...]:
-        """What is wrong with the data of the logs; of several each fault tells which of them it is in."""
+        """Faults of the data of the logs; of several logs each fault names its log."""
         if len(self.logs) == 1:
             return self.logs[0].faults
         names = [name_of(each.surveyed.log, k) for k, each in enumerate(self.logs)]
@@ -252,7 +252,7 @@ class Analysis:
         )
 
     def refusal(self, effect: _imufit.Effect) -> str | None:
-        """Return why no log can tell of an effect; None if one can."""
+        """Return why no log can show an effect; None if one can."""
         reasons = [each.surveyed.refusal(effect) for each in self.logs]
         return None if None in reasons else reasons[0]
 
@@ -285,12 +285,12 @@ class Analysis:
         held = [slot for slot in chosen if slot in self._held]
         free = [slot for slot in chosen if slot not in held]
         result = self.problem.estimate(free)
-        # What is held is not known exactly, and leaves the others as open as if it were fitted along.
+        # A held parameter is not exact, and leaves the others as uncertain as a fitted one.
         along = self.problem.estimate(chosen) if held else result
         covariance = along["covariance"]
         errors = _by_slot(self, chosen, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
         searched = {slot: self.found.get(self.slots[slot]) for slot in held}
-        # A slope does not see the jumps that tell most of it.
+        # A slope does not contain the jumps, which are most informative.
         spreads = {slot: np.array(found.spread) for slot, found in searched.items() if found}
         spreads = {slot: np.where(self._fixed(slot), 0.0, spread) for slot, spread in spreads.items()}
         errors |= spreads
@@ -374,7 +374,7 @@ class Analysis:
     def covariance_of(self, estimate: Estimate) -> tuple[list[str], Array]:
         """Return the covariance of all parameters of the model, and their names ``EFFECT.PARAM`` in its order.
 
-        What each of several logs has for itself stands with its mean. Rows of parameters that are fixed or only
+        A log's own parameters stand with their mean over the logs. Rows of parameters that are fixed or only
         searched for are zero, those of parameters at their bounds are not numbers.
         """
         keys: list[str] = []

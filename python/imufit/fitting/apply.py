@@ -64,14 +64,14 @@ def _left_alone(model: EffectStack, log: Log) -> list[str]:
     notes = []
     of_reference = [effect.id for effect, _ in model.stack() if effect.reference_part not in (None, "mount")]
     if of_reference:
-        notes.append(f"{' and '.join(of_reference)} left alone: of the reference, not of the readings")
+        notes.append(f"{' and '.join(of_reference)} left unchanged: an effect of the reference, not of the readings")
     for sensor in SENSORS:
         of_sensor = [e.id for e, _ in model.stack() if e.sensors == [sensor] and e.reference_part is None]
         if of_sensor and getattr(log, sensor) is None:
-            notes.append(f"{' and '.join(of_sensor)} left alone: the log has no {sensor}")
+            notes.append(f"{' and '.join(of_sensor)} left unchanged: the log has no {sensor}")
     on_temperature = [effect.id for effect, _ in model.stack() if "temp" in effect.centred_columns]
     if on_temperature and "temperature_mean" not in model.constants and log.temp is not None:
-        notes.append(f"{' and '.join(on_temperature)}: the model has no temperature_mean, the log's own was taken")
+        notes.append(f"{' and '.join(on_temperature)}: the model has no temperature_mean, the log's own mean was used")
     return notes
 
 

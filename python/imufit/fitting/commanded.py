@@ -52,7 +52,7 @@ class CommandedAttitude:
         -------
         CommandedAttitude or None
             None if the log has not both, if the angle is not less noisy, or if they differ by more than noise: then the
-            measured attitude tells something of its own.
+            measured attitude adds information.
         """
         attitudes, angles = [], []
         for part in parts:

@@ -108,7 +108,7 @@ class FittedStack(Plotted, Result):
         return self._analysis
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the evidence, which the logs give again when it is asked for."""
+        """Everything but the evidence, which the logs give again when it is requested."""
         kept = self._analysis if isinstance(self._analysis, KeptAnalysis) else KeptAnalysis.of(self._analysis)
         return {**self.__dict__, "_analysis": kept}
 
@@ -119,7 +119,7 @@ class FittedStack(Plotted, Result):
 
     @property
     def by_log(self) -> tuple[LogParameters, ...]:
-        """What each of several logs has for itself, and how far it is above its noise floor; empty for one log."""
+        """Each log's own parameters, and its ratio to the noise floor; empty for one log."""
         if len(self.logs) == 1:
             return ()
         return tuple(
@@ -187,7 +187,7 @@ class FittedStack(Plotted, Result):
         """Covariance of the fitted parameters, rows and columns ``EFFECT.PARAM``, in the products of their SI units.
 
         The square roots of its diagonal are the standard errors. Parameters that are fixed, at a bound, or found by a
-        search of whole numbers have no row. What each of several logs has for itself stands with its mean.
+        search of whole numbers have no row. A log's own parameters stand with their mean over the logs.
         """
         import pandas as pd  # noqa: PLC0415
 
@@ -231,7 +231,7 @@ class FittedStack(Plotted, Result):
             The log has no such sensor or no reference, or it is open which log is meant.
         """
         if sensor not in SENSOR_NAMES:
-            raise InputError(f"there is no sensor {sensor!r}", remedy=f"Use one of {', '.join(SENSOR_NAMES)}.")
+            raise InputError(f"unknown sensor {sensor!r}", remedy=f"Use one of {', '.join(SENSOR_NAMES)}.")
         number = self._number(log)
         found = row_residuals(self.analysis.logs[number], self.analysis.own_step(number, self.estimate.step))
         if sensor not in found:
@@ -329,7 +329,7 @@ class FittedStack(Plotted, Result):
         return drawn_parameters(self.parameters, ax)
 
     def sentences(self) -> list[str]:
-        """Return what the fit says: its effects, and how far its residual is above the noise floor."""
+        """Return the fit as text: its effects, and how far its residual is above the noise floor."""
         stack = " + ".join(self.model.effects) or "the ideal sensor"
         return [f"{stack}: {self.ratio:.3f} times the noise floor (held out)"]
 

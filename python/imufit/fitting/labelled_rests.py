@@ -1,4 +1,4 @@
-"""Rests whose label says which body axis points up: how they were laid, and labels that cannot be."""
+"""Rests whose label states which body axis points up: how they were laid, and labels that cannot be."""
 
 from __future__ import annotations
 

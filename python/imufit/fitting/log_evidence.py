@@ -29,7 +29,7 @@ LEFT_OF_STEP = 0.05
 
 @dataclass(frozen=True, eq=False)
 class LogEvidence:
-    """Evidence of one log with the columns of every effect that it can tell of, taken around given parameter values.
+    """Evidence of one log with the columns of every effect that it can show, taken around given parameter values.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class LogEvidence:
 
     @property
     def facts(self) -> _imufit.Facts:
-        """What is known of the log as a whole."""
+        """Facts of the log as a whole."""
         return self.surveyed.facts
 
     def slow_gain(self, channel: int) -> float:
@@ -124,7 +124,7 @@ class LogEvidence:
         return self if isinstance(self.passes, RestPasses) else self._whitened(step)
 
     def _whitened(self, step: Array) -> LogEvidence:
-        """Return evidence that stands in for its whitened form, whitened; `step` leaves only its noise."""
+        """Return evidence that replaces its whitened form, whitened; `step` leaves only its noise."""
         passes, facts = self.passes, self.facts
         filters = passes.autocovariance(self.raw, facts, step).filters()
         if not any(filters):
@@ -149,7 +149,7 @@ class LogEvidence:
     def ln_smoothing(self, counts: Sequence[int]) -> float:
         """Log of what the effects raise the density of so many samples by as they smooth the noise of the reference.
 
-        A sensor that is called sluggish or weak leaves less of that noise in the residual, whatever it is. The log
+        A sensor that is called low-passed or weak leaves less of that noise in the residual, whatever it is. The log
         density of a sample changes by half the part of its variance that is left out.
 
         Parameters
@@ -163,7 +163,7 @@ class LogEvidence:
         own = np.array(self.white.reference_variance(*noise))
         ideal = np.array(_empty(self.surveyed, {}, [], {}, self.filters).reference_variance(*noise))
         variance = np.where(np.isfinite(self.variance), self.variance, np.inf)
-        # A reference that would be noisier than the residual has no white noise: the less is it believed.
+        # A reference that would be noisier than the residual has no white noise: the smaller is the correction.
         variance = np.maximum(variance, ideal**2 / np.maximum(variance, np.finfo(float).tiny))
         known = variance > 0.0
         return float(np.sum(0.5 * np.array(counts)[known] * ((ideal - own) / variance)[known]))
@@ -183,11 +183,11 @@ class LogEvidence:
         fitted : mapping of str to list of float
             As for :meth:`of`.
         candidates : sequence of str
-            Effects whose columns are taken besides, where the log can tell of them.
+            Effects whose columns are taken besides, where the log can show them.
         found : mapping of str to Found
             As for :meth:`of`.
         lean : bool
-            Tell the residual only whitened, not as it stands.
+            Hold the residual only whitened, not as it stands.
         """
         passes, facts = self.passes, self.facts
         known = self.surveyed.columns

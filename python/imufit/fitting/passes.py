@@ -31,7 +31,7 @@ PAST = 3.0
 before a row, and the rest is for rows that come more often than usual."""
 
 MASKS = ("ref_exact", "movement")
-"""Columns that say how to use a row; they are no covariates."""
+"""Columns that state the use of a row; they are not covariates."""
 
 CHANNELS = tuple(f"{sensor}_{axis}" for sensor in SENSOR_NAMES for axis in "xyz")
 UNITS = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
@@ -74,7 +74,7 @@ class Passes:
     log : LogSource
         The log.
     progress : callable
-        Told of the rows done.
+        Called with the rows done.
     """
 
     def __init__(self, log: LogSource, progress: Progress) -> None:
@@ -83,7 +83,7 @@ class Passes:
         computed = computed_columns(log) if names else ()
         self.covariates = [name for name in names if name not in computed]
         self.empty: list[str] = []
-        """What is to be said of columns that are not used."""
+        """Notes on columns that are not used."""
         if computed:
             self.empty.append(f"Not used, since they are computed from the readings: {', '.join(computed)}.")
         self.column_noise: dict[str, float] = {}
@@ -100,7 +100,7 @@ class Passes:
         return facts.margin + (self.log.n if not past < self.log.n else math.ceil(past))
 
     def chunks(self, margin: int, label: str) -> Iterator[dict[str, Any]]:
-        """Chunks of the log as the compiled core takes them, telling the progress."""
+        """Chunks of the log for the compiled core, with reports of progress."""
         for chunk in self.log.chunks(CHUNK_ROWS, margin):
             arrays = chunk_arrays(chunk, self.covariates)
             angle = chunk.log.ref_angle
@@ -174,7 +174,7 @@ class Passes:
         if still := readings.still(MIN_ROWS):
             if set(still) == set(readings.read()):
                 raise self._motionless(still)
-            # Such readings have no noise to weigh them by, and tell no more than that they are less than a step.
+            # Such readings have no noise to weigh them by, and show only that they are less than a step.
             self.empty += [
                 f"Every reading of the {SENSOR_NAMES[sensor]} is the same: it is left out." for sensor in still
             ]
@@ -208,8 +208,8 @@ class Passes:
     def _motionless(self, names: Sequence[str]) -> InputError:
         """Make the error for a log whose readings have no noise at all."""
         return InputError(
-            f"no effect can be judged, because no reading of {' or '.join(names)} ever changes: without noise there is "
-            "nothing to weigh a deviation by",
+            f"no effect can be judged, because no reading of {' or '.join(names)} ever changes: without noise a "
+            "deviation cannot be weighed",
             file=self.log.path,
             remedy="Record the readings with all their digits, while the sensor turns.",
         )
@@ -265,11 +265,11 @@ class Passes:
         return np.column_stack([edges[:-1], edges[1:]])
 
     def lacking(self, effect: _imufit.Effect) -> str | None:
-        """Return why nothing can be told of an effect's sensor, though the log has it; None otherwise."""
+        """Return why an effect's sensor cannot be judged, though the log has it; None otherwise."""
         return None
 
     def told(self, effect: _imufit.Effect, facts: _imufit.Facts) -> str | None:
-        """Return why what the log is judged by cannot tell of an effect; None if it can."""
+        """Return why the log's evidence cannot show an effect; None if it can."""
         return None
 
     def evidence(self, evidence: _imufit.Evidence, facts: _imufit.Facts, label: str) -> _imufit.Evidence:

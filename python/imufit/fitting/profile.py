@@ -17,7 +17,7 @@ CHANCE = 20.0
 
 @dataclass(frozen=True)
 class Found:
-    """What a search found best for one effect.
+    """The best values of a search for one effect.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ def search(
     tellers = {
         key: [k for k, each in enumerate(logs) if each.refusal(effect) is None] for key, effect in candidates.items()
     }
-    # The longest log tells of the longest times.
+    # The longest log limits the longest times.
     guides = {key: logs[max(known, key=lambda k: _duration(logs[k]))].facts for key, known in tellers.items() if known}
     finer = 0
     if around is None:
@@ -108,7 +108,7 @@ def _found(
     effect: _imufit.Effect, trial: list[float], step: list[float], spread: list[float], steps: list[float]
 ) -> Found:
     if effect.tried_at_full_size:
-        # No grid tells more than its own step.
+        # A grid does not resolve more than its own step.
         return Found(step, step, [max(s, h / np.sqrt(12.0)) for s, h in zip(spread, steps, strict=True)])
     start = [
         searched if name in effect.searched else moved

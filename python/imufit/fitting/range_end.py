@@ -1,6 +1,6 @@
 """Where a sensor's readings may be cut off, for the question whether they are.
 
-This is only the value that a cut-off is tried at: whether readings are cut off there, the reference tells.
+This is only the value that a cut-off is tried at: the reference determines whether readings are cut off there.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class RangeEnd:
         self._pairs += steps.size
         self._same += int(np.count_nonzero(steps == 0.0))
         steps = steps[steps > 0.0]
-        # A reading at the end has no digits of its own: steps to and from there tell nothing of the resolution.
+        # A reading at the end has no digits of its own: steps to and from there do not show the resolution.
         self._step = min(self._step, float(np.quantile(steps, 0.01)) if steps.size else np.inf)
         self.largest = max(self.largest, float(values.max()))
         ends = np.concatenate([np.fmax.reduce(column, axis=0), np.fmax.reduce(-column, axis=0)])

@@ -15,7 +15,7 @@ from imufit.log import LogSource, whole
 from imufit.progress import Progress
 
 NEEDS_REFERENCE = "it needs a reference attitude"
-"""Why rests cannot tell of an effect."""
+"""Reason why rests cannot show an effect."""
 IN_REFERENCE = ("reference", "time")
 """Stages of effects that only a reference shows."""
 
@@ -42,7 +42,7 @@ class RestPasses(Passes):
     log : LogSource
         The log.
     progress : callable
-        Told of the rows done.
+        Called with the rows done.
     """
 
     rests: RestReadings
@@ -63,7 +63,7 @@ class RestPasses(Passes):
         self.rests = rests = read_rests(log, self.covariates)
         if not rests.sensors:
             raise InputError(
-                "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz), and too few rests to do without",
+                "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz), and too few rests to replace it",
                 file=log.path,
                 remedy=(
                     "Add the reference, or ref_angle with the metadata rig_axis; or record the sensor lying still in "
@@ -98,14 +98,14 @@ class RestPasses(Passes):
         return self.rests.spans
 
     def lacking(self, effect: _imufit.Effect) -> str | None:
-        """Return why nothing can be told of an effect's sensor, though the log has it; None otherwise."""
+        """Return why an effect's sensor cannot be judged, though the log has it; None otherwise."""
         if any(sensor in self.rests.sensors for sensor in effect.sensors):
             return None
         sensors = " or ".join(effect.sensors)
-        return f"the log has no reference attitude, and too little at rest to tell anything of {sensors}"
+        return f"the log has no reference attitude, and too little at rest to judge {sensors}"
 
     def told(self, effect: _imufit.Effect, facts: _imufit.Facts) -> str | None:
-        """Return why rests cannot tell of an effect; None if they can."""
+        """Return why rests cannot show an effect; None if they can."""
         if effect.stage in IN_REFERENCE or not _imufit.rests_tell(effect, facts, self.rests.arrays):
             return NEEDS_REFERENCE
         if effect.least_levels > self.rests.levels:
@@ -116,13 +116,13 @@ class RestPasses(Passes):
         return None
 
     def evidence(self, evidence: _imufit.Evidence, facts: _imufit.Facts, label: str) -> _imufit.Evidence:
-        """Fill empty evidence with what the rests tell."""
+        """Fill empty evidence from the rests."""
         evidence.add_rests(self.rests.arrays)
         self._progress(self.log.n, self.log.n, label)
         return evidence
 
     def fill(self, profiles: Sequence[_imufit.Profile], facts: _imufit.Facts) -> None:
-        """Fill empty searches with what the rests tell."""
+        """Fill empty searches from the rests."""
         for profile in profiles:
             profile.add_rests(self.rests.arrays)
 
@@ -161,6 +161,6 @@ def passes_of(log: LogSource, progress: Progress) -> Passes:
     log : LogSource
         The log.
     progress : callable
-        Told of the rows done.
+        Called with the rows done.
     """
     return (RestPasses if without_reference(log) else Passes)(log, progress)

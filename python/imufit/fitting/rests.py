@@ -1,4 +1,4 @@
-"""What a log without a reference attitude tells: rests, turns between them, the length of the magnetic field."""
+"""Evidence of a log without a reference attitude: rests, turns between them, the length of the magnetic field."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_STRETCHES = 2000
 BLOCKS = 20
 """Groups of rests that are left out in turn."""
 FEWEST_RESTS = 8
-"""Fewer rests leave no blocks to judge by, unless labels tell what each of six reads."""
+"""Fewer rests leave no blocks to judge by, unless labels state the side of each of six."""
 PARTS = 4
 """Blocks that each of fewer labelled rests is cut into. Six rests make 24 blocks, two for each held-out fold.
 
@@ -35,10 +35,10 @@ LEAST_SPREAD = np.radians(10.0)
 MOST_FIELD_ROWS = 4000
 FEWEST_FIELD_ROWS = 200
 FEWEST_DIFFERENCES = 6
-"""Fewer stretches that follow each other do not tell how much they differ."""
+"""Fewer stretches that follow each other do not show how much they differ."""
 FIELD_BLOCKS = 20
 CLEAR = 8.0
-"""Specific forces of different poses are told apart from this many times their noise on."""
+"""Specific forces of different poses are distinct from this many times their noise on."""
 EDGES = 60
 APART: Final = 0.1
 """Part of gravity by which two levels of an axis differ; a sensor that is laid up by hand lies within five degrees."""
@@ -47,7 +47,7 @@ _POSE = _imufit.rest_channels().index("acc_pose")
 
 @dataclass(frozen=True, eq=False)
 class RestReadings:
-    """What a log tells without a reference.
+    """Evidence of a log without a reference.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class RestReadings:
     placement : float
         How far a labelled side is off the vertical, rad; NaN without labels.
     sensors : tuple of str
-        Sensors that something is told of.
+        Sensors with evidence.
     field : float or None
         Mean length of the magnetic field, uT.
     expected : list of float
@@ -126,7 +126,7 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
         expected[_POSE] = off**2 + expected[0] / float(log.metadata.gravity) ** 2
     turns: list[tuple[int, int, int, int, float, int]] = []
     path = np.zeros(0, dtype=np.intp)
-    # A few turns do not tell how far off turns are, and would pull at the accelerometer's parameters.
+    # A few turns do not show the noise of turns, and would bias the accelerometer's parameters.
     if len(poses) >= FEWEST_RESTS and log.gyr is not None:
         turns, path = _turns(log, poses, gyr_noise, of_whole, notes)
     known = (bool(poses), bool(poses) and bool(np.isfinite(stills["gyr"]).any()), field_rows.size > 0)
@@ -284,7 +284,7 @@ def _as_they_scatter(
 ) -> tuple[list[Pose], float]:
     """Return rests and the gyroscope's noise, rad/s, no quieter than successive stretches of one rest differ.
 
-    Noise that is coloured does not average out as fast as the readings' own scatter says.
+    Noise that is coloured does not average out as fast as the readings' own scatter implies.
     """
     if not poses:
         return [], gyr_noise
@@ -376,7 +376,7 @@ def _turns(
 
 
 def _field_rows(log: Log, notes: list[str]) -> NDArray[np.intp]:
-    """Return rows with a magnetic field, evenly spread over the log; none if they tell nothing."""
+    """Return rows with a magnetic field, evenly spread over the log; none if they are not informative."""
     nothing = np.zeros(0, dtype=np.intp)
     if log.mag is None:
         return nothing
@@ -388,7 +388,7 @@ def _field_rows(log: Log, notes: list[str]) -> NDArray[np.intp]:
     if spread < LEAST_SPREAD:
         notes.append(
             f"The magnetometer was hardly turned: the field's direction in the body varies by {np.degrees(spread):.0f} "
-            f"deg, {np.degrees(LEAST_SPREAD):.0f} are needed for its length to tell anything."
+            f"deg, {np.degrees(LEAST_SPREAD):.0f} are needed for its length to be informative."
         )
         return nothing
     return np.asarray(rows)

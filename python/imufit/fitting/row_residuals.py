@@ -29,7 +29,7 @@ def residual_chunks(
     step : ndarray
         (p,) step of every parameter of the evidence, SI units.
     label : str
-        What the progress is told.
+        Text of the progress report.
     """
     for arrays in evidence.passes.chunks(evidence.passes.margin(evidence.facts), label):
         yield arrays, _imufit.evaluate(evidence.raw, arrays, step)

@@ -1,4 +1,4 @@
-"""A log after its first pass: its facts, and the effects that it can tell of."""
+"""A log after its first pass: its facts, and the effects that it can show."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class SurveyedLog:
     coverage : dict of str to float
         Share of the rows that each covariate is known in.
     effects : dict of str to Effect
-        Effects that it can tell of, by id.
+        Effects that it can show, by id.
     refused : dict of str to str
-        Why it cannot tell of the others.
+        Reasons why it cannot show the others.
     probes : dict of str to Effect
         Dependences without a name that it can be asked about, see `rust/model/src/probes`.
     faults : tuple of DataFault
@@ -62,7 +62,7 @@ class SurveyedLog:
         faults: tuple[DataFault, ...] = (),
         place: tuple[tuple[LogSource, ...], int] = ((), 0),
     ) -> SurveyedLog:
-        """Ask a log of which effects it can tell.
+        """Determine the effects that a log can show.
 
         Parameters
         ----------
@@ -99,7 +99,7 @@ class SurveyedLog:
         return 0.0 if column is None else self.passes.column_noise.get(column, 0.0)
 
     def refusal(self, effect: _imufit.Effect) -> str | None:
-        """Return why the log cannot tell of an effect; None if it can."""
+        """Return why the log cannot show an effect; None if it can."""
         return _refusal(effect, self.passes, self.facts, self.coverage)
 
 
@@ -124,7 +124,7 @@ def survey(
     logs : sequence of LogSource
         Logs of one sensor.
     progress : callable
-        Told of the rows done.
+        Called with the rows done.
     keep_constants : bool
         Temperatures and covariates count from the means that the model was fitted with, not from these logs'.
     """
@@ -133,7 +133,7 @@ def survey(
     surveys = [each.survey() for each in passes]
     facts = [found for found, _ in surveys]
     ranges = _ranges(passes)
-    # A log that never comes to the end of the range says nothing of it: there the model's is the one to go by.
+    # A log that never comes to the end of the range is not informative about it: there the model's is the one to go by.
     facts = [each.with_ranges(**{**_ranges_of(model), **ranges}) for each in facts]
     faults = [data_faults(each, found, ranges) for each, found in zip(passes, facts, strict=True)]
     if keep_constants and model.constants:
@@ -163,7 +163,7 @@ def _check_sensors(logs: Sequence[LogSource], facts: Sequence[_imufit.Facts]) ->
 
 
 def _ranges(passes: Sequence[Passes]) -> dict[str, float]:
-    """Where the ranges of the sensors end, from all logs: a reading beyond shows that it was no end."""
+    """Where the ranges of the sensors end, from all logs: a reading beyond shows that it was not an end."""
     ends: dict[str, float] = {}
     largest: dict[str, float] = {}
     for each in passes:

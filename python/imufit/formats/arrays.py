@@ -30,7 +30,7 @@ _LEAST: Final = 2
 
 @dataclass
 class Named:
-    """What a file holds, by path.
+    """The content of a file, by path.
 
     Parameters
     ----------

@@ -61,7 +61,7 @@ def read(path: Path) -> Recording:
 
 
 def _sheet(path: Path, sheet: Any) -> tuple[list[Table], list[str]]:
-    sheet.reset_dimensions()  # what the sheet says of its size need not be so
+    sheet.reset_dimensions()  # the size that the sheet states may be wrong
     above: list[tuple[Any, ...]] = []
     names: list[str] | None = None
     dates: set[str] = set()

@@ -1,4 +1,4 @@
-"""Which format a file is of: by its content first, by its suffix where the content does not tell."""
+"""Which format a file is of: by its content first, by its suffix where the content does not decide."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Format:
     extra : str or None
         The optional dependency of imufit that reads it; None where what imufit always needs does.
     by_suffix : bool
-        Whether a file that its content does not tell is one by its suffix; not where others use the suffix as well.
+        Whether the suffix decides if the content does not; not where others use the suffix as well.
     """
 
     name: str
@@ -85,7 +85,7 @@ def format_of(path: Path) -> Format | None:
         with path.open("rb") as file:
             head = file.read(_HEAD)
     except OSError:
-        return None  # whoever opens it next says why it cannot be read
+        return None  # the next reader reports why it cannot be read
     for form in FORMATS:
         if form.recognises(head, path):
             return form

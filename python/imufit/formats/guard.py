@@ -81,7 +81,7 @@ def guarded(path: Path, form: str) -> Iterator[None]:
     except MemoryError:
         raise InputError(f"the {form} declares more than fits into memory", file=path) from None
     except FileNotFoundError:
-        raise InputError("the file is not there", file=path) from None
+        raise InputError("the file does not exist", file=path) from None
     except IsADirectoryError:
         raise InputError("this is a folder, not a file", file=path) from None
     except PermissionError:

@@ -23,7 +23,7 @@ _DEPTH: Final = 16
 
 
 def recognises(_head: bytes, _path: Path) -> bool:
-    """Return False: a bracket at the beginning is too little, so that only the suffix tells."""
+    """Return False: a bracket at the beginning is too little, so that only the suffix decides."""
     return False
 
 

@@ -28,7 +28,7 @@ _STEP: Final = 1 << 20
 
 
 def check_elements(path: Path, data: bytes) -> None:
-    """Check that the file is built as the format says, and does not unpack to more than readings can.
+    """Check that the file is built as the format states, and does not unpack to more than readings can.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def check_elements(path: Path, data: bytes) -> None:
                 raise ValueError("a packed variable is not whole")
             body = body[8 : 8 + inner]
         if kind != _MATRIX:
-            raise ValueError("something stands between the variables")
+            raise ValueError("extra bytes stand between the variables")
         _check_matrix(memoryview(body), order, 0)
         at += 8 + length
 
@@ -120,7 +120,7 @@ def _elements(body: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
             start = at + 8
             end = start + (length if kind == _MATRIX else -(-length // 8) * 8)
         if kind not in _NUMBERS and kind != _MATRIX:
-            raise ValueError(f"there is no kind {kind} of element")
+            raise ValueError(f"unknown kind {kind} of element")
         if start + length > len(body):
             raise ValueError("an element is longer than its variable")
         yield kind, body[start : start + length]

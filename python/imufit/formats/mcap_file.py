@@ -133,7 +133,7 @@ class _Walk:
         while True:
             try:
                 yield next(found)
-            except Exception:  # there is no other sign of the end
+            except Exception:  # another sign of the end does not exist
                 return
 
     def _rest(self, tail: bytes) -> None:

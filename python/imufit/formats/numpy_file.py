@@ -30,7 +30,7 @@ def read(path: Path) -> Recording:
         shape, _, dtype = readers[version](file)
         if dtype.hasobject:
             raise InputError(
-                "the array holds Python objects, and reading one would run code that the file brings along",
+                "the array holds Python objects, and reading one would run code that the file contains",
                 file=path,
                 remedy="Write an array of numbers, or a table with pandas: frame.to_parquet(FILE).",
             )

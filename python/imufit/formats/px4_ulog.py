@@ -28,11 +28,11 @@ _DEFINITIONS: Final = frozenset(b"BFIMPQ")
 _STARTS: Final = frozenset(b"ALC")
 """Kinds of which the first ends the definitions."""
 _SYNC: Final = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
-"""Mark that the recorder writes twice a second for whoever has to begin in the middle."""
+"""Mark that the recorder writes twice a second for a reader that has to begin in the middle."""
 _SEARCHED: Final = 200_000
 """Bytes in which messages are looked for behind a damaged one: several sectors of a memory card."""
 _ROW: Final = 6
-"""Readings in a row that are no accident: one in 256 bytes looks like the beginning of one."""
+"""Readings in a row that are not an accident: one in 256 bytes looks like the beginning of one."""
 _LONGEST: Final = 10_000
 """Bytes of a message, more than any of PX4's; pyulog takes longer ones for damage."""
 _FLAG: Final = 11

@@ -1,4 +1,4 @@
-"""What a file of another program holds: one table, or several with clocks of their own rate."""
+"""The content of a file of another program: one table, or several with clocks of their own rate."""
 
 from __future__ import annotations
 

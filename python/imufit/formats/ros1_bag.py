@@ -110,7 +110,9 @@ def _split(data: Any, at: int, size: int, header: Any) -> Iterator[tuple[Any, by
         try:
             about = header.read(io.BytesIO(data[at:body]))
             about.get_uint8("op")
-        except Exception:  # fields that do not fit the header, names that are no text: nothing tells where the next is
+        except (
+            Exception
+        ):  # fields that do not fit the header, names that are not text: the place of the next is unknown
             return
         (length,) = struct.unpack_from("<L", data, body)
         end = body + 4 + length

@@ -88,7 +88,7 @@ class Messages:
             topics = list(self.undecoded)
             shown = ", ".join(topics[:5]) + ("" if len(topics) <= 5 else f" and {len(topics) - 5} more")
             notes.append(
-                f"{sum(self.undecoded.values())} messages were left out, because they are no rows of numbers or "
+                f"{sum(self.undecoded.values())} messages were left out, because they are not rows of numbers or "
                 f"cannot be decoded: topics {shown}."
             )
         return notes

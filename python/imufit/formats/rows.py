@@ -36,7 +36,7 @@ class Rows:
         self._tables: dict[str, _Growing] = {}
         self._values = 0
         self.left_out: dict[str, None] = {}
-        """What did not become a column, in the order of the file."""
+        """Parts that did not become a column, in the order of the file."""
 
     def append(self, table: str, values: Mapping[str, Value], time: float | None = None) -> None:
         """Add a row.
@@ -147,7 +147,7 @@ class _Growing:
             column = self.columns.get(name)
             if column is None:
                 if value is None or len(self.columns) >= COLUMNS:
-                    continue  # nothing tells yet whether it will hold numbers or texts
+                    continue  # it is not yet determined whether it holds numbers or texts
                 column = self.columns[name] = [] if isinstance(value, str) else array("d")
                 begun += 1
             if len(column) < self.n:

@@ -1,4 +1,4 @@
-"""What is in a log and what it can show, in words and as a figure."""
+"""The contents of a log and the effects that it can show, in words and as a figure."""
 
 from imufit.inspection.info import info
 from imufit.inspection.plot import drawing

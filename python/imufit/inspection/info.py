@@ -1,4 +1,4 @@
-"""What is in a log: samples, columns, motion, rests, reference, and which effects it can show."""
+"""The contents of a log: samples, columns, motion, rests, reference, and which effects it can show."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from imufit.results.log_info import LogInfo, ReferenceInfo, SeriesInfo
 
 
 def info(log: LogSource, *, effects: bool = True, progress: Progress | None = None) -> LogInfo:
-    """Tell what is in a log, and what it can show.
+    """List the contents of a log, and the effects that it can show.
 
     The log is read chunk by chunk, a few times. Of one that is too long to be judged row by row, effects and rests are
-    told by evenly spread stretches.
+    found in evenly spread stretches.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def info(log: LogSource, *, effects: bool = True, progress: Progress | None = No
 def _reference(
     log: LogSource, held: Contents, series: dict[str, SeriesInfo], counts: tuple[int, int, int], told: Shown
 ) -> ReferenceInfo:
-    """Say what the readings can be held against; `counts` are rows with a reference, and of them told and measured."""
+    """Describe the log's references; `counts` are rows with a reference, and among them stated and measured rows."""
     referenced, filled, exact = counts
     labels = next((column.labels for column in held.columns if column.name == "pose"), ())
     frame = log.metadata.frame
@@ -103,6 +103,6 @@ def _reference(
 
 
 def _notes(log: LogSource, told: Shown) -> tuple[str, ...]:
-    """Return by which rows rests and effects are told, and what the first pass of a fit noticed."""
+    """Return the rows for rests and effects, and the notes of the first pass of a fit."""
     empty = [] if told.surveyed is None else told.surveyed.passes.empty
     return tuple(note for note in (*judged_rows(log).notes, *empty) if note not in log.notes)

@@ -1,4 +1,4 @@
-"""Readings of a log over time, what its reference says they should be, and its rests, as a figure."""
+"""Readings of a log over time, the ideal readings of its reference, and its rests, as a figure."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def drawing(
     panels = drawn.panels()
     if not panels:
         what = "a reference" if show == "reference" else "readings"
-        raise InputError(f"there is nothing to draw: no {what.removeprefix('a ')} in this part", file=log.path)
+        raise InputError(f"nothing can be drawn: no {what.removeprefix('a ')} in this part", file=log.path)
     # Rests of stretches of a long log would be shaded in these alone.
     spans = rests_of(part).spans if judged_rows(part) is part else ()
     rests = [(max(a, low), min(b, high)) for a, b in spans if a < high and b > low]
@@ -143,7 +143,7 @@ class _Drawn:
             if name not in numbers - {"t"}:
                 near = nearest(name, numbers - {"t"})
                 raise InputError(
-                    "there is no such column of numbers",
+                    "the log has no such column of numbers",
                     file=log.path,
                     column=name,
                     remedy=f"Did you mean {near[0]}?" if near else f"The columns are {', '.join(list(numbers)[:12])}.",
@@ -184,7 +184,7 @@ class _Drawn:
             return
         course = reference_course(t, q)
         middle = 0.5 * (t[1:] + t[:-1])
-        # Over a gap nobody knows the rate.
+        # Over a gap the rate is unknown.
         self._rates.add(middle[~course.gap], UNITS["gyr"][1] * course.rate[~course.gap])
 
     def panels(self) -> list[PanelLines]:

@@ -25,7 +25,7 @@ def rests_of(log: LogSource) -> RestInfo:
     held = whole(judged_rows(log))
     if held.acc is None or not np.isfinite(held.acc).any():
         return RestInfo(reason="not known without an accelerometer")
-    # Readings of zero have no direction, and are no rest on earth.
+    # Readings of zero have no direction, and are not a rest on earth.
     poses = [pose for pose in find_poses(held, labelled_only=False).poses if pose.used and np.any(pose.mean)]
     if not poses:
         return RestInfo()

@@ -22,7 +22,7 @@ LISTED: Final = 1000
 ROWS: Final = "rows"
 """Name of the series of all rows."""
 SERIES: Final = (ROWS, "acc", "gyr", "mag", "temp", "ref_q", "ref_p", "ref_angle")
-"""What has a rate of its own: all rows, each sensor, each part of the reference."""
+"""Parts with a rate of their own: all rows, each sensor, each part of the reference."""
 
 
 def sample_rows(log: Log, name: str) -> NDArray[np.bool_] | None:

@@ -47,7 +47,7 @@ VANISHES: Final = 1e-9
 
 @dataclass(frozen=True)
 class Shown:
-    """What a log can show.
+    """The effects that a log can show.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def shown(log: LogSource, held: Contents, motion: MotionInfo, progress: Progress
     motion : MotionInfo
         How much it turns and moves.
     progress : callable
-        Told of the rows done.
+        Called with the rows done.
     """
     try:
         analysis = Analysis.of(EffectStack([]), [log], progress)
@@ -285,7 +285,7 @@ class _Alike:
         return bool(self._bases[key].size)
 
     def errors(self, key: str) -> Array:
-        """Return standard errors by the rows alone, offsets aside; infinite where no row tells."""
+        """Return standard errors by the rows alone, offsets aside; infinite where no row is informative."""
         base = self._bases[key]
         squares = np.sum(base**2, axis=1)
         whole = base.shape[1] == base.shape[0]
@@ -311,7 +311,7 @@ class _Alike:
             others = [self._places[each] for each in keys if each in self._places and each != key]
             left = _without(self._whole, np.concatenate([np.empty(0, int), *others]).astype(int))[np.ix_(at, at)]
             scale = np.sqrt(np.maximum(self._own[at], np.finfo(float).tiny))
-            # What the others leave of a direction counts from rounding on.
+            # The rest of a direction beside the others counts from rounding on.
             return np.diag(np.linalg.inv(left / np.outer(scale, scale) + VANISHES * np.eye(at.size))).copy()
 
         return np.asarray(np.sqrt(np.maximum(variances([*along, *besides]) / variances(along), 1.0)))

@@ -96,7 +96,7 @@ def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | Non
     if not ways:
         held = ", ".join(list(reference.covariates)[:12]) or "none"
         raise InputError(
-            f"no columns look like an attitude; there are {held}",
+            f"no columns have the names of an attitude; the columns are {held}",
             file=file,
             remedy="Name them with " + Remedy("attitude=", "--attitude ") + f"KIND:COLUMNS, which is {KINDS}.",
         )
@@ -128,7 +128,7 @@ def _off_vertical(log: Log) -> float:
     """Angle between the mean specific force in the reference frame and its vertical axis, rad; NaN without any.
 
     A quaternion with its scalar misplaced is, up to constant turns of body and frame, the inverse of the right one (an
-    orthogonal map of determinant -1): the rates are the same, and only gravity tells them apart.
+    orthogonal map of determinant -1): the rates are the same, and only gravity separates them.
     """
     if log.acc is None or log.ref_q is None:
         return float("nan")
@@ -192,6 +192,6 @@ def _angles(reference: Log, names: Sequence[str]) -> Iterator[tuple[str, tuple[s
 
 
 def _unit(reference: Log, names: Collection[str]) -> str:
-    """Return the mark of degrees where a name says so, or an angle exceeds a whole turn in rad."""
+    """Return the mark of degrees where a name states this, or an angle exceeds a whole turn in rad."""
     largest = max(float(np.nanmax(np.abs(reference.covariates[name]))) for name in names)
     return "[deg]" if largest > WHOLE_TURN or any("deg" in name.lower() for name in names) else ""

@@ -28,8 +28,8 @@ TILT_ERROR: Final = 0.1
 """Standard deviation of the direction of the mean specific force, rad: a frame that is not level, an offset of the
 accelerometer (0.5 m/s^2 are 0.05 rad), accelerations that do not cancel."""
 UPRIGHT: Final = 0.35
-"""Largest angle between the mean specific force and the vertical of the frame, rad: 20 degrees. Where a frame is not
-the one that was told, the angle is 90 degrees or 180."""
+"""Largest angle between the mean specific force and the vertical of the frame, rad: 20 degrees. In a frame other than
+the stated one the angle is 90 degrees or 180."""
 
 
 @dataclass(frozen=True, eq=False)

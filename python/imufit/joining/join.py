@@ -157,7 +157,7 @@ def _join_positions(log: Log, reference: Log, lag: float | None, skew: float | N
     if turned_over is not None and likelier and not (turned_over.unrelated or turned_over.ambiguous):
         raise InputError(
             f"the z axis of the positions points {'up' if up[2] < 0.0 else 'down'}, and frame "
-            f"{reference.metadata.frame} says otherwise",
+            f"{reference.metadata.frame} has the opposite direction",
             file=reference.path or "reference",
             column="ref_pz",
             remedy="Name the frame: " + reading(reference.path, option("frame", "ENU" if up[2] < 0.0 else "NED")),
@@ -226,7 +226,7 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
         raise _unrelated(best.traces, *logs)
     if second is None and found.unrelated:
         raise InputError(
-            f"the motion that both recordings saw is too short or too uniform to tell the lag: correlation "
+            f"the motion that both recordings saw is too short or too uniform to determine the lag: correlation "
             f"{best.traces.correlation:.3f} over {best.traces.overlap:.1f} s",
             file=logs[0].path or "log",
             remedy="Move the sensor for longer, once as at no other time, or give the lag, in s, such as "
@@ -253,7 +253,7 @@ def _with_lag(found: Placed) -> Remedy:
 
 def _apart(reference: Log) -> InputError:
     return InputError(
-        "the recordings have no few seconds of motion in common that no gap interrupts",
+        "the recordings share less than a few seconds of motion without a gap",
         file=reference.path or "reference",
         remedy="Record sensor and reference at the same time, and turn the sensor.",
     )
@@ -270,7 +270,7 @@ def _unrelated(traces: RateTrace, log: Log, reference: Log) -> InputError:
 
 
 def _joined(log: Log, reference: Log, rows: NDArray[np.intp], aligned: Aligned, mount: Array | None) -> Log:
-    """Lay the rows of both in the order of the sensor's clock; without a mount there is no attitude."""
+    """Lay the rows of both in the order of the sensor's clock; without a mount the attitude is omitted."""
     t_ref = aligned.on_sensor_clock(reference.t[rows], float(reference.t[rows[0]]))
     within = (t_ref >= log.t[0]) & (t_ref <= log.t[-1])
     between = Stretches.between_gaps(t_ref).seen(log.t, log.t)

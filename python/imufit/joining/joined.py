@@ -1,4 +1,4 @@
-"""What joining two recordings found."""
+"""The result of joining two recordings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Compared(Enum):
-    """What two recordings are compared by, in the words of a sentence."""
+    """The compared quantity of two recordings, in words."""
 
     RATES = "the rates"
     FORCES = "the lengths of the specific force"
@@ -65,7 +65,7 @@ class RateTrace(Part):
 
     @property
     def factor(self) -> float:
-        """What the values are multiplied with for this unit."""
+        """The factor of the values for this unit."""
         return float(np.rad2deg(1.0)) if self.compared is Compared.RATES else 1.0
 
     @property
@@ -139,7 +139,7 @@ class Joined(Plotted, Result):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader should know besides."""
+        """Further notes for the reader."""
         angle = np.rad2deg(self.left)
         if self.mount is None:
             return ("The reference has positions alone: the log has no attitude.",)

@@ -23,7 +23,7 @@ SAME: Final = 0.5
 FEW: Final = 100
 """Blocks of the attitude, of 1.5 s each, by which several lags are refined before the likeliest one is by all."""
 SURE: Final = 7.0
-"""Log odds from which on an alignment is believed: one in a thousand is wrong. They count against all alignments that
+"""Log odds from which on an alignment is accepted: one in a thousand is wrong. They count against all alignments that
 were tried, of unrelated recordings, and against the second one."""
 
 
@@ -48,7 +48,7 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class Likeliest:
-    """The likeliest alignment and what speaks against it.
+    """The likeliest alignment and the evidence against it.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def likeliest(
 
 
 def of_these(found: Sequence[Placed], search: LagSearch) -> Likeliest:
-    """Return the likeliest of some alignments, one at least, and what speaks against it."""
+    """Return the likeliest of some alignments, one at least, and the evidence against it."""
     best, *others = sorted(found, key=lambda each: -each.traces.gain)
     second = min(others, key=lambda each: each.traces.left, default=None)
     next_gain = max((each.traces.gain for each in others), default=0.0)

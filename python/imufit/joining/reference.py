@@ -137,7 +137,7 @@ def _column(log: Log, name: str, kind: str) -> Array:
     if values is None:
         held = ", ".join(list(log.covariates)[:20]) or "none"
         raise InputError(
-            "there is no such column of numbers",
+            "the file has no such column of numbers",
             file=log.path or "reference",
             column=plain,
             remedy=f"Columns without a fixed meaning: {held}.",

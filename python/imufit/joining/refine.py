@@ -186,7 +186,7 @@ _Guess = tuple[float, float, Array, float]
 
 @dataclass(frozen=True)
 class _Errors:
-    """What is compared in some blocks.
+    """The compared data of some blocks.
 
     Attributes
     ----------

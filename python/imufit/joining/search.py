@@ -109,7 +109,7 @@ def bin_width(sensor: Course, reference: Course) -> float:
 
 @dataclass(frozen=True)
 class _Lags:
-    """What there is at every lag with one skew: log likelihood ratio (lags,) and products of the rates (9, lags)."""
+    """Sums at every lag with one skew: log likelihood ratio (lags,) and products of the rates (9, lags)."""
 
     skew: float
     gain: Array

@@ -1,6 +1,6 @@
 """Logs whose truth is known: simulated sensors with effects hidden in them, and how well they are found.
 
-Nothing in the library's core uses this room.
+Nothing in the library's core uses this package.
 """
 
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ else:
     from importlib import import_module
 
     def __getattr__(name: str) -> object:
-        """Load a package of this room on first use (PEP 562)."""
+        """Load a subpackage on first use (PEP 562)."""
         if name in ("grade", "simulate"):
             return import_module(f"{__name__}.{name}")
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

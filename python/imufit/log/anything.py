@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class LogHolder(Protocol):
-    """What gives a log when asked: a simulation."""
+    """Objects that give a log: a simulation."""
 
     def to_log(self) -> Log:
         """Give the log."""

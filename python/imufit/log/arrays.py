@@ -40,7 +40,7 @@ def contiguous(values: ArrayLike, name: str, shape: tuple[int, ...] | None = Non
         raise InputError("the array does not hold numbers", file="log", column=name) from None
     if shape is not None and array.shape != shape:
         raise InputError(
-            f"the array has shape {array.shape}, but {shape} is wanted: rows are samples", file="log", column=name
+            f"the array has shape {array.shape}, but {shape} is required: rows are samples", file="log", column=name
         )
     return array
 
@@ -111,7 +111,7 @@ def fields_from_arrays(
             raise truth_value("", name, None, place)
     time = contiguous(t, "t")
     if time.ndim != 1:
-        raise InputError(f"the array has shape {time.shape}, but (n,) is wanted", file="log", column="t")
+        raise InputError(f"the array has shape {time.shape}, but (n,) is required", file="log", column="t")
     scan = TimeScan(place)
     scan.add(time)
     numbers: dict[str, Array] = {}

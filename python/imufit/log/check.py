@@ -31,7 +31,7 @@ def number_from_text(cell: Any, *, truth: bool = False) -> float:
     Raises
     ------
     ValueError
-        The cell is no number.
+        The cell is not a number.
     """
     if cell is None:
         return float("nan")
@@ -47,7 +47,7 @@ def number_from_text(cell: Any, *, truth: bool = False) -> float:
 
 
 def is_truth(cell: Any) -> bool:
-    """Whether a cell says true or false."""
+    """Whether a cell states true or false."""
     return str(cell).strip().lower() in _BOOLEAN
 
 
@@ -96,7 +96,7 @@ def checked_attitude(q: NDArray[np.float64], start: int, place: Place) -> NDArra
     Returns
     -------
     (n, 4) array
-        Unit quaternions. Norms up to 1e-3 off one are set right; beyond, it is an error.
+        Unit quaternions. Norms up to 1e-3 off one are corrected; beyond, it is an error.
     """
     missing = np.isnan(q)
     half = np.flatnonzero(missing.any(axis=1) & ~missing.all(axis=1))
@@ -128,7 +128,7 @@ def checked_attitude(q: NDArray[np.float64], start: int, place: Place) -> NDArra
 
 
 def checked_labels(cells: NDArray[np.object_]) -> NDArray[np.object_]:
-    """Text column with None where there is no text."""
+    """Text column with None where the text is missing."""
     labels = np.empty(len(cells), dtype=object)
     labels[:] = [None if _absent(cell) else str(cell) for cell in cells]
     return labels

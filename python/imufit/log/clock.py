@@ -17,9 +17,9 @@ from imufit.log.units import conversion
 Array = NDArray[np.float64]
 
 BETWEEN: Final = " + "
-"""What stands in a mapping between a column of dates and one of times of day."""
+"""The sign in a mapping between a column of dates and one of times of day."""
 _SAME_PACE: Final = 1.0
-"""Steps by which two clocks of one table may differ over its first rows and still tell the same time."""
+"""Steps by which two clocks of one table may differ over its first rows and still show the same time."""
 _MOST: Final = 0.5
 """Share of the cells that are times in a column of times: the rest may be empty."""
 

@@ -16,7 +16,7 @@ from imufit.log.check import number_from_text
 MONTH_FIRST: Final = "mm/dd/yyyy"
 DAY_FIRST: Final = "dd/mm/yyyy"
 ORDERS: Final = (MONTH_FIRST, DAY_FIRST)
-"""Orders of the numbers of a date with slashes, as a mapping writes them: no cell by itself tells which one it is."""
+"""Orders of the numbers of a date with slashes, as in a mapping: a single cell does not determine the order."""
 _STAMP: Final = re.compile(
     r"(?:(?P<date>[^\s:,]*?[^\s:,T])(?:T|[\s_]+|,\s*))?"
     r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d)(?:[.,:](?P<fraction>\d+))?"
@@ -38,7 +38,7 @@ def seconds_from_text(text: str, order: str = "") -> float:
         Such as ``2024-05-01T12:00:00.250Z``, ``25-Nov-2026 06:20:11.123``, ``5/1/2024 8:00:00.5 PM`` or
         ``12:30:01.250``. A time without a zone counts as UTC.
     order : str
-        One of `ORDERS`, for dates such as ``5/1/2024``; without one they are no dates.
+        One of `ORDERS`, for dates such as ``5/1/2024``; without one they are not dates.
     """
     found = _STAMP.fullmatch(text.strip())
     if found is None:

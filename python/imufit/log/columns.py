@@ -17,7 +17,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 
 SENSORS: Final = ("acc", "gyr", "mag")
 SENSOR_NAMES: Final = {"acc": "accelerometer", "gyr": "gyroscope", "mag": "magnetometer"}
-"""What the sensors are called in a sentence."""
+"""Names of the sensors in a sentence."""
 
 EULER: Final = ("ref_roll", "ref_pitch", "ref_yaw")
 """Reference attitude as angles, rad: a file may have them in place of `ref_q`, a log has not."""
@@ -52,7 +52,7 @@ UNITS: Final = {
 """Unit of each column that has a fixed one."""
 
 LARGEST: Final[dict[str, float]] = {
-    # ns since 1970 are 2e18; check_units says so with the mapping, so they must come through
+    # ns since 1970 are 2e18; check_units states this with the mapping, so they must come through
     "t": 1e19,
     # m/s^2; the most robust shock sensors end at 2e5 g. Raw counts of 24 bits come through, for check_units to name.
     **dict.fromkeys(GROUPS["acc"], 1e7),
@@ -60,9 +60,9 @@ LARGEST: Final[dict[str, float]] = {
     **dict.fromkeys(GROUPS["gyr"], 1e7),
     # uT; the strongest lasting magnets have 45 T = 4.5e7 uT
     **dict.fromkeys(GROUPS["mag"], 1e8),
-    # degC; no sensor lives at 1e3, but raw counts of 16 bits may stand unconverted in a column that nobody uses
+    # degC; no sensor lives at 1e3, but raw counts of 16 bits may stand unconverted in an unused column
     "temp": 1e6,
-    # a unit quaternion; how far from one is told by checked_attitude
+    # a unit quaternion; checked_attitude reports the distance from one
     **dict.fromkeys(GROUPS["ref_q"], 1e7),
     # m; the moon is at 4e8, and earth-centred positions are 6.4e6
     **dict.fromkeys(GROUPS["ref_p"], 1e9),
@@ -76,7 +76,7 @@ LARGEST_COVARIATE: Final = 1e30
 comes near; what lies beyond is a filler such as FLT_MAX. Fourth powers of 1e9 rows still have room in a float64."""
 
 SMALLEST: Final = 1e-30
-"""What is nearer to zero counts as zero in a column of a sensor, m/s^2, rad/s or uT. The quietest instrument (the test
+"""A value nearer to zero counts as zero in a column of a sensor, m/s^2, rad/s or uT. The quietest instrument (the test
 masses of LISA Pathfinder) resolves 1e-15 m/s^2, and fourth powers still have room in a float64."""
 
 POSES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")

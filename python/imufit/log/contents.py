@@ -1,4 +1,4 @@
-"""What a log holds and what it lacks, for whoever has just read one."""
+"""The contents of a log and the missing parts, for display after reading."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 SAMPLED: Final = 500_000
 """Rows that a median is taken of at most: its error is then a thousandth of the spread, and four digits are shown."""
 LABELS: Final = 1000
-"""Different texts of a column that are told at most."""
+"""Largest number of different texts of a column that are listed."""
 
 _WANTED: Final = {
     **SENSOR_NAMES,
@@ -92,7 +92,7 @@ class Contents:
 
     @property
     def missing_words(self) -> str:
-        """What is not there, in words."""
+        """The missing parts, in words."""
         return ", ".join(_WANTED[name] for name in self.missing)
 
     def to_dict(self) -> dict[str, Any]:

@@ -194,7 +194,7 @@ class CsvSource:
                     yield line, text.rstrip("\r\n")
 
     def _ragged(self) -> InputError:
-        """Error for the first line with another number of fields; the last line tells of a cut-off file."""
+        """Error for the first line with another number of fields; the last line indicates a cut-off file."""
         width, row, line, fields, last = len(self.names), 0, 0, 0, False
         for row, (line, text) in enumerate(rows := self._rows()):  # noqa: B007 - used after the loop
             fields = len(split_line(text, self._layout.separator))

@@ -19,7 +19,7 @@ _SAMPLE: Final = 1 << 16
 _LINES: Final = 60
 _COMMA_NUMBER: Final = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
 _NOTHING: Final = ' \t"'
-"""What may stand in a line without values, besides separators."""
+"""Texts that may stand in a line without values, besides separators."""
 COMMENT: Final = ("#", "%", "//")
 NOT_DATA: Final = re.compile(rb"\n[ \t]*(?:#|%|//|\r?\n)")
 """Line end before a line that holds no data: a comment or a blank line."""
@@ -84,7 +84,7 @@ def lines_in(file: IO[bytes], path: Path) -> Iterator[bytes]:
 def too_long(path: Path) -> InputError:
     """Return the error for a line that no log has."""
     return InputError(
-        f"a line is longer than {size_in_words(LONGEST_LINE)}: this is no table of rows",
+        f"a line is longer than {size_in_words(LONGEST_LINE)}: this is not a table of rows",
         file=path,
         remedy="Export it with a line for each sample.",
     )
@@ -111,7 +111,7 @@ def read_layout(path: Path) -> Layout:
     Raises
     ------
     InputError
-        It is no text, or no header and rows can be made out.
+        It is not text, or a header and rows cannot be found.
     """
     with path.open("rb") as file:
         raw = file.read(_SAMPLE + 1)
@@ -127,7 +127,7 @@ def read_layout(path: Path) -> Layout:
     lines[0] = lines[0].removeprefix("\ufeff")
     table = [i for i, line in enumerate(lines) if not is_comment(line)]
     if not table:
-        raise InputError("the file holds no table", file=path, remedy="A header and rows are wanted.")
+        raise InputError("the file does not hold a table", file=path, remedy="A header and rows are wanted.")
     separator, width = _separator([lines[i] for i in table])
     decimal = _decimal([lines[i] for i in table], separator)
     if decimal == ",":

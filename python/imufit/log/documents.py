@@ -31,12 +31,12 @@ def table_from_toml(path: Path, remedy: str | None = None) -> dict[str, Any]:
     path : Path
         The file.
     remedy : str, optional
-        What to do about a file that is no TOML.
+        Remedy for a file that is not TOML.
 
     Raises
     ------
     InputError
-        The file is no TOML, or is nested too deeply to be meant.
+        The file is not TOML, or is nested too deeply.
     OSError
         The file cannot be opened.
     """
@@ -70,7 +70,7 @@ def table_from_json(text: str | bytes, file: Path, column: str | None = None) ->
     Raises
     ------
     InputError
-        It is no JSON object, or is nested too deeply to be meant.
+        It is not a JSON object, or is nested too deeply.
     """
     what, valid = ("the metadata are", "valid JSON") if column else ("this is", "JSON")
     try:

@@ -16,7 +16,7 @@ MOST_ROWS: Final = 2_000_000
 """Rows that a model is held against at most: a diagnosis takes some 40 us of the processor for each, and from so many
 it knows every effect to a thousandth of what is worth correcting."""
 STRETCHES: Final = 96
-"""Stretches, evenly spread: two in each of the 48 blocks that tell how much the residual scatters over the log."""
+"""Stretches, evenly spread: two in each of the 48 blocks that show how much the residual scatters over the log."""
 
 
 class Excerpt(SomeRows):

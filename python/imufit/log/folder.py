@@ -36,7 +36,7 @@ def recording_of_folder(path: Path) -> Recording:
     Raises
     ------
     InputError
-        There is no table in it, or more than can be held in memory.
+        A table is missing in it, or it exceeds the memory.
     """
     files = sorted(file for file in path.iterdir() if file.is_file() and file.suffix.lower() in TEXT_SUFFIXES)
     return _recording(path, "folder of text files", files)
@@ -102,7 +102,7 @@ def _recording(path: Path, form: str, files: list[Path]) -> Recording:
     if len(files) > MOST_FILES:
         notes.append(f"{path.name}: {len(files) - MOST_FILES} of {len(files)} text files left out")
     if not tables:
-        raise InputError(f"the {form} holds no table", file=path, remedy="Name a file that holds samples.")
+        raise InputError(f"the {form} does not hold a table", file=path, remedy="Name a file that holds samples.")
     return Recording(form, tuple(tables), tuple(notes), clues=tuple(clues))
 
 

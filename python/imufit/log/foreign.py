@@ -24,7 +24,7 @@ from imufit.remedy import Remedy, reading, template
 ROW: Final = "row"
 """Name that stands for the row number in a mapping, when the file has no column of that name."""
 NUMBER: Final = re.compile(r"[+-]?\s*(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-"""What stands for a constant in a mapping, when the file has no column of that name."""
+"""The text of a constant in a mapping, when the file has no column of that name."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ def plan_columns(
                 column=column.name,
                 remedy="Choose one of them.",
             )
-    # What was only read for a column that is left out is no covariate either.
+    # A column read only for a dropped column is not a covariate either.
     dropped = {*dropped, *(column.origin for column in resolved if column.target in dropped)}
     targets = {column.target for column in mapped}
     used = {name for column in mapped for name in column.names}
@@ -318,7 +318,7 @@ def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place,
     complete = [group for group in (*SENSORS, "ref_q") if all(column in targets for column in GROUPS[group])]
     if not complete and "ref_angle" not in targets and not bare:
         raise place.error(
-            "there is no sensor: neither acc_x acc_y acc_z nor gyr_* nor mag_* nor a reference ref_q*",
+            "the file has no sensor: neither acc_x acc_y acc_z nor gyr_* nor mag_* nor a reference ref_q*",
             remedy="Name the columns with " + reading(place.file, template("acc")) + "." + _listing(free),
         )
 

@@ -74,13 +74,13 @@ class Log:
     covariates : mapping of (n,) arrays, optional
         Other numeric columns by name.
     labels : mapping of sequences of str or None, optional
-        Other text columns by name, None where there is no text.
+        Other text columns by name, None where the text is missing.
     metadata : Metadata or mapping, optional
         Frame, gravity, field, rig axis, noise.
     path : Path, optional
         File that the log was read from.
     notes : tuple of str
-        What reading noticed or changed.
+        Findings and changes of the reader.
     ref_q : (n, 4) array, optional
         `attitude` under the name of its columns.
     **more
@@ -178,7 +178,7 @@ class Log:
         for name, cells in [*self.labels.items(), *([("pose", self.pose)] if self.pose is not None else [])]:
             if cells.shape != (t.size,):
                 raise InputError(
-                    f"the array has shape {cells.shape}, but ({t.size},) is wanted", file="log", column=name
+                    f"the array has shape {cells.shape}, but ({t.size},) is required", file="log", column=name
                 )
 
     @property
@@ -276,7 +276,7 @@ class Log:
         """
         mask = np.asarray(mask)
         if mask.dtype != np.bool_ or mask.shape != (self.n,):
-            raise ValueError(f"mask has shape {mask.shape} and type {mask.dtype}; ({self.n},) and bool are wanted")
+            raise ValueError(f"mask has shape {mask.shape} and type {mask.dtype}; ({self.n},) and bool are required")
         return self._picked(mask)
 
     def _picked(self, key: Any) -> Self:
@@ -555,7 +555,7 @@ class Chunk:
 
 @runtime_checkable
 class LogSource(Protocol):
-    """What a log in memory and a log on disk have in common."""
+    """The common part of a log in memory and a log on disk."""
 
     @property
     def n(self) -> int:
@@ -579,7 +579,7 @@ class LogSource(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What reading noticed or changed."""
+        """Findings and changes of the reader."""
         ...
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:

@@ -39,7 +39,7 @@ class Maker:
     counter : str
         Column that counts the samples, for a file whose rate is known.
     instance : str
-        Column that tells sensors of one kind apart whose rows take turns.
+        Column that separates sensors of one kind whose rows alternate.
     source : str
         Where the layout is documented.
     """
@@ -72,7 +72,7 @@ class Maker:
         return None if re.search(self.varied, table) else self.units.get(group)
 
     def sensor(self, column: str) -> str | None:
-        """Give the sensor that a column is whatever its name says; None where the name counts."""
+        """Give the sensor of a column independent of its name; None where the name counts."""
         return next((sensor for sensor, pattern in self.columns.items() if re.search(pattern, column)), None)
 
     def rate_in(self, clues: Sequence[str]) -> float | None:

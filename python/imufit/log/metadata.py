@@ -1,4 +1,4 @@
-"""What a log says about itself: frame, gravity, field, rig axis, noise."""
+"""The metadata of a log: frame, gravity, field, rig axis, noise."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FRAMES: Final = ("NED", "ENU", "NWU")
 AXES: Final = ("x", "y", "z")
 STANDARD_GRAVITY: Final = 9.80665
 SMALLEST_GRAVITY: Final = 1e-3
-"""m/s^2; the moons of Mars have 3e-3. What is smaller is a slip, and a division by it tells nothing."""
+"""m/s^2; the moons of Mars have 3e-3. A smaller value is a slip, and a division by it has no meaning."""
 
 ALIKE: Final = 0.8
 """Share of letters in common (difflib) from which a name is a slip for another: one letter of five lost has 0.89, two
@@ -152,7 +152,7 @@ def check_sidecar(path: Path) -> None:
     older = read_sidecar(path)
     if older and not KNOWN & older.keys():
         raise InputError(
-            "this file is in the way: it is no log metadata, but the log's metadata would be written there",
+            "this file is in the way: it does not hold log metadata, but the log's metadata would be written there",
             file=sidecar_path(path),
             remedy="Write the log under another name.",
         )
@@ -208,7 +208,7 @@ def _check_unknown(key: str, values: Mapping[str, Any], file: str | Path | None)
 def _frame(value: Any, file: str | Path | None) -> Frame:
     if value not in FRAMES:
         raise InputError(
-            f"metadata frame is {_shown(value)}, which is no frame",
+            f"metadata frame is {_shown(value)}, which is not a frame",
             file=file,
             column="frame",
             remedy="Write NED, ENU or NWU.",
@@ -220,7 +220,7 @@ def _gravity(value: Any, file: str | Path | None) -> float:
     number = _number(value)
     if number is None or not SMALLEST_GRAVITY <= number <= 30.0:
         raise InputError(
-            f"metadata gravity is {_shown(value)}, which is no gravity in m/s^2",
+            f"metadata gravity is {_shown(value)}, which is not a gravity in m/s^2",
             file=file,
             column="gravity",
             remedy=f"Write a number such as {STANDARD_GRAVITY}.",
@@ -244,7 +244,7 @@ def _mag_reference(value: Any, file: str | Path | None) -> tuple[float, ...]:
 def _rig_axis(value: Any, file: str | Path | None) -> str:
     if value not in AXES:
         raise InputError(
-            f"metadata rig_axis is {_shown(value)}, which is no body axis",
+            f"metadata rig_axis is {_shown(value)}, which is not a body axis",
             file=file,
             column="rig_axis",
             remedy='Write "x", "y" or "z".',

@@ -11,7 +11,7 @@ from imufit.log.check import is_truth, number_from_text
 from imufit.log.units import lookup
 
 LONGEST_LINE: Final = 4096
-"""Characters of a line; what is longer is no record but noise or a binary dump."""
+"""Characters of a line; a longer line is not a record but noise or a binary dump."""
 
 _COLOUR: Final = re.compile(r"\x1b(?:\[[0-9;?]*[ -/]*[@-~]?|[@-Z\\-_])")
 _NUMBER: Final = r"(?:[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|(?i:nan|[-+]?inf|true|false)\b)"
@@ -26,7 +26,7 @@ _ITEM: Final = re.compile(rf"{_NAME}{_SIGN}(?:(?P<open>[(\[{{])\s*(?P<in>{_VALUE
 _BEHIND: Final = re.compile(
     r"\s?(?P<unit>[^\s,;|=:()\[\]{}\d][^\s,;|=:()\[\]{}]{0,11})(?=\s*(?:[,;|)]|$)|\s+[A-Za-z_#])"
 )
-"""What may be a unit behind the values, as in ``9.81 m/s^2,``."""
+"""A possible unit behind the values, as in ``9.81 m/s^2,``."""
 _MARK: Final = re.compile(rf"{_NAME}{_SIGN}")
 _ONE: Final = re.compile(f"({_NUMBER})({_UNIT})")
 _MEASURED: Final = ("time", "specific force", "angular rate", "magnetic flux density")
@@ -174,7 +174,7 @@ def lead_of(text: str) -> tuple[str, tuple[tuple[str, float], ...]]:
     -------
     words : str
         The text with ``#`` for each number, by which lines of one kind are recognised. Numbers within words, as in
-        ``imu2`` or ``0x68``, stay: they tell sensors apart.
+        ``imu2`` or ``0x68``, stay: they separate sensors.
     numbers : tuple of (str, float)
         ``clock``, s (since midnight, or since 1970 with a date), and the other numbers as ``c1``, ``c2``, ...
     """
@@ -192,7 +192,7 @@ def lead_of(text: str) -> tuple[str, tuple[tuple[str, float], ...]]:
 
 
 def _seconds(clock: str) -> float:
-    """Time of day, or since 1970 with a date, s; NaN where there is no such time."""
+    """Time of day, or since 1970 with a date, s; NaN where such a time is missing."""
     date, _, time = clock.rstrip("Z").replace(",", ".").replace("T", " ").rpartition(" ")
     hours, minutes, seconds = (float(part) for part in time.split(":"))
     if hours > 24.0 or minutes > 59.0 or seconds >= 61.0:

@@ -35,7 +35,7 @@ _BROKEN: Final = (
     EOFError,
     ValueError,
     OSError,
-    # what the header of an array says is read as Python: too deep, too large, no literal
+    # the header of an array is read as Python: too deep, too large, no literal
     SyntaxError,
     tokenize.TokenError,
     MemoryError,
@@ -44,7 +44,7 @@ _BROKEN: Final = (
     TypeError,
     KeyError,
 )
-"""What the readers of archives and arrays raise about damaged bytes."""
+"""Errors of the readers of archives and arrays about damaged bytes."""
 _UNKNOWN: Final = (NotImplementedError, RuntimeError)
 """... and about a compression, a version or an encryption that they do not know."""
 
@@ -99,7 +99,7 @@ class NpzSource:
 
     def _unknown(self, error: Exception) -> InputError:
         return InputError(
-            f"the archive is encrypted, or of a kind that is not known ({error})",
+            f"the archive is encrypted, or of an unknown kind ({error})",
             file=self._path,
             remedy="Write it with numpy.savez or numpy.savez_compressed.",
         )
@@ -107,7 +107,7 @@ class NpzSource:
     def _add(self, entry: str, file: IO[bytes], lengths: dict[str, int]) -> None:
         name = entry.removesuffix(".npy")
         if name in lengths or (name == _METADATA and self.embedded):
-            raise InputError("the array is there twice", file=self._path, column=name, remedy="Save each array once.")
+            raise InputError("the array is stored twice", file=self._path, column=name, remedy="Save each array once.")
         shape, fortran, dtype = _header(file)
         if dtype.kind not in "fiubUS":
             kind = "Python objects" if dtype.hasobject else f"values of type {dtype}"

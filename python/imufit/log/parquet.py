@@ -22,7 +22,7 @@ _KEY: Final = b"imufit"
 ROW_GROUP: Final = 131_072
 """Rows of a row group that is written: what a reader has to hold at least."""
 _BROKEN: Final = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
-"""What the reader raises about damaged bytes; a schema's size may be anything."""
+"""Errors of the reader about damaged bytes; a schema's size may be anything."""
 _DAMAGED: Final = (
     "Copy or record it again; " + command("recover", "imufit.devices.record.recover") + " saves what a crash left."
 )
@@ -42,7 +42,7 @@ class ParquetSource:
             raise
         except UnicodeDecodeError:
             raise InputError(
-                "a name in the file's schema is no UTF-8", file=path, remedy="Rename the column and write it again."
+                "a name in the file's schema is not UTF-8", file=path, remedy="Rename the column and write it again."
             ) from None
         except _BROKEN as error:
             raise self._unreadable(error) from None

@@ -1,4 +1,4 @@
-"""What a person says about a file that is read as a log: columns, frame, noise, and what to leave out."""
+"""A user's options for a file that is read as a log: columns, frame, noise, and what to leave out."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _VALUE = re.compile(r"(?P<number>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 
 @dataclass(frozen=True)
 class Reading:
-    """How a file is to be read, where the file does not say so itself or says it wrongly.
+    """How a file is to be read, where the file does not state it or states it wrongly.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Reading:
         Raises
         ------
         InputError
-            There is no such column, or the mapping makes it.
+            The column is missing, or the mapping makes it.
         """
         shown = {printable(name, NAME): name for name in names}
         known = dict.fromkeys([*shown, *targets])

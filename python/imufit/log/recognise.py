@@ -51,7 +51,7 @@ class Readable(Protocol):
 
     @property
     def clues(self) -> tuple[str, ...]:
-        """What its maker is known by."""
+        """Marks of its maker."""
         ...
 
     def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
@@ -61,7 +61,7 @@ class Readable(Protocol):
 
 @dataclass(frozen=True)
 class Recognised:
-    """What a file was taken for.
+    """The recognised layout of a file.
 
     Parameters
     ----------

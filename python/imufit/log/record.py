@@ -30,7 +30,7 @@ Shape = tuple[str, str, str, tuple[str, ...]]
 
 @dataclass(frozen=True)
 class Found:
-    """What one line gives.
+    """The content of one line.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ class Record:
             return lead if 2 * len(matched) >= len(self.shapes) else None
         values = [value for _, value in numbers] if begins else [_NAN] * len(self.lead_names)
         used = [id(item) for item in matched.values()]
-        # of the last value nobody can tell; any other that ends its line is the end of what was cut off
+        # the end of the last value is uncertain; any other that ends its line is the end of what was cut off
         last = len(self.shapes) - 1
         matched = {place: item for place, item in matched.items() if place == last or not _may_be_cut(item, line)}
         for place, shape in enumerate(self.shapes):

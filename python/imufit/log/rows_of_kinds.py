@@ -1,4 +1,4 @@
-"""Text files whose lines are of several kinds, told by their first cell or by the number of their sensor."""
+"""Text files whose lines are of several kinds, identified by their first cell or by the number of their sensor."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def recording_of_kinds(path: Path) -> Recording | None:
     Returns
     -------
     Recording or None
-        None where the file is no such file: fewer than half of its first lines are of a kind whose columns are told.
+        None where the file is not such a file: fewer than half of its first lines are of a kind with stated columns.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def _kind(line: str) -> str:
 
 
 def _told(lines: list[str]) -> dict[str, list[str]]:
-    """Names of the columns of each kind that lines tell."""
+    """Names of the columns of each kind that lines state."""
     told: dict[str, list[str]] = {}
     for line in lines:
         cells = split_line(line.strip().lstrip("#%/").strip(), ",")

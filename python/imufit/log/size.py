@@ -1,4 +1,4 @@
-"""How much of a log is held in memory at once: told by rows and columns, since a file's own size tells little."""
+"""How much of a log is held in memory at once: computed from rows and columns, not from the file's size."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BLOCK: Final = 32 << 20
 BLOCK_ROWS: Final = 65_536
 """Rows that are read from a file at once, at most."""
 LONGEST_TEXT: Final = 4096
-"""Bytes of a cell of text: labels are words. What is longer would take memory for nothing."""
+"""Bytes of a cell of text: labels are words. A longer one would take memory for nothing."""
 LONGEST_LINE: Final = 1 << 20
 """Bytes of a line of text: a thousand columns take a fiftieth of it."""
 TEXT_GROUP: Final = 64 << 20
@@ -37,7 +37,7 @@ def rows_at_once(row_bytes: int) -> int:
 
 
 def size_in_words(size: float) -> str:
-    """Bytes as a person says them, such as ``3.1 GB``.
+    """Bytes in readable form, such as ``3.1 GB``.
 
     Parameters
     ----------

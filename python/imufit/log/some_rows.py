@@ -27,7 +27,7 @@ class SomeRows:
     spans : sequence of (int, int)
         Stretches of its rows, ascending.
     note : str
-        What is to be said of it; empty for nothing.
+        Notes on it; empty for nothing.
 
     Raises
     ------
@@ -66,7 +66,7 @@ class SomeRows:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What reading noticed or changed, and which rows these are."""
+        """Findings and changes of the reader, and the rows."""
         return (*self._log.notes, *([self._note] if self._note else []))
 
     def pieces(self) -> Iterator[Log]:

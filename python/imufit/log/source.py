@@ -1,4 +1,4 @@
-"""What every file format offers, and which format a file has."""
+"""The interface of every file format, and the format of a file."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ class Source(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was noticed on reading."""
+        """Findings of the reader."""
         ...
 
     @property
     def clues(self) -> tuple[str, ...]:
-        """What its maker is known by; see `imufit.log.makers.maker_of`."""
+        """Marks of its maker; see `imufit.log.makers.maker_of`."""
         ...
 
     def scan(self, columns: Sequence[str]) -> Iterator[Block]:
@@ -79,7 +79,7 @@ class Source(Protocol):
 
 
 _ARRAYS: Final[Mapping[str, Callable[[Path], Source]]] = {".parquet": ParquetSource, ".npz": NpzSource}
-"""Formats of logs that are told by their suffix."""
+"""Formats of logs that are identified by their suffix."""
 
 
 def open_source(path: Path) -> Source:
@@ -91,13 +91,13 @@ def open_source(path: Path) -> Source:
         The file is missing, empty, damaged or of no known format.
     """
     if not path.exists():
-        raise InputError(f"there is no file {path}", file=path, remedy="Check the name.")
+        raise InputError(f"the file {path} does not exist", file=path, remedy="Check the name.")
     try:
         suffix = "" if path.is_dir() else path.suffix.lower()
         if not path.is_dir() and path.stat().st_size == 0:
             raise InputError("the file is empty (0 bytes)", file=path, remedy="Record or copy it again.")
         if re.fullmatch(r"\.part\d*", suffix):
-            raise InputError("this is what a recording wrote while it ran", file=path, remedy=recovering(path))
+            raise InputError("this is the part of a running or killed recording", file=path, remedy=recovering(path))
         if suffix in _ARRAYS:
             return _ARRAYS[suffix](path)
         if (found := _recording(path)) is not None:
@@ -106,7 +106,7 @@ def open_source(path: Path) -> Source:
             return open_unpacked(path)
         if suffix not in SUFFIXES and not looks_like_text(path):
             raise InputError(
-                f"the suffix {suffix or '(none)'} is not a log's, and the file is no text",
+                f"the suffix {suffix or '(none)'} is not a log's, and the file is not text",
                 file=path,
                 remedy=f"Logs are {', '.join(SUFFIXES)}: export it as text, of which "
                 + command("convert", "imufit.read")

@@ -63,7 +63,7 @@ class LogStream:
     ) -> None:
         file = Path(path)
         source = open_source(file)
-        # what says of itself that it is a log may have rows as far apart as it says
+        # a source that states that it is a log may have rows as far apart as stated
         is_log = bool(source.embedded) or sidecar_path(file).is_file()
         reading = Reading(mapping, frame, noise or {}, (drop,) if isinstance(drop, str) else tuple(drop))
         stated = {**source.embedded, **read_sidecar(file)}
@@ -74,7 +74,7 @@ class LogStream:
     def of_source(
         cls, source: Source, metadata: Metadata, reading: Reading | None = None, clock: Clock = "open"
     ) -> Self:
-        """Make the log of a source that is no file.
+        """Make the log of a source that is not a file.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ class LogStream:
         reading : Reading, optional
             How the table is to be read, where it does not say so itself.
         clock : "open" or "a log's"
-            Whether the source says of itself that it is a log, so that its time is in seconds.
+            Whether the source states that it is a log, so that its time is in seconds.
         """
         log = cls.__new__(cls)
         log._begin(source, None, metadata, {}, clock, reading or Reading(), bare=False)
@@ -186,7 +186,7 @@ class LogStream:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What reading noticed or changed, in the rows that have been read so far."""
+        """Findings and changes of the reader, in the rows read so far."""
         return (*self._notes, *self._unmeasured.notes)
 
     def pieces(self) -> Iterator[Log]:
@@ -225,7 +225,7 @@ class LogStream:
 
     @property
     def size(self) -> int:
-        """Bytes that the whole log would take in memory, told by rows and columns."""
+        """Bytes that the whole log would take in memory, computed from rows and columns."""
         text = sum(column.name in self._source.text for column in self._plan.columns)
         numbers = len(self._plan.columns) - text
         if "ref_angle" in self._columns and self._metadata.rig_axis is not None:
@@ -247,7 +247,7 @@ class LogStream:
         Raises
         ------
         InputError
-            It is too large for that; the message says how to take a part of it.
+            It is too large for that; the message states how to take a part of it.
         """
         made = self.size + self.n * more
         held, kept = HELD * gigabytes, KEPT * gigabytes
@@ -300,7 +300,7 @@ class _Left:
 
     @property
     def clues(self) -> tuple[str, ...]:
-        """What its maker is known by."""
+        """Marks of its maker."""
         return self._source.clues
 
     def scan(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
@@ -326,8 +326,8 @@ def open_log(
     mapping : mapping, optional
         Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
     stream : bool, optional
-        Whether to leave the log on disk; None does so if it would take more than 200 MB of memory, which its rows and
-        columns tell.
+        Whether to leave the log on disk; None does so if it would take more than 200 MB of memory, by its rows and
+        columns.
     frame, noise, drop
         As for `read`.
     """

@@ -21,7 +21,7 @@ def open_text(path: Path) -> CsvSource | TranscriptSource:
     """Open a text file as what it is.
 
     A file whose begin reads as a table is one, so that long tables need no pass of their own; any other is a
-    transcript if records with named values can be found in it. What is neither is told by the table's errors.
+    transcript if records with named values can be found in it. The table's errors report any other text.
 
     Parameters
     ----------

@@ -16,14 +16,14 @@ DAY: Final = 86400.0
 """Length of a day, s."""
 COARSE_AT_LEAST: Final = 10
 COARSE_AT_MOST: Final = 0.02
-"""Share of rows that repeat a stamp below which it says nothing of the clock's step how many rows a step has."""
+"""Share of rows that repeat a stamp below which the rows per step do not show the clock's step."""
 _PARTS: Final = 10
 _PARTS_AT_LEAST: Final = 4
 _KEPT_STEPS: Final = 100_000
 MOST_AT_ONE: Final = 10_000
 """Rows at one stamp from which on the clock stands still: more than a second of the fastest sensors, at 8 kHz."""
 EVEN: Final = 0.9
-"""Share of the clock's steps that have as many rows as their length says, by one row or a quarter. Of steps of a clock
+"""Share of the clock's steps with as many rows as their length states, to one row or a quarter. Of steps of a clock
 all do; 0.9 leaves room for rows that were lost."""
 PAUSE: Final = 3.5
 """Usual steps of the clock from which on a step is a pause of the recording, as for `is_gap`."""
@@ -144,7 +144,7 @@ class TimeScan:
     """Goes once over all time stamps, block by block, before anything else is read.
 
     A stamp that is not finite or that goes back is an error at once. Repeated stamps are collected. When there are at
-    least 10, scattered over the log, and each step of the clock has as many rows as its length says, the clock is
+    least 10, scattered over the log, and each step of the clock has as many rows as its length states, the clock is
     coarser than the sampling, and the rows of a step are spread evenly over it. Otherwise the first repeated stamp is
     an error, since it means a splice or a copied block.
 
@@ -312,7 +312,9 @@ class TimeScan:
             digit = float(np.spacing(np.float32(stamp)))
             different = np.unique(stamps)
             if different.size > 1 and digit > 0.5 * float(np.median(np.diff(different))):
-                problem += f": t is in single precision (float32), which tells times of this size only to {digit:g} s"
+                problem += (
+                    f": t is in single precision (float32), which resolves times of this size only to {digit:g} s"
+                )
                 remedy = "Write t as float64, or subtract the first time before it is rounded; record or export again."
         return self._place.error(problem, row=row, column="t", remedy=remedy)
 

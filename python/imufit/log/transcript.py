@@ -28,7 +28,7 @@ _POSE_MARK: Final = re.compile(
 
 @dataclass
 class _Tally:
-    """What a pass over the file came across, for the notes."""
+    """Findings of a pass over the file, for the notes."""
 
     records: int = 0
     others: int = 0

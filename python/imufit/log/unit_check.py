@@ -25,7 +25,7 @@ LEAST_STEP: Final = 1e-6
 """Mean time from row to row, s, below which no sensor samples: the fastest accelerometers give 1e5 samples a second."""
 SLOWEST_STEP: Final = 2.0
 """Median time from row to row, s, from which a clock that was not stated is taken for one of another unit: at 0.5 Hz a
-hand turns a sensor over between two samples. A log of rests may be as slow, and then says so."""
+hand turns a sensor over between two samples. A log of rests may be as slow, and then has metadata."""
 _ROWS_OF_A_CLOCK: Final = 20
 """Rows from which on the steps of a clock are judged."""
 HEAD: Final = 200_000
@@ -182,7 +182,7 @@ def check_units(
         except OtherUnitError as other:
             others.append(other)
     if others:
-        # all of it in one mapping, so that nobody is asked twice
+        # all of it in one mapping, so that the question comes once
         units = {column: unit for other in others for column, unit in other.units.items()}
         others_words = sum((Remedy.of(other.otherwise) for other in others), Remedy("", ""))
         raise OtherUnitError(others[0].problem, units, place, origin, others_words)
@@ -544,7 +544,7 @@ def _check_mag(mag: Array, metadata: Metadata, place: Place, origin: Mapping[str
 def _milligauss_or_counts(
     mag: Array, size: float, told: float, milligauss: tuple[float, str, str]
 ) -> list[tuple[float, str, str]]:
-    """Units of about ten to the uT: by the field that is told, or by whole numbers."""
+    """Units of about ten to the uT: by the stated field, or by whole numbers."""
     units = [(10.0, *milligauss[1:]), *_COUNTS]
     if told > 0.0:
         return _nearest(size / told, units, math.inf)

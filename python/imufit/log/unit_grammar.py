@@ -20,7 +20,7 @@ QUANTITIES: Final[dict[str, Powers]] = {
     "angular rate": (0, -1, 1, 0),
     "magnetic flux density": (0, 0, 0, 1),
 }
-"""What a log measures, apart from temperatures, which have no prefix and stand in no product."""
+"""Quantities of a log, apart from temperatures, which have no prefix and stand in no product."""
 
 _SYMBOLS: Final[dict[str, tuple[Powers, str, tuple[str, ...]]]] = {
     # what it is of, its unit among those of `imufit.log.units`, spellings
@@ -117,8 +117,8 @@ def readings_of(text: str, folded: bool = False) -> tuple[Reading, ...]:
     Returns
     -------
     tuple of Reading
-        Each quantity once: the plain product before the one with a bar that is not written. Empty where the text is
-        no such unit.
+        Each quantity once: the plain product before the one with a bar that is not written. Empty where the text is not
+        such a unit.
     """
     plain = _plain(text)
     if not plain or len(plain) > LONGEST or _PLAIN.fullmatch(plain) is None:

@@ -92,7 +92,7 @@ QUANTITIES: Final = {
     **dict.fromkeys(GROUPS["ref_p"], "length"),
     "ref_angle": "angle",
 }
-"""What each column of a log measures."""
+"""The quantity of each column of a log."""
 _UNSIGNED: Final = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _NUMBER: Final = rf"[-+]?{_UNSIGNED}"
 # the sign of an exponent, as in *1e-3, begins no offset
@@ -153,7 +153,7 @@ def conversion(target: str, unit: str) -> Conversion:
         Column of the log; a name without fixed meaning takes any unit.
     unit : str
         ``g``, ``deg/s``, ..., ``16384 LSB/g``, ``0.061 mg/LSB``, ``*0.0005`` (a bare factor), ``100 Hz`` (row numbers
-        or ticks to seconds), or empty for SI. What is added after that may follow, in the unit named:
+        or ticks to seconds), or empty for SI. An offset may follow, in the unit named:
         ``340 LSB/degC + 36.53``.
 
     Raises

@@ -1,4 +1,4 @@
-"""Single readings that nothing can have measured: they are left out and told; a log with many of them is refused."""
+"""Single impossible readings: they are left out and reported; a log with many of them is refused."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ MOST: Final = 0.01
 """Share of the samples of a column that may be left out. Transmission errors that spoil whole numbers are rarer by
 orders of magnitude; what is more frequent is another unit, a filler, or bytes that are not numbers."""
 TOLD: Final = 5
-"""Readings that are told one by one; of more the number is told."""
+"""Readings that are listed one by one; of more the number is stated."""
 
 _SENSOR_COLUMNS: Final = frozenset(column for sensor in SENSORS for column in GROUPS[sensor])
 
 
 @dataclass
 class _Column:
-    """What was seen of one column so far.
+    """Findings in one column so far.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class _Column:
 class Unmeasured:
     """Leaves out readings beyond `LARGEST`, infinite ones too, and counts them, each row once however often it is read.
 
-    Whatever works on a log relies on it: squares of readings and their sums are finite, and none is zero unless the
+    All code on a log relies on it: squares of readings and their sums are finite, and none is zero unless the
     reading is.
 
     Parameters
@@ -128,7 +128,7 @@ class Unmeasured:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out of the rows read so far."""
+        """Readings left out of the rows read so far."""
         told = [(row, target, value) for target, seen in self._columns.items() for row, value in seen.first]
         notes = []
         for row, target, value in sorted(told)[:TOLD]:

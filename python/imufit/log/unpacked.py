@@ -19,7 +19,7 @@ from imufit.log.transcript import TranscriptSource
 COMPRESSED: Final = (".gz", ".zst")
 _UTF_16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 LARGEST: Final = 64 << 30
-"""Bytes of one unpacked text file: a day at 8 kHz has 50 GB. What is longer was made to fill a disk."""
+"""Bytes of one unpacked text file: a day at 8 kHz has 50 GB. A longer one was made to fill a disk."""
 _PIECE: Final = 1 << 20
 
 
@@ -32,7 +32,7 @@ def is_utf_16(path: Path) -> bool:
 def open_unpacked(path: Path) -> CsvSource | TranscriptSource:
     """Open a text file that ends in ``.gz`` or ``.zst``, or is in UTF-16.
 
-    What is unpacked is deleted with the source.
+    Unpacked files are deleted with the source.
 
     Parameters
     ----------
@@ -110,6 +110,6 @@ def damaged(path: Path, error: Exception) -> InputError:
     path : Path
         Archive.
     error : Exception
-        What its library says.
+        The error of its library.
     """
     return InputError(f"the file is cut off, damaged or encrypted ({error})", file=path, remedy="Copy it again.")

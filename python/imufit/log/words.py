@@ -144,7 +144,7 @@ _NO_TIME: Final = frozenset(
 _LONGEST_UNIT: Final = 4
 """Words that a unit within a name has at most, as in ``m_per_s_2``."""
 _SI: Final = {"acc": "m/s^2", "gyr": "rad/s"}
-"""What the word SI in a name means."""
+"""The meaning of the word SI in a name."""
 _QUANTITY: Final = {
     "acc": "specific force",
     "gyr": "angular rate",
@@ -180,7 +180,7 @@ class Words:
 
     @property
     def triple(self) -> tuple[str, ...]:
-        """What the three axes of a sensor have in common."""
+        """The common part of the three axes of a sensor."""
         return (*self.words, "#" if self.index else "", self.bracket)
 
 
@@ -335,7 +335,7 @@ def meant(name: str) -> str | None:
 
 
 def _close(name: str) -> str | None:
-    """Contract column that differs from the name by a slip of the finger; a digit is no slip, it counts sensors."""
+    """Contract column that differs from the name by a slip of the finger; a digit is not a slip, it counts sensors."""
     if re.search(r"\d", name):
         return None
     grouped = [column for group in GROUPS.values() for column in group]

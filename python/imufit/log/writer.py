@@ -50,7 +50,7 @@ def write_rows(path: Path, metadata: Metadata, tables: Iterable[Table]) -> None:
     Raises
     ------
     InputError
-        The suffix is no log's, the disk is full, or another file would be overwritten. No log is there then.
+        The suffix is not a log's, the disk is full, or another file would be overwritten. No log is there then.
     """
     path = Path(path)
     suffix = path.suffix.lower()

@@ -59,7 +59,7 @@ def each_log_has_its_own(effect_id: str) -> bool:
     Raises
     ------
     InputError
-        There is no such effect.
+        The effect is unknown.
     """
     return find_effect(effect_id).scope == "log"
 
@@ -83,7 +83,7 @@ def find_effect(effect_id: str) -> _imufit.Effect:
         near = difflib.get_close_matches(effect_id, list(effects()), n=1, cutoff=0.4)
         every = command("explain", "imufit.catalogue()") + " lists all effects."
         remedy = f"Did you mean {near[0]}?" if near else every
-        raise InputError(f"there is no effect {effect_id}", remedy=remedy)
+        raise InputError(f"unknown effect {effect_id}", remedy=remedy)
     return effect
 
 
@@ -102,8 +102,8 @@ class Catalogue(Result, list[EffectCard]):
     """A list of cards that shows itself as a table."""
 
     def sentences(self) -> list[str]:
-        """Return how many effects there are, and where more is told."""
-        return [f"{len(self)} effects; imufit.explain(id) tells more of each."]
+        """Return the number of effects, and the place of the details."""
+        return [f"{len(self)} effects; imufit.explain(id) shows the card of each."]
 
     def tables(self) -> list[Table]:
         """Return a row for each effect."""
@@ -138,7 +138,7 @@ def explain(effect_id: str) -> EffectCard:
     Raises
     ------
     InputError
-        There is no such effect.
+        The effect is unknown.
     """
     return card_of(find_effect(effect_id))
 
@@ -158,7 +158,7 @@ def load_effects(path: str | Path) -> list[str]:
     """
     file = Path(path)
     if not file.is_file():
-        raise InputError(f"there is no file {file}", file=file, remedy="Check the name.")
+        raise InputError(f"the file {file} does not exist", file=file, remedy="Check the name.")
     before = set(registered())
     run_effects(file)
     added = [effect_id for effect_id in registered() if effect_id not in before]

@@ -252,7 +252,7 @@ def _check_affine(effect_id: str, affine: str, stage: str, parameters: set[str],
     own_stage, names = AFFINE[affine]
     if needs:
         raise InputError(
-            f"effect {effect_id}: what needs a column is not a constant {affine}", remedy="Leave affine out."
+            f"effect {effect_id}: an effect with a column is not a constant {affine}", remedy="Leave affine out."
         )
     if stage != own_stage:
         raise InputError(f"effect {effect_id}: affine {affine} at stage {stage}", remedy=f"Use stage {own_stage}.")
@@ -273,7 +273,7 @@ def _check_arguments(effect_id: str, function: Function, names: Sequence[str]) -
             "the reading.",
         ) from None
     except ValueError:
-        return  # a function of another language tells nothing of its arguments
+        return  # a function of another language does not state its arguments
 
 
 def _ranges(effect_id: str, search: Mapping[str, Sequence[float]], names: Sequence[str]) -> dict[str, SearchRange]:
@@ -360,7 +360,7 @@ def forget(effect_id: str) -> None:
     Parameters
     ----------
     effect_id : str
-        Such as ``gyr.fan``; one that is not defined is no mistake.
+        Such as ``gyr.fan``; an undefined one is not a mistake.
     """
     _registered.pop(effect_id, None)
     _written.pop(effect_id, None)

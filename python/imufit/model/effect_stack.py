@@ -175,7 +175,7 @@ class EffectStack:
             del self._limits[effect_id][name]
         if not self._limits[effect_id]:
             del self._limits[effect_id]
-        # The error of an earlier fit says nothing of another value; what is given has none.
+        # The error of an earlier fit is not informative about another value; a given value has none.
         if limits.fixed or at[names.index(name)] != before or known.fixed:
             errors = self.standard_errors.get(effect_id)
             if errors is not None:

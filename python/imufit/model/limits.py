@@ -1,4 +1,4 @@
-"""What the user allows a parameter of a model: that it stays as it is, or within bounds."""
+"""The user's limits of a parameter of a model: that it stays as it is, or within bounds."""
 
 from __future__ import annotations
 

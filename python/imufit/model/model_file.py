@@ -19,7 +19,7 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class ModelFile:
-    """What the file of a model holds.
+    """The content of the file of a model.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class ModelFile:
         Raises
         ------
         InputError
-            The file is missing, cut off, no model, of a later format, or something in it is no table or number.
+            The file is missing, cut off, not a model, of a later format, or something in it is not a table or number.
         """
         file = Path(path)
         document, marked = read_toml(file, "the model")
@@ -97,7 +97,9 @@ class ModelFile:
             raise InputError(f"format {document.get('format')!r} is not known", file=file, remedy="Update imufit.")
         effects = document.get("effects")
         if not isinstance(effects, list) or not all(isinstance(key, str) for key in effects):
-            raise InputError("the key effects is no list of names", file=file, remedy='Write effects = ["gyr.bias"].')
+            raise InputError(
+                "the key effects is not a list of names", file=file, remedy='Write effects = ["gyr.bias"].'
+            )
         try:
             return cls(
                 effects,
@@ -143,7 +145,7 @@ class ModelFile:
         for effect in map(find_effect, self.effects):
             for column in set(effect.centred_columns) - known:
                 raise InputError(
-                    f"constants do not tell the mean of {column}, which {effect.id} counts from: is the file cut off?",
+                    f"constants do not hold the mean of {column}, which {effect.id} counts from: is the file cut off?",
                     remedy=HOW_TO_END,
                 )
 
@@ -185,7 +187,7 @@ def _standard_errors(value: Any) -> dict[str, dict[str, float]]:
     errors = _tables(value, "standard_errors")
     for key, numbers in errors.items():
         for name, number in numbers.items():
-            # One that nobody could work out is not a number, and stays so.
+            # One that could not be computed is not a number, and stays so.
             if isinstance(number, bool) or not isinstance(number, int | float):
                 raise InputError(f"the standard error of {key} {name} is {shown(number)}, not a number")
             if number < 0.0:

@@ -63,7 +63,7 @@ class ModelParameter(Parameter):
 
 
 class ModelParams(Params):
-    """Parameters of a model by ``EFFECT.PARAM``, as they are whenever they are asked for.
+    """Parameters of a model by ``EFFECT.PARAM``, as they are whenever they are requested.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class ModelParams(Params):
         Raises
         ------
         KeyError
-            There is no such parameter.
+            The parameter is unknown.
         """
         plain = super().__getitem__(key)
         return ModelParameter(**{item.name: getattr(plain, item.name) for item in fields(Parameter)}, model=self._model)

@@ -11,9 +11,9 @@ from imufit.errors import InputError
 MOST_TRIALS = 144
 """Combinations of values in the first grid at most: each is a fit beside the model, and counts as a chance finding."""
 PER_DECADE = 4
-"""Trials in a factor of ten: a lag is told from one 1.8 times as long by half of what it explains."""
+"""Trials in a factor of ten: a lag differs from one 1.8 times as long by half of its explained part."""
 LINEAR_TRIALS = 12
-"""Trials of a range that is no factor (through zero)."""
+"""Trials of a range that is not a factor (through zero)."""
 FINER = 4
 """Steps of a finer grid in one of the grid before, to each side."""
 ROUNDS = 2

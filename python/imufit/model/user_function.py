@@ -44,7 +44,7 @@ class UserFunction:
     axes : str
         Axes that a value of shape (n,) is added to.
     counted_from_mean : set of str
-        Columns that the function has asked for less their mean.
+        Columns that the function has requested less their mean.
     """
 
     effect: str
@@ -59,7 +59,7 @@ class UserFunction:
 
     @property
     def centred(self) -> list[str]:
-        """Columns that the function has asked for less their mean, by name."""
+        """Columns that the function has requested less their mean, by name."""
         return sorted(self.counted_from_mean)
 
     def __call__(self, arrays: dict[str, Any], parameters: Sequence[float], asked: str) -> Array:

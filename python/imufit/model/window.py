@@ -1,4 +1,4 @@
-"""What the function of a user's effect is asked about: rows of a log."""
+"""The argument of a user's effect: rows of a log."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Window:
     effect : str
         Id of the effect that asks.
     counted_from_mean : set of str
-        Columns that were asked for less their mean.
+        Columns that were requested less their mean.
     """
 
     t: Array
@@ -57,7 +57,7 @@ class Window:
     means: Mapping[str, float]
     effect: str = "of the user"
     counted_from_mean: set[str] = attribute(default_factory=set, repr=False)
-    """Columns that were asked for less their mean."""
+    """Columns that were requested less their mean."""
 
     @property
     def rate(self) -> Array:

@@ -13,7 +13,7 @@ An axis counts as clipped at the largest value of the log, of one sign, where
 
 - that stands in at least `ROWS` consecutive rows while another axis changes from each of at least `ROWS` samples to the
   next, by more than `STEPS` steps of the resolution and a thousandth of the value in all, and where the rows before and
-  after tell that the value went on: one differs by more than `WINDOW` of it, or by `STEPS` steps while the parabola
+  after show that the value went on: one differs by more than `WINDOW` of it, or by `STEPS` steps while the parabola
   through two rows on either side passes `BEYOND` of the value above it; or
 - readings pile up there: at least `PILE` of them, more than within the next `WINDOW` of the value below, most of them
   peaks of one or two rows that stand out by more than a thousandth and a step. So short blows show.
@@ -48,8 +48,7 @@ _LEAST_RATE: Final = 1.0
 def ranges(log: Log) -> dict[str, float]:
     """Find where the ranges of a log's sensors end: the rules ``acc_range`` (m/s^2) and ``gyr_range`` (rad/s).
 
-    What the metadata say under these names comes first, then what the readings show; where neither tells, there is no
-    entry.
+    The metadata under these names come first, then the readings; if neither determines a range, the entry is missing.
 
     Parameters
     ----------
@@ -131,7 +130,7 @@ def _is_cut(column: Array, axis: int, span: NDArray[np.intp], end: float, step: 
 
 
 def _goes_beyond(values: Array, start: int, stop: int, step: float) -> bool:
-    """Whether the rows around those from `start` to `stop` tell that the true top is above them."""
+    """Whether the rows around those from `start` to `stop` show that the true top is above them."""
     if start < 2 or stop + 2 > len(values):
         return False
     end = abs(values[start])

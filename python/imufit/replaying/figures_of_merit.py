@@ -247,7 +247,7 @@ def _before_vibration(rest: Rest, stretches: Stretches) -> tuple[int, int]:
 def _settling(
     t: Array, error: Array, calm: tuple[int, int], band_deg: float, bounded: bool
 ) -> tuple[float, bool] | None:
-    """Time to settle after one move and whether the rest was too short to tell; None without enough rest."""
+    """Time to settle after one move and whether the rest was too short to determine it; None without enough rest."""
     start, stop = calm
     rows = np.arange(start, stop)
     rows = rows[np.isfinite(error[rows]).all(axis=1)]

@@ -1,4 +1,4 @@
-"""Attitudes told in another reference frame."""
+"""Attitudes expressed in another reference frame."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from imufit import _imufit
 
 
 def convert_frame(q: ArrayLike, source: str, target: str) -> NDArray[np.float64]:
-    """Tell attitudes of one reference frame in another; north, east and up stay where they are.
+    """Express attitudes of one reference frame in another; north, east and up stay where they are.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def convert_frame(q: ArrayLike, source: str, target: str) -> NDArray[np.float64]
     Returns
     -------
     (n, 4) array
-        The same attitudes, body to frame `target`; NaN where a row of `q` is no attitude.
+        The same attitudes, body to frame `target`; NaN where a row of `q` is not an attitude.
 
     Raises
     ------

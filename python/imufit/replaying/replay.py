@@ -55,7 +55,7 @@ FILTERS: Final[dict[str, str]] = {name: entry["summary"] for name, entry in _DES
 SMOOTHERS: Final[dict[str, str]] = {
     "smoother": "The filter mekf forwards and backwards over the whole log: each row from those before and after it.",
 }
-"""What needs the whole log, and so is no filter for live rows: name and one sentence."""
+"""Filters that need the whole log, and so are not for live rows: name and one sentence."""
 
 SETTINGS: Final[dict[str, dict[str, _imufit._Setting]]] = {
     **{name: entry["settings"] for name, entry in _DESCRIPTIONS.items()},
@@ -76,8 +76,8 @@ _ERRORS: Final = ("total", "heading", "inclination", "roll", "pitch", "yaw", "sd
 class Errors(TypedDict):
     """Root mean square errors of one filter against the reference, deg.
 
-    `sd_deg` is the spread of the error vector about its mean: ``total_deg**2 == |mean error|**2 + sd_deg**2``. What the
-    total has beyond the spread is a constant error, which no smoothing removes.
+    `sd_deg` is the spread of the error vector about its mean: ``total_deg**2 == |mean error|**2 + sd_deg**2``. The
+    total beyond the spread is a constant error, which no smoothing removes.
     """
 
     total_deg: float
@@ -114,7 +114,7 @@ class Replay(Plotted, Result):
     mag_reference: Array | None = None
 
     def sentences(self) -> list[str]:
-        """Return the best filter by its error, or what was replayed where there is no reference."""
+        """Return the best filter by its error, or the replayed filters if a reference is missing."""
         ran = f"{self.log.n} rows by {', '.join(self.attitude)}"
         total = {name: errors["total_deg"] for name, errors in self.errors.items() if errors is not None}
         if not total:
@@ -311,7 +311,7 @@ def replay(
     settings : mapping of mappings, optional
         ``{"mahony": {"k_p": 1.0}, "replay": {"max_gap": 0.5}}``: filter (or "replay"), name and value as in
         `SETTINGS`. Without `max_gap` a gap is a step longer than 1 s and than ten usual steps of the log. Without
-        `acc_range` and `gyr_range` the metadata or the readings themselves tell where the ranges end
+        `acc_range` and `gyr_range` the metadata or the readings themselves show where the ranges end
         (`imufit.replaying.clipped`); 0 takes every reading for unclipped.
     initial : (4,) array, Rotation, "vectors" or "reference", optional
         Attitude at the first row, scalar first, body to reference frame; or where to take it from. Without it the
@@ -327,7 +327,7 @@ def replay(
     Raises
     ------
     ValueError
-        An unknown filter or setting, or a filter without its sensor; the message says which and what to do.
+        An unknown filter or setting, or a filter without its sensor; the message states which and what to do.
 
     Notes
     -----
@@ -357,7 +357,7 @@ def replay(
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What every filter over one log is given.
+    """The input of every filter over one log.
 
     Attributes
     ----------
@@ -458,7 +458,7 @@ def _made(name: str, arguments: Mapping[str, Any], settings: Mapping[str, float]
 def _checked(settings: Settings | None) -> Settings:
     for name in settings or {}:
         if name not in SETTINGS:
-            raise ValueError(f"settings for {name!r}: there is no such filter. Use one of {', '.join(SETTINGS)}")
+            raise ValueError(f"settings for {name!r}: the filter is unknown. Use one of {', '.join(SETTINGS)}")
     return settings or {}
 
 

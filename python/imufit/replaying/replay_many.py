@@ -46,7 +46,7 @@ def replay_many(
     Raises
     ------
     InputError
-        A log that cannot be replayed; the message says which. Logs that have not begun are left out.
+        A log that cannot be replayed; the message states which. Logs that have not begun are left out.
     """
     if threads is not None and threads < 1:
         raise InputError(f"threads is {threads}", remedy="Pass 1 or more, or leave it out.")

@@ -42,7 +42,7 @@ def read_settings(path: str | Path) -> dict[str, dict[str, float]]:
     Raises
     ------
     InputError
-        No TOML, cut off, an unknown filter or setting, or a value that is no number; the place is named.
+        Not TOML, cut off, an unknown filter or setting, or a value that is not a number; the place is named.
     """
     path = Path(path)
     groups, _ = read_toml(path, "the file of settings")
@@ -51,12 +51,12 @@ def read_settings(path: str | Path) -> dict[str, dict[str, float]]:
         _known("filter", group, SETTINGS, path)
         if not isinstance(values, dict):
             raise InputError(
-                f"{group} is no table of settings", file=path, remedy=f"Write [{group}] above its settings."
+                f"{group} is not a table of settings", file=path, remedy=f"Write [{group}] above its settings."
             )
         for name, value in values.items():
             _known(f"setting of {group}", name, SETTINGS[group], path)
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-                raise InputError(f"{group}.{name} is {value!r}, which is no number", file=path)
+                raise InputError(f"{group}.{name} is {value!r}, which is not a number", file=path)
             settings.setdefault(group, {})[name] = float(value)
     return settings
 
@@ -66,4 +66,4 @@ def _known(kind: str, name: str, known: Mapping[str, object], path: Path) -> Non
         return
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     remedy = f"Did you mean {near[0]}?" if near else f"There is {', '.join(known) or 'none'}."
-    raise InputError(f"{name!r} is no {kind}", file=path, remedy=remedy)
+    raise InputError(f"unknown {kind} {name!r}", file=path, remedy=remedy)

@@ -25,7 +25,7 @@ class Stream:
     """Several filters at once on a live stream of rows.
 
     The same compiled step as in `imufit.replaying.replay`: with the same settings and initial attitude the results are
-    equal bit by bit, however the rows are cut. A stream knows nothing of the rows to come, so that the rules
+    equal bit by bit, however the rows are cut. A stream does not have the rows to come, so that the rules
     `max_gap`, `acc_range` and `gyr_range` are those of the settings and not taken from the whole log.
 
     Parameters
@@ -48,7 +48,7 @@ class Stream:
     Raises
     ------
     ValueError
-        An unknown filter, setting or sensor, or a smoother, which is no filter for live rows.
+        An unknown filter, setting or sensor, or a smoother, which is not a filter for live rows.
 
     Examples
     --------
@@ -70,7 +70,7 @@ class Stream:
     ) -> None:
         for sensor in sensors:
             if sensor not in ("acc", "gyr", "mag"):
-                raise ValueError(f"{sensor!r} is no sensor: use acc, gyr, mag")
+                raise ValueError(f"{sensor!r} is not a sensor: use acc, gyr, mag")
         for name in filters:
             if name in SMOOTHERS:
                 raise ValueError(
@@ -79,7 +79,7 @@ class Stream:
                 )
         for name in settings or {}:
             if name not in SETTINGS:
-                raise ValueError(f"settings for {name!r}: there is no such filter. Use one of {', '.join(SETTINGS)}")
+                raise ValueError(f"settings for {name!r}: the filter is unknown. Use one of {', '.join(SETTINGS)}")
         chosen = settings or {}
         q0 = None
         if initial is not None:

@@ -67,7 +67,7 @@ class Rest:
 
 @dataclass(frozen=True)
 class Stretches:
-    """What a log's time is made of.
+    """The stretches of a log's time.
 
     Parameters
     ----------

@@ -114,7 +114,9 @@ def compare_tilt(
 def _notes(reference: TiltReference, stretches: Stretches, methods: Mapping[str, TiltFigures | None]) -> list[str]:
     notes = []
     if not any(methods.values()) and reference.kind != "heading":
-        return ["No row counts: none has both an estimate and a reference, with movement = 1 where the log says so."]
+        return [
+            "No row counts: none has both an estimate and a reference, with movement = 1 where the log has that column."
+        ]
     if reference.kind == "heading":
         blind = [name for name, figures in methods.items() if figures is None]
         notes.append(

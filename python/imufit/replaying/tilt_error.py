@@ -1,7 +1,7 @@
 """The error of a method's tilt: about the rig's axis, or of the inclination as a whole.
 
-Tilt is where up is in the body: ``up_b = R^T up``. It needs no heading, which gravity does not show and which a filter
-without a magnetometer lets wander, and it goes through the gimbal lock and beyond 90 degrees.
+Tilt is where up is in the body: ``up_b = R^T up``. It needs no heading, which gravity does not show and which drifts in
+a filter without a magnetometer, and it goes through the gimbal lock and beyond 90 degrees.
 
 - **A rig** (metadata `rig_axis`): the angle of `up_b` about that body axis, estimate less reference, one component:
   estimated angle = reference angle + error. For an axis that lies level and a heading that is right this is the twist
@@ -30,7 +30,7 @@ _LEAST_LEVER = 0.2
 
 @dataclass(frozen=True)
 class TiltReference:
-    """What the tilt of a log is measured against.
+    """The reference of the tilt of a log.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class TiltReference:
     def angle(self) -> Array:
         """Return the angle to draw, (n,), rad: about the rig's axis from the first row, or of z from the vertical.
 
-        For a log with `ref_angle` that column is to be preferred, as it knows its zero.
+        For a log with `ref_angle` that column is to be preferred, as it has an absolute zero.
         """
         if self.kind == "inclination":
             return inclination_of_z(self.q, self.up)

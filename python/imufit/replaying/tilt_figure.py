@@ -1,4 +1,4 @@
-"""What of a replay is drawn: the angles, and the stretches that deserve a panel of their own."""
+"""The drawn part of a replay: the angles, and the stretches that deserve a panel of their own."""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ def _next_step(diagnosis: Diagnosis | None, ladder: Ladder | None) -> str:
     steps = {
         "missing": f"Add {diagnosis.best} with `{add}`, or let `{command('ladder')}` go on until nothing is missing.",
         "unknown": f"Find what couples in here: {found}." if found else "Look at the worst segments.",
-        "ambiguous": f"Record a log with another motion or temperature profile, so that {rivals} can be told apart.",
+        "ambiguous": f"Record a log with another motion or temperature profile, so that {rivals} are separated.",
         "adequate": "Use the model as it stands. Record another log of this sensor to check it."
         if ladder is not None and ladder.steps
         else "The model describes this log down to its noise; a harder motion could show more.",

@@ -166,11 +166,11 @@ def find_poses(
     Raises
     ------
     InputError
-        There is no accelerometer, or a label names no side.
+        The accelerometer is missing, or a label is not a side.
     """
     if log.acc is None:
         raise InputError(
-            "poses are found by the accelerometer, but there is no acc_x acc_y acc_z", file=log.path or "log"
+            "poses are found by the accelerometer, but acc_x acc_y acc_z are missing", file=log.path or "log"
         )
     labels = side_numbers(log)
     # With a reference attitude every rest is known, labelled or not.
@@ -206,7 +206,7 @@ def side_numbers(log: Log) -> Array | None:
         rows = np.flatnonzero(log.pose == label)
         if side not in SIDES:
             raise InputError(
-                f"the label {label!r} is no side",
+                f"the label {label!r} is not a side",
                 file=log.path or "log",
                 row=int(rows[0]),
                 column="pose",
@@ -251,7 +251,7 @@ def _pose(found: Any, log: Log, labels: Array | None, *, index: int, number: int
 
 def _flaw(kind: str, value: float, hold: float) -> str:
     if kind == "short":
-        return f"still for {value:.1f} s, {hold:.1f} s are asked for: too short"
+        return f"still for {value:.1f} s, {hold:.1f} s are required: too short"
     if kind == "crept":
         return f"moved by {np.degrees(value):.1f} deg while it should have been still"
     return f"not still: the readings scatter by {value:.2g} m/s²"

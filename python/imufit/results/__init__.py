@@ -1,4 +1,4 @@
-"""What the loop hands back: frozen results that print, plot, and turn into JSON, data frames and HTML.
+"""Results of the loop: frozen results that print, plot, and turn into JSON, data frames and HTML.
 
 Every ``ratio`` and held-out value is residual RMS over noise floor: 1.0 is at the floor.
 """

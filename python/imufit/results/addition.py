@@ -79,7 +79,7 @@ class Addition(Plotted, Result):
 
     @property
     def warning(self) -> str:
-        """What to know where the drop was not the expected one; else empty."""
+        """A note if the drop was not the expected one; else empty."""
         return surprise(self.before, self.expected, self.after)
 
     def to_dict(self) -> dict[str, Any]:
@@ -108,5 +108,5 @@ class Addition(Plotted, Result):
         return (parameter_table(self.parameters, "Parameters of the new model"),)
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return [self.sentence, self.warning]

@@ -21,7 +21,7 @@ PARTS = ("total", "heading", "inclination")
 
 @dataclass(frozen=True, repr=False)
 class AttitudeDependence(Part):
-    """How one part of the error goes with one quantity.
+    """How one part of the error depends on one quantity.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class AttitudeBins(Part):
     centre : (k,) array
         Mean of the quantity in each bin, ascending.
     before, after : (k,) arrays
-        RMS error of each bin, deg; `after` is `before` where there is no model.
+        RMS error of each bin, deg; `after` is `before` without a model.
     """
 
     part: str
@@ -70,7 +70,7 @@ class AttitudeBins(Part):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AttitudeComparison(Plotted, Part):
-    """What a model is worth to an attitude filter, and what limits the filter then.
+    """The benefit of a model to an attitude filter, and the remaining limit of the filter.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class AttitudeComparison(Plotted, Part):
     after : dict or None
         The same with the model's effects taken out; None for a model without effects.
     dependences : tuple of AttitudeDependence
-        What the error that remains goes with, largest share first; only what stands out of chance.
+        What the error that remains depends on, largest share first; only what stands out of chance.
     bins : tuple of AttitudeBins
         Error against each quantity.
     limit : str
@@ -99,7 +99,7 @@ class AttitudeComparison(Plotted, Part):
     sentence: str
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON: ``before_deg``, ``after_deg``, the same by part, filter, limit, and what the error goes with."""
+        """JSON: ``before_deg``, ``after_deg``, the same by part, filter, limit, and what the error depends on."""
         value: dict[str, Any] = {"filter": self.filter}
         for part in PARTS:
             prefix = "" if part == "total" else f"{part}_"
@@ -114,14 +114,14 @@ class AttitudeComparison(Plotted, Part):
         return value
 
     def table(self) -> Table:
-        """Errors by part, before and after, and what the remaining one goes with."""
+        """Errors by part, before and after, and what the remaining one depends on."""
         rows = []
         for part in PARTS:
             causes = [f"{quantity.share(d.share)} {d.quantity}" for d in self.dependences if d.part == part]
             after = "-" if self.after is None else f"{quantity.number(self.after[part])} deg"
             rows.append((part, f"{quantity.number(self.before[part])} deg", after, ", ".join(causes) or "-"))
         return Table(
-            f"Attitude error of {self.filter}, RMSE", ("", ">as it is", ">model applied", "goes with"), tuple(rows)
+            f"Attitude error of {self.filter}, RMSE", ("", ">as it is", ">model applied", "depends on"), tuple(rows)
         )
 
     def _drawn(self, ax: Place | None) -> Drawing:

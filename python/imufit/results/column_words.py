@@ -15,7 +15,7 @@ from imufit.results.fault_words import AXES, UNITS, Words
 Array = NDArray[np.float64]
 
 Unit = tuple[str, str]
-"""What a unit is called, and how a mapping writes it."""
+"""The name of a unit, and its form in a mapping."""
 
 
 def _declare(columns: Sequence[str], units: Sequence[str]) -> Remedy:

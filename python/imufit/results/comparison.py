@@ -175,10 +175,9 @@ class Where(Part):
         return json_fields(self)
 
     def __str__(self) -> str:
-        return (
-            f"{self.channel} depends on {self.covariate}: {quantity.share(self.share)} of its excess, "
-            f"most of it at {quantity.span(self.t_start, self.t_end)}"
-        )
+        dependence = "is constant" if self.covariate == "constant" else f"depends on {self.covariate}"
+        span = quantity.span(self.t_start, self.t_end)
+        return f"{quantity.share(self.share)} of the excess of {self.channel} {dependence}, most of it at {span}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -198,7 +197,7 @@ class Comparison(Plotted, Result):
     sensors : dict
         Ratio by sensor.
     attitude : AttitudeComparison or None
-        How far an attitude filter is off, where the log allows to tell.
+        How far an attitude filter is off, where the log determines this.
     where : tuple of Where
         Covariates that explain the excess, largest share first.
     panels : tuple of Panel
@@ -321,7 +320,7 @@ class Comparison(Plotted, Result):
             (item.channel, item.covariate, quantity.share(item.share), quantity.span(item.t_start, item.t_end))
             for item in self.where[:limit]
         )
-        return Table("What the excess depends on", ("channel", "covariate", ">share", ">mostly at"), rows)
+        return Table("Dependences of the excess", ("channel", "covariate", ">share", ">mostly at"), rows)
 
     def segment_table(self, limit: int = 5) -> Table:
         """Worst segments.

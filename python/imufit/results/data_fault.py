@@ -16,7 +16,7 @@ from imufit.results.table import Table
 
 @dataclass(frozen=True, repr=False)
 class DataFault(Part):
-    """Something wrong with the data that is no effect of the sensor.
+    """A fault of the data, which is not an effect of the sensor.
 
     Attributes
     ----------
@@ -35,13 +35,13 @@ class DataFault(Part):
     advice : str or Remedy
         What to do about it, in a sentence: in the words of Python and in those of the command line.
     left_out : bool
-        True if the samples concerned were left out of the evidence; what is said of the log rests on the others.
+        True if the samples concerned were left out of the evidence; the answer on the log rests on the others.
     false_readings : bool
-        True if the sensor read falsely in these rows, and what is said of the others is not the whole truth about it.
+        True if the sensor read falsely in these rows, and the answer on the others is not the whole truth about it.
     spoils : bool
-        True if nothing can be said of effects before it is put right.
+        True if effects cannot be judged before it is corrected.
     spoils_sensors : tuple of str
-        Sensors of whose effects nothing can be said before it is put right.
+        Sensors whose effects cannot be judged before it is corrected.
     gain : float
         Drop of the sum of squares, in units of the noise, that it explains beside every effect; NaN where not asked.
     file : str or None

@@ -86,7 +86,7 @@ class Candidate(Part):
     parameters : tuple of Parameter
         Predicted parameters.
     confounded_with : tuple of Rival
-        Effects that this log hardly tells apart from it.
+        Effects that this log hardly separates from it.
     minimal_detectable : dict
         Smallest detectable (value, unit) by parameter.
     logs : tuple of LogParameters
@@ -224,7 +224,7 @@ class Diagnosis(Plotted, Result):
     model : tuple of str
         Effects that the model has.
     experiment : str or None
-        What to record next to tell the rivals apart.
+        The recording that would separate the rivals.
     sentence : str
         The result in words.
     notes : tuple of str

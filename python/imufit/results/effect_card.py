@@ -1,4 +1,4 @@
-"""An effect's card: what a person wants to know before adding it."""
+"""An effect's card: details for a decision to add it."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class EffectCard(Result):
         return [f"{self.id}: {self.name}, {self.physics}"]
 
     def paragraphs(self) -> list[str]:
-        """Return nothing: the table says everything."""
+        """Return nothing: the table has all details."""
         return []
 
     def tables(self) -> list[Table]:

@@ -13,7 +13,7 @@ from imufit.results.part import Part
 from imufit.results.table import Table
 
 NEARLY: Final = 1.05
-"""Sizes within this factor are told as one: two digits are shown."""
+"""Sizes within this factor are stated as one: two digits are shown."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -29,7 +29,7 @@ class ParameterSight(Part):
     smallest : float
         Size from which on a diagnosis of this log names the effect in four of five cases.
     typical : float or None
-        Size that it usually has; None where no card tells it.
+        Size that it usually has; None where no card states it.
     """
 
     name: str
@@ -63,13 +63,13 @@ class EffectSight(Part):
     effect : str
         Its id.
     parameters : tuple of ParameterSight
-        What the log determines of it; empty where nothing is known, or where the readings themselves tell.
+        What the log determines of it; empty where nothing is known, or where the readings themselves decide.
     shown : str
         ``yes``, ``in part`` (some of its parameters) or ``no``.
     reason : str
         Why not, or why only in part; empty for ``yes``.
     like : tuple of str
-        Effects that look the same in this log: it cannot be told from them.
+        Effects that look the same in this log: it is not separated from them.
     """
 
     effect: str
@@ -86,7 +86,7 @@ class EffectSight(Part):
 
     @property
     def open(self) -> bool:
-        """Whether nobody knows how large it usually is: effects of a log's own columns."""
+        """Whether its typical size is unknown: effects of a log's own columns."""
         return bool(self.parameters) and all(p.typical is None for p in self.parameters)
 
     @property
@@ -120,11 +120,11 @@ class EffectSight(Part):
 
     def __str__(self) -> str:
         if self.shown == "no":
-            return f"{self.effect} cannot be seen: {self.reason}"
+            return f"{self.effect} is not visible: {self.reason}"
         like = f"; it looks like {', '.join(self.like)}" if self.like else ""
         start = f"from {self.smallest} on" if self.parameters else "by the readings themselves"
         only = f"; {self.reason}" if self.reason else ""
-        return f"{self.effect} can be seen {start}{only}{like}"
+        return f"{self.effect} is visible {start}{only}{like}"
 
 
 def sizes(values: Sequence[tuple[float, str]]) -> str:
@@ -161,11 +161,11 @@ def seen_table(effects: Sequence[EffectSight]) -> Table:
         (item.effect, item.smallest if item.parameters else "its end shows", item.typical, item.reason)
         for item in shown
     )
-    return Table("What this log can show", ("effect", ">seen from", ">typical", "but"), rows)
+    return Table("Effects that this log can show", ("effect", ">visible from", ">typical", "but"), rows)
 
 
 def open_table(effects: Sequence[EffectSight]) -> Table:
-    """List dependences on the log's own columns that it can show; nobody knows how large they usually are.
+    """List dependences on the log's own columns that it can show; their typical sizes are unknown.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def open_table(effects: Sequence[EffectSight]) -> Table:
         All of them.
     """
     rows = tuple((item.effect, item.smallest, item.reason) for item in effects if item.open and item.shown != "no")
-    return Table("What it can show of its own columns", ("effect", ">seen from", "but"), rows)
+    return Table("Dependences that it can show on its own columns", ("effect", ">visible from", "but"), rows)
 
 
 def weak_table(effects: Sequence[EffectSight]) -> Table:
@@ -186,7 +186,9 @@ def weak_table(effects: Sequence[EffectSight]) -> Table:
     """
     weak = sorted((item for item in effects if item.weak), key=lambda item: -item.clearness)
     rows = tuple((item.effect, item.smallest, item.typical, item.reason) for item in weak)
-    return Table("What it would show only in unusual sizes", ("effect", ">seen from", ">typical", "why"), rows)
+    return Table(
+        "Effects that it would show only in unusual sizes", ("effect", ">visible from", ">typical", "why"), rows
+    )
 
 
 def unseen_table(effects: Sequence[EffectSight]) -> Table:
@@ -202,11 +204,11 @@ def unseen_table(effects: Sequence[EffectSight]) -> Table:
         if item.shown == "no" and not item.weak:
             reasons.setdefault(item.reason, []).append(item.effect)
     rows = tuple((str(len(ids)), reason, ", ".join(ids)) for reason, ids in reasons.items())
-    return Table("What it cannot show", (">", "because", "effects"), rows)
+    return Table("Effects that it cannot show", (">", "because", "effects"), rows)
 
 
 def alike(effects: Sequence[EffectSight]) -> list[str]:
-    """Name the effects that a log cannot tell apart, each group in a sentence.
+    """Name the effects that a log does not separate, each group in a sentence.
 
     Parameters
     ----------
@@ -217,4 +219,4 @@ def alike(effects: Sequence[EffectSight]) -> list[str]:
         tuple(sorted((item.effect, *item.like))) for item in effects if item.like and item.shown != "no"
     )
     largest = [group for group in groups if not any(set(group) < set(other) for other in groups)]
-    return [f"It cannot tell apart {', '.join(group[:-1])} and {group[-1]}." for group in largest]
+    return [f"The log does not separate {', '.join(group[:-1])} and {group[-1]}." for group in largest]

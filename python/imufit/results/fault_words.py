@@ -52,7 +52,7 @@ def mount(sensors: Sequence[str], matrix: Array, excited: str) -> Words:
 
 def frame(name: str, declared: str) -> Words:
     """Say that the reference is in another frame."""
-    text = f"The reference is in the frame {name}, not {declared} as the log says."
+    text = f"The reference is in the frame {name}, not {declared} as the log states."
     return text, "Declare the frame: " + when_read(option("frame", name)) + "."
 
 
@@ -73,7 +73,7 @@ def quaternion(places: Sequence[int], signs: Sequence[float]) -> Words:
             "is the inverse: it takes vectors of the reference frame into the body, or its angle counts the other way"
         )
     elif turned:
-        hand = " (a reference of the other hand)" if len(turned) == 2 else " (mirrored)"
+        hand = " (a left-handed reference)" if len(turned) == 2 else " (mirrored)"
         other = f"has the wrong sign in {' and '.join(turned)}{hand}"
     else:
         other = ""
@@ -92,10 +92,10 @@ def quaternion(places: Sequence[int], signs: Sequence[float]) -> Words:
 
 
 def clock(factor: float) -> Words:
-    """Say that the time that passed is a multiple of what `t` says."""
-    size = f"{factor:g} times as long as" if factor > 1.0 else f"1/{1.0 / factor:g} of what"
+    """Say that the true time is a multiple of `t`."""
+    size = f"{factor:g} times as long as" if factor > 1.0 else f"1/{1.0 / factor:g} as long as"
     return (
-        f"The clock is at another rate: by the turns of the reference, the steps between rows are {size} t says.",
+        f"The clock is at another rate: by the turns of the reference, the steps between rows are {size} in t.",
         "Put t right: " + when_read(mapped({"t": f"t[*{factor:g}]"})) + ".",
     )
 
@@ -103,7 +103,7 @@ def clock(factor: float) -> Words:
 def axes(sensor: str, matrix: Array, left: str, other: str | Remedy | None) -> Words:
     """Say which axes of a sensor are exchanged or turned round; `other` is another remedy."""
     if np.array_equal(matrix, -np.eye(3)):
-        what = f"{sensor} reads the opposite of what it should on every axis"
+        what = f"{sensor} has the opposite sign on every axis"
         if sensor == "acc":
             what += ": gravity instead of specific force, or a reference whose vertical axis points the other way"
     else:

@@ -1,4 +1,4 @@
-"""Results as strict JSON: plain numbers and lists, null where there is no number."""
+"""Results as strict JSON: plain numbers and lists, null where a number is missing."""
 
 from __future__ import annotations
 

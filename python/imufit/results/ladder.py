@@ -101,7 +101,7 @@ class Ladder(Plotted, Result):
     ratio_start, ratio_end : float
         Held-out residual over noise floor before the first and after the last step.
     attitude : AttitudeComparison or None
-        How far an attitude filter is off without and with the final model, where the log allows to tell.
+        How far an attitude filter is off without and with the final model, where the log determines this.
     diagnosis : Diagnosis
         After the last step.
     comparison_start, comparison_end : Comparison or None

@@ -1,4 +1,4 @@
-"""What is in a log, and what it can show."""
+"""The contents of a log, and the effects that it can show."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SERIES_NAMES: Final = {
     "ref_p": "reference position",
     "ref_angle": "commanded angle",
 }
-"""What the series of a log are called."""
+"""Names of the series of a log."""
 SHOWN_GAPS: Final = 10
 """Gaps that are printed; the JSON has up to a thousand of each series."""
 LABELS: Final = 8
@@ -171,7 +171,9 @@ class MotionInfo(Part):
         if axes:
             parts.append(f"Rates in deg/s: {', '.join(axes)}.")
         if self.force_rms is not None:
-            parts.append(f"The specific force is off gravity's length by {self.force_rms:.3g} m/s² (RMS).")
+            parts.append(
+                f"The magnitude of the specific force differs from gravity by {self.force_rms:.3g} m/s² (RMS)."
+            )
         return " ".join(parts)
 
     def to_dict(self) -> dict[str, Any]:
@@ -215,12 +217,12 @@ class RestInfo(Part):
         if self.reason:
             return f"Rests: {self.reason}."
         if not self.count:
-            return "It never rests."
+            return "The log never rests."
         poses = "pose" if self.directions == 1 else "different poses"
         if self.count == 1:
-            return f"It rests once, for {self.longest:.3g} s."
+            return f"The log rests once, for {self.longest:.3g} s."
         return (
-            f"It rests {self.count} times in {self.directions} {poses}, {self.total:.3g} s in all, "
+            f"The log rests {self.count} times in {self.directions} {poses}, {self.total:.3g} s in all, "
             f"at the longest {self.longest:.3g} s."
         )
 
@@ -238,7 +240,7 @@ class RestInfo(Part):
 
 @dataclass(frozen=True, repr=False)
 class ReferenceInfo(Part):
-    """What the readings of a log can be held against.
+    """The references of a log.
 
     Attributes
     ----------
@@ -259,7 +261,7 @@ class ReferenceInfo(Part):
     position : bool
         Whether the position is there, too.
     attitude_noise : float or None
-        Noise of one sample of the attitude, rad, as far as its fast changes tell.
+        Noise of one sample of the attitude, rad, as far as its fast changes show.
     position_noise : float or None
         The same of the position, m.
     labels : tuple of str
@@ -291,7 +293,7 @@ class ReferenceInfo(Part):
         if self.rate is not None:
             parts.append(f"{self.rate:.4g} Hz")
         if self.exact is not None:
-            parts.append(f"{quantity.share(self.exact)} of these rows measured, the others filled in")
+            parts.append(f"{quantity.share(self.exact)} of these rows measured, the others interpolated")
         gaps = "gap" if self.gap_count == 1 else "gaps"
         parts.append(f"{self.gap_count} {gaps}, the longest {self.longest_gap:.3g} s" if self.gap_count else "no gap")
         parts.append("with position" if self.position else "without position")
@@ -326,7 +328,7 @@ class ReferenceInfo(Part):
 
 @dataclass(frozen=True, repr=False)
 class LogInfo(Result):
-    """What is in a log, and what it can show.
+    """The contents of a log, and the effects that it can show.
 
     Attributes
     ----------
@@ -436,15 +438,15 @@ class LogInfo(Result):
         if not self.effects:
             return ""
         if self.refusal:
-            return f"It can show no effect: {self.refusal}. {self.remedy}".rstrip()
+            return f"The log cannot show an effect: {self.refusal}. {self.remedy}".rstrip()
         named = [item for item in self.effects if not item.open]
         shown = sum(item.shown != "no" for item in named)
-        by = "Without a reference attitude it" if self.judged_by == "rests" else "It"
-        return f"{by} can show {shown} of {len(named)} effects in the sizes that sensors usually have."
+        by = "Without a reference attitude the log" if self.judged_by == "rests" else "The log"
+        return f"{by} can show {shown} of {len(named)} effects at their typical sizes."
 
     def sentences(self) -> list[str]:
         """Return rows, what it can show, reference, motion, rests, and what is not there."""
-        missing = f"Not in it: {self.contents.missing_words}." if self.contents.missing else ""
+        missing = f"Missing: {self.contents.missing_words}." if self.contents.missing else ""
         said = (self.sentence, self.verdict, self.reference.sentence, self.motion.sentence, self.rests.sentence)
         return [text for text in (*said, missing) if text]
 
@@ -506,11 +508,11 @@ class LogInfo(Result):
         return [*kept, *(() if self.refusal else (unseen_table(self.effects),)), self.column_table()]
 
     def alike(self) -> list[str]:
-        """Return which effects the log cannot tell apart, a sentence for each group."""
+        """Return which effects the log does not separate, a sentence for each group."""
         return alike(self.effects)
 
     def remarks(self) -> list[str]:
-        """Return what reading noticed, and what is to be said of the figures."""
+        """Return what reading noticed, and notes on the figures."""
         said = dict.fromkeys(note.rstrip(".") for note in (*self.contents.notes, *self.notes))
         return [f"Note: {note}." for note in said]
 

@@ -13,7 +13,7 @@ from imufit.results.table import Table
 
 @dataclass(frozen=True, repr=False)
 class LogParameters(Part):
-    """What one of several logs has for itself.
+    """The own parameters of one of several logs.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ def log_table(logs: Sequence[LogParameters]) -> Table:
             cells[log.file] = item.shown
     header = ("effect", "parameter", *(log.file for log in logs))
     lines = tuple((*key, *(row.get(log.file, "-") for log in logs)) for key, row in rows.items())
-    return Table("What each log has for itself", header, lines)
+    return Table("Each log's own parameters", header, lines)
 
 
 def logs_json(logs: Iterable[LogParameters]) -> dict[str, Any]:

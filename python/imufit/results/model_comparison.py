@@ -105,5 +105,5 @@ class ModelComparison(Plotted, Result):
         return (Table("Residual RMS by channel, most changed first", header, rows),)
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return [self.sentence]

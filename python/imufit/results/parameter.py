@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 UNTOLD = 10.0
-"""A parameter whose standard error is this many typical sizes is one that the log says nothing about."""
+"""A parameter whose standard error is this many typical sizes is one that the log is not informative about."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -98,7 +98,7 @@ class Parameter(Plotted, Part):
             return f"{quantity.quantity(self.value, self.unit)} (fixed)"
         if self.at_bound is not None:
             return f"{quantity.quantity(self.value, self.unit)} (at its {self.at_bound})"
-        return quantity.with_error(self.value, self.standard_error, self.unit) if self.told else "not told"
+        return quantity.with_error(self.value, self.standard_error, self.unit) if self.told else "not determined"
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one parameter: value, standard error, unit, typical size; its limits, if it has any."""

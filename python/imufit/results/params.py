@@ -42,12 +42,12 @@ class Params(Plotted, Mapping[str, Parameter]):
         Raises
         ------
         KeyError
-            There is no such parameter.
+            The parameter is unknown.
         """
         known = self._known()
         if key not in known:
             near = [other for other in known if other.startswith(f"{key}.")] or list(known)
-            raise KeyError(f"there is no parameter {key!r}; there are {', '.join(near) or 'none'}")
+            raise KeyError(f"unknown parameter {key!r}; the parameters are {', '.join(near) or 'none'}")
         return known[key]
 
     def __iter__(self) -> Iterator[str]:
@@ -71,7 +71,7 @@ class Params(Plotted, Mapping[str, Parameter]):
     def _drawn(self, ax: Place | None) -> Drawing:
         """Draw the parameters beside their typical sizes."""
         if not self:
-            raise InputError("there are no parameters to draw", remedy="Take a model with at least one effect.")
+            raise InputError("parameters to draw are missing", remedy="Take a model with at least one effect.")
         return drawn_parameters(tuple(self.values()), ax)
 
     def _repr_html_(self) -> str:

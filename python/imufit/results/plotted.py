@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Plotted:
-    """What can be drawn, on a figure of its own or where its user says."""
+    """A result that can be drawn, on a figure of its own or on given axes."""
 
     def _drawn(self, ax: Place | None) -> Drawing:
         """Draw it, see :mod:`imufit.figures.place`."""
@@ -25,7 +25,7 @@ class Plotted:
     def plot(self, ax: Place) -> Axes | list[Axes]: ...
 
     def plot(self, ax: Place | None = None) -> Figure | Axes | list[Axes]:
-        """Draw this, on a new figure or where `ax` says.
+        """Draw this, on a new figure or where `ax` states.
 
         Parameters
         ----------

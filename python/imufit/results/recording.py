@@ -1,4 +1,4 @@
-"""What was recorded from a device: how much, what is missing, and how its clock ran."""
+"""The result of a recording: how much, what is missing, and how its clock ran."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class RecordingGap(Part):
     reason : str
         ``unplugged`` (the line was lost and opened anew), ``reset`` (the device started anew) or ``lost frames``.
     frames : int
-        Frames (in text form: damaged lines) known to be missing; what a device sent to nobody is not known.
+        Frames (in text form: damaged lines) known to be missing; samples sent before the port was open are not known.
     """
 
     t_start: float
@@ -42,12 +42,12 @@ class RecordingGap(Part):
 
 @dataclass(frozen=True, repr=False)
 class RecordingClock(Part):
-    """How the time of a recording was told.
+    """The source of a recording's time.
 
     Attributes
     ----------
     source : str
-        ``device``: by its clock, put on the host's; ``arrival``: it tells no time, rows are timed as they arrived.
+        ``device``: by its clock, put on the host's; ``arrival``: it sends no time, rows are timed on arrival.
     offset_s : float or None
         `t` of the log when the device's clock stood at 0: ``t = offset_s + seconds / (1 + drift_ppm / 1e6)``; of the
         first run if the device started anew.
@@ -98,12 +98,12 @@ class Recording(Result):
     columns : tuple of str
         Columns besides `t`.
     lost, damaged, unknown, unexplained : int
-        Frames missing between others; pieces that are no frame or lines that are no row; frames of an unknown kind;
+        Frames missing between others; pieces that are not frames or lines that are not rows; frames of an unknown kind;
         samples without an announcement, or rows without a header.
     gaps : tuple of RecordingGap
         Where rows are missing.
     clock : RecordingClock
-        How the time was told.
+        The source of the time.
     ended : str
         Why it ended: ``stopped``, ``duration``, ``line lost``, ``disk full``, ``other columns`` or ``crash``.
     cpu_share : float or None
@@ -163,9 +163,9 @@ class Recording(Result):
 
     @property
     def clock_sentence(self) -> str:
-        """How the time was told, in a sentence."""
+        """The source of the time, in a sentence."""
         if self.clock.source == "arrival":
-            return "The device tells no time: rows are timed as they arrived."
+            return "The device sends no time: rows are timed as they arrived."
         if self.clock.drift_ppm is None:
             return "Time is that of the device's clock."
         late = quantity.quantity(self.clock.jitter_s, "s")

@@ -15,7 +15,7 @@ class Result:
     """A result made of sentences and tables; its line in a shell is its first sentence."""
 
     def sentences(self) -> Sequence[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         raise NotImplementedError
 
     def tables(self) -> Sequence[Table]:

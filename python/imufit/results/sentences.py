@@ -75,7 +75,7 @@ def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: in
     untold : int
         Number of effects that only a reference would show.
     spoilt : bool
-        The logs differ so much that there is no answer for all of them.
+        The logs differ so much that an answer for all of them does not exist.
     """
     adequate = found.verdict == "adequate"
     text = _adequate(found, ratio, untold) if adequate else _missing(found, best)
@@ -91,18 +91,18 @@ def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: in
 
 
 def _adequate(found: Diagnosis, ratio: float, untold: int) -> str:
-    """Say that nothing is missing, as far as the logs can tell."""
+    """Say that nothing is missing, as far as the logs show."""
     if "rests" in found.evidence:
         text = "Nothing that this log can show without a reference attitude is missing"
         if ratio > OFF_FLOOR:
-            return f"{text}: what is left stands at {ratio:.1f} times the noise, but no effect lowers that for certain."
-        return f"{text}; {untold} effects it cannot show at all." if untold else f"{text}."
+            return f"{text}: the residual stands at {ratio:.1f} times the noise, but no effect lowers it for certain."
+        return f"{text}. This log cannot show {untold} effects." if untold else f"{text}."
     if ratio > OFF_FLOOR:
         return (
             f"No effect is missing for certain, but the residual stands at {ratio:.2f} times the noise: the noise is "
-            "stronger or more coloured than stated, or something is left that goes with nothing in the log."
+            "stronger or more coloured than stated, or the log does not contain the cause of the residual."
         )
-    return "Nothing that this log can show is missing: the residual is at its noise floor as far as can be told."
+    return "Nothing that this log can show is missing: the residual is at its noise floor."
 
 
 def _missing(found: Diagnosis, best: Candidate | None) -> str:
@@ -117,7 +117,7 @@ def _missing(found: Diagnosis, best: Candidate | None) -> str:
         doubtful = next((candidate for candidate in found.candidates if candidate.status in DOUBTS), None)
         if doubtful is not None and not left and best is None:
             text += f" {doubtful.effect} comes nearest, but {DOUBTS[doubtful.status]}."
-        return text if best is None else f"{text} {best.effect} would take a part of it, but not most."
+        return text if best is None else f"{text} {best.effect} would explain a part of it, but not most."
     if found.verdict == "ambiguous":
         rivals = " or ".join(found.ambiguous_with)
         return (
@@ -129,7 +129,7 @@ def _missing(found: Diagnosis, best: Candidate | None) -> str:
 
 
 def spoilt(faults: Sequence[DataFault]) -> str:
-    """Say which faults of the data have to be put right before any effect can be judged."""
+    """Say which faults of the data must be corrected before any effect can be judged."""
     said = " ".join(fault.sentence for fault in faults)
     kinds = ", ".join(dict.fromkeys(fault.fault for fault in faults))
     logs = ", ".join(dict.fromkeys(fault.file for fault in faults if fault.file is not None))
@@ -151,7 +151,7 @@ def _with_disagreements(text: str, found: Sequence[Disagreement], *, spoilt: boo
 
 
 def _differences(found: Sequence[Disagreement]) -> str:
-    """Say what each log says; of two that differ from each other it is said once."""
+    """State the values of each log; of two that differ from each other once."""
     first = found[0]
     if len(found) == 2 and found[1].value == first.others:
         return str(first).replace("the others", found[1].file)
@@ -164,7 +164,7 @@ def unshown(effect: str, reason: str) -> str:
 
 
 def experiment(cards: Sequence[EffectCard]) -> str:
-    """Say what would separate candidates that this log cannot tell apart."""
+    """Say what would separate candidates that this log does not separate."""
     parts = [f"for {card.id}, {card.confirm}" for card in cards if card.confirm]
     if not parts:
         return "Record a log with another motion, in more attitudes and over a wider range of temperature."

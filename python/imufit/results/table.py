@@ -14,7 +14,7 @@ class Table:
     Attributes
     ----------
     title : str
-        What the table says; may be empty.
+        Title of the table; may be empty.
     header : tuple of str
         One name per column; a leading ``>`` aligns the column right.
     rows : tuple of tuple of str

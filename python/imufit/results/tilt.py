@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class TiltFigures(Part):
-    """Figures of merit of one method; None where the log cannot tell.
+    """Figures of merit of one method; None where the log does not determine it.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Mark(Part):
 
 @dataclass(frozen=True, repr=False)
 class _Ranked(Part):
-    """What is ranked, from which number, and below which difference two methods tie whatever their ratio."""
+    """The ranked quantity, its number, and the difference below which two methods tie at any ratio."""
 
     title: str
     value: Callable[[TiltFigures], float | None]
@@ -242,7 +242,7 @@ class TiltComparison(Result):
         return f"{what}: {counts}"
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return list(self.notes)
 
 

@@ -1,4 +1,4 @@
-"""Which settings of a filter are gains that a log can tell, and where their search begins."""
+"""Which settings of a filter are gains that a log determines, and where their search begins."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def starts(filter_name: str, names: Sequence[str] = ()) -> dict[str, float]:
         chosen = {name: known.get(name, settings[name]["default"]) for name in dict.fromkeys(names)}
         zero = [name for name, value in chosen.items() if not value > 0.0]
         if zero:
-            raise InputError(f"{zero[0]} of {filter_name} is 0 by default, which is no start for a search over factors")
+            raise InputError(f"{zero[0]} of {filter_name} is 0 by default, which cannot start a search over factors")
         return chosen
     found = known or {
         name: entry["default"]

@@ -1,4 +1,4 @@
-"""What a tuning found."""
+"""The result of a tuning."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Gain(Part):
         Factors on the tuned value between which the value stays within 5 % of the least.
     wins : (2,) tuple or None
         Factors between which the filter is better than the rival; None where it is not even with the tuned gains, or
-        where there is no rival. 0 and infinity: no limit within a factor of 10 000.
+        where a rival is missing. 0 and infinity: no limit within a factor of 10 000.
     factors : (k,) array
         Factors that were tried.
     values : (k,) array
@@ -118,7 +118,7 @@ class GainMap(Part):
 
 @dataclass(frozen=True, repr=False)
 class Innovation(Part):
-    """What a filter is surprised by at each row: the angle between measured and foreseen vertical.
+    """Reading less prediction at each row: the angle between measured and foreseen vertical.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ class Tuning(Plotted, Result):
 
     @property
     def sentence(self) -> str:
-        """What was found, in one sentence."""
+        """The result in one sentence."""
         what = "error" if self.criterion == "error" else f"error of {self.horizon:g} s predictions"
         default, held = self.value["default"], self.value["held_out"]
         return (
@@ -201,7 +201,7 @@ class Tuning(Plotted, Result):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Notes, and what the gains' tolerance says."""
+        """Notes, and a note on the gains' tolerance."""
         remarks = list(self.notes)
         for gain in self.gains:
             if gain.edge is not None:
@@ -212,7 +212,7 @@ class Tuning(Plotted, Result):
                 side = "smaller" if gain.flat[0] == 0.0 else "larger"
                 remarks.append(f"{gain.name} is flat: any {side} value is within 5 % of the best.")
         if self.value["held_out"] > 1.02 * self.value["default"]:
-            remarks.append("Held out, the tuned gains are no better than the defaults: keep the defaults.")
+            remarks.append("Held out, the tuned gains are not better than the defaults: keep the defaults.")
         if self.rival is not None:
             remarks.append(self._against_rival(*self.rival))
         if self.innovation is not None:
@@ -237,8 +237,10 @@ class Tuning(Plotted, Result):
             ]
             limits.append(f"{gain.name} " + " or ".join(side for side in sides if side))
         if not limits:
-            return f"It beats {name} ({quantity.number(error)} deg) whichever gain is wrong by up to 10 000 times."
-        return f"It loses to {name} ({quantity.number(error)} deg) only with {'; '.join(limits)}."
+            return (
+                f"The filter beats {name} ({quantity.number(error)} deg) whichever gain is wrong by up to 10 000 times."
+            )
+        return f"The filter loses to {name} ({quantity.number(error)} deg) only with {'; '.join(limits)}."
 
     def tables(self) -> list[Table]:
         """Gains, values, and the map as tables."""
@@ -310,7 +312,7 @@ class Tuning(Plotted, Result):
         return gain_figure(self.map, self.gains, self.rival, f"{self.metric} {self.criterion}, deg", ax)
 
     def sentences(self) -> list[str]:
-        """Return what the result says, the answer first."""
+        """Return the result as text, the answer first."""
         return [self.sentence, *self.remarks]
 
 

@@ -38,7 +38,7 @@ def refine(
     Parameters
     ----------
     value : callable
-        Values (k,) of points (k, d); all points of a step are asked for at once.
+        Values (k,) of points (k, d); all points of a step are requested at once.
     best : (d,) array
         Where to begin, logarithms.
     least : float

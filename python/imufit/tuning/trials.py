@@ -146,12 +146,12 @@ def trials(
     needs = _imufit.filter_descriptions()[filter_name]["needs"]
     for sensor in needs:
         if around.sensors[sensor] is None:
-            raise InputError(f"{filter_name} needs {sensor}, which is not there", file=log.path or "log")
+            raise InputError(f"{filter_name} needs {sensor}, which the log does not have", file=log.path or "log")
     referenced = log.ref_q is not None and bool(log.has_reference.any())
     chosen: Criterion = criterion or ("error" if referenced else "prediction")
     if chosen == "error" and not referenced:
         raise InputError(
-            "the log has no reference attitude to tell the error by",
+            "the log has no reference attitude for the error",
             file=log.path or "log",
             remedy="Tune by prediction.",
         )
@@ -166,7 +166,7 @@ def trials(
         counts &= log.has_reference
     rows = np.flatnonzero(counts)
     if rows.size < 2:
-        raise InputError("no rows count: there is no movement = 1 with a reference", file=log.path or "log")
+        raise InputError("no rows count: movement = 1 with a reference is missing", file=log.path or "log")
     part = np.full(log.n, PARTS, np.uint8)
     part[rows] = (np.arange(rows.size) >= rows.size // 2).astype(np.uint8)
     ref_q = log.ref_q if referenced else None

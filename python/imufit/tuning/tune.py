@@ -34,7 +34,7 @@ _ONE_ROW = 1e-9
 _REST = 20.0
 """Shortest rest, s, whose Allan deviation is used."""
 _NOISES = ("gyr_noise", "bias_walk")
-"""Noises that an Allan deviation tells; the accelerometer's and the magnetometer's include motion and surroundings."""
+"""Noises from an Allan deviation; the accelerometer's and the magnetometer's include motion and surroundings."""
 
 
 def tune(
@@ -56,8 +56,9 @@ def tune(
     Without one it is the mean error of the filter's predictions: from an attitude of the filter a copy goes on for
     `horizon` seconds on the gyro and the learned bias alone, and the specific force and the field that come in the
     second half of that time are held against what it foresees. Noise that is independent over that time cancels; a
-    disturbance that lasts longer (the field of a room, a constant acceleration) cannot be told from an attitude, and
-    gains tuned this way follow it. Where the log rests long enough, the gyro's noise and the walk of its bias come from
+    disturbance that lasts longer (the field of a room, a constant acceleration) cannot be separated from an attitude,
+    and gains tuned this way follow it. Where the log rests long enough, the gyro's noise and the walk of its bias come
+    from
     its Allan deviation and are not searched.
 
     The search is a grid over factors up to 1000 either way, then steps down to 2 %, each a single pass over the log.
@@ -94,15 +95,15 @@ def tune(
     Raises
     ------
     InputError
-        The log lacks what this takes, or there is no such filter or gain.
+        The log lacks the needed columns, or the filter or gain is unknown.
     """
     if not horizon > 0.0:
-        raise InputError(f"horizon = {horizon} is no time for a prediction", remedy="Write seconds, such as 1.")
+        raise InputError(f"horizon = {horizon} is not a time for a prediction", remedy="Write seconds, such as 1.")
     begin = starts(filter_name, gains)
     held = dict(fixed or {})
     begin = {name: value for name, value in begin.items() if name not in held}
     if not begin:
-        raise InputError(f"every gain of {filter_name} is fixed: nothing is left to tune")
+        raise InputError(f"every gain of {filter_name} is fixed: no gain remains to tune")
     ready = trials(log, filter_name, by, metric, horizon, held, rules)
     notes: list[str] = []
     if ready.criterion == "prediction" and not gains:
@@ -167,7 +168,7 @@ def _column(ready: Trials, scores: Callable[[Array], Array], k: int, points: Arr
 
 
 def _known_noise(log: Log, name: str) -> tuple[dict[str, float], str]:
-    """Return the noises that the log's longest rest tells of this filter, and what is to be said about it."""
+    """Return the noises of this filter from the log's longest rest, and a note on them."""
     try:
         found = allan(log, sensors=("gyr",))
     except InputError:
@@ -187,7 +188,7 @@ def _that_matter(ready: Trials, begin: dict[str, float], notes: list[str]) -> di
     kept = {name: begin[name] for name, value in zip(begin, values[1:], strict=True) if value != values[0]}
     idle = [name for name in begin if name not in kept]
     if idle and kept:
-        notes.append(f"{', '.join(idle)} changes nothing on this log and was left alone.")
+        notes.append(f"{', '.join(idle)} changes nothing on this log and was left unchanged.")
     return kept or begin
 
 

@@ -1,4 +1,4 @@
-"""What sensors deliver, decoded to SI units: one module for each device, with its registers and ranges as data."""
+"""Bytes of sensors, decoded to SI units: one module for each device, with its registers and ranges as data."""
 
 from imufit.devices.chips import mpu6050
 

@@ -60,7 +60,7 @@ class FullScale:
 
 @dataclass(frozen=True)
 class LowPass:
-    """What the digital low-pass filter does to the readings at one value of ``DLPF_CFG``.
+    """Effect of the digital low-pass filter on the readings at one value of ``DLPF_CFG``.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def decode(
         Selected ranges, 0 to 3: index of `ACC_RANGES` and `GYR_RANGES`, bits 4 and 3 of ACCEL_CONFIG and GYRO_CONFIG
         (`full_scale_selection`).
     temperature : bool
-        False for frames of 12 bytes without the thermometer, as the FIFO gives them where it is told so.
+        False for frames of 12 bytes without the thermometer, as the FIFO gives them if so configured.
     partial : bool
         True: a frame that is not whole is left in `Frames.remainder`, to be put before the next burst.
 
@@ -208,7 +208,7 @@ def decode(
     Raises
     ------
     InputError
-        No bytes, a range that does not exist, or a burst that ends within a frame; the message says where.
+        No bytes, a range that does not exist, or a burst that ends within a frame; the message states where.
     """
     for name, value in (("afs_sel", afs_sel), ("fs_sel", fs_sel)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value <= 3:
@@ -220,7 +220,7 @@ def decode(
     try:
         acc, gyr, temp, acc_clipped, gyr_clipped = _imufit.mpu6050_decode(whole, int(afs_sel), int(fs_sel), temperature)
     except InputError as error:
-        remedy = "Pass whole frames; or partial=True, and what is left over before the next burst."
+        remedy = "Pass whole frames; or partial=True, and the remainder before the next burst."
         raise InputError(error.problem.rstrip("."), row=whole.size // size, remedy=remedy) from None
     return Frames(
         acc,
@@ -263,9 +263,9 @@ def sample_rate(smplrt_div: int, dlpf_cfg: int) -> float:
         A divider or filter that the device does not have.
     """
     if not 0 <= smplrt_div <= 255:
-        raise InputError(f"SMPLRT_DIV is {smplrt_div}, which is no byte", remedy="Pass 0 to 255.")
+        raise InputError(f"SMPLRT_DIV is {smplrt_div}, which is not a byte", remedy="Pass 0 to 255.")
     if not 0 <= dlpf_cfg < len(LOW_PASS):
-        raise InputError(f"DLPF_CFG is {dlpf_cfg}, which is no filter of the device", remedy="Pass 0 to 6.")
+        raise InputError(f"DLPF_CFG is {dlpf_cfg}, which is not a filter of the device", remedy="Pass 0 to 6.")
     return LOW_PASS[dlpf_cfg].gyr_rate / (1 + smplrt_div)
 
 

@@ -20,7 +20,7 @@ LATEST = np.uint32(0xFFFFFFFF)
 
 @dataclass(frozen=True)
 class Load:
-    """What a device puts on its line.
+    """The load of a device on its line.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Load:
         rate = float(np.floor((baud / BITS - self.a_second) / self.a_row))
         if rate < 1.0:
             raise InputError(
-                f"a line of {baud} baud carries not one sample a second",
+                f"a line of {baud} baud carries less than one sample a second",
                 remedy="Give a higher " + keyword("baud") + ".",
             )
         return rate
@@ -110,7 +110,7 @@ def check(load: Load, rate: float, baud: int) -> None:
     Raises
     ------
     InputError
-        Tells the highest rate that fits.
+        States the highest rate that fits.
     """
     if load.bytes_a_second(rate) > baud / BITS:
         raise InputError(

@@ -1,4 +1,4 @@
-"""The rows of a source one after another, from the first again after the last if asked for."""
+"""The rows of a source one after another, from the first again after the last if requested."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ Stream = tuple[float, str, bytes, list[Channel]]
 ROOM = 25.0
 """Temperature (degC) that a device shows whose source has none: its registers always hold one."""
 GRAVITY = 9.80665
-"""What an MPU6050's g are, m/s^2."""
+"""One g of an MPU6050, m/s^2."""
 LOW_PASS = 3
 """`DLPF_CFG` of an emulated MPU6050, 44 and 42 Hz: with a low-pass it samples at 1 kHz over a divider."""
 COMPASS = (0x18, 0x20, 0x00)

@@ -32,7 +32,7 @@ PROBE = 5.0
 
 
 class Emulator:
-    """A device without hardware: it speaks the wire protocol, or text, on a pty or a socket.
+    """A device without hardware: it uses the wire protocol, or text, on a pty or a socket.
 
     As a context it runs in a thread from entering to leaving; `run` runs it here.
 
@@ -124,7 +124,7 @@ class Emulator:
             raise InputError(f"the duration is {duration} s", remedy="Give a number above 0.")
         ticks = clock or Clock()
         opened_at = partial(open_source, source, device=device, effects=effects, seed=seed, mapping=tuple(mapping))
-        # What the line carries in a second of the device.
+        # Capacity of the line in a second of the device.
         carried = None if baud is None else int(baud / (hurry if np.isfinite(hurry) else 1.0))
         if carried is not None and (rate == "max" or np.isfinite(hurry)):
             short = opened_at(rate=None if rate == "max" else rate, duration=PROBE)
@@ -140,7 +140,7 @@ class Emulator:
         unplugged = any(fault.kind == "unplug" for fault in planned) or (fault_rates or {}).get("unplug", 0.0) > 0.0
         if unplugged and on == "pty" and link is None:
             raise InputError(
-                "an unplugged pty comes back by another name",
+                "an unplugged pty returns with another name",
                 remedy="Give " + keyword("link") + " a path, or use " + option("on", "socket://127.0.0.1:5000"),
             )
         self.source: Source = opened
@@ -166,11 +166,11 @@ class Emulator:
 
     @property
     def port(self) -> str:
-        """What a reader opens: path of the pty or its link, or URL of the socket."""
+        """Name that a reader opens: path of the pty or its link, or URL of the socket."""
         return self._line.address
 
     def open(self) -> Self:
-        """Plug it in without switching it on, so that `port` can be told."""
+        """Plug it in without switching it on, so that `port` can be printed."""
         self._line.open()
         return self
 
@@ -205,7 +205,7 @@ class Emulator:
     def _run_beside(self) -> None:
         try:
             self.run()
-        except BaseException as error:  # told when the context is left
+        except BaseException as error:  # raised when the context is left
             self._error = error
 
     def __enter__(self) -> Self:
@@ -224,7 +224,7 @@ class Emulator:
 
     @property
     def sent(self) -> pa.Table:
-        """Samples so far with what became of each, as `Sent` says; of a run that keeps them in memory."""
+        """Samples so far with the fate of each, as in `Sent`; of a run that keeps them in memory."""
         return self._sent.table()
 
     def summary(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What goes wrong on a line, one function a kind, and when."""
+"""Faults of a line and their times, one function a kind."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Kind:
     unit : str
         What its length counts.
     length : float
-        Length unless told otherwise.
+        Length unless stated otherwise.
     change : callable
         Changes the pieces of the sample that is struck.
     """

@@ -22,7 +22,7 @@ LONGEST = 1024
 
 
 class Form(Protocol):
-    """What turns rows into bytes.
+    """The encoder of rows into bytes.
 
     Attributes
     ----------
@@ -45,10 +45,10 @@ class Form(Protocol):
     sequence: int
 
     def announce(self) -> bytes:
-        """Return what says what rows hold."""
+        """Return the announcement of the rows' columns."""
 
     def asks(self, said: bytes) -> bool:
-        """Return whether a reader asks for the announcement.
+        """Return whether a reader requests the announcement.
 
         Parameters
         ----------
@@ -149,7 +149,7 @@ class Text:
         return (",".join([time, *self._device.columns]) + "\r\n").encode()
 
     def asks(self, said: bytes) -> bool:
-        """Return False: a sketch that prints text listens to nobody."""
+        """Return False: a sketch that prints text does not read the line."""
         return False
 
     def rows(self, stamps: NDArray[np.uint32], values: Array) -> tuple[bytes, NDArray[np.uint64]]:

@@ -32,7 +32,7 @@ class Line(Protocol):
 
     @property
     def address(self) -> str:
-        """What a reader opens."""
+        """Name that a reader opens."""
 
     def open(self) -> None:
         """Plug in: from now on a reader can open it."""
@@ -57,7 +57,7 @@ class Line(Protocol):
         """
 
     def heard(self) -> bytes:
-        """Return what the reader has said since this was last asked."""
+        """Return the bytes of the reader since the last call."""
 
     def drain(self, patience: float) -> None:
         """Wait until the reader has read what was written, for at most `patience` (s)."""
@@ -84,7 +84,7 @@ class Pty:
     def __init__(self, link: Path | None = None) -> None:
         if link is not None and os.path.lexists(link) and not link.is_symlink():
             raise InputError(
-                f"{str(link)!r} exists and is no link",
+                f"{str(link)!r} exists and is not a link",
                 remedy="Give " + keyword("link") + " a path that is free.",
             )
         self._link, self._master, self._name, self._since = link, -1, "", float("inf")
@@ -99,7 +99,7 @@ class Pty:
         self._master, slave = os.openpty()
         tty.setraw(slave)
         self._name = os.ttyname(slave)
-        # With no reader the master is hung up, which tells when there is one.
+        # With no reader the master is hung up, which shows when a reader opens it.
         os.close(slave)
         os.set_blocking(self._master, False)
         self._since = float("inf")
@@ -136,10 +136,10 @@ class Pty:
         return self.write(data, 0.0)
 
     def heard(self) -> bytes:
-        """Return what the reader has said since this was last asked."""
+        """Return the bytes of the reader since the last call."""
         try:
             return os.read(self._master, HEARD)
-        except OSError:  # nothing, or nobody
+        except OSError:  # nothing, or not read
             return b""
 
     def drain(self, patience: float) -> None:
@@ -203,7 +203,7 @@ class Socket:
         except OSError as error:
             server.close()
             raise InputError(
-                f"port {self._port} cannot be had: {error.strerror}", remedy="Use another one, or 0 for a free one."
+                f"port {self._port} cannot be opened: {error.strerror}", remedy="Use another one, or 0 for a free one."
             ) from error
         server.listen(1)
         server.setblocking(False)
@@ -227,12 +227,12 @@ class Socket:
         return self._reader is not None and time.monotonic() - self._since >= SETTLING
 
     def heard(self) -> bytes:
-        """Return what the reader has said since this was last asked."""
+        """Return the bytes of the reader since the last call."""
         said, self._heard = self._heard, b""
         return said
 
     def _left(self, reader: socket.socket) -> bool:
-        """Return whether the reader has closed its end; the last of what it says is kept until it is asked for."""
+        """Return whether the reader has closed its end; its last bytes are kept until requested."""
         try:
             while data := reader.recv(HEARD):
                 self._heard = (self._heard + data)[-HEARD:]

@@ -1,4 +1,4 @@
-"""What was sent, sample by sample: the truth against which a recording is checked."""
+"""The sent samples with their truth: the truth against which a recording is checked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an emulated device measures: readings by column over time, from a scenario or a log."""
+"""The readings of an emulated device: readings by column over time, from a scenario or a log."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Effects = Mapping[str, Mapping[str, float] | None]
 
 SENSORS = {"acc": ("acc_x", "acc_y", "acc_z"), "gyr": ("gyr_x", "gyr_y", "gyr_z"), "mag": ("mag_x", "mag_y", "mag_z")}
 LENGTH = 120.0
-"""Time (s) for which a scenario is simulated unless told otherwise; a longer run repeats it on request."""
+"""Time (s) for which a scenario is simulated by default; a longer run repeats it on request."""
 FULL = 0.9
 """Share of rows in which a column must have a reading to count as one of the full rate."""
 
@@ -36,8 +36,8 @@ class Source:
     t : (n,) array
         Time since the first row, s.
     groups : dict of dict of (n,) arrays
-        Columns that are read together, by sensor or covariate, then by column; SI units, NaN where there is no
-        reading.
+        Columns that are read together, by sensor or covariate, then by column; SI units, NaN where a reading is
+        missing.
     """
 
     name: str

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 ROWS = 1024
 """Samples written at a time at most."""
 PATIENCE = 1.0
-"""Time (s) for which a reader may be busy before samples are given up, as they are by the buffers of a real port."""
+"""Time (s) for which a reader may be busy before samples are discarded, as they are by the buffers of a real port."""
 LEAVE = 0.05
 """Longest wait (s) without looking whether the reader has gone."""
 DRAINED = 2.0
@@ -36,12 +36,12 @@ PULLED = 0.3
 
 @dataclass(frozen=True)
 class Parts:
-    """What a run is made of.
+    """The parts of a run.
 
     Attributes
     ----------
     device, form, clock, line, pace, course, schedule, sent :
-        Each as its class says.
+        See their classes.
     rng : numpy.random.Generator
         Of jitter and damage.
     """
@@ -101,7 +101,7 @@ class Transmission:
             self._is.pace.rest(0.0)
 
     def run(self) -> None:
-        """Send until the source ends or it is told to stop."""
+        """Send until the source ends or the run is stopped."""
         course, pace, schedule = self._is.course, self._is.pace, self._is.schedule
         pace.begin()
         while not self._stop.is_set() and self._row < course.total:
@@ -185,7 +185,7 @@ class Transmission:
                 self._reset(float(t[0]), fault.length)
 
     def _announce(self) -> None:
-        """Say what the samples hold, to whoever listens."""
+        """Announce the columns of the samples."""
         data = self._form.announce()
         self.counts["announcements"] += 1
         greeted = self._greeted or not self._form.greets

@@ -23,7 +23,7 @@ LACKING: Final = {
     "neighbours": "the rows around a row",
     "history": "all rows since the start",
 }
-"""What live rows lack, by the reach of an effect that needs it."""
+"""Rows that live rows lack, by the reach of an effect that needs it."""
 
 
 class LiveCorrection:
@@ -44,7 +44,7 @@ class LiveCorrection:
         means = model.constants.get("covariate_means", {})
         self._warmth_known = "temperature_mean" in model.constants
         for effect, _ in model.stack():
-            # What is wrong with the reference is not taken out of readings; a mount turns each row by itself.
+            # Errors of the reference are not removed from readings; a mount turns each row by itself.
             if effect.reference_part is None and effect.reach != "row":
                 raise InputError(
                     f"{effect.id} needs {LACKING[effect.reach]}, which live rows do not have",

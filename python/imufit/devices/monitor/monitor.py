@@ -28,7 +28,7 @@ _WINDOW: Final = 2.0  # over which the rate is taken, s
 
 @dataclass(frozen=True)
 class MonitorState:
-    """What is known of a device now.
+    """The present state of a device.
 
     Attributes
     ----------

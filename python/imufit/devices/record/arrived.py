@@ -1,4 +1,4 @@
-"""Bytes and rows as they come from a line: what the device says they hold, the numbers, and when they arrived."""
+"""Bytes and rows as they come from a line: the device's announcement, the numbers, and their times of arrival."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Chunk:
 
 @dataclass(frozen=True)
 class Announced:
-    """What a device says of its rows.
+    """A device's announcement of its rows.
 
     Attributes
     ----------

@@ -100,7 +100,7 @@ class BeginningFile:
 
 @dataclass(frozen=True)
 class Beginning:
-    """What such a file holds.
+    """The content of such a file.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ def read_beginning(path: Path) -> Beginning | None:
     """
     data = path.read_bytes()
     if not data.startswith(_MARK[: len(data)]):
-        raise InputError("these are no bytes that a recording began with", file=path, remedy="Delete it.")
+        raise InputError("the file does not hold the first bytes of a recording", file=path, remedy="Delete it.")
     end = data.find(b"\n", len(_MARK))
     if end < 0:
         return None

@@ -252,7 +252,7 @@ def spread(t: Array, step: float | None = None) -> Array:
 
 
 def spread_arrivals(arrival: Array, before: float = -np.inf, step: float | None = None) -> Array:
-    """Rows that were read together spread over the time since the read before: for devices that tell no time.
+    """Rows that were read together spread over the time since the read before: for devices without a clock.
 
     Parameters
     ----------

@@ -27,14 +27,14 @@ class Columns:
     Parameters
     ----------
     announced : Announced
-        What the device says.
+        The device's announcement.
     mapping : mapping, optional
         Source text for target columns, such as ``{"acc_x": "-AccX[g]"}``.
 
     Raises
     ------
     InputError
-        No log can be made of them: an axis is missing or misspelt, there is no sensor, a name stands there twice.
+        No log can be made of them: an axis is missing or misspelt, a sensor is missing, a name stands there twice.
     """
 
     def __init__(self, announced: Announced, mapping: Mapping[str, str] | None = None) -> None:
@@ -66,7 +66,8 @@ class Columns:
         Returns
         -------
         dict of (n,) arrays
-            Without `t`. What no log can hold is NaN: infinite values, and attitudes that are no unit quaternions.
+            Without `t`. Values that a log cannot hold are NaN: infinite values, and attitudes that are not unit
+            quaternions.
         """
         columns = {}
         for column in self._plan.columns:

@@ -91,7 +91,7 @@ class _Commanded:
 
 @dataclass
 class _Survey:
-    """What a pass over all rows finds: when they begin and end, runs of the clock, gaps, and steps from row to row."""
+    """Result of a pass over all rows: when they begin and end, runs of the clock, gaps, and steps from row to row."""
 
     first: float
     last: float = 0.0
@@ -137,9 +137,9 @@ def make_log(parts: Sequence[Part], file: Path, ended: str | None = None, cpu_sh
     parts : sequence of Part
         In order; at least one has rows.
     file : Path
-        The log to be. What stands there is replaced; metadata that a sidecar already holds for it are kept.
+        The log to be. An existing file is replaced; metadata that a sidecar already holds for it are kept.
     ended : str, optional
-        Why the recording ended; without it what the parts tell.
+        Why the recording ended; without it the state of the parts.
     cpu_share : float, optional
         Time of the processor over time that passed while it was recorded.
 
@@ -220,7 +220,7 @@ def make_log(parts: Sequence[Part], file: Path, ended: str | None = None, cpu_sh
 
 
 def _gaps(before: _Piece | None, piece: _Piece, first: float) -> list[RecordingGap]:
-    """Tell of the gaps between rows, and before the first of them."""
+    """Report the gaps between rows, and before the first of them."""
     rows, t, run = piece.rows, piece.t, piece.run
     part = np.full(rows.n, piece.part)
     opening, start, lost = rows.opening, rows.start, rows.lost
@@ -247,7 +247,7 @@ def _gaps(before: _Piece | None, piece: _Piece, first: float) -> list[RecordingG
 
 
 def _gap_at_end(told: dict[str, Any], end: float, first: float) -> list[RecordingGap]:
-    """Tell of a line that was lost and did not come back."""
+    """Report a line that was lost and did not come back."""
     if told.get("lost_since") is None:
         return []
     return [RecordingGap(end, max(float(told["now"]) - first, end), "unplugged", 0)]
@@ -304,7 +304,7 @@ def check_target(log: Path, force: bool) -> None:
         raise InputError(f"the directory {log.parent} does not exist", file=log, remedy="Make it first.")
     if log.exists() and not force:
         raise InputError(
-            "this log is there already",
+            "this log exists already",
             file=log,
             remedy="Take another name, or " + Remedy("force=True", "--force") + " to overwrite it.",
         )
@@ -314,7 +314,7 @@ def check_target(log: Path, force: bool) -> None:
 
         if not (KNOWN | {KEY}) & older.keys():
             raise InputError(
-                "this file is in the way: it is no log metadata, but the log's metadata would be written there",
+                "this file is in the way: it does not hold log metadata, but the log's metadata would be written there",
                 file=sidecar_path(log),
                 remedy="Record under another name.",
             )
@@ -338,7 +338,7 @@ def unreadable(path: Path, n: int) -> str:
     try:
         found = LogStream(path).n
     except InputError as error:
-        return f"the log is written, but reading it says: {error}"
+        return f"the log is written, but reading it fails: {error}"
     if found != n:
         raise InputError(f"{found} rows stand in the log, but {n} were recorded", file=path)
     return ""

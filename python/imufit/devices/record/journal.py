@@ -1,4 +1,4 @@
-"""What a running recording writes: bytes until rows come out of them, then rows, a batch five times a second."""
+"""The files of a running recording: bytes until rows come out of them, then rows, a batch five times a second."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ class Journal:
         DiskError
             The disk is full or gone: what was written stays.
         InputError
-            The device announces columns of which no log can be made. What came before stays.
+            The device announces columns of which no log can be made. Earlier rows stay.
         """
         now = time.monotonic()
         self._keep_beginning()

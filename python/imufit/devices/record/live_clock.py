@@ -20,14 +20,14 @@ KEPT: Final = 1200
 EACH: Final = 4
 """Arrivals kept after which the drift is fitted anew."""
 SLEW: Final = 0.001
-"""Share of the time that passes by which the offset is set right, so that no step is off by more."""
-_SETTLED: Final = 2.0  # of arrivals before a drift is believed, s
+"""Share of the time that passes by which the offset is corrected, so that no step is off by more."""
+_SETTLED: Final = 2.0  # of arrivals before a drift is accepted, s
 
 
 class LiveClock:
     """Time of live rows on the host's clock, s from the first row, strictly increasing.
 
-    Unlike the clock of a finished recording it knows only what has come. An offset that turns out wrong is set right
+    Unlike the clock of a finished recording it uses only the rows so far. An offset that turns out wrong is corrected
     gently, by `SLEW`; a restart of the device or of the line begins a new offset.
     """
 

@@ -140,7 +140,7 @@ class LiveRows:
         return self._reception.nothing_whole
 
     def take_texts(self) -> list[str]:
-        """Messages of the device since this was last asked."""
+        """Messages of the device since the last call."""
         return self._reception.take_texts()
 
 

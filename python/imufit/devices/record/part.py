@@ -1,4 +1,4 @@
-"""What is written while a recording runs: append-only, so that a crash leaves all but the last quarter of a second."""
+"""The file of a running recording: append-only, so that a crash leaves all but the last quarter of a second."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ class PartFile:
         Parameters
         ----------
         announced : Announced
-            What the device says.
+            The device's announcement.
         about : mapping
             What else has to be known to make a log of them: plain values.
         """
@@ -151,7 +151,7 @@ class PartFile:
         Parameters
         ----------
         rows : Arrived or None
-            At least one row; None for a batch that only tells.
+            At least one row; None for a batch of notes only.
         told : mapping
             What is known now: plain values.
 
@@ -231,20 +231,20 @@ def _schema(announced: Announced) -> Any:
 
 @dataclass(frozen=True)
 class Part:
-    """What a part holds.
+    """The content of a part.
 
     Attributes
     ----------
     path : Path
         The file.
     announced : Announced
-        What the device says.
+        The device's announcement.
     about : dict
         What else was written at its beginning.
     n : int
         Rows of whole batches.
     told : list of dict
-        What each batch told.
+        The notes of each batch.
     dropped : int
         Bytes behind the last whole batch.
     """
@@ -292,7 +292,7 @@ def read_part(path: Path) -> Part | None:
     Raises
     ------
     InputError
-        This is no part of a recording, or a recording is still running.
+        The file is not a part of a recording, or a recording is still running.
     """
     with path.open("rb") as file:
         if fcntl is not None:
@@ -316,7 +316,7 @@ def _read(path: Path, data: Any, size: int) -> Part | None:
         if stream is None and _is_cut_off(path, size):
             return None
         raise InputError(
-            "this is no part of a recording",
+            "this is not a part of a recording",
             file=path,
             remedy=command("record", "imufit.devices.record.record") + " writes LOG.part while it runs.",
         )
@@ -329,7 +329,7 @@ def _read(path: Path, data: Any, size: int) -> Part | None:
                 file=path,
                 remedy="Use the imufit that recorded it.",
             )
-        # What the end of a recording computes with; it fails here, where the file is named.
+        # The input of the end of a recording; it fails here, where the file is named.
         datetime.fromisoformat(about["utc"])
         float(about["monotonic"])
         said = about.pop("announced")
@@ -359,7 +359,7 @@ def _is_cut_off(path: Path, size: int) -> bool:
 
 @dataclass(frozen=True)
 class _Batch:
-    """A whole batch: its columns, what it tells, and where it ends."""
+    """A whole batch: its columns, its notes, and its end."""
 
     n: int
     rows: dict[str, Any] | None

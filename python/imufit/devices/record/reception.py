@@ -19,9 +19,9 @@ PAUSE: Final = (0.006, 0.012)
 """Shortest and longest wait between two reads, s: irregular, so that no rate of a device falls in step with it."""
 
 ASK_EVERY: Final = 0.1
-"""Time between two requests to a device that has not said yet what its samples hold, s."""
+"""Time between two requests to a device that has not announced its columns yet, s."""
 ASK_FOR: Final = 1.0
-"""Time for which it is asked after the line was opened, s: then it announces itself by itself, or speaks no frames."""
+"""Time for requests after the line was opened, s: then the device announces itself anyway, or sends no frames."""
 _DOUBTFUL: Final = 50
 
 
@@ -118,7 +118,7 @@ class Reception:
     def finish(self) -> list[Arrived]:
         """Nothing more is read: return samples that still wait for an announcement, if there ever was one.
 
-        Half a frame that is left is no damage: it is this end that cuts it.
+        A remaining half frame is not damage: it is this end that cuts it.
         """
         self.chunk = None
         if self.form is not None:
@@ -155,13 +155,13 @@ class Reception:
         place = (batch["feed"] - np.uint64(self._first_feed)).astype(np.intp)
         arrival, opening = np.array(self._feeds[: int(place[-1]) + 1]).T
         rows = of_frames(batch, arrival[place], opening[place].astype(np.uint32))
-        # Rows come in order: nothing before the last one is asked for again.
+        # Rows come in order: nothing before the last one is requested again.
         del self._feeds[: int(place[-1])]
         self._first_feed += int(place[-1])
         return rows
 
     def take_texts(self) -> list[str]:
-        """Messages of the device since this was last asked."""
+        """Messages of the device since the last call."""
         texts, self._texts = self._texts, []
         return texts
 
@@ -175,7 +175,7 @@ class Reception:
 
     @property
     def unexplained(self) -> int:
-        """Samples that were given up since nothing said what they hold, also where no form is known."""
+        """Samples that were discarded since their columns were unknown, also where no form is known."""
         return int(self._frames.counts()["unexplained"])
 
     @property
@@ -188,17 +188,15 @@ class Reception:
             "": frames["samples"] or lines["samples"],
             "nothing came from the device": not self._bytes,
             f"rows of numbers came, but no header that names them: give one, {header}": lines["unexplained"],
-            f"{frames['unexplained']} samples came, but no announcement that says what they hold": frames[
-                "unexplained"
-            ],
+            f"{frames['unexplained']} samples came, but no announcement of their columns": frames["unexplained"],
             "the device announced itself, but sent no sample": self._frames.announcement() is not None,
-            f"no row and no frame came, but the device says {said[:80]!r}": said.isascii()
+            f"no row and no frame came, but the device reports {said[:80]!r}": said.isascii()
             and said.isprintable()
             and said,
         }
         otherwise = (
             f"{self._bytes} bytes came, but no whole frame and no rows under a header: check {keyword('baud')} "
-            "and that the device speaks the wire protocol"
+            "and that the device uses the wire protocol"
         )
         return next((reason for reason, holds in reasons.items() if holds), otherwise)
 

@@ -84,8 +84,8 @@ def record(
     Raises
     ------
     InputError
-        The port cannot be opened, the log is in the way, nothing whole came, or the disk is full. What was recorded
-        until then stays: in the log, or in the part that the message names.
+        The port cannot be opened, the log is in the way, nothing whole came, or the disk is full. The rows recorded
+        until then stay: in the log, or in the part that the message names.
     """
     path = Path(log)
     check_mapping(mapping)
@@ -130,7 +130,7 @@ def _run(
     stopped: Callable[[], bool],
     rig: Rig | None,
 ) -> tuple[str, InputError | None]:
-    """Record; return why it ended, and the error if that was no ordinary end."""
+    """Record; return why it ended, and the error if the end was not ordinary."""
     try:
         for rows in listen(reception, duration=duration, give_up=give_up, stopped=stopped):
             texts = reception.take_texts()
@@ -161,7 +161,7 @@ def _finished(
 ) -> Recording:
     """Make the log of the parts, and delete them."""
     why, problem = end
-    # bytes that nothing explained are no recording; of others the rows are in the parts
+    # unexplained bytes are not a recording; of others the rows are in the parts
     beginning_path(path).unlink(missing_ok=True)
     if journal.n == 0:
         for part in journal.paths:
@@ -194,7 +194,7 @@ def converted(
     log : Path
         The log.
     ended : str, optional
-        For `Recording.ended`; without it what the parts tell.
+        For `Recording.ended`; without it the state of the parts.
     cpu_share : float, optional
         For `Recording.cpu_share`.
     keep : bool

@@ -1,4 +1,4 @@
-"""What a crash left of a recording becomes a log."""
+"""The part left by a crash becomes a log."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def recover(
     Raises
     ------
     InputError
-        There is no part, nothing whole is in it, nothing tells what its samples hold, a recording is still writing it,
-        or the log cannot be written.
+        The part is missing, nothing whole is in it, the columns of its samples are unknown, a recording is still
+        writing it, or the log cannot be written.
     """
     file = Path(file)
     found = re.fullmatch(r"(.+)\.part\d*", file.name)
@@ -68,7 +68,7 @@ def recover(
     parts = parts_of(wanted)
     if not parts and not first.exists():
         raise InputError(
-            f"there is no {part_path(wanted)}", file=file, remedy="Name the .part file that the recording left."
+            f"{part_path(wanted)} does not exist", file=file, remedy="Name the .part file that the recording left."
         )
     target = wanted if log is None else Path(log)
     check_target(target, force)
@@ -98,9 +98,9 @@ def _explain(begun: Beginning, wanted: Path, port: str | None) -> None:
     rows += reception.finish()
     if not rows and (waiting := reception.unexplained):
         raise InputError(
-            f"{waiting} samples are in it, but the recording was killed before the device said what they hold",
+            f"{waiting} samples are in it, but the recording was killed before the device announced their columns",
             file=beginning_path(wanted),
-            remedy="Plug the device in, and run " + recovering(wanted, "PORT") + ": it is asked.",
+            remedy="Plug the device in, and run " + recovering(wanted, "PORT") + ".",
         )
     told = {"counts": counts, "now": last.arrival, "lost_since": None, "texts": [(last.arrival, t) for t in texts]}
     kept = [part.where(part.opening <= last.opening) for part in rows]

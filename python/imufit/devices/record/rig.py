@@ -35,8 +35,8 @@ class Rig:
     angle : float
         Commanded angle when the recording begins, rad.
     typed : callable
-        Gives the angles that were commanded since it was last asked, rad; `MOVING` while the rig moves. It must not
-        wait. It is told whether rows have come: before that an angle has no place in the recording, and is not used.
+        Gives the angles that were commanded since the last call, rad; `MOVING` while the rig moves. It must not
+        wait. It receives whether rows have come: before that an angle has no place in the recording, and is not used.
     """
 
     axis: Literal["x", "y", "z"]
@@ -71,7 +71,7 @@ class TypedAngles:
     Parameters
     ----------
     say : callable
-        Tells the operator what was understood.
+        Reports the understood angle to the operator.
     file : int, optional
         File descriptor of the terminal; standard input if None.
     """
@@ -82,7 +82,7 @@ class TypedAngles:
         self._held = b""
 
     def __call__(self, rows_came: bool = True) -> list[float]:
-        """Angles since this was last asked, rad; `MOVING` while the rig moves. None before rows have come."""
+        """Angles since the last call, rad; `MOVING` while the rig moves. None before rows have come."""
         angles: list[float] = []
         for line in self._lines():
             if not rows_came:
@@ -133,5 +133,5 @@ def _ours(file: int) -> bool:
     try:
         return not os.isatty(file) or os.tcgetpgrp(file) == os.getpgrp()
     except OSError:
-        # Not the terminal that controls this process: reading it stops nobody.
+        # Not the terminal that controls this process: reading it blocks nothing.
         return True

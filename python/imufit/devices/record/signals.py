@@ -11,7 +11,7 @@ from types import FrameType
 
 @contextmanager
 def requests_to_end() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C, SIGTERM and SIGHUP only set a flag; gives a function that tells whether one came.
+    """Let Ctrl-C, SIGTERM and SIGHUP only set a flag; returns a function that states whether one came.
 
     Outside of the main thread, where Python hands out no signals, it is never set.
     """

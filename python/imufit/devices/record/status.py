@@ -37,8 +37,8 @@ _WINDOW: Final = 2.0  # over which the rate is taken, s
 class StatusLine:
     """Called as a recording's `watch`; a context manager that takes the line away again.
 
-    Where no person is looking (standard error is no terminal) there is no line; messages of the device are printed in
-    either case.
+    Where no person is looking (standard error is not a terminal) the line is omitted; messages of the device are
+    printed in either case.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class StatusLine:
                 self._attitude = None
             try:
                 batch = self._converter.batch(part)
-            except InputError:  # the recording itself says so
+            except InputError:  # the recording itself states this
                 return
             if self._attitude is None:
                 sensors = self._converter.names

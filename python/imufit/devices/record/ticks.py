@@ -41,7 +41,7 @@ def time_column(columns: tuple[str, ...]) -> tuple[int, float | None] | None:
     Returns
     -------
     tuple or None
-        Place of the first such column and its unit, s; the unit is None where the name does not tell it.
+        Place of the first such column and its unit, s; the unit is None where the name does not state it.
     """
     for place, name in enumerate(columns):
         plain = without_unit(name).strip().lower()
@@ -85,7 +85,7 @@ class Unwrapper:
     announced : Announced
         What the rows hold.
     unit : float, optional
-        Unit of the column of time in text form, s, where its name does not tell it.
+        Unit of the column of time in text form, s, where its name does not state it.
     """
 
     def __init__(self, announced: Announced, unit: float | None = None) -> None:

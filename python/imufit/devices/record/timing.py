@@ -1,4 +1,4 @@
-"""The time of every row of a recording: its clock is fitted in one pass over the rows, and told in another."""
+"""The time of every row of a recording: its clock is fitted in one pass over the rows, and applied in another."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ FEW = 1000
 
 @dataclass(frozen=True)
 class Clock:
-    """What tells the time of the rows under one announcement.
+    """The source of the times of the rows under one announcement.
 
     Attributes
     ----------
     unit : float or None
-        Unit of the column of time, s, where its name does not tell it.
+        Unit of the column of time, s, where its name does not state it.
     fit : ClockFit or None
-        None where the device tells no time.
+        None where the device sends no time.
     notes : tuple of str
         What was taken for granted.
     """
@@ -50,7 +50,7 @@ class Timing:
     run : (n,) int array
         Number of the run of the device's clock.
     fit : ClockFit or None
-        None where the device tells no time.
+        None where the device sends no time.
     notes : tuple of str
         What was taken for granted.
     """
@@ -62,7 +62,7 @@ class Timing:
 
 
 def timed(rows: Arrived) -> Timing:
-    """Tell the time of rows.
+    """Compute the time of rows.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def clock_of(blocks: Iterable[Arrived]) -> Clock:
     device, arrival, segment, start = (np.concatenate(values) for values in zip(*kept, strict=True))
     fit = fit_clock(device, arrival, segment, start)
     if fit.alien:
-        notes.append("the rows came at another pace than their time tells: the device's seconds were taken as they are")
+        notes.append("the rows came at another rate than their time states: the device's seconds were used unchanged")
     return Clock(unit, fit, tuple(notes))
 
 
@@ -174,7 +174,7 @@ class Runs:
         self._floor = self._end = -np.inf
 
     def told(self, raw: Array, run: NDArray[np.int64], *, whole: bool) -> Array:
-        """Tell the times of as many of the rows, from the first, as can be known yet.
+        """Compute the times of as many of the rows, from the first, as are determined yet.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ class Runs:
 
 
 def _as_they_arrived(blocks: Iterable[Arrived]) -> Iterator[tuple[Arrived, Array, NDArray[np.int64]]]:
-    """Tell the times of rows of a device that tells none: those of the last read wait for the rest of it."""
+    """Compute the times of rows of a device that sends none: those of the last read wait for the rest of it."""
     waiting: Arrived | None = None
     step: float | None = None
     before = -np.inf

@@ -25,7 +25,7 @@ RETRY: Final = 0.1
 """Wait between two attempts to open a lost line, s: the same however long it is away, so that what a device sends once
 it is back is read from its first quarter of a second on."""
 REQUEST: Final = b"\x00"
-"""What asks a device to announce itself (docs/wire.md): the end of a frame, which is no command of anything else."""
+"""The byte that requests a device's announcement (docs/wire.md): the end of a frame, not a command of others."""
 BUSY: Final = 3.0
 """Time that a port may be in use when it is opened first, s: the program before may be about to close it."""
 
@@ -115,7 +115,7 @@ class Line:
             self.port, do_not_open=True, baudrate=self.baud, timeout=0, write_timeout=_STUCK, exclusive=True
         )
         if self.port.lower().startswith("socket:"):
-            # what comes with the connection is no rest of an earlier one, as it may be with a serial port
+            # bytes that come with the connection are not the rest of an earlier one, as it may be with a serial port
             line.reset_input_buffer = lambda: None  # type: ignore[method-assign]
         line.open()
         return line
@@ -165,10 +165,10 @@ def _refusal(port: str, error: Exception) -> InputError:
             f"the port {port} cannot be opened ({_plain(error)})", remedy="Start what is to listen there first."
         )
     there = [found.device for found in list_ports.comports()]
-    listing = f"Ports here: {', '.join(there)}." if there else "There is no serial port here: plug the device in."
+    listing = f"Ports here: {', '.join(there)}." if there else "This machine has no serial port: plug the device in."
     number = getattr(error, "errno", None)
     if number == 2 or isinstance(error, FileNotFoundError):  # ENOENT
-        return InputError(f"there is no port {port}", remedy=listing)
+        return InputError(f"the port {port} does not exist", remedy=listing)
     if number == 13:  # EACCES
         return InputError(
             f"the port {port} may not be opened by this user",

@@ -16,7 +16,7 @@ from imufit.results.part import Part
 
 MARKS = ("named", "wrong", "missed", "alarm", "single", "needless", "covariate")
 WITHIN = 0.10
-"""Share of itself by which an expected drop may differ from the realised one to count as foretold."""
+"""Share of itself by which an expected drop may differ from the realised one to count as predicted."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -33,7 +33,7 @@ class BlindGrade(Part):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> BlindGrade:
-        """Return what `to_dict` told, also after a way through JSON.
+        """Return the grade of a `to_dict`, also after JSON.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class BlindGrade(Part):
         return tuple(trial for trial in self.trials if trial.marks.faults)
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row per set: how many logs, and for each mark asked for the count, of how many, share and interval."""
+        """One row per set: how many logs, and for each mark requested the count, of how many, share and interval."""
         return [
             {"set": name, "logs": len(trials), **counts(trials), **figures(trials)}
             for name in SETS
@@ -89,10 +89,10 @@ class BlindGrade(Part):
             for row in rows
         )
         head = ("set", ">logs", *(f">{mark}" for mark in asked))
-        ends = ("set", ">over true noise, median", ">worst", ">95 % intervals that cover", ">drops foretold")
+        ends = ("set", ">over true noise, median", ">worst", ">95 % intervals that cover", ">drops predicted")
         return (
             Table("Blind logs: how many of how many, % (95 % interval)", head, marks),
-            Table("End of the ladder: residual, parameters, drops of the error foretold within 10 %", ends, end),
+            Table("End of the ladder: residual, parameters, drops of the error predicted within 10 %", ends, end),
         )
 
     def lines(self) -> list[str]:
@@ -104,7 +104,7 @@ class BlindGrade(Part):
 
 
 def counts(trials: Sequence[Trial]) -> dict[str, dict[str, float]]:
-    """Return count, number, share and 95 % interval of each mark that was asked for.
+    """Return count, number, share and 95 % interval of each mark that was requested.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def share(values: Iterable[bool]) -> dict[str, float]:
 
 
 def figures(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Return error at the end over the true noise (median, worst), coverage, and share of drops foretold.
+    """Return error at the end over the true noise (median, worst), coverage, and share of drops predicted.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def _ratio(ratio: float | None) -> str:
 
 
 def _rightly_stopped(trial: Trial) -> bool:
-    """Return whether the ladder rightly left something in the residual: what it cannot tell, or does not know."""
+    """Return whether the ladder rightly left something in the residual: rivals, or an effect outside the catalogue."""
     return trial.answer.end in ("ambiguous", "unknown") and not trial.marks.faults
 
 

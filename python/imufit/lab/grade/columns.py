@@ -18,7 +18,7 @@ ATTEMPTS = 12
 
 
 def courses(rng: np.random.Generator, seed: int) -> dict[str, Course]:
-    """Return temperature and seven columns: switched, wandering, with a slope, like the temperature."""
+    """Return temperature and seven columns: switched, a random walk, with a slope, like the temperature."""
     temperature = Temperature.random(stream(seed, "temperature"), DURATION)
 
     def wandering(number: int, time: float) -> Wandering:

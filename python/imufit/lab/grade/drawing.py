@@ -1,4 +1,4 @@
-"""How the sets draw: seeds, effects with sizes, and whether the log can tell them from all others."""
+"""How the sets draw: seeds, effects with sizes, and whether the log separates them from all others."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from imufit.lab.simulate.separation import Separation, near
 from imufit.lab.simulate.study import Study
 
 COLUMNS = ("motor_current", "vbat")
-"""Covariates of every log, so that their presence tells nothing."""
+"""Covariates of every log, so that their presence is not informative."""
 
 TOLD = 100.0
-"""Squared standard errors by which a rival must be worse to count as one that the log can tell: ten of them."""
+"""Squared standard errors by which a rival must be worse to count as separated by the log: ten of them."""
 
 SAME = 16.0
 """Squared standard errors within which two effects count as the same in a log: four of them."""
@@ -31,7 +31,7 @@ Parameters = dict[str, float]
 
 
 class ImpossibleError(Exception):
-    """What was to be drawn cannot be, with this seed and setting."""
+    """The draw is impossible with this seed and setting."""
 
 
 def rng_of(blind_set: str, seed: int) -> tuple[np.random.Generator, int]:
@@ -75,7 +75,7 @@ class Drawn:
 
     @property
     def rivals(self) -> tuple[str, ...]:
-        """Effects that cannot surely be told from it."""
+        """Effects that are not surely separated from it."""
         return near(self.distances, TOLD)
 
 
@@ -109,7 +109,7 @@ def drawn(
     found = parameters_of(study, effect, size, rng, only)
     distances = Separation(study, setting.columns).distances(effect, found, beside, least=TOLD)
     if distances[""] < TOLD:
-        raise ImpossibleError(f"{effect} is too small to be seen in this log")
+        raise ImpossibleError(f"{effect} is too small to be visible in this log")
     return Drawn(effect, found, distances)
 
 

@@ -1,4 +1,4 @@
-"""What is right and wrong in an answer."""
+"""Right and wrong parts of an answer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CERTAIN, SILENT = "missing", ("adequate", "unknown")
 
 @dataclass(frozen=True, repr=False)
 class Answer(Part):
-    """What the ladder said of a log.
+    """The ladder's answer on a log.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Marks(Part):
     Attributes
     ----------
     named : bool or None
-        The truth is found: named alone, or among rivals that the log really cannot tell from it; both of two effects;
+        The truth is found: named alone, or among rivals that the log does not separate from it; both of two effects;
         or, of an effect outside the catalogue, called unknown.
     wrong : bool or None
         An effect is named, or added by the ladder, that is not there, and none of the true rivals either.
@@ -56,12 +56,12 @@ class Marks(Part):
     alarm : bool or None
         Something is found although nothing is hidden.
     single : bool or None
-        One name alone although the log cannot tell it from another.
+        One name alone although the log does not separate it from another.
     needless : bool or None
-        Names beside the truth that the log could have told from it; of an effect outside the catalogue: effects that
+        Names beside the truth that the log separates from it; of an effect outside the catalogue: effects that
         the ladder adds although the diagnosis said unknown.
     covariate : bool or None
-        The first dependence told of an effect outside the catalogue is on what causes it.
+        The first dependence of an effect outside the catalogue is on its cause.
     """
 
     named: bool | None = None
@@ -74,7 +74,7 @@ class Marks(Part):
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What is wrong with the answer, in words; empty for a right one."""
+        """Errors of the answer, in words; empty for a right answer."""
         good = ("named", "covariate")
         words = {"named": "not named", "wrong": "wrong name", "covariate": "another covariate"}
         found = [f.name for f in fields(self) if getattr(self, f.name) is (f.name not in good)]
@@ -83,7 +83,7 @@ class Marks(Part):
         return tuple(words.get(name, name) for name in found)
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON: those that were asked for."""
+        """JSON: those that were requested."""
         return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) is not None}
 
 

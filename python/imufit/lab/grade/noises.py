@@ -26,7 +26,7 @@ def coloured() -> Noise:
 
 
 def wandering() -> Noise:
-    """Return noise with biases that wander."""
+    """Return noise with bias random walks."""
     full = Noise.realistic()
     return _each(everyday(), lambda name: replace(full.sensor(name), coloured=0.0))
 

@@ -35,8 +35,8 @@ Sizes = tuple[float, float]
 def one(blind_set: str, seed: int, sizes: Sizes, realistic: bool = False) -> Puzzle:
     """Return a log with one hidden effect: number `seed` of the list, of a size drawn within `sizes`.
 
-    Of the motions, in an order by chance, the first is taken in which the effect can be told from all others; else,
-    the first that shows it, and what it cannot be told from counts as a rival.
+    Of the motions, in an order by chance, the first is taken that separates the effect from all others; else, the first
+    that shows it, and the unseparated effects count as rivals.
     """
     rng, simulation_seed = rng_of(blind_set, seed)
     names = effects()
@@ -78,7 +78,7 @@ def hidden_in(setting: Setting, found: Drawn, kind: str = "", model: tuple[str, 
     simulation = simulate(setting.scenario, effects, setting.seed, **setting.options)
     twin = None
     if setting.options["noise"].attitude_deg > 0.0:
-        # What shakes the sensor shakes the twin, too.
+        # A vibration of the sensor acts on the twin, too.
         shaken = {found.effect: dict.fromkeys(found.parameters, 0.0)} if injection(found.effect).vibration else {}
         twin = simulate(setting.scenario, shaken, setting.seed, **setting.options)
     return Puzzle("one", kind or found.effect, simulation, found.rivals, model, twin)

@@ -1,4 +1,4 @@
-"""Pairs of effects that one log cannot tell apart and another one can."""
+"""Pairs of effects that one log does not separate and another log does."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class Pair(Part):
     Attributes
     ----------
     first, second : str and the parameters that are not zero (all if empty).
-    together, apart : where the two cannot be told apart, and where they can.
+    together, apart : where the two are not separated, and where they are.
     model : effects that are there besides, and known: without an offset of its own, a drift since the start could be
-        told from one about the mean.
-    sizes, sizes_apart : smallest and largest size of the hidden one there, over the noise.
+    separated from one about the mean. sizes, sizes_apart : smallest and largest size of the hidden one there, over the
+    noise.
     """
 
     first: tuple[str, tuple[str, ...]]
@@ -135,7 +135,7 @@ PAIRS: Mapping[str, Pair] = {
         (_LIVELY, _with(sensors=("gyr", "temp"))),
         (_LIVELY, _plain),
     ),
-    "slow motion: late against sluggish": Pair(
+    "slow motion: delay against low-pass": Pair(
         ("acc.delay", _ALL),
         ("acc.lowpass", _ALL),
         (("turntable",), _plain),
@@ -152,7 +152,7 @@ def confounded(blind_set: str, seed: int) -> Puzzle:
 
 
 def separated(blind_set: str, seed: int) -> Puzzle:
-    """Return a log in which the two effects of pair number `seed` can be told apart; one of them is hidden."""
+    """Return a log in which the two effects of pair number `seed` are separated; one of them is hidden."""
     return _hidden(blind_set, seed, together=False)
 
 

@@ -31,7 +31,7 @@ STRIDE = 17
 
 @dataclass(frozen=True, repr=False)
 class PowerPoint(Part):
-    """What one diagnosis said of an effect of one size.
+    """The answer of one diagnosis on an effect of one size.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class PowerCurve(Plotted, Part):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> PowerCurve:
-        """Return what `to_dict` told, also after a way through JSON.
+        """Return the curve of a `to_dict`, also after JSON.
 
         Parameters
         ----------
@@ -83,7 +83,7 @@ class PowerCurve(Plotted, Part):
         Parameters
         ----------
         realistic : bool
-            Of the logs with coloured and wandering noise and a noisy reference, or of those with white noise.
+            Of the logs with coloured noise, bias random walks and a noisy reference, or of those with white noise.
         """
         chosen = [point for point in self.points if point.realistic is realistic]
         rows = []
@@ -158,7 +158,7 @@ def points_of(seed: int, realistic: bool, sizes: Sequence[float]) -> list[PowerP
     seed : int
         Of the log.
     realistic : bool
-        Whether the noise is coloured and wanders and the reference has noise.
+        Whether the noise is coloured, the biases walk and the reference has noise.
     sizes : sequence of float
         Root mean square of the effect over the white noise of its sensor.
     """

@@ -94,7 +94,7 @@ def side_by_side(
             done.append(work(*job))
             tell(len(done), len(jobs), "diagnosing blind logs")
         return done
-    # A fresh interpreter for each worker: the compiled core's threads do not survive a fork.
+    # A fresh interpreter for each worker: the compiled core's threads are lost in a fork.
     threads = max(1, (os.cpu_count() or 1) // workers)
     with ProcessPoolExecutor(workers, get_context("spawn"), _share_processors, (threads,)) as pool:
         for future in [pool.submit(work, *job) for job in jobs]:
@@ -104,5 +104,5 @@ def side_by_side(
 
 
 def _share_processors(threads: int) -> None:
-    """Let the compiled core of this worker use its share of the processors, unless the user says otherwise."""
+    """Let the compiled core of this worker use its share of the processors, unless the user sets another."""
     os.environ.setdefault("RAYON_NUM_THREADS", str(threads))

@@ -9,7 +9,7 @@ from typing import Literal
 from imufit.lab.simulate import Simulation
 
 Question = Literal["one", "nothing", "two", "outside", "confounded"]
-"""What is asked: one effect, none, two, one that no catalogue holds, or one that the log cannot tell from another."""
+"""The question: one effect, none, two, one outside the catalogue, or one that the log does not separate."""
 
 
 @dataclass(frozen=True)
@@ -19,13 +19,13 @@ class Puzzle:
     Attributes
     ----------
     question : str
-        What is asked of the answer.
+        The question.
     kind : str
         What makes this log differ from others of its set: the effect, the pair, the kind of noise.
     simulation : Simulation
         The log, and what was done to it.
     rivals : tuple of str
-        Effects that really cannot be told from the hidden one in this log.
+        Effects that this log does not separate from the hidden one.
     model : tuple of str
         Effects that are known to be there: the ladder starts from them.
     twin : Simulation or None

@@ -52,13 +52,13 @@ SETS: Mapping[str, BlindSet] = {
         "one hidden effect, 0.1 of the noise", partial(one, sizes=SMALL), 60, {"named": 0.95, "wrong": 0.01}
     ),
     "one-realistic": BlindSet(
-        "one, coloured and wandering noise, noisy reference",
+        "one, coloured noise, bias random walks, noisy reference",
         partial(one, sizes=LARGE, realistic=True),
         100,
         {"named": 0.95, "wrong": 0.01},
     ),
     "small-realistic": BlindSet(
-        "small, coloured and wandering noise, noisy reference",
+        "small, coloured noise, bias random walks, noisy reference",
         partial(one, sizes=SMALL, realistic=True),
         100,
         {"named": 0.80, "wrong": 0.01},
@@ -67,9 +67,9 @@ SETS: Mapping[str, BlindSet] = {
     "two": BlindSet("two hidden effects", two, 60, {"named": 0.97}),
     "outside": BlindSet("outside the catalogue", outside, 40, {"named": 0.97, "wrong": 0.03, "covariate": 0.90}),
     "confounded": BlindSet(
-        "pair that this log cannot tell apart", confounded, 40, {"named": 0.99, "single": 0.02, "needless": 0.25}
+        "pair that this log does not separate", confounded, 40, {"named": 0.99, "single": 0.02, "needless": 0.25}
     ),
-    "separated": BlindSet("the same pairs where they can be told apart", separated, 40, {"named": 0.97}),
+    "separated": BlindSet("the same pairs in a log that separates them", separated, 40, {"named": 0.97}),
     "columns": BlindSet("column among irrelevant ones", columns, 30, {"named": 0.99}),
 }
 """Every set by its name, in the order in which they are gone through."""

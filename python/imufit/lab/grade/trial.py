@@ -34,9 +34,9 @@ class Trial(Part):
     size : float
         Root mean square of the smallest injected effect over the white noise of its sensor; 0 with none.
     rivals : tuple of str
-        Effects that really cannot be told from it in this log.
+        Effects that this log does not separate from it.
     answer : Answer
-        What the ladder said.
+        The ladder's answer.
     marks : Marks
         What is right and wrong in that.
     ratio_start, ratio_end : float
@@ -72,7 +72,7 @@ class Trial(Part):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Trial:
-        """Return the trial that `to_dict` told, also after a way through JSON.
+        """Return the trial of a `to_dict`, also after JSON.
 
         Parameters
         ----------
@@ -156,7 +156,7 @@ def judged(puzzle: Puzzle, result: Ladder, blind_set: str = "", seed: int = 0) -
 
 
 def answer_of(result: Ladder) -> Answer:
-    """Return what the ladder said, without the figures."""
+    """Return the ladder's answer, without the figures."""
     first = result.first or result.diagnosis
     return Answer(
         verdict=first.verdict,
@@ -180,7 +180,7 @@ def true_ratio(puzzle: Puzzle, result: Ladder) -> float:
     Parameters
     ----------
     puzzle : Puzzle
-        Knows the noise.
+        Holds the noise.
     result : Ladder
         The ladder on its log.
     """

@@ -56,5 +56,5 @@ def _pair(setting: Setting, first: str, second: str, rng: np.random.Generator) -
     for name, other in ((first, second), (second, first)):
         for beside in ([], [other]):
             if min(separation.distances(name, pair[name], beside).values()) < TOLD:
-                raise ImpossibleError(f"{name} cannot be told from others beside {other}")
+                raise ImpossibleError(f"{name} is not separated from others beside {other}")
     return pair

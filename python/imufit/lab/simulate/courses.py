@@ -1,4 +1,4 @@
-"""Courses of temperature or of a column that are asked for, instead of those that chance gives.
+"""Courses of temperature or of a column that are requested, instead of those that chance gives.
 
 Each has `at(t)`, the quantity (n,) at times t (s); `simulate(..., courses={"temp": Line(20.0, 0.1)})`.
 """

@@ -1,4 +1,4 @@
-"""What an effect done physically consists of, and the ways in which most of them get into a sensor's readings."""
+"""The parts of a physically simulated effect, and the common paths into a sensor's readings."""
 
 from __future__ import annotations
 

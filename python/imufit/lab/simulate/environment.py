@@ -1,4 +1,4 @@
-"""What surrounds the sensor: gravity, magnetic field, temperature, supply and motor current, vibration."""
+"""The environment of the sensor: gravity, magnetic field, temperature, supply and motor current, vibration."""
 
 from __future__ import annotations
 

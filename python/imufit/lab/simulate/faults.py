@@ -1,6 +1,6 @@
-"""Faults of the data that are no effects: what is done to a finished simulated log.
+"""Faults of the data, which are not effects: what is done to a finished simulated log.
 
-An entry of `FAULTS` says what goes wrong and does it to a log as it would be recorded. Where and how much is drawn.
+An entry of `FAULTS` states what goes wrong and does it to a log as it would be recorded. Where and how much is drawn.
 """
 
 from __future__ import annotations

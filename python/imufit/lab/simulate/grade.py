@@ -45,7 +45,7 @@ class Grade:
 
     Attributes
     ----------
-    mark : "right"; "named among rivals" = one of several that the answer could not tell apart; "wrong" = something else
+    mark : "right"; "named among rivals" = one of several that the answer did not separate; "wrong" = something else
         was named; "missed" = nothing was named; "false alarm" = something was named beyond what there is.
     truth, answer : effects that there are, and that the answer names.
     parameters : one entry for each parameter of the true effects.

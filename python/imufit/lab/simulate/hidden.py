@@ -1,4 +1,4 @@
-"""A log with an effect that is not told: for blind trials of whatever is to find it."""
+"""A log with a hidden effect: for blind trials of whatever is to find it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from imufit.lab.simulate.study import Study
 from imufit.log.words import one_of
 
 COLUMNS = ("motor_current", "vbat")
-"""Covariates that every log with a hidden effect has, so that their presence tells nothing."""
+"""Covariates that every log with a hidden effect has, so that their presence is not informative."""
 
 LARGEST = 20.0
 """Nothing is hidden with a parameter more than this many times its typical size: the Earth does not turn that fast."""
@@ -28,7 +28,7 @@ NOTHING = 0.25
 
 _ANYWHERE = {
     "gyr.bias": "Constant at rest and in motion, which no other effect of the gyroscope is at changing attitude.",
-    "gyr.bias_temperature": "The temperature rises and falls several times, so it is no function of time or attitude.",
+    "gyr.bias_temperature": "The temperature rises and falls several times, so it does not follow time or attitude.",
     "acc.bias_temperature": "As for the gyroscope; the specific force does not follow the temperature.",
     "gyr.column:motor_current": "The current is switched independently of motion and temperature.",
     "acc.column:motor_current": "The current is switched independently of motion and temperature.",
@@ -42,7 +42,7 @@ _ALL_ATTITUDES = {
     "acc.scale": "Each axis sees gravity from -g to g; only a cubic comes near, and it bends.",
     "acc.misalignment": "Each axis is seen with gravity along the other two; gyroscope and magnetometer stay right.",
     "gyr.g_sensitivity": "Gravity takes all directions in the body, also at rest, where scale errors are silent.",
-    "mag.hard_iron": "The field takes all directions in the body, so an offset is no gain.",
+    "mag.hard_iron": "The field takes all directions in the body, so an offset is not a gain.",
     "mag.soft_iron": "The field takes all directions in the body; only an equal gain of all axes is the field's own.",
 }
 _ALL_RATES = {
@@ -64,7 +64,7 @@ OBSERVABLE: Mapping[str, Mapping[str, str]] = {
     # turned against the reference shows at rest in acc and mag alike.
     "poses": {**_ANYWHERE, **_ALL_ATTITUDES, **_ALL_RATES, "ref.alignment": _LIVELY["ref.alignment"]},
     # One axis: half of the gains are never excited, an offset in acc or mag is also a gain times what stays constant,
-    # a gyroscope's bias is also its sensitivity to a gravity that keeps much of its direction. What remains does not
+    # a gyroscope's bias is also its sensitivity to a gravity that keeps much of its direction. The remainder does not
     # depend on attitude, or follows the drive, or is seen by acc and mag alike.
     "tilt": {
         **{effect: reason for effect, reason in _ANYWHERE.items() if effect != "gyr.bias"},
@@ -133,7 +133,7 @@ def hidden(
                 named = label if isinstance(label, str) else ""
                 truth = replace(simulation.truth, label=named)
                 return replace(simulation, truth=truth), truth
-    raise ValueError(f"no effect of size {label} can be told from all others in this log: ask for a larger size")
+    raise ValueError(f"no effect of size {label} is separated from all others in this log: choose a larger size")
 
 
 def _with_columns(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Every effect, done physically: what it does to the setup of sensors, body, rig and reference.
 
-An entry of `INJECTIONS` says which parameters an effect has, how large they typically are, which sensors see it, and at
-which stage of the measurement it acts. A further effect is one more entry.
+An entry of `INJECTIONS` states which parameters an effect has, how large they typically are, which sensors see it, and
+at which stage of the measurement it acts. A further effect is one more entry.
 """
 
 from __future__ import annotations
@@ -240,7 +240,7 @@ def injection(effect: str) -> Injection:
     sensor = prefix.removesuffix(".column")
     if column and sensor in SENSORS and sensor != prefix:
         if (named := effect_of_column(sensor, column)) != effect:
-            raise ValueError(f"the effect of {column} on {sensor} has a name of its own: {named}")
+            raise ValueError(f"the effect of {column} on {sensor} has a separate name: {named}")
         typical = {"acc": 0.1, "gyr": 5e-3, "mag": 1.0}[sensor]
         apply = disturbance_of(sensor, lambda s, p: times(s.covariates[column], p))
         return Injection(effect, three(typical), (sensor,), "disturbance", apply, column=column)

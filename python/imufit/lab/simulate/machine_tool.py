@@ -1,4 +1,4 @@
-"""What a machine tool does with a sensor in the middle of its tilting table (paper B).
+"""Motion of a sensor in the middle of a machine tool's tilting table (paper B).
 
 The A axis turns the table about `rig_axis`. The machine reports the commanded angle; that its frame rocks when it is
 struck, it does not.

@@ -46,7 +46,7 @@ class SensorNoise:
         Parameters
         ----------
         density : float
-            One-sided noise density, unit of the sensor per sqrt(Hz), as data sheets tell it.
+            One-sided noise density, unit of the sensor per sqrt(Hz), as in data sheets.
         bandwidth : float
             Corner of the low-pass, Hz. White noise comes through as through pi/2 times that bandwidth.
         random_walk, resolution : float, optional
@@ -149,7 +149,7 @@ class Noise:
 
     @classmethod
     def realistic(cls) -> Noise:
-        """Return the defaults with colour, wandering bias, 16 bit steps, jitter, lost rows, a slow magnetometer."""
+        """Return the defaults with colour, bias random walk, 16 bit steps, jitter, lost rows, a slow magnetometer."""
         plain = cls()
         return cls(
             acc=replace(plain.acc, coloured=0.006, random_walk=2e-4, resolution=9.80665 / 8192),
@@ -188,7 +188,7 @@ class Noise:
 
         Densities are those of the data sheet (gyroscope 0.005 deg/s/sqrt(Hz); accelerometer 400 ug/sqrt(Hz), of which
         paper B's sensor has seven eighths), steps those of 16 bit over +-2 g and +-250 deg/s. The gyroscope's bias
-        wanders by 0.05 millidegrees per second in five minutes.
+        walks by 0.05 millidegrees per second in five minutes.
 
         Parameters
         ----------

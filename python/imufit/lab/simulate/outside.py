@@ -1,7 +1,7 @@
 """Effects that no catalogue holds, done physically: what is to be answered with "something, but nothing I know".
 
-Each adds an error to one sensor, is drawn with random parameters like an effect of `INJECTIONS`, and knows what causes
-it. Errors that would come with an offset are taken about their mean: the sensor was zeroed before.
+Each adds an error to one sensor, is drawn with random parameters like an effect of `INJECTIONS`, with its cause stated.
+Errors that would come with an offset are taken about their mean: the sensor was zeroed before.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What records the reference: it may be late, on a clock of its own, and smooth what it records.
+"""The recorder of the reference: it may be late, on a clock of its own, and smooth what it records.
 
 A smoothed reference is an average of poses over times before and after its own: as many attitudes and positions of the
 motion as the average needs, with the attitude nearest to all of them (the chordal mean of rotations), and positions

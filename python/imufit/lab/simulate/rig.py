@@ -1,4 +1,4 @@
-"""What a one-axis rig does to its commanded angle: backlash, flexure and periodic error of the drive.
+"""Errors of a one-axis rig against its commanded angle: backlash, flexure and periodic error of the drive.
 
 Each class is the angle (rad) that the axis really has, as a function of time with its derivatives.
 """

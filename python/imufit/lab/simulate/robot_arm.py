@@ -1,9 +1,9 @@
-"""What a robot arm does with a sensor at its end while it is swung back and forth (paper C).
+"""Motion of a sensor at the end of a robot arm that swings back and forth (paper C).
 
 Three hinges meet in one point that stands still: the base turns about the vertical, the shoulder lifts, the wrist
 rolls. So the sensor, `ARM` from that point, feels `omega x (omega x r) + domega/dt x r` besides gravity. One hinge
 after the other goes from end to end, as a drive does: quickly up to a constant rate, quickly to a stop, a short rest.
-The paper tells neither rates nor lengths; these are those of a small arm with hobby or stepper drives.
+The paper states neither rates nor lengths; these are those of a small arm with hobby or stepper drives.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a scenario is: a kind of motion, and what a log of it has."""
+"""Scenarios: a kind of motion, and what a log of it has."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from imufit.lab.simulate.truth import Trajectory
 
 @dataclass(frozen=True)
 class Plan:
-    """What a scenario is built from: random stream, duration (s), reference frame, rig axis (index)."""
+    """The parts of a scenario: random stream, duration (s), reference frame, rig axis (index)."""
 
     rng: np.random.Generator
     duration: float
@@ -33,8 +33,8 @@ class Scenario:
     position : whether the reference records a position (otherwise the body does not translate).
     poses : whether static poses are labelled in the log.
     rig : whether the motion is that of a one-axis rig with a commanded angle.
-    sensors : which of "acc", "gyr", "mag", "temp" the log has unless told otherwise.
-    noise : makes the random errors that the log has unless told otherwise.
+    sensors : which of "acc", "gyr", "mag", "temp" the log has by default.
+    noise : makes the random errors that the log has by default.
     field : horizontal (northward) and downward flux density, uT.
     """
 

@@ -1,4 +1,4 @@
-"""What was done to a simulated log, and how it is kept beside the log without being read by accident."""
+"""The truth of a simulated log, kept beside the log without being read by accident."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ HEADER = "imufit sealed truth, format 1: what was done to this log; `imufit reve
 
 @dataclass(frozen=True)
 class Truth:
-    """What a simulated log holds.
+    """The content of a simulated log.
 
     Attributes
     ----------
     scenario, seed : the motion and its random seed.
     effects : each injected effect with its parameters, SI units; empty = the sensors are perfect but for noise.
     sizes : for each effect, its root mean square over the white noise of the sensor that it affects most.
-    label : the name of the size that was asked for, such as "large"; empty where the parameters were given.
+    label : the name of the size that was requested, such as "large"; empty where the parameters were given.
     faults : faults of the data that were put in.
     """
 
@@ -105,7 +105,7 @@ def unseal(log_path: str | Path) -> Truth:
     """
     path = sealed_path(log_path)
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: there is no sealed truth beside this log")
+        raise FileNotFoundError(f"{path}: the sealed truth beside this log is missing")
     try:
         header, *lines = path.read_text(encoding="utf-8").splitlines() or [""]
         if not header.startswith("imufit sealed truth, format 1"):

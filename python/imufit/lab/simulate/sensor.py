@@ -33,7 +33,7 @@ KEPT = 6
 
 @dataclass(frozen=True)
 class Situation:
-    """What acts on one sensor at the n rows of a log.
+    """Quantities that act on one sensor at the n rows of a log.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Situation:
     since : (n,), time since the start of the log, s.
     warmth : (n,), temperature less its mean over the log, K.
     covariates : (n,) each, less their means over the log.
-    current : (n,), motor current, A; NaN where there is no motor.
+    current : (n,), motor current, A; NaN without a motor.
     vibration_power : (n,), local mean square of the vibration, (m/s^2)^2.
     """
 

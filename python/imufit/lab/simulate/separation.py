@@ -1,7 +1,7 @@
-"""Whether an effect, as drawn, can be told from the other effects in a log.
+"""Separation of a drawn effect from the other effects in a log.
 
 Each rival gets its best chance: the least squares fit of its parameters to what the drawn effect does to all sensors,
-each whitened by its true noise. What is left of the sum of squares is the squared distance, in standard errors, at
+each whitened by its true noise. The rest of the sum of squares is the squared distance, in standard errors, at
 which the data put the rival.
 """
 
@@ -34,7 +34,7 @@ def whitening(
     Parameters
     ----------
     noise : SensorNoise
-        White, coloured and wandering noise; the filter is the steady Kalman filter's, from reading to innovation.
+        White and coloured noise and random walk; the filter is the steady Kalman filter's, from reading to innovation.
     step : float
         Time between two samples, s.
     share : float
@@ -150,7 +150,7 @@ class Separation:
         Parameters
         ----------
         effect, parameters :
-            What is drawn.
+            The drawn effect.
         beside : sequence of str
             Effects that are fitted along with every rival.
         least : float
@@ -201,7 +201,7 @@ class Separation:
 def _is_rival(entry: Injection) -> bool:
     """Return whether an effect is held against all others.
 
-    What acts on single samples is never like an effect that acts all the time. A lag is to first order the delay of the
+    An effect on single samples is never like an effect that acts all the time. A lag is to first order the delay of the
     same sensor, and is held against delays only.
     """
     return entry.stage != "range" and entry.late != "lag"

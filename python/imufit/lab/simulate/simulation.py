@@ -113,7 +113,7 @@ def simulate(
     noise : random errors; default those of the scenario: white noise, on a machine tool an MPU6050's.
     realistic : whether the default is `Noise.realistic()` instead.
     rig_axis : axis of a one-axis rig: "x", "y" or "z".
-    noise_in_metadata : whether the metadata tells the white noise.
+    noise_in_metadata : whether the metadata states the white noise.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a person does with a sensor in a box who calibrates it on a level table (paper A)."""
+"""Motion of a sensor in a box during a calibration on a level table (paper A)."""
 
 from __future__ import annotations
 

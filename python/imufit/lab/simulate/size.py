@@ -1,9 +1,9 @@
 """How strong an effect is in a log, and parameters for a wanted strength.
 
 The size of an effect is the root mean square of (reading with it - reading without it), over the rows and channels of
-the sensor that it affects most, divided by that sensor's noise: its white noise and the shaking that no reference tells
-of. Effects of the reference leave the readings as they are and change what the reference predicts; for these it is the
-change of (reading - prediction).
+the sensor that it affects most, divided by that sensor's noise: its white noise and the shaking that no reference
+shows. Effects of the reference leave the readings as they are and change what the reference predicts; for these it is
+the change of (reading - prediction).
 """
 
 from __future__ import annotations

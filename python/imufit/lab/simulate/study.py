@@ -30,7 +30,7 @@ COARSE_LAG_STEP = 4e-3
 
 
 class Study:
-    """What effects are tried out on, or injected into; arguments as in `simulate`, effects by name.
+    """The data that effects are tried out on, or injected into; arguments as in `simulate`, effects by name.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Study:
         sampled = {name: rows for name, rows in sampled.items() if name in self.names}
         white = self.noise.white()
         if self.environment.vibration is not None:
-            # No reference tells of shaking: it is noise to whoever looks at the log.
+            # A reference does not show shaking: it is noise to any reader that looks at the log.
             white["acc"] = float(np.hypot(white["acc"], self.environment.vibration.rms(t)))
         self.scale = Scale(self.trajectory, self.environment, self.run, self.rows, sampled=sampled, white=white)
 

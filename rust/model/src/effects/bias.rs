@@ -18,10 +18,10 @@ pub fn bias(sensor: Sensor) -> Linear {
         Sensor::Acc => (
             Words {
                 name: "accelerometer bias",
-                physics: "the resting position of the proof mass is off: package stress, soldering and mounting shift the zero of each axis",
+                physics: "package stress, soldering and mounting shift the resting position of the proof mass, and with it the zero of each axis",
                 formula: "b",
-                signature: "a constant residual that is the same in every attitude and at every temperature",
-                mistaken_for: "a tilted levelling table or a mount misalignment (one attitude cannot tell them apart), acc.scale when one attitude dominates",
+                signature: "a constant residual, the same in every attitude and at every temperature",
+                mistaken_for: "a tilted levelling table or a mount misalignment (one attitude does not separate them), acc.scale if one attitude dominates",
                 confirm: "lay the sensor on opposite faces: a bias keeps its sign, gravity changes it",
             },
             0.5,
@@ -33,7 +33,7 @@ pub fn bias(sensor: Sensor) -> Linear {
                 physics: "quadrature and offset of the vibrating structure and its amplifier leave a rate at standstill",
                 formula: "b",
                 signature: "a constant residual, the same at rest and in motion",
-                mistaken_for: "gyr.bias_temperature over a short log, gyr.g_sensitivity when the attitude never changes, the earth's rotation",
+                mistaken_for: "gyr.bias_temperature over a short log, gyr.g_sensitivity if the attitude never changes, the earth's rotation",
                 confirm: "let the sensor lie still for a minute and average: the mean is the bias",
             },
             0.05,

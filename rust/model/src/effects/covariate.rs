@@ -21,12 +21,12 @@ pub fn column(sensor: Sensor, name: &str) -> Covariate {
     let words = Words {
         name: &format!("influence of {name} on the {}", sensor.name()),
         physics: &format!(
-            "something that {name} measures (a supply, a current, a load) shifts the reading of the {}",
+            "the cause that {name} measures (a supply, a current, a load) shifts the reading of the {}",
             sensor.name()
         ),
         formula: &format!("c ({name} - mean of {name})"),
         signature: &format!("the residual follows {name}"),
-        mistaken_for: "whatever else changed together with that column",
+        mistaken_for: "any other quantity that changes together with that column",
         confirm: &format!("change {name} on purpose while the sensor lies still"),
     };
     let parameters = VECTOR

@@ -20,9 +20,9 @@ fn fill(rows: &Rows, out: &mut Columns) {
 pub fn current() -> Linear {
     let words = Words {
         name: "field of a current",
-        physics: "the wires of motor or battery run past the magnetometer: their current makes a field in proportion, fixed in the body",
+        physics: "the wires of motor or battery run past the magnetometer: their current adds a proportional field, fixed in the body",
         formula: "c motor_current",
-        signature: "the field residual follows the current, whatever the attitude",
+        signature: "the field residual follows the current, at any attitude",
         mistaken_for: "mag.hard_iron while the current hardly changes, mag.bias_temperature if the current warms the board",
         confirm: "let the sensor lie still and switch the motor on and off: the field must jump with the current",
     };

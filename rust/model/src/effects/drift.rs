@@ -21,11 +21,11 @@ pub fn bias_drift(sensor: Sensor) -> Linear {
         Sensor::Acc => (
             Words {
                 name: "drift of the accelerometer bias in time",
-                physics: "stress in package and solder relaxes, and whatever no thermometer sees warms up: the zero of each axis moves steadily",
+                physics: "stress in package and solder relaxes, and parts away from the thermometer warm up: the bias of each axis changes steadily",
                 formula: "c (t - start of the log)",
                 signature: "a residual that grows in proportion to time, in every attitude and at every temperature",
-                mistaken_for: "acc.bias_temperature while the temperature only rises, acc.bias over a short log, a zero that wanders at random",
-                confirm: "go on recording for twice as long with the temperature going up and down: the residual must keep its slope in time",
+                mistaken_for: "acc.bias_temperature while the temperature only rises, acc.bias over a short log, a bias random walk",
+                confirm: "record for twice as long while the temperature rises and falls: the residual must keep its slope in time",
             },
             1e-4,
         ),
@@ -33,11 +33,11 @@ pub fn bias_drift(sensor: Sensor) -> Linear {
         _ => (
             Words {
                 name: "drift of the gyroscope bias in time",
-                physics: "quadrature and stress of the vibrating structure change slowly after switching on, and the rate read at standstill moves steadily",
+                physics: "quadrature and stress of the vibrating structure change slowly after power-on, and with them the rate read at standstill",
                 formula: "c (t - start of the log)",
                 signature: "a rate residual that grows in proportion to time, at rest as in motion",
-                mistaken_for: "gyr.bias_temperature while the temperature only rises, gyr.warmup over a short log, a zero that wanders at random",
-                confirm: "let the sensor lie still for twice as long with the temperature going up and down: the mean rate must keep its slope in time",
+                mistaken_for: "gyr.bias_temperature while the temperature only rises, gyr.warmup over a short log, a bias random walk",
+                confirm: "let the sensor lie still for twice as long while the temperature rises and falls: the mean rate must keep its slope in time",
             },
             5e-5,
         ),

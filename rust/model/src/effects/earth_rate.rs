@@ -24,10 +24,10 @@ fn fill(rows: &Rows, out: &mut Columns) {
 pub fn earth_rate() -> Linear {
     let words = Words {
         name: "rotation of the Earth",
-        physics: "the gyroscope turns with the Earth, which a reference fixed to the ground does not show",
+        physics: "the gyroscope rotates with the Earth, which a reference fixed to the ground does not show",
         formula: "R^T omega_earth, omega_earth = (north, vertical) with up positive",
-        signature: "a rate residual of 15 deg/h that is constant in the reference frame: it turns over with the sensor",
-        mistaken_for: "gyr.bias when the attitude never changes, gyr.g_sensitivity (which follows the vertical part), a reference whose heading drifts",
+        signature: "a rate residual of 15 deg/h that is constant in the reference frame and rotates with the attitude in the body frame",
+        mistaken_for: "gyr.bias if the attitude never changes, gyr.g_sensitivity (which follows the vertical part), a reference whose heading drifts",
         confirm: "let the sensor lie still, then turn it by 180 deg about the vertical: the north part changes its sign in the body; north over vertical must be 1 / tan(latitude)",
     };
     Linear {

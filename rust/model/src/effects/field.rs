@@ -27,10 +27,10 @@ fn fill(rows: &Rows, out: &mut Columns) {
 pub fn field_reference() -> Linear {
     let words = Words {
         name: "wrong reference field",
-        physics: "the field at the place of the recording differs from the one assumed: buildings, another location, an old field model",
+        physics: "the field at the place of the recording differs from the assumed field: buildings, another location, an old field model",
         formula: "R^T dm",
-        signature: "a field residual that is constant in the reference frame and turns with the attitude in the body frame",
-        mistaken_for: "mag.hard_iron when the attitude hardly changes, ref.alignment about the vertical",
+        signature: "a field residual that is constant in the reference frame and rotates with the attitude in the body frame",
+        mistaken_for: "mag.hard_iron if the attitude hardly changes, ref.alignment about the vertical",
         confirm: "measure the field with a second magnetometer at the same place",
     };
     Linear {

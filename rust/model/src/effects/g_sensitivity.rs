@@ -16,8 +16,8 @@ pub fn g_sensitivity() -> Linear {
         physics: "acceleration bends the vibrating structure of the gyroscope, which reads it as rotation",
         formula: "G f, full 3x3",
         signature: "at rest the rate residual changes with the attitude; in motion it follows the specific force",
-        mistaken_for: "gyr.bias when the attitude never changes, gyr.bias_temperature when attitude and temperature change together",
-        confirm: "let the sensor lie still on each of its six faces: the mean rate must not depend on the face",
+        mistaken_for: "gyr.bias if the attitude never changes, gyr.bias_temperature if attitude and temperature change together",
+        confirm: "let the sensor lie still on each of its six faces: without g-sensitivity the mean rate is the same on all",
     };
     Linear {
         card: words

@@ -19,10 +19,10 @@ fn fill_soft(rows: &Rows, out: &mut Columns) {
 pub fn hard_iron() -> Linear {
     let words = Words {
         name: "hard iron",
-        physics: "magnetised parts that turn with the sensor (screws, batteries, speakers) add a constant field, on top of the sensor's own offset",
+        physics: "magnetised parts fixed to the sensor (screws, batteries, speakers) add a constant field to the sensor's own offset",
         formula: "b",
-        signature: "a constant field residual in the body frame, whatever the attitude",
-        mistaken_for: "mag.field_reference when the attitude hardly changes, a magnet in the room (that one changes with the place)",
+        signature: "a constant field residual in the body frame, at any attitude",
+        mistaken_for: "mag.field_reference if the attitude hardly changes, a magnet in the room (whose field changes with the place)",
         confirm: "turn the sensor through all attitudes far from iron: the readings lie on a sphere whose centre is b",
     };
     Linear {
@@ -43,10 +43,10 @@ pub fn hard_iron() -> Linear {
 pub fn soft_iron() -> Linear {
     let words = Words {
         name: "soft iron",
-        physics: "unmagnetised iron that turns with the sensor bends the field lines, and the three sensing bridges differ in gain and direction",
+        physics: "unmagnetised iron fixed to the sensor bends the field lines, and the three sensing bridges differ in gain and direction",
         formula: "S m, full 3x3",
-        signature: "the residual is proportional to the field in body axes: it turns over with the sensor",
-        mistaken_for: "ref.alignment (its part of S is antisymmetric and shows in the other sensors too), mag.hard_iron when few attitudes are visited",
+        signature: "the residual is proportional to the field in body axes and changes sign with it",
+        mistaken_for: "ref.alignment (its part of S is antisymmetric and shows in the other sensors too), mag.hard_iron if few attitudes are visited",
         confirm: "turn the sensor through all attitudes far from iron: the readings lie on an ellipsoid instead of a sphere",
     };
     Linear {

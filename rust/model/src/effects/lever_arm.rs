@@ -34,10 +34,10 @@ fn fill(rows: &Rows, out: &mut Columns) {
 pub fn lever_arm() -> Linear {
     let words = Words {
         name: "lever arm",
-        physics: "the accelerometer sits away from the point whose position the reference gives, so rotation accelerates it",
+        physics: "the accelerometer sits away from the point whose position the reference measures, so rotation accelerates it",
         formula: "omega x (omega x r) + domega/dt x r",
-        signature: "nothing at rest; the residual grows with the square of the rate and with the angular acceleration",
-        mistaken_for: "vibration rectification, ref.delay of the position, a gyroscope scale error seen through a filter",
+        signature: "zero at rest; the residual grows with the square of the rate and with the angular acceleration",
+        mistaken_for: "vibration rectification, ref.delay of the position, a gyroscope scale error behind a filter",
         confirm: "spin at a constant rate about each axis: the reading away from the axis is r omega^2",
     };
     Linear {

@@ -19,19 +19,19 @@ pub fn misalignment(sensor: Sensor) -> Linear {
     let words = match sensor {
         Sensor::Acc => Words {
             name: "accelerometer axis misalignment",
-            physics: "the sensing axes are not at right angles or not parallel to the package: each axis feels a part of the others",
+            physics: "the sensing axes are not at right angles or not parallel to the package: each axis measures a part of the others",
             formula: "M f, zero diagonal",
             signature: "the residual of an axis grows in proportion to the specific force on another axis",
-            mistaken_for: "ref.alignment (a turned mount shows in every sensor, and antisymmetrically), ref.tilt",
-            confirm: "stand the sensor on each of its six faces on a level table: the two axes that should read zero show M g",
+            mistaken_for: "ref.alignment (a rotated mount shows in every sensor, and antisymmetrically), ref.tilt",
+            confirm: "lay the sensor on each of its six faces on a level table: the two axes that should read zero show M g",
         },
         _ => Words {
             name: "gyroscope axis misalignment",
-            physics: "the sensing axes are not at right angles or not parallel to the package: each axis feels a part of the rotation about the others",
+            physics: "the sensing axes are not at right angles or not parallel to the package: each axis measures a part of the rotation about the others",
             formula: "M omega, zero diagonal",
             signature: "the residual of an axis grows in proportion to the rate about another axis",
-            mistaken_for: "ref.alignment (a turned mount shows in every sensor, and antisymmetrically)",
-            confirm: "turn about one package axis at a time: the other two axes must stay at zero",
+            mistaken_for: "ref.alignment (a rotated mount shows in every sensor, and antisymmetrically)",
+            confirm: "turn about one package axis at a time: without misalignment the other two axes read zero",
         },
     };
     Linear {

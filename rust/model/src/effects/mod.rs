@@ -82,10 +82,10 @@ impl Effect for Linear {
             return Some(format!("the log has no {}", self.sensor[0].name()));
         }
         if self.needs == Needs::Shaking && !facts.sensors[Sensor::Acc.index()] {
-            return Some("the log has no accelerometer, which would show how the sensor is shaken".to_string());
+            return Some("the log has no accelerometer, which would show the vibration".to_string());
         }
         if self.needs == Needs::Shaking && !facts.shaking_varies {
-            return Some("the sensor is shaken alike all the time, or not at all".to_string());
+            return Some("the vibration is constant or absent".to_string());
         }
         let lacking = match self.needs {
             Needs::Sensor | Needs::Levels(_) | Needs::Shaking => None,

@@ -69,21 +69,21 @@ pub fn quadratic(sensor: Sensor) -> Linear {
         Sensor::Acc => (
             Words {
                 name: "quadratic nonlinearity of the accelerometer",
-                physics: "the capacitor gaps on either side of the proof mass are not alike, so that a push reads more than a pull of the same size",
+                physics: "the capacitor gaps on the two sides of the proof mass differ, so that a push reads more than a pull of the same size",
                 formula: "diag(k) f^2",
                 signature: "the residual of an axis follows the square of the specific force on it: the same with gravity along and against the axis, none across",
-                mistaken_for: "acc.bias when an axis only sees plus and minus g, acc.vibration_rectification under vibration",
-                confirm: "stand each axis up, down and across: the mean of up and down differs from the reading across by k g^2",
+                mistaken_for: "acc.bias if an axis only measures plus and minus g, acc.vibration_rectification under vibration",
+                confirm: "point each axis up, down and across: the mean of up and down differs from the reading across by k g^2",
             },
             "1/(m/s^2)",
         ),
         _ => (
             Words {
                 name: "quadratic nonlinearity of the gyroscope",
-                physics: "drive and sense motion couple differently for the two directions, which adds a part with the square of the rate",
+                physics: "drive and sense motion couple differently in the two directions, which adds a part with the square of the rate",
                 formula: "diag(k) omega^2",
-                signature: "the residual of an axis has one sign for turns both ways and grows with the square of the rate",
-                mistaken_for: "gyr.scale_asymmetry (|omega| instead of its square), gyr.scale when the sensor always turns the same way, gyr.g_sensitivity to the centripetal force",
+                signature: "the residual of an axis has one sign for both directions of rotation and grows with the square of the rate",
+                mistaken_for: "gyr.scale_asymmetry (|omega| instead of its square), gyr.scale if the sensor always turns the same way, gyr.g_sensitivity to the centripetal force",
                 confirm: "turn both ways at two rates, one twice the other: the mean of both ways must grow fourfold",
             },
             "s/rad",
@@ -99,21 +99,21 @@ pub fn cubic(sensor: Sensor) -> Linear {
         Sensor::Acc => (
             Words {
                 name: "cubic nonlinearity of the accelerometer",
-                physics: "the springs stiffen and the electric force grows as the proof mass leaves its middle, for both directions alike",
+                physics: "the springs stiffen and the electric force grows with the displacement of the proof mass, alike in both directions",
                 formula: "diag(k) f^3",
                 signature: "a scale error that grows with the square of the specific force, the same for both signs",
-                mistaken_for: "acc.scale when only gravity acts, readings that are cut off at the end of the range",
-                confirm: "tilt each axis in steps from up to down: what a straight line leaves is S-shaped",
+                mistaken_for: "acc.scale if only gravity acts, readings that are cut off at the end of the range",
+                confirm: "tilt each axis in steps from up to down: the residual of a straight line is S-shaped",
             },
             "1/(m/s^2)^2",
         ),
         _ => (
             Words {
                 name: "cubic nonlinearity of the gyroscope",
-                physics: "the springs of the sense mass stiffen with its swing, for both directions alike",
+                physics: "the springs of the sense mass stiffen with its displacement, alike in both directions",
                 formula: "diag(k) omega^3",
-                signature: "a scale error that grows with the square of the rate, the same for turns both ways",
-                mistaken_for: "gyr.scale when the sensor always turns at one speed, readings that are cut off at the end of the range",
+                signature: "a scale error that grows with the square of the rate, the same in both directions of rotation",
+                mistaken_for: "gyr.scale if the sensor always turns at one speed, readings that are cut off at the end of the range",
                 confirm: "turn by exactly 360 degrees slowly and fast: the excess over 360 degrees must grow with the square of the rate",
             },
             "(s/rad)^2",
@@ -132,11 +132,11 @@ pub fn cubic(sensor: Sensor) -> Linear {
 /// `gyr.scale_asymmetry`.
 pub fn scale_asymmetry() -> Linear {
     let words = Words {
-        name: "different gyroscope scale for turns both ways",
-        physics: "the electronics amplify positive and negative rates differently, or the zero of an analogue gyroscope is not that of its converter",
+        name: "gyroscope scale asymmetry",
+        physics: "the electronics amplify positive and negative rates differently, or the zero of an analogue gyroscope differs from its converter's",
         formula: "diag(k) |omega|",
-        signature: "the residual of an axis has one sign for turns both ways and grows in proportion to the rate: V-shaped over it",
-        mistaken_for: "gyr.quadratic (a square instead of a V), gyr.scale when the sensor always turns the same way",
+        signature: "the residual of an axis has one sign for both directions of rotation and is V-shaped over the rate",
+        mistaken_for: "gyr.quadratic (a square instead of a V), gyr.scale if the sensor always turns the same way",
         confirm: "turn by exactly 360 degrees one way and back: the two angles differ by 2 k of the turn, at any speed",
     };
     // Half of the IDG-300 data sheet's nonlinearity of 1 %, on either side of a straight line.

@@ -40,11 +40,11 @@ pub(super) const fn wrong(part: ReferencePart, reach: Reach) -> Traits {
 pub fn alignment() -> Reference {
     let words = Words {
         name: "mount misalignment",
-        physics: "the sensor is mounted slightly turned against the body whose attitude the reference gives",
+        physics: "the sensor is mounted at a small rotation against the body whose attitude the reference measures",
         formula: "exp(-[phi]) x - x, about x cross phi, on every sensor",
         signature: "every sensor shows the same small rotation between predicted and measured vectors",
-        mistaken_for: "acc.misalignment, gyr.misalignment or mag.soft_iron, if only one sensor is looked at",
-        confirm: "compare the rotation found from gravity with the one found from turning: a mount gives the same for both",
+        mistaken_for: "acc.misalignment, gyr.misalignment or mag.soft_iron, if only one sensor is used",
+        confirm: "compare the rotation from gravity with the rotation from the rates: a mount gives the same for both",
     };
     Reference {
         card: words
@@ -64,12 +64,12 @@ pub fn alignment() -> Reference {
 /// `ref.tilt`: rotation vector (x, y, 0) in the reference frame with R = exp([tau]) R_reference.
 pub fn tilt() -> Reference {
     let words = Words {
-        name: "table that is not level",
-        physics: "the reference frame is not level: the table, the rig's base or the camera's axes lean against the vertical",
+        name: "table out of level",
+        physics: "the reference frame is not level: the table, the rig's base or the camera's axes are tilted against the vertical",
         formula: "R^T exp(-[tau]) (-g) + R^T g on acc, the same for the field on mag, tau horizontal",
-        signature: "a residual that is constant in the reference frame and turns with the attitude in the body frame, in acc and mag alike",
-        mistaken_for: "acc.bias when the attitude hardly changes, mag.field_reference if only the magnetometer is looked at, ref.alignment on a rig with one axis",
-        confirm: "turn the sensor by 180 deg about the vertical on the same table: a leaning table changes the sign in the body, a bias does not",
+        signature: "a residual that is constant in the reference frame and rotates with the attitude in the body frame, in acc and mag alike",
+        mistaken_for: "acc.bias if the attitude hardly changes, mag.field_reference if only the magnetometer is used, ref.alignment on a rig with one axis",
+        confirm: "turn the sensor by 180 deg about the vertical on the same table: a tilted table changes the sign in the body, a bias does not",
     };
     Reference {
         card: words
@@ -93,7 +93,7 @@ pub fn delay() -> Reference {
         physics: "the reference reaches the log later than the sensors: transport, filtering or another clock",
         formula: "x(t + tau) - x(t) on every sensor, with x the ideal reading as recorded",
         signature: "the residual of every sensor is proportional to the time derivative of its reading",
-        mistaken_for: "a delay or a lag of one sensor, if only that one moves; acc.lever_arm when rotations are harmonic",
+        mistaken_for: "a delay or a lag of one sensor, if only that sensor sees motion; acc.lever_arm if rotations are harmonic",
         confirm: "knock the body: the step in the sensor and in the reference must come at the same time",
     };
     Reference {
@@ -112,10 +112,10 @@ pub fn delay() -> Reference {
 pub fn skew() -> Reference {
     let words = Words {
         name: "reference on another clock",
-        physics: "reference and sensors are stamped by two clocks that run at different rates, so that the reference falls behind or gains",
+        physics: "two clocks of different rates stamp reference and sensors, so that the reference falls behind or gains",
         formula: "x(t + k (t - t0)) - x(t) on every sensor, with x the ideal reading as recorded",
         signature: "the residual of every sensor is proportional to the time derivative of its reading and to the time since the log began",
-        mistaken_for: "ref.delay in a short log or where only one part of it moves, drifting biases, a delay that warms up",
+        mistaken_for: "ref.delay in a short log or if only one part of it moves, drifting biases, a delay that changes during warm-up",
         confirm: "knock the body at the beginning and at the end: the time from knock to knock must differ between sensors and reference",
     };
     Reference {

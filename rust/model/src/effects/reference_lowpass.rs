@@ -20,11 +20,11 @@ const LEAST_DEGREE: usize = 4;
 pub fn lowpass() -> Lowpass {
     let words = Words {
         name: "smoothed reference",
-        physics: "the reference was low-passed, averaged over an exposure or drawn straight between sparse poses: it has lost fast motion, and is not late",
+        physics: "the reference was low-passed, averaged over an exposure or interpolated between sparse poses: fast motion is lost, without a delay",
         formula: "-c d2x/dt2 to first order, one c for all: on gyr -c (dalpha/dt + omega x alpha), on mag c alpha x m, on acc c alpha x f - c R^T d4p/dt4",
-        signature: "the residual of every sensor is opposite to the second derivative of its reading: the sensor sees more of what is fast than the reference",
-        mistaken_for: "gyr.scale and acc.scale when all motion has one frequency, gyr.cubic when only fast turns are large, acc.lever_arm",
-        confirm: "do the same motion at half the speed: what is missing of the rates must fall to a quarter, which a scale does not",
+        signature: "the residual of every sensor is opposite to the second derivative of its reading: the sensor shows more fast motion than the reference",
+        mistaken_for: "gyr.scale and acc.scale if all motion has one frequency, gyr.cubic if only fast turns are large, acc.lever_arm",
+        confirm: "repeat the motion at half the speed: the lost part of the rates must fall to a quarter, which a scale error does not",
     };
     Lowpass {
         card: words
@@ -53,7 +53,7 @@ impl Effect for Lowpass {
             .iter()
             .flatten()
             .any(|width| width.degree < LEAST_DEGREE);
-        coarse.then(|| "the reference is too coarse to tell how its accelerations change".to_string())
+        coarse.then(|| "the reference is too coarse to show changes of its accelerations".to_string())
     }
 
     fn columns(&self, rows: &Rows, sensor: Sensor, _: &[f64], out: &mut Columns) -> Result<(), EffectError> {

@@ -30,9 +30,9 @@ pub struct RigEffect {
 pub fn backlash() -> RigEffect {
     let words = Words {
         name: "backlash of the drive",
-        physics: "the drive has play: after a reversal the axis stands still until the drive has crossed it",
+        physics: "the drive has backlash: after a reversal the axis stands still until the drive has crossed the gap",
         formula: "angle error -(w/2) sign(direction of travel) about rig_axis, with memory",
-        signature: "at the same commanded angle the residual has one sign on the way up and the other on the way down, and keeps it at rest",
+        signature: "at the same commanded angle the residual has opposite signs on the way up and on the way down, and keeps its sign at rest",
         mistaken_for: "ref.delay, which vanishes at rest; a bias, if every position is approached from the same side",
         confirm: "approach the same angle from below and from above and rest there: the readings differ by the width",
     };
@@ -52,10 +52,10 @@ pub fn backlash() -> RigEffect {
 pub fn flexure() -> RigEffect {
     let words = Words {
         name: "flexure of the axis",
-        physics: "the axis or its table bends under its own weight, most where the load stands out sideways",
+        physics: "the axis or its table bends under its own weight, most at angles with a horizontal lever arm of the load",
         formula: "angle error k sin(angle) about rig_axis",
-        signature: "a residual that grows with the sine of the commanded angle, seen as a rotation by every sensor",
-        mistaken_for: "rig.periodic with a long period, acc.scale or acc.misalignment if only the accelerometer is looked at",
+        signature: "a residual that grows with the sine of the commanded angle, as a rotation common to all sensors",
+        mistaken_for: "rig.periodic with a long period, acc.scale or acc.misalignment if only the accelerometer is used",
         confirm: "repeat with the table unloaded, or with a counterweight: flexure follows the load",
     };
     RigEffect {
@@ -74,11 +74,11 @@ pub fn flexure() -> RigEffect {
 pub fn periodic() -> RigEffect {
     let words = Words {
         name: "periodic error of the drive",
-        physics: "an eccentric gear or a worm with pitch error repeats with every turn of the wheel, N times in a turn of the axis",
+        physics: "the error of an eccentric gear or of a worm's pitch repeats with every turn of the wheel, N times in a turn of the axis",
         formula: "angle error a cos(N angle) + b sin(N angle) about rig_axis",
-        signature: "a residual that is a wave of the commanded angle, the same at every speed and on the way up and down",
+        signature: "a residual that is periodic in the commanded angle, the same at every speed and in both directions",
         mistaken_for: "a vibration, if the axis always moves at the same speed",
-        confirm: "move at two speeds: the wave keeps its period in angle, a vibration keeps its period in time",
+        confirm: "move at two speeds: the error keeps its period in angle, a vibration keeps its period in time",
     };
     let mut list = parameters(&["a", "b"], "rad", 2e-3);
     list.push(Parameter {

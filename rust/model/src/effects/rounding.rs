@@ -27,9 +27,9 @@ pub struct Rounding {
 pub fn rounding(sensor: Sensor) -> Rounding {
     let words = Words {
         name: "coarse steps",
-        physics: "the converter tells only steps that are larger than the noise, which then does not average them out",
+        physics: "the steps of the converter are larger than the noise, which then does not average them out",
         formula: "harmonics of a sawtooth over x with the step as its period",
-        signature: "a residual that goes up and down with the reading itself, once a step",
+        signature: "a residual that is periodic in the reading, with the step as its period",
         mistaken_for: "a bias or a scale that is smaller than a step, in a sensor that hardly moves",
         confirm: "let the sensor lie still: the readings stand on one or two values",
     };

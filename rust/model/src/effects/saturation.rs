@@ -19,10 +19,10 @@ pub fn saturation(sensor: Sensor) -> Saturation {
         Sensor::Acc => (
             Words {
                 name: "end of the accelerometer's range",
-                physics: "the converter cannot tell more than its range: stronger forces read as its end",
+                physics: "the converter's range is limited: a stronger force reads as the end of the range",
                 formula: "f held within +-range, less f",
-                signature: "readings that stand at the same largest value while the force goes on; nothing below it",
-                mistaken_for: "acc.cubic, which bends smaller readings too; acc.scale, if the end is often reached",
+                signature: "readings stay at one largest value while the force grows; smaller readings are correct",
+                mistaken_for: "acc.cubic, which changes smaller readings too; acc.scale, if the end is often reached",
                 confirm: "repeat with a larger range: the readings must go beyond the old end",
             },
             "m/s^2",
@@ -30,10 +30,10 @@ pub fn saturation(sensor: Sensor) -> Saturation {
         _ => (
             Words {
                 name: "end of the gyroscope's range",
-                physics: "the converter cannot tell more than its range: faster turns read as its end",
+                physics: "the converter's range is limited: a faster rotation reads as the end of the range",
                 formula: "omega held within +-range, less omega",
-                signature: "readings that stand at the same largest value while the turn goes on; nothing below it",
-                mistaken_for: "gyr.cubic, which bends smaller readings too; gyr.scale, if the end is often reached",
+                signature: "readings stay at one largest value while the rate grows; smaller readings are correct",
+                mistaken_for: "gyr.cubic, which changes smaller readings too; gyr.scale, if the end is often reached",
                 confirm: "repeat with a larger range: the readings must go beyond the old end",
             },
             "rad/s",

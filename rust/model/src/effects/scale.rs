@@ -19,7 +19,7 @@ pub fn scale(sensor: Sensor) -> Linear {
             physics: "spring stiffness and capacitor gaps differ from the design, so each axis has its own sensitivity",
             formula: "diag(s) f",
             signature: "the residual of an axis grows in proportion to the specific force on that axis and changes sign with it",
-            mistaken_for: "acc.bias when one attitude dominates, a wrong value of local gravity (all axes alike)",
+            mistaken_for: "acc.bias if one attitude dominates, a wrong value of local gravity (all axes alike)",
             confirm: "turn each axis up and down: half the difference of the two readings over g is 1 + s",
         },
         _ => Words {
@@ -27,7 +27,7 @@ pub fn scale(sensor: Sensor) -> Linear {
             physics: "drive amplitude and sense gain differ from the design, so each axis has its own sensitivity",
             formula: "diag(s) omega",
             signature: "the residual of an axis grows in proportion to the rate about that axis and changes sign with it",
-            mistaken_for: "ref.delay when every motion has the same shape, a lag, gyr.misalignment when axes always turn together",
+            mistaken_for: "ref.delay if every motion has the same shape, a lag, gyr.misalignment if axes always turn together",
             confirm: "turn by exactly 360 degrees about the axis and integrate: the excess over 360 degrees is s",
         },
     };

@@ -19,11 +19,11 @@ pub fn rectification(sensor: Sensor) -> Linear {
         Sensor::Gyr => (
             Words {
                 name: "vibration rectification of the gyroscope",
-                physics: "shaking moves the masses against each other and bends their springs, and what the sensor makes of that does not average out",
+                physics: "vibration moves the masses against each other and bends their springs, and the sensor's response does not average out",
                 formula: "c times the local mean square of the accelerometer's vibration, all axes together, above a tenth of the sampling rate",
-                signature: "the zero rate shifts while a motor or a machine runs, whatever the attitude and the rate",
-                mistaken_for: "gyr.column:motor_current, when the motor shakes the sensor; gyr.bias under steady vibration; gyr.g_sensitivity",
-                confirm: "let the sensor lie still, then run the motor at two speeds: the zero must shift with the square of the shaking",
+                signature: "the bias shifts while a motor or a machine runs, at any attitude and rate",
+                mistaken_for: "gyr.column:motor_current, if the motor shakes the sensor; gyr.bias under steady vibration; gyr.g_sensitivity",
+                confirm: "let the sensor lie still, then run the motor at two speeds: the bias must shift with the square of the vibration",
             },
             "(rad/s)/(m/s^2)^2",
             // Weinberg, Analog Devices MS-2158, table of commercial gyroscopes: 0.005 deg/s/g^2 where the linear g-sensitivity is
@@ -33,11 +33,11 @@ pub fn rectification(sensor: Sensor) -> Linear {
         Sensor::Acc | Sensor::Mag => (
             Words {
                 name: "vibration rectification",
-                physics: "the springs, the air gap and the end of the range are not the same on both sides, so that fast shaking does not average out",
+                physics: "springs, air gap and end of the range differ between the two directions, so that fast vibration does not average out",
                 formula: "c times the local mean square of the vibration, all axes together, above a tenth of the sampling rate",
-                signature: "the mean of the residual shifts while a motor or a machine runs, whatever the attitude",
-                mistaken_for: "acc.column:motor_current, when the motor shakes the sensor; acc.bias under steady vibration; acc.quadratic",
-                confirm: "let the sensor lie still, then run the motor at two speeds: the mean must shift with the square of the shaking",
+                signature: "the mean of the residual shifts while a motor or a machine runs, at any attitude",
+                mistaken_for: "acc.column:motor_current, if the motor shakes the sensor; acc.bias under steady vibration; acc.quadratic",
+                confirm: "let the sensor lie still, then run the motor at two speeds: the mean must shift with the square of the vibration",
             },
             "1/(m/s^2)",
             // MPU6050 product specification 3.2: nonlinearity 0.5 %, of which shaking by 1 m/s^2 can leave that much.

@@ -22,11 +22,11 @@ const TRIALS: u32 = 9;
 pub fn warmup() -> WarmUp {
     let words = Words {
         name: "warm-up of the gyroscope",
-        physics: "drive and electronics warm up after switching on, faster than the thermometer beside them, and the zero settles with them",
+        physics: "drive and electronics warm up after power-on, faster than the thermometer beside them, and the bias settles with them",
         formula: "c exp(-(t - start of the log) / tau)",
-        signature: "a rate residual that fades in the same time on all axes, whatever attitude and motion",
-        mistaken_for: "gyr.bias_temperature while the temperature only rises, gyr.bias_drift over a short log, a zero that wanders at random",
-        confirm: "switch off, let it cool down and record again from switching on: the same decay must come back",
+        signature: "a rate residual that decays with one time constant on all axes, at any attitude and motion",
+        mistaken_for: "gyr.bias_temperature while the temperature only rises, gyr.bias_drift over a short log, a bias random walk",
+        confirm: "switch the sensor off, let it cool down and record again from power-on: the same decay must return",
     };
     // MPU6050 product specification 3.1: zero-rate change over temperature +-20 deg/s in 125 K, for a chip that warms by 4 K in some minutes.
     let mut list = parameters(&VECTOR, "rad/s", 0.01);

@@ -1,4 +1,4 @@
-//! The heading of the reference wanders.
+//! The heading of the reference drifts.
 
 use std::f64::consts::{PI, SQRT_2};
 
@@ -30,7 +30,7 @@ impl Heading {
         };
         Self {
             card: Card {
-                id: "the heading of the reference wanders".to_string(),
+                id: "the heading of the reference drifts".to_string(),
                 name: "heading of the reference".to_string(),
                 stage: Stage::Input,
                 traits: Traits {
@@ -42,7 +42,7 @@ impl Heading {
                 parameters: (0..PARTS).map(parameter).collect(),
                 physics: String::new(),
                 formula: String::new(),
-                signature: "it wanders".to_string(),
+                signature: "random walk".to_string(),
                 mistaken_for: String::new(),
                 confirm: String::new(),
                 shares: 1.0,
