@@ -302,7 +302,8 @@ def allan(log: AnyLog, *, progress: Progress | None = None) -> Allan:
     >>> noise = np.random.default_rng(1).normal(scale=0.001, size=(30_000, 3))
     >>> still = imufit.Log.from_arrays(0.01 * np.arange(30_000), gyr=noise)
     >>> deviation = imufit.allan(still)
-    >>> {channel: f"{found.density:.0e}" for channel, found in deviation.channels.items()}
+    >>> {channel: f"{found.noise_density:.1e}" for channel, found in deviation.channels.items()}
+    {'gyr_x': '1.4e-04', 'gyr_y': '1.4e-04', 'gyr_z': '1.4e-04'}
     """
     from imufit.allan_deviation import allan  # noqa: PLC0415  only needed here
 
