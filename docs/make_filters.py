@@ -57,7 +57,10 @@ def page() -> str:
     for kind in (*filters.AttitudeFilter.__subclasses__(), filters.Smoother):
         parts += [f"::: imufit.filters.{kind.__name__}", ""]
         if kind is filters.Smoother:  # its signature says only **options
-            parts[-1:] = ["    options: {docstring_options: {warn_unknown_params: false, warn_missing_types: false}}", ""]
+            parts[-1:] = [
+                "    options: {docstring_options: {warn_unknown_params: false, warn_missing_types: false}}",
+                "",
+            ]
             parts += ["Its settings are those of `Mekf`.", ""]
         else:
             parts += [f"Needs {' and '.join(f'`{name}`' for name in kind.needs)}.", "", *table(kind.settings), ""]

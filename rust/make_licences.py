@@ -60,7 +60,9 @@ def texts(package: dict[str, Any]) -> list[str]:
     chosen = [path for path in files if "MIT" in path.name.upper()]
     if chosen and " AND " not in package["license"]:
         files = chosen
-    found = ["\n".join(line.rstrip() for line in path.read_text(encoding="utf-8").strip().splitlines()) for path in files]
+    found = [
+        "\n".join(line.rstrip() for line in path.read_text(encoding="utf-8").strip().splitlines()) for path in files
+    ]
     return list(dict.fromkeys(found))
 
 

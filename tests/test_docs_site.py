@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-MONTHS = "January February March April May June July August October November December".split()
+MONTHS = ["January", "February", "March", "April", "May", "June", "July", "August", "October", "November", "December"]
 CITATION = re.compile(r"\b([A-ZÀ-Ž][a-zà-ž]{2,})\b,? \(?(1[89]\d\d|20[0-2]\d)\b")
 SOURCES = (("rust", "*.rs"), ("python", "*.py"), ("docs", "*.md"), ("examples", "*.py"), ("benches", "*.py"))
 

@@ -92,7 +92,9 @@ def test_effects_sensors_and_parameters_are_explained():
 
 def test_verdicts_and_states_of_candidates_are_explained():
     assert unexplained(VERDICTS) == []
-    states = [value for name in dir(_imufit.Status) if isinstance(value := getattr(_imufit.Status, name), _imufit.Status)]
+    states = [
+        value for name in dir(_imufit.Status) if isinstance(value := getattr(_imufit.Status, name), _imufit.Status)
+    ]
     assert len(states) >= 5
     assert unexplained(state.words for state in states) == []
 

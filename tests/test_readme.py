@@ -11,6 +11,7 @@ sys.path.insert(0, str(ROOT / "docs"))
 
 import blocks  # noqa: E402  lies beside the documents
 
+
 @pytest.mark.parametrize("name", [name for name in blocks.pages() if blocks.blocks((ROOT / name).read_text("utf-8"))])
 def test_blocks_print_what_the_page_says(name, tmp_path):
     blocks.prepare(tmp_path)
@@ -38,7 +39,9 @@ def page_of(*parts):
 
 
 def test_blocks_of_a_page_share_names_and_files_and_errors_are_noticed(tmp_path):
-    page = page_of("```python", "a = 3", "```", "```python", "print(a)", "```", "```text", "3", "```", "```sh", "echo b", "```")
+    page = page_of(
+        "```python", "a = 3", "```", "```python", "print(a)", "```", "```text", "3", "```", "```sh", "echo b", "```"
+    )
     found = blocks.blocks(page)
     assert [block.expected for block in found] == [None, "3\n", None]
     with blocks.Session(tmp_path) as session:

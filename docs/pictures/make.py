@@ -93,7 +93,11 @@ def hybrid(folder: Path) -> None:
 
 
 OF_PAGES = {
-    "tutorial_first_log": {"readings": "tutorial_readings", "residual": "tutorial_residual", "ladder": "tutorial_ladder"},
+    "tutorial_first_log": {
+        "readings": "tutorial_readings",
+        "residual": "tutorial_residual",
+        "ladder": "tutorial_ladder",
+    },
     "tutorial_own_effect": {"parabola": "tutorial_parabola", "supply_ladder": "tutorial_supply"},
     "tutorial_real_sensor": {"calibration": "tutorial_calibration", "angles": "tutorial_angles"},
     "join": {"rates": "join_rates"},

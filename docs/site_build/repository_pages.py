@@ -36,6 +36,9 @@ LOADED = re.compile(
 """What a browser would fetch from another host while it opens a page."""
 LOADED_BY_STYLE = re.compile(r"(?:@import|url\()\s*[\"']?(?:https?:)?//[^\s\"')]+")
 
+STORE = "https://unpkg.com/"
+"""Host of which the theme's script fetches what it lacks: a part for browsers before 2020, and diagrams."""
+
 _shown: dict[str, Path] = {}
 """Files outside `docs/` by their place on the site."""
 
@@ -43,7 +46,9 @@ _shown: dict[str, Path] = {}
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add a page for each file outside `docs/` that a page links to, and for those that these link to."""
     _shown.clear()
-    waiting = [(DOCS / file.src_uri, Path(file.abs_src_path or "").read_text(encoding="utf-8")) for file in _pages(files)]
+    waiting = [
+        (DOCS / file.src_uri, Path(file.abs_src_path or "").read_text(encoding="utf-8")) for file in _pages(files)
+    ]
     while waiting:
         place, text = waiting.pop()
         for match in LINK.finditer(FENCE.sub("", text)):
@@ -89,10 +94,16 @@ def on_page_content(content: str, **_: Any) -> str:
 def on_post_build(config: MkDocsConfig) -> None:
     """Refuse a site that would load anything from elsewhere."""
     built = Path(config.site_dir)
+    for script in built.rglob("*.js"):  # the theme's script would fetch parts that no page here needs
+        text = script.read_text(encoding="utf-8")
+        if STORE in text:
+            script.write_text(text.replace(STORE, "missing/"), encoding="utf-8")
     found = []
     for suffix, pattern in ((".html", LOADED), (".css", LOADED_BY_STYLE)):
         for file in built.rglob(f"*{suffix}"):
-            found += [f"{file.relative_to(built)}: {part}" for part in pattern.findall(file.read_text(encoding="utf-8"))]
+            found += [
+                f"{file.relative_to(built)}: {part}" for part in pattern.findall(file.read_text(encoding="utf-8"))
+            ]
     if found:
         raise PluginError("pages that load from other hosts:\n" + "\n".join(sorted(set(found))))
 
