@@ -14,9 +14,9 @@ HEAD = """# Filters
 
 Written by `python docs/make_filters.py` from what the filters say about themselves: do not edit.
 
-Attitude filters on bare arrays. Rows are samples: angular rate in rad/s, specific force in m/s², magnetic flux density in
-µT, in the axes of the body. Attitudes are unit quaternions, scalar first, which turn body vectors into the reference frame.
-`imufit.replay` runs filters by name over a log.
+Attitude filters on bare arrays. Rows are samples: angular rate in rad/s, specific force in m/s², magnetic flux density
+in µT, in the axes of the body. Attitudes are unit quaternions, scalar first, which turn body vectors into the reference
+frame. `imufit.replay` runs filters by name over a log.
 
 ```python
 import imufit
@@ -64,7 +64,8 @@ def page() -> str:
             parts += ["Its settings are those of `Mekf`.", ""]
         else:
             parts += [f"Needs {' and '.join(f'`{name}`' for name in kind.needs)}.", "", *table(kind.settings), ""]
-    rules = "Every filter takes them besides its own: gaps, free fall, ends of the ranges ([rules](conventions.md#rules-of-a-replay))."
+    place = "[rules](conventions.md#rules-of-a-replay)"
+    rules = f"Every filter takes them besides its own: gaps, free fall, ends of the ranges ({place})."
     parts += ["## Rules around every filter", "", rules, "", *table(filters.RULES)]
     return "\n".join(parts) + "\n"
 

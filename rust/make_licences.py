@@ -20,8 +20,8 @@ PLATFORM = "x86_64-unknown-linux-gnu"
 NAMES = ("LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE")
 HEAD = """Licences of the Rust crates that are compiled into imufit's extension module.
 
-Written by `python rust/make_licences.py` from Cargo.lock: do not edit. Where a crate leaves the choice, imufit takes the MIT
-licence. imufit itself is under the licence in the file LICENSE.
+Written by `python rust/make_licences.py` from Cargo.lock: do not edit. Where a crate leaves the choice, imufit takes
+the MIT licence. imufit itself is under the licence in the file LICENSE.
 """
 
 

@@ -1,4 +1,4 @@
-"""Every word that screens and reports use is explained: the words are taken from results and from the catalogue in code."""
+"""Every word of screens and reports is explained: words are taken from results and from the catalogue in code."""
 
 import re
 import runpy

@@ -132,7 +132,8 @@ def _as_markdown(path: Path) -> str:
         return text
     if path.suffix == ".ipynb":
         return _notebook(path.name, json.loads(text))
-    return f"# {path.name}\n\n`{path.relative_to(ROOT).as_posix()}`\n\n````{LANGUAGES.get(path.suffix, 'text')}\n{text}````\n"
+    head = f"# {path.name}\n\n`{path.relative_to(ROOT).as_posix()}`\n\n"
+    return f"{head}````{LANGUAGES.get(path.suffix, 'text')}\n{text}````\n"
 
 
 def _notebook(name: str, notebook: dict[str, Any]) -> str:
