@@ -169,3 +169,4 @@ def test_a_letter_that_is_a_unit_is_no_word():
     assert [term.word for term in used_in(["m", "t: explains"])] == ["t", "m"]
     assert [term.word for term in used_in(["ref.skew was added"])] == ["ref.*"]
     assert explained("no such word") is None
+    assert [term.word for term in used_in(["The mount held.", "held"])] == ["held"]

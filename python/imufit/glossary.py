@@ -31,6 +31,8 @@ class Term:
         Where the value or the word comes from, with links into ``docs/``.
     group : str
         What it belongs to.
+    whole : bool
+        True for a plain English word, which counts in a text only as a whole piece of it.
     """
 
     word: str
@@ -39,6 +41,7 @@ class Term:
     means: str
     origin: str
     group: str
+    whole: bool
 
     @property
     def spellings(self) -> tuple[str, ...]:
@@ -58,6 +61,7 @@ def terms() -> tuple[Term, ...]:
             means=entry["means"],
             origin=entry["origin"],
             group=group["title"],
+            whole=entry.get("whole", group.get("whole", False)),
         )
         for group in tomllib.loads(text)["group"]
         for entry in group["term"]
@@ -81,8 +85,8 @@ def used_in(texts: Sequence[str]) -> tuple[Term, ...]:
     Parameters
     ----------
     texts : sequence of str
-        Paragraphs, cells of tables, headings. A term of one letter counts only where it is a whole piece, or stands
-        before a colon: elsewhere the letter may be a unit.
+        Paragraphs, cells of tables, headings. A term of one letter, or one that is marked so, counts only where it is a
+        whole piece, or stands before a colon: elsewhere a letter may be a unit, and the word plain English.
     """
     together = "\n".join(texts)
     first = {text.partition(":")[0].strip() for text in texts}
@@ -103,5 +107,5 @@ def _alone(term: Term) -> re.Pattern[str]:
 @cache
 def _anywhere(term: Term) -> re.Pattern[str]:
     """Return what finds a spelling of more than one letter in a text."""
-    found = "|".join(_pattern(spelling) for spelling in term.spellings if len(spelling) > 1)
+    found = "|".join(_pattern(spelling) for spelling in term.spellings if len(spelling) > 1 and not term.whole)
     return re.compile(rf"(?<![\w.])(?:{found})(?!\w|\.\w)" if found else r"(?!)", re.IGNORECASE)

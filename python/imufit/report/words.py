@@ -30,7 +30,7 @@ def with_words(page: str, environment: Environment) -> str:
     words = used_in([text for text in seen if text])
     section = environment.get_template("words.html.j2").render(
         words=[
-            {"word": term.word, "unit": term.unit, "means": _shown(term.means), "origin": _shown(term.origin)}
+            {"word": term.word, "unit": _shown(term.unit), "means": _shown(term.means), "origin": _shown(term.origin)}
             for term in words
         ]
     )
