@@ -11,7 +11,7 @@ CARGO_FLAGS := --workspace --release
 SOURCES := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help build quick demo test test-rust test-python fuzz audit lint docs wheel bench clean
+.PHONY: help build quick demo test test-rust test-python fuzz audit lint docs site wheel bench clean
 
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -69,11 +69,18 @@ lint: $(STAMP) ## Formatting, clippy, ruff, mypy, stubs, import layers
 	$(BIN)/python -m mypy.stubtest imufit._imufit
 	$(BIN)/lint-imports
 
-docs: $(STAMP) ## Refresh what the documents take from the code: effects, pictures, pasted output
+docs: $(STAMP) ## Refresh what the documents take from the code (effects, glossary, pictures, pasted output), build the site
 	$(BIN)/python docs/make_effects.py
+	$(BIN)/python docs/make_glossary.py
+	$(BIN)/python docs/make_filters.py
 	$(BIN)/python docs/pictures/make.py
 	$(BIN)/python examples/notebooks/make.py
-	$(BIN)/python docs/blocks.py --write README.md docs/logs.md docs/own_effect.md docs/calibration.md docs/replay.md docs/tuning.md docs/tilt.md docs/hybrid.md
+	$(BIN)/python docs/blocks.py --write
+	$(BIN)/python rust/make_licences.py
+	$(MAKE) --no-print-directory site
+
+site: $(STAMP) ## The documents as pages in site/; a warning is an error
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 wheel: $(DEPENDENCIES) ## One abi3 wheel in dist/
 	$(BIN)/maturin build --release --out dist
@@ -83,7 +90,7 @@ bench: $(STAMP) ## Speed and accuracy against other packages
 	for file in benches/*.py; do if [ -f "$$file" ]; then $(BIN)/python "$$file" || exit 1; fi; done
 
 clean: ## Remove what was built
-	rm -rf $(VENV) target dist demo
+	rm -rf $(VENV) target dist demo site
 
 # The build backend and the development tools are named in pyproject.toml, and only there.
 $(DEPENDENCIES): pyproject.toml
@@ -94,5 +101,5 @@ $(DEPENDENCIES): pyproject.toml
 
 $(STAMP): $(DEPENDENCIES) $(SOURCES)
 	@echo 'make: builds the Rust core and installs imufit with its development tools into $(VENV) (some minutes)'
-	. $(BIN)/activate && PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --extras dev --quiet
+	. $(BIN)/activate && PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 maturin develop --release --extras dev,docs --quiet
 	touch $@ $(USED)

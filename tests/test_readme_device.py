@@ -25,7 +25,7 @@ BIAS = {"acc.bias": {"x": 0.15, "y": -0.1, "z": 0.2}}
 def commands():
     page = (ROOT / "README.md").read_text(encoding="utf-8")
     section = page.split("## From a breadboard to a calibrated angle in ten minutes\n")[1].split("\n## ")[0]
-    return "".join(re.findall(r"```sh\n(.*?)```", section, re.DOTALL)).splitlines()
+    return "".join(re.findall(r"```sh[^\n]*\n(.*?)```", section, re.DOTALL)).splitlines()
 
 
 def done(command, folder):

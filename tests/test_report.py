@@ -88,7 +88,7 @@ def test_page_answers_where_which_and_what_next(whole):
     assert "0.0169 deg/s per g" in text
     assert "gyr.misalignment (0.31)" in text
     assert whole.index("verdict") < whole.index("Where the model fails")
-    assert read(whole).tags.count("details") == 6 + 1
+    assert read(whole).tags.count("details") == 6 + 1 + 1
 
 
 def test_page_escapes_what_comes_from_the_log(whole):

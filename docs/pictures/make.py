@@ -5,6 +5,7 @@ python docs/pictures/make.py [FOLDER]
 
 import runpy
 import sys
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ import imufit
 import numpy as np
 from imufit.figures.style import AXES, GREY, INK, PALE, new_figure
 from numpy.typing import NDArray
+from PIL import Image
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +32,8 @@ LYING = {
     "-y": ("+x", "-z", "+y"),
 }
 """For each side that is up: where the box's x, y and z point in the room (x right, y away, z up)."""
+WIDTH = 1100
+"""Width of a picture that a page wrote, pixels: twice that of a page's text on a desk's screen at most."""
 FRAMES = {
     "NED": {"x": (0.0, 1.0, 0.0), "y": (1.0, 0.0, 0.0), "z": (0.0, 0.0, -1.0)},
     "ENU": {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)},
@@ -86,6 +90,42 @@ def hybrid(folder: Path) -> None:
     """Draw the pictures of docs/hybrid.md: the example does."""
     example = Path(__file__).resolve().parents[2] / "examples" / "paper_c_hybrid.py"
     runpy.run_path(str(example))["main"](str(folder))
+
+
+OF_PAGES = {
+    "tutorial_first_log": {
+        "readings": "tutorial_readings",
+        "residual": "tutorial_residual",
+        "ladder": "tutorial_ladder",
+    },
+    "tutorial_own_effect": {"parabola": "tutorial_parabola", "supply_ladder": "tutorial_supply"},
+    "tutorial_real_sensor": {"calibration": "tutorial_calibration", "angles": "tutorial_angles"},
+    "join": {"rates": "join_rates"},
+}
+"""Pictures that the blocks of a page write: what they are called there, and here."""
+
+
+def of_pages(folder: Path) -> None:
+    """Draw the pictures of tutorials: the blocks of these pages do."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+    import blocks  # noqa: PLC0415  lies beside the documents
+
+    for page, pictures in OF_PAGES.items():
+        text = (Path(__file__).resolve().parents[1] / f"{page}.md").read_text(encoding="utf-8")
+        with tempfile.TemporaryDirectory() as name, blocks.Session(Path(name)) as session:
+            blocks.prepare(Path(name))
+            for block in blocks.blocks(text):
+                session.run(block)
+            for there, here in pictures.items():
+                _smaller(Path(name) / f"{there}.png", folder / f"{here}.png")
+
+
+def _smaller(source: Path, target: Path) -> None:
+    """Store a picture of the width of a page in 128 colours."""
+    with Image.open(source) as picture:
+        height = round(picture.height * WIDTH / picture.width)
+        scaled = picture.convert("RGB").resize((WIDTH, height)) if picture.width > WIDTH else picture.convert("RGB")
+        scaled.quantize(128).save(target, optimize=True)
 
 
 def _seen(point: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -167,3 +207,4 @@ if __name__ == "__main__":
     calibration().savefig(folder / "calibration.png", dpi=90)
     tilt(folder)
     hybrid(folder)
+    of_pages(folder)

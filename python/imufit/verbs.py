@@ -74,6 +74,14 @@ def fit(logs: AnyLogs, model: AnyModel = None, *, progress: Progress | None = No
     ------
     InputError
         The log has no usable reference, or an effect of the model cannot be tested on it.
+
+    Examples
+    --------
+    >>> fitted = imufit.fit("walk.parquet", ["gyr.scale"])
+    >>> print(fitted)
+    gyr.scale: 0.99... times the noise floor (held out)
+    >>> round(fitted.params["gyr.scale.y"].value, 3)
+    -0.02
     """
     return model_of(model).fit(logs_of_any(logs), progress)
 
@@ -94,6 +102,14 @@ def diagnose(logs: AnyLogs, model: AnyModel = None, *, progress: Progress | None
     ------
     InputError
         The log has no usable reference, or an effect of the model cannot be tested on it.
+
+    Examples
+    --------
+    >>> diagnosis = imufit.diagnose("walk.parquet")
+    >>> diagnosis.verdict, diagnosis.best
+    ('missing', 'gyr.scale')
+    >>> diagnosis.candidates[0].parameters[0].name
+    'x'
     """
     return fit(logs, model, progress=progress).diagnose(progress=progress)
 
@@ -119,6 +135,14 @@ def ladder(logs: AnyLogs, model: AnyModel = None, *, progress: Progress | None =
     ------
     InputError
         The log has no usable reference, or an effect of the model cannot be tested on it.
+
+    Examples
+    --------
+    >>> result = imufit.ladder("walk.parquet")
+    >>> result.model, result.verdict
+    (('gyr.scale',), 'adequate')
+    >>> print(f"{result.ratio_start:.1f} -> {result.ratio_end:.1f}")
+    7.9 -> 1.0
     """
     return ladder_from(fit(logs, model, progress=progress), progress)
 
@@ -149,6 +173,15 @@ def compare(
     ------
     InputError
         The log has no usable reference, or an effect of a model cannot be tested on it.
+
+    Examples
+    --------
+    >>> comparison = imufit.compare("walk.parquet")
+    >>> {name: round(ratio) for name, ratio in comparison.sensors.items()}
+    {'acc': 1, 'gyr': 14, 'mag': 1}
+    >>> two = imufit.compare("walk.parquet", [], ["gyr.scale"])
+    >>> print(two.sentence)
+    Held-out error: 7.9... times the noise floor with the ideal sensor, ... with gyr.scale. ...
     """
     opened = log_of(log)
     first = model_of(model)
@@ -181,6 +214,14 @@ def calibrate(
     ------
     InputError
         The logs leave a calibration open; the message states what is missing.
+
+    Examples
+    --------
+    >>> calibration = imufit.calibrate("poses.parquet")
+    >>> bias = calibration.to_dict()["bias"]
+    >>> [round(value, 2) for value in bias]
+    [-0.15, 0.1, -0.2]
+    >>> calibration.save("sensor.toml")
     """
     from imufit.calibrating import calibrate  # noqa: PLC0415  only needed here
 
@@ -220,6 +261,12 @@ def replay(
     ------
     InputError
         A filter or setting is unknown, or a filter lacks its sensor.
+
+    Examples
+    --------
+    >>> run = imufit.replay("walk.parquet", ["mahony", "mekf"], {"mahony": {"k_p": 1.0}})
+    >>> list(run.to_dict()["filters"])
+    ['mahony', 'mekf']
     """
     from imufit.replaying import DEFAULT_FILTERS, replay  # noqa: PLC0415  only needed here
 
@@ -249,6 +296,14 @@ def allan(log: AnyLog, *, progress: Progress | None = None) -> Allan:
     ------
     InputError
         A rest that is long enough is missing.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).normal(scale=0.001, size=(30_000, 3))
+    >>> still = imufit.Log.from_arrays(0.01 * np.arange(30_000), gyr=noise)
+    >>> deviation = imufit.allan(still)
+    >>> {channel: f"{found.noise_density:.1e}" for channel, found in deviation.channels.items()}
+    {'gyr_x': '1.4e-04', 'gyr_y': '1.4e-04', 'gyr_z': '1.4e-04'}
     """
     from imufit.allan_deviation import allan  # noqa: PLC0415  only needed here
 
@@ -273,6 +328,12 @@ def tune(log: AnyLog, filter: str, *, progress: Progress | None = None, **option
     ------
     InputError
         The log lacks what this takes, or a setting cannot be.
+
+    Examples
+    --------
+    >>> tuning = imufit.tune("walk.parquet", "mahony", gains=["k_p"])
+    >>> print(tuning.sentence)
+    mahony: total error 1.78 deg with the defaults, 1.40 deg held out with tuned gains.
     """
     from imufit.tuning import tune  # noqa: PLC0415  only needed here
 
@@ -290,6 +351,11 @@ def info(log: AnyLog, *, effects: bool = True, progress: Progress | None = None)
         Whether to find out which effects it can show, which takes a pass over all rows.
     progress : callable, optional
         Called with (rows done, rows in all, what is being done).
+
+    Examples
+    --------
+    >>> print(imufit.info("walk.parquet", effects=False).sentence)
+    walk.parquet: 6000 rows over 59.99 s; accelerometer, gyroscope, magnetometer.
     """
     from imufit.inspection import info  # noqa: PLC0415  only needed here
 
@@ -330,6 +396,11 @@ def plot(
     ------
     InputError
         The log has nothing to draw, or `ax` has another number of Axes.
+
+    Examples
+    --------
+    >>> figure = imufit.plot("walk.parquet", columns=["gyr_x", "gyr_y"])
+    >>> figure.savefig("readings.png")
     """
     from imufit.inspection import drawing  # noqa: PLC0415  only needed here
 
@@ -367,6 +438,15 @@ def join(
     ------
     InputError
         The two have too little motion in common, or the lag is ambiguous.
+
+    Examples
+    --------
+    >>> log = imufit.read("walk.parquet")
+    >>> sensor = log.with_fields(ref_q=None, ref_p=None)
+    >>> late = imufit.Log.from_arrays(log.t + 0.25, ref_q=log.ref_q)
+    >>> joined = imufit.join(sensor, late)
+    >>> print(f"{joined.lag:.2f} s")
+    0.25 s
     """
     from imufit.joining import declared_attitude, join, join_as_found, with_attitude  # noqa: PLC0415  only needed here
 

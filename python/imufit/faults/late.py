@@ -122,5 +122,5 @@ def _left_by_an_effect(declared: CommonRates) -> float:
     mount = declared.mount()
     columns = np.stack([(each @ mount.T).ravel() for each in (declared.expected, declared.change)], axis=1)
     measured = declared.measured.ravel()
-    solved = np.linalg.lstsq(columns, measured)[0]
+    solved = np.linalg.lstsq(columns, measured, rcond=None)[0]
     return float(np.sum((measured - columns @ solved) ** 2) / max(float(measured @ measured), 1e-300))

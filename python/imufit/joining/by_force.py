@@ -112,7 +112,7 @@ def _refined(
         columns = np.stack([slope, slope * (t[used] - middle), np.ones(int(used.sum())), length[used]], axis=1)
         scale = float(np.polyfit(length[used], expected[used], 1)[0])
         columns[:, :2] *= -scale
-        left = expected[used] - columns[:, 2:] @ np.linalg.lstsq(columns[:, 2:], expected[used])[0]
+        left = expected[used] - columns[:, 2:] @ np.linalg.lstsq(columns[:, 2:], expected[used], rcond=None)[0]
         normal, pull = _equations(columns, left, t[used], BLOCK * width)
         normal[1, 1] += 2.0 / (USUAL_SKEW**2 + rate**2)
         pull[1] -= 2.0 * rate / (USUAL_SKEW**2 + rate**2)
@@ -137,7 +137,7 @@ def _refined(
 
 def _equations(columns: Array, left: Array, t: Array, block: float) -> tuple[Array, Array]:
     """Return normal equations, weighted by what blocks show (White 1980): errors within a block are not independent."""
-    residual = left - columns @ np.linalg.lstsq(columns, left)[0]
+    residual = left - columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
     number = np.floor((t - t[0]) / block).astype(int)
     scores = np.stack([np.bincount(number, columns[:, k] * residual) for k in range(4)], axis=1)
     information = columns.T @ columns

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from imufit.figures import quantity
 from imufit.remedy import command
 from imufit.report.inline_svg import inline_svg
+from imufit.report.words import with_words
 from imufit.results.comparison import MOST_PANELS, Panel, drawn_panels
 from imufit.results.diagnosis import VERDICTS
 from imufit.results.parameter import in_lines, parameter_table
@@ -64,7 +65,7 @@ def page(
     environment.globals.update(q=quantity, svg=inline_svg, in_lines=in_lines, plot_panels=_panels)
     by_covariate = _by_covariate(comparison)
     last = ladder.diagnosis if ladder is not None else diagnosis
-    return environment.get_template("page.html.j2").render(
+    body = environment.get_template("page.html.j2").render(
         title=title,
         verdict=_verdict(comparison, last, ladder, addition),
         comparison=comparison,
@@ -83,6 +84,7 @@ def page(
         faults=_faults(comparison, last),
         next_step=_next_step(last, ladder),
     )
+    return with_words(body, environment)
 
 
 def _verdict(
