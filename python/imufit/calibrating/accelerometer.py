@@ -193,8 +193,8 @@ def fit_vector(poses: Sequence[Pose], targets: Targets, gravity: float, temperat
     remarks += _weak_axes(poses)
     if rms(lengths - gravity) > 1.5 * rms(np.linalg.norm(readings, axis=1) - gravity) + 0.01:
         remarks.append(
-            "The error of the lengths grew: a tilted table or a crooked side is mistaken for misalignment. Record one log "
-            f"with the gyro, so that headings are known, or nine attitudes for {option('cost', 'magnitude')}."
+            "The error of the lengths grew: a tilted table or a crooked side is mistaken for misalignment. Record one "
+            f"log with the gyro, so that headings are known, or nine attitudes for {option('cost', 'magnitude')}."
         )
     return _result("vector", readings, solution, gravity, lengths, residuals, remarks, extras, chosen)
 
