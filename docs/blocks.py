@@ -95,7 +95,7 @@ def blocks(page: str) -> list[Block]:
 
 
 class Session:
-    """What the blocks of one page share: a folder, and an interpreter from the first Python block on.
+    """State that the blocks of one page share: a folder, and an interpreter from the first Python block on.
 
     Parameters
     ----------

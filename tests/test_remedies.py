@@ -284,7 +284,7 @@ def test_a_refused_join_names_lag_and_attitude_in_both(tmp_path: Path) -> None:
     bare = log.with_fields(ref_q=None)
     columns = {name: log.ref_q[:, k] for k, name in enumerate("abcd")}
     nameless = imufit.Log.of_fields(t=log.t + 3.0, covariates=columns)
-    with pytest.raises(InputError, match="no columns look like an attitude") as caught:
+    with pytest.raises(InputError, match="no columns have the names of an attitude") as caught:
         imufit.join(bare, nameless)
     assert "attitude=KIND:COLUMNS" in str(caught.value)
     assert not OPTION.search(str(caught.value))

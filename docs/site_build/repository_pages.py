@@ -33,7 +33,7 @@ LOADED = re.compile(
     r"<(?:script|img|iframe|source|video|audio)\b[^>]*?\ssrc=[\"']?(?:https?:)?//[^\s\"'>]+"
     r"|<link\b(?=[^>]*\brel=[\"']?(?:stylesheet|preload|preconnect|prefetch|icon))[^>]*?href=[\"']?(?:https?:)?//[^\s\"'>]+"
 )
-"""What a browser would fetch from another host while it opens a page."""
+"""Addresses that a browser would fetch from another host while it opens a page."""
 LOADED_BY_STYLE = re.compile(r"(?:@import|url\()\s*[\"']?(?:https?:)?//[^\s\"')]+")
 
 STORE = "https://unpkg.com/"

@@ -54,12 +54,12 @@ class InputError(ValueError):
 
     @property
     def remedy(self) -> str | None:
-        """What the user can do about it, in Python; in the words of the command line where that is running."""
+        """The user's remedy in Python; in the words of the command line where that is running."""
         return None if self.advice is None else str(self.advice)
 
     @property
     def shell_remedy(self) -> str | None:
-        """What the user can do about it, in the words of the command line."""
+        """The user's remedy in the words of the command line."""
         return None if self.advice is None else self.advice.shell
 
     @property

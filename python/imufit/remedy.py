@@ -1,7 +1,7 @@
-"""What a user can do about a problem, in the words of Python and in those of the command line.
+"""The remedy of a problem, in the words of Python and in those of the command line.
 
-A process has one reader. Whoever imports the package reads Python's words; the program ``imufit`` says once, where it
-starts, that its reader sits at a shell. Text that is made of a remedy is in the words of that reader.
+A process has one reader. A program that imports the package reads Python's words. The program ``imufit`` states once,
+at its start, that its reader sits at a shell. Text that is made of a remedy is in the words of that reader.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def told_to(reader: Reader) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Remedy:
-    """What to do, in both languages; text before it or after it is added with ``+``.
+    """A remedy in both languages; text before it or after it is added with ``+``.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def command(name: str, call: str | None = None) -> Remedy:
     name : str
         Of the command.
     call : str, optional
-        What it is in Python, where that is no function of the same name.
+        Its form in Python, if that is not a function of the same name.
     """
     return Remedy(f"imufit.{name}" if call is None else call, f"imufit {name}")
 

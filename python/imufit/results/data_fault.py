@@ -71,12 +71,12 @@ class DataFault(Part):
 
     @property
     def remedy(self) -> str:
-        """What to do about it, in Python; in the words of the command line where that is running."""
+        """The remedy in Python; in the words of the command line where that is running."""
         return str(self.advice)
 
     @property
     def shell_remedy(self) -> str:
-        """What to do about it, in the words of the command line."""
+        """The remedy in the words of the command line."""
         return Remedy.of(self.advice).shell
 
     @property

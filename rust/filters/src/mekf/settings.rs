@@ -94,7 +94,7 @@ pub const PARAMETERS: &[Parameter] = &[
         name: "rest_noise",
         default: 5e-4,
         unit: "rad/s/sqrt(Hz)",
-        meaning: "noise density of the bias that a rest shows: smaller believes a rest faster",
+        meaning: "noise density of the bias that a rest shows: smaller follows a rest faster",
     },
     Parameter {
         name: "min_angle",
