@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_readme import PAGES
+from test_readme import blocks
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 SHOWS = {
@@ -23,7 +23,7 @@ ON_A_PAGE = {"paper_b_tilt.py": "docs/tilt.md", "paper_c_hybrid.py": "docs/hybri
 def test_every_example_is_tested():
     assert {path.name for path in EXAMPLES.glob("*.py")} == {*SHOWS, *ON_A_PAGE}
     for name, page in ON_A_PAGE.items():
-        assert page in PAGES
+        assert page in blocks.pages()
         assert f"python examples/{name}" in (EXAMPLES.parent / page).read_text(encoding="utf-8")
 
 

@@ -199,7 +199,7 @@ def test_what_cannot_be_exported_is_refused():
         export(SensorModel(["ref.delay"]), "json")
     with pytest.raises(InputError, match=r"acc\.scale cannot be undone"):
         export(SensorModel(["acc.scale"], {"acc.scale": {"x": -1.0}}), "c-header")
-    with pytest.raises(InputError, match=r"no form 'matlab'.*c-header"):
+    with pytest.raises(InputError, match=r"the form 'matlab' is unknown.*c-header"):
         export(MODEL, "matlab")
 
 

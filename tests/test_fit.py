@@ -137,7 +137,7 @@ def model_file(tmp_path):
         ("rad/s", "deg/s", "gyr.bias x is in deg/s, not in rad/s"),
         ("imufit sensor model", "recipe", "kind is 'recipe'"),
         ("format = 1", "format = 99", "format 99 is not known"),
-        ("gyr.bias", "gyr.bios", "no effect gyr.bios.*Did you mean gyr.bias"),
+        ("gyr.bias", "gyr.bios", "unknown effect gyr.bios.*Did you mean gyr.bias"),
         ("x = 0.01", "w = 0.01", "gyr.bias has no parameter w.*x, y, z"),
         ("x = 0.01", 'x = "much"', "gyr.bias x is 'much', not a finite number"),
         ("x = 0.01", "x = ", "not valid TOML"),

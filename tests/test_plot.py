@@ -175,9 +175,9 @@ def test_what_cannot_be_drawn_is_refused_in_one_line(
 
 
 def test_a_log_without_values_has_nothing_to_draw() -> None:
-    with pytest.raises(InputError, match="nothing to draw"):
+    with pytest.raises(InputError, match="nothing can be drawn"):
         imufit.plot(Log.from_arrays([0.0, 1.0], acc=np.full((2, 3), np.nan)))
-    with pytest.raises(InputError, match="nothing to draw"):
+    with pytest.raises(InputError, match="nothing can be drawn"):
         imufit.plot(Log.from_arrays([0.0, 1.0], acc=np.ones((2, 3))), show="reference")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -99,6 +100,7 @@ class Unwrapper:
         self.segment = -1
         self._last = (0.0, 0.0, 0.0, 0)  # stamp, unwrapped, arrival, opening
         self._start = -1
+        self._late = self._earliest = 0.0  # arrival less the device's time, s: of the last row, of the earliest
 
     def add(self, rows: Arrived) -> tuple[Array, NDArray[np.int64]]:
         """Time on the device's clock and number of the piece in which that clock certainly ran on.
@@ -142,15 +144,43 @@ class Unwrapper:
             back = (step < 0.0) & missing
         else:
             back = step < 0.0
-        odd = missing & (np.abs(step - passed) * self._tick > ELSEWHERE)
-        segment = self.segment + np.cumsum(anew | reset | back | odd)
         ticks = self._last[1] + np.cumsum(step)
+        broken = anew | reset | back
+        broken |= self._elsewhere(rows.arrival - ticks * self._tick, missing, broken)
+        segment = self.segment + np.cumsum(broken)
         self.segment = int(segment[-1])
         self._start = int(start[-1])
         self._last = (float(stamps[-1]), float(ticks[-1]), float(rows.arrival[-1]), int(opening[-1]))
         return np.asarray(ticks * self._tick, dtype=np.float64), segment
 
+    def _elsewhere(self, late: Array, missing: NDArray[np.bool_], broken: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Say at which lost frames the device's clock is another one, by how late rows arrive: (n,).
+
+        A row arrives late while the computer is busy, and the rows behind it catch up. No row arrives before it was
+        sent. A row has another clock if it is earlier than the earliest row of its piece, or suddenly much later.
+        """
+        found = np.zeros(late.size, np.bool_)
+        grown = np.diff(late, prepend=self._late) > ELSEWHERE
+        edges = np.unique([0, *np.flatnonzero(broken), late.size])
+        for begin, end in pairwise(edges.tolist()):
+            if broken[begin]:
+                self._earliest = float(late[begin])
+            at = begin
+            while at < end:
+                earliest = np.minimum.accumulate(np.concatenate(([self._earliest], late[at:end])))
+                other = missing[at:end] & (grown[at:end] | (late[at:end] < earliest[:-1] - ELSEWHERE))
+                if not other.any():
+                    self._earliest = float(earliest[-1])
+                    break
+                at += int(np.argmax(other))
+                found[at] = True
+                self._earliest = float(late[at])
+                at += 1
+        self._late = float(late[-1])
+        return found
+
     def _begin(self, rows: Arrived, stamp: float) -> None:
+        self._late = self._earliest = float(rows.arrival[0]) - stamp * self._tick
         self._last = (stamp, stamp, float(rows.arrival[0]), int(rows.opening[0]))
 
     def _text_stamps(self, rows: Arrived) -> Array:
