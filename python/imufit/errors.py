@@ -28,8 +28,8 @@ class InputError(ValueError):
     column : str, optional
         Column or metadata key concerned.
     remedy : str or Remedy, optional
-        What the user can do about it: a full sentence. A :class:`imufit.remedy.Remedy` says it in the words of Python
-        and in those of the command line.
+        The user's remedy, a full sentence. A :class:`imufit.remedy.Remedy` has the words of Python and those of the
+        command line.
     line : int, optional
         Line of the text file, counted from 1.
     """

@@ -30,7 +30,7 @@ class Term:
     origin : str
         Where the value or the word comes from, with links into ``docs/``.
     group : str
-        What it belongs to.
+        Title of its group in the glossary.
     whole : bool
         True for a plain English word, which counts in a text only as a whole piece of it.
     """

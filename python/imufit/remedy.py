@@ -62,7 +62,7 @@ class Remedy:
         Parameters
         ----------
         words : str or Remedy
-            What to do.
+            The remedy, in a sentence.
         """
         return words if isinstance(words, Remedy) else cls(words, words)
 
@@ -123,7 +123,7 @@ def recovering(part: str | Path, port: str | None = None) -> Remedy:
     Parameters
     ----------
     part : str or Path
-        What it left, or the log that was to be.
+        The part of the recording, or the name of its log.
     port : str, optional
         Where the device is plugged in.
     """

@@ -97,7 +97,7 @@ def other_clock(t: Array, ratio: float, gyr_units: tuple[float, ...], column: st
     rate = 1.0 / ratio
     if np.all(np.diff(t) == 1.0) and not own and _USUAL_RATE[0] < rate < _USUAL_RATE[1]:
         rounded = round_rate(rate)
-        return f"t counts rows, of which {rate:.4g} come in a second (rate by the gyroscope)", f"row[{rounded:g}Hz]"
+        return f"t counts rows at {rate:.4g} Hz (rate by the gyroscope)", f"row[{rounded:g}Hz]"
     return None
 
 

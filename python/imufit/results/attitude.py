@@ -81,7 +81,7 @@ class AttitudeComparison(Plotted, Part):
     after : dict or None
         The same with the model's effects taken out; None for a model without effects.
     dependences : tuple of AttitudeDependence
-        What the error that remains depends on, largest share first; only what stands out of chance.
+        Quantities that the remaining error depends on, the largest share first; only those that exceed chance.
     bins : tuple of AttitudeBins
         Error against each quantity.
     limit : str

@@ -33,7 +33,7 @@ class DataFault(Part):
     evidence : str
         What shows it, in a sentence with figures.
     advice : str or Remedy
-        What to do about it, in a sentence: in the words of Python and in those of the command line.
+        The remedy in a sentence; a `Remedy` has the words of Python and those of the command line.
     left_out : bool
         True if the samples concerned were left out of the evidence; the answer on the log rests on the others.
     false_readings : bool
@@ -66,8 +66,8 @@ class DataFault(Part):
     def to_dict(self) -> dict[str, Any]:
         """JSON of one fault, its remedy in the shell's words; the key ``file`` only where there are several logs."""
         names = [name for name in self.__dataclass_fields__ if name != "file" or self.file is not None]
-        values = {"remedy" if name == "advice" else name: json_value(getattr(self, name)) for name in names}
-        return values | {"remedy": self.shell_remedy}
+        values = {name: getattr(self, name) for name in names} | {"advice": self.shell_remedy}
+        return {"remedy" if name == "advice" else name: json_value(value) for name, value in values.items()}
 
     @property
     def remedy(self) -> str:

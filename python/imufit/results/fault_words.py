@@ -160,7 +160,7 @@ def late(lag: float, correlation: float, declared: float, path: Path | None) -> 
     return (
         f"The reference is {abs(lag):.2f} s {'late' if lag > 0.0 else 'early'} against the sensors (correlation of "
         f"the rates {correlation:.2f}, {declared:.2f} as declared).",
-        "Shift the reference: " + _joined(path, lag),
+        "Shift the reference: " + _joined(path, f"{lag:.4f}"),
     )
 
 
@@ -169,14 +169,14 @@ def skew(lag: float, rate: float, correlation: float, declared: float, path: Pat
     return (
         f"The clock of the reference runs {100.0 * abs(rate):.3g} % {'fast' if rate > 0.0 else 'slow'} against the "
         f"sensors' (correlation of the rates {correlation:.2f}, {declared:.2f} as declared).",
-        "Put the reference on their clock: " + _joined(path, lag, rate),
+        "Put the reference on their clock: " + _joined(path, f"{lag:.4f}", rate),
     )
 
 
-def _joined(path: Path | None, lag: float, rate: float | None = None) -> Remedy:
+def _joined(path: Path | None, lag: str, rate: float | None = None) -> Remedy:
     """Name the call that joins a log with itself: its reference is moved by a lag, s, and a rate of its clock."""
     python, shell = ("log", "LOG") if path is None else (repr(str(path)), shlex.quote(str(path)))
-    known = Remedy(f"imufit.join({python}, {python}, lag={lag:.4f}", f"imufit join {shell} {shell} --lag {lag:.4f}")
+    known = Remedy(f"imufit.join({python}, {python}, lag={lag}", f"imufit join {shell} {shell} --lag {lag}")
     if rate is not None:
         known += Remedy(f", skew={rate:.6f}", f" --skew {1e6 * rate:.0f}")
     return known + Remedy(").log", " -o joined.parquet")
@@ -191,8 +191,7 @@ def another_motion(declared: float, lags: Sequence[tuple[float, float]], *, fits
             f"not one lag alone puts them together, but each of {shown} as well as the other: the motion repeats "
             "itself, or the reference was put together from another recording."
         )
-        moved = Remedy("imufit.join(log, log, lag=S).log", "imufit join LOG LOG --lag S -o joined.parquet")
-        return text, "Look whether it is the right file; where the lag is known, " + moved + " moves it."
+        return text, "Look whether it is the right file; where the lag is known, " + _joined(None, "S") + " moves it."
     text = (
         "ref_q belongs to another motion: its rates and those of the gyroscope have nothing in common at any time "
         f"(correlation {declared:.2f} as declared{f', at best after a lag of {shown}' if shown else ''})."

@@ -100,7 +100,7 @@ class Unwrapper:
         self.segment = -1
         self._last = (0.0, 0.0, 0.0, 0)  # stamp, unwrapped, arrival, opening
         self._start = -1
-        self._late = self._earliest = 0.0  # arrival less the device's time, s: of the last row, of the earliest
+        self._earliest = 0.0  # least arrival less the device's time, s, of the piece
 
     def add(self, rows: Arrived) -> tuple[Array, NDArray[np.int64]]:
         """Time on the device's clock and number of the piece in which that clock certainly ran on.
@@ -160,7 +160,7 @@ class Unwrapper:
         sent. A row has another clock if it is earlier than the earliest row of its piece, or suddenly much later.
         """
         found = np.zeros(late.size, np.bool_)
-        grown = np.diff(late, prepend=self._late) > ELSEWHERE
+        grown = np.diff(late, prepend=self._last[2] - self._last[1] * self._tick) > ELSEWHERE
         edges = np.unique([0, *np.flatnonzero(broken), late.size])
         for begin, end in pairwise(edges.tolist()):
             if broken[begin]:
@@ -176,11 +176,10 @@ class Unwrapper:
                 found[at] = True
                 self._earliest = float(late[at])
                 at += 1
-        self._late = float(late[-1])
         return found
 
     def _begin(self, rows: Arrived, stamp: float) -> None:
-        self._late = self._earliest = float(rows.arrival[0]) - stamp * self._tick
+        self._earliest = float(rows.arrival[0]) - stamp * self._tick
         self._last = (stamp, stamp, float(rows.arrival[0]), int(rows.opening[0]))
 
     def _text_stamps(self, rows: Arrived) -> Array:
