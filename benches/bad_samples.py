@@ -3,7 +3,8 @@
 Every filter that holds on to a vector replays a motion by hand (`moving` in tests/test_mekf.py) with and without bad
 samples of one sensor: one, two, or those of a second (all the same, noise, zeros), of each size in
 tests/test_bad_samples.py. The measure is the largest angle between both attitudes from 20 s after the last bad sample
-on; of the vertical where nothing shows the heading.
+on; of the vertical where nothing shows the heading. Filters with a bound of their own there (`LEFT_OF`) have rows of
+their own.
 
 Run: ``python benches/bad_samples.py [--seeds N] [--first SEED] [--write]``. With `--write` the table goes between the
 marks of the page, otherwise to standard output. Twenty-two logs take two minutes on one core.
@@ -21,7 +22,7 @@ from marked import markdown, write_between
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from test_bad_samples import AT, FILTERS, KINDS, LEFT, SIZES, apart, hand, with_bad  # noqa: E402  lies beside the tests
+from test_bad_samples import AT, FILTERS, KINDS, LEFT, LEFT_OF, SIZES, apart, hand, with_bad  # noqa: E402  lies beside the tests
 
 PAGE = ROOT / "docs" / "reliability.md"
 BEGIN, END = "<!-- bad samples -->", "<!-- end of bad samples -->"
@@ -51,14 +52,17 @@ def left(seeds: range) -> dict[str, dict[str, list[float]]]:
     return found
 
 
+def row(what: str, by_filter: dict[str, list[float]]) -> tuple[str, ...]:
+    """Write runs, runs beyond the limit, the most and the filter that it is of."""
+    values = np.concatenate(list(by_filter.values()))
+    worst = max(by_filter, key=lambda name: max(by_filter[name]))
+    return what, str(len(values)), str(int((values > LEFT).sum())), f"{values.max():.2f}", f"`{worst}`"
+
+
 def page(found: dict[str, dict[str, list[float]]], command: str) -> str:
-    """Write runs, runs beyond the limit and the most by kind, and the worst filter of each."""
-    rows = []
-    for kind, by_filter in found.items():
-        values = np.concatenate(list(by_filter.values()))
-        worst = max(by_filter, key=lambda name: max(by_filter[name]))
-        most = f"{values.max():.2f}"
-        rows.append((NAMES[kind], str(len(values)), str(int((values > LEFT).sum())), most, f"`{worst}`"))
+    """Write the table, and the command that made it."""
+    rows = [row(NAMES[kind], {n: v for n, v in found[kind].items() if n not in LEFT_OF}) for kind in KINDS]
+    rows += [row(f"`{name}`: {NAMES[kind]}", {name: found[kind][name]}) for name in LEFT_OF for kind in KINDS]
     header = ("bad samples of one sensor", ">runs", f">beyond {LEFT:g} deg", ">most, deg", "by")
     table = Table(title="", header=header, rows=tuple(rows))
     return f"{markdown(table)}\n\n`{command}`"

@@ -103,8 +103,7 @@ def _pieces(log: LogSource) -> tuple[Array, Array]:
             continue
         mean = 0.5 * (gyr[1:] + gyr[:-1])
         turn = np.concatenate([np.zeros((1, 3)), np.cumsum(mean * np.diff(t)[:, None], axis=0)])
-        edges = np.unique(np.searchsorted(t, np.arange(t[0], t[-1], PIECE)))
-        edges = edges[edges < t.size]
+        edges = np.concatenate(([0], np.flatnonzero(np.diff(np.floor((t - t[0]) / PIECE))) + 1))
         angles.append(np.diff(angle[edges]))
         turns.append(np.diff(turn[edges], axis=0))
     return _joined(angles, ()), _joined(turns, (3,))

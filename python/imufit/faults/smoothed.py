@@ -59,21 +59,24 @@ class Gain:
         """Take the spectra; None where too few stretches are long enough."""
         body, sensor = turning.body, turning.sensor
         step = float(np.median(np.diff(body.t)))
-        edges = np.arange(max(body.t[0], sensor.t[0]), min(body.t[-1], sensor.t[-1]), step)
+        if not 16.0 <= SEGMENT / step <= len(body.t):
+            return None
         length = int(SEGMENT / step)
-        if length < 16 or len(edges) < LEAST_SEGMENTS * length:
+        segments: list[list[Array]] = []
+        for begin, end in body.unbroken:
+            edges = np.arange(max(begin, sensor.t[0]), min(end, sensor.t[-1]), step)
+            if len(edges) <= length:
+                continue
+            rates = [np.diff(course.angle_at(edges), axis=0) / step for course in (sensor, body)]
+            seen = sensor.seen(edges[:-1], edges[1:])
+            starts = range(0, len(seen) - length + 1, length // 2)
+            segments += [[rate[at : at + length] for rate in rates] for at in starts if seen[at : at + length].all()]
+        if len(segments) < LEAST_SEGMENTS:
             return None
-        rates = [np.diff(course.angle_at(edges), axis=0) / step for course in (sensor, body)]
-        seen = sensor.seen(edges[:-1], edges[1:]) & body.seen(edges[:-1], edges[1:])
         window = np.hanning(length)[:, None]
-        starts = [at for at in range(0, len(seen) - length, length // 2) if seen[at : at + length].all()]
-        if len(starts) < LEAST_SEGMENTS:
-            return None
         own, other, shared = np.zeros(length // 2 + 1), np.zeros(length // 2 + 1), np.zeros(length // 2 + 1, complex)
-        for at in starts:
-            a, b = (
-                np.fft.rfft((x[at : at + length] - x[at : at + length].mean(axis=0)) * window, axis=0) for x in rates
-            )
+        for segment in segments:
+            a, b = (np.fft.rfft((rate - rate.mean(axis=0)) * window, axis=0) for rate in segment)
             own += np.sum(np.abs(a) ** 2, axis=1)
             other += np.sum(np.abs(b) ** 2, axis=1)
             shared += np.sum(a * np.conj(b), axis=1)

@@ -42,6 +42,13 @@ class Stretches:
         row = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
         return row, t - self.t[row]
 
+    @property
+    def unbroken(self) -> list[tuple[float, float]]:
+        """First and last time, s, of each stretch without a gap."""
+        ends = np.flatnonzero(self.gap)
+        begins = np.concatenate(([0], ends + 1))
+        return list(zip(self.t[begins].tolist(), self.t[np.append(ends, len(self.t) - 1)].tolist(), strict=True))
+
     def seen(self, begin: Array, end: Array) -> NDArray[np.bool_]:
         """Say which stretches lie within the times and touch no gap."""
         count = np.concatenate(([0], np.cumsum(self.gap)))

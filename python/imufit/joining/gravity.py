@@ -154,22 +154,19 @@ def _forces(aligned: Aligned, log: Log, reference: Log, rows: NDArray[np.intp]) 
     turns = rotation_from_quaternions(reference.ref_q[rows])
     up = turns.apply(vertical(reference.metadata.frame), inverse=True)
     begin, end = max(log.t[there][0], t_ref[0]), min(log.t[there][-1], t_ref[-1])
-    edges = np.arange(begin, end, 1.0)
-    if len(edges) < 2:
-        return np.zeros((0, 3)), np.zeros((0, 3))
-    force, had = _means(edges, log.t[there], log.acc[there])
-    expected, seen = _means(edges, t_ref, up)
-    both = had & seen
-    return _unit(force[both]), _unit(expected[both])
+    t = log.t[there]
+    own, other = (np.where((x >= begin) & (x < end), np.floor(x - begin), -1.0) for x in (t, t_ref))
+    seconds = np.setdiff1d(np.intersect1d(own, other), [-1.0])
+    return _unit(_means(seconds, own, log.acc[there])), _unit(_means(seconds, other, up))
 
 
-def _means(edges: Array, t: Array, values: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Means of (n, 3) values between edges, and where there are any."""
-    place = np.digitize(t, edges) - 1
-    inside = (place >= 0) & (place < len(edges) - 1)
-    count = np.bincount(place[inside], minlength=len(edges) - 1)
-    sums = np.stack([np.bincount(place[inside], values[inside, k], minlength=len(edges) - 1) for k in range(3)], axis=1)
-    return sums / np.maximum(count, 1)[:, None], count > 0
+def _means(seconds: Array, second: Array, values: Array) -> Array:
+    """Means of (n, 3) values in each of (k,) seconds, all of which have some."""
+    place = np.searchsorted(seconds, second)
+    inside = np.isin(second, seconds)
+    count = np.bincount(place[inside], minlength=len(seconds))
+    sums = [np.bincount(place[inside], values[inside, k], minlength=len(seconds)) for k in range(3)]
+    return np.stack(sums, axis=1) / count[:, None]
 
 
 def _unit(vectors: Array) -> Array:

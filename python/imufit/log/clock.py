@@ -9,7 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.log.clock_text import MONTH_FIRST, is_date, joined, order_of, seconds_from_cells
+from imufit.log.clock_text import MONTH_FIRST, ORDERS, is_date, joined, order_of, seconds_from_cells
+from imufit.log.columns import LARGEST_COVARIATE
 from imufit.log.time_order import counted_on
 from imufit.log.time_unit import time_unit
 from imufit.log.units import conversion
@@ -52,6 +53,15 @@ class Clock:
     def source(self) -> str:
         """Text that stands for it in a mapping, without the unit."""
         return self.column if self.day is None else f"{self.day}{BETWEEN}{self.column}"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns that it is read from."""
+        return (self.column,) if self.day is None else (self.day, self.column)
+
+    def times(self, cells: Mapping[str, NDArray[Any]]) -> Array:
+        """Read the times of some rows, s, from the cells of its columns; NaN where a cell is not a time."""
+        return _times(cells, self.column, self.unit, self.day)
 
 
 def clocks_of(
@@ -102,17 +112,26 @@ def _clock(
         if not np.isfinite(values).any():
             return None
         unit = unit or time_unit(values, ticks)
-        to_s: Callable[[Array], Array] = conversion("t", unit).apply if unit is not None else np.asarray
-        return Clock(name, unit, "ms", None, to_s(counted_on(values)))
+        return Clock(name, unit, "ms", None, _times(cells, name, unit, None))
     if name in days:
         return None
     day = next((each for each in days if _shows_day_alone(own)), None)
     whole = own if day is None else joined(cells[day], own)
     order = order_of(str(cell) for cell in whole if cell is not None)
-    seconds = seconds_from_cells(whole, order or MONTH_FIRST)
+    seconds = _times(cells, name, order, day)
     if np.isfinite(seconds).sum() <= _MOST * len(seconds):
         return None
     return Clock(name, (order or "s") if order is not None else None, MONTH_FIRST, day, seconds)
+
+
+def _times(cells: Mapping[str, NDArray[Any]], name: str, unit: str | None, day: str | None) -> Array:
+    """Convert cells to seconds; to whatever unit they stand in where none is known."""
+    own = cells[name]
+    if own.dtype != object:
+        values = np.where(np.abs(own) <= LARGEST_COVARIATE, own, np.nan)
+        to_s: Callable[[Array], Array] = conversion("t", unit).apply if unit is not None else np.asarray
+        return to_s(counted_on(values))
+    return seconds_from_cells(own if day is None else joined(cells[day], own), unit if unit in ORDERS else MONTH_FIRST)
 
 
 def _are_dates(cells: NDArray[Any]) -> bool:

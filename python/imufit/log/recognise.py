@@ -398,8 +398,10 @@ class _Readings:
             return cls(chosen, {})
         columns = [column for each in chosen.values() for column in each.columns]
         own = ("t", *GROUPS["acc"], *GROUPS["ref_q"])
-        rows = _first_rows(source, [*columns, *(c for c in own if c in names and c not in given)])
-        time = clock.seconds if clock is not None else rows.get("t")
+        own_clock = clock.columns if clock is not None else ()
+        cells = _first_cells(source, [*columns, *own_clock, *(c for c in own if c in names and c not in given)])
+        rows = {column: _numbers(values) for column, values in cells.items()}
+        time = clock.times(cells) if clock is not None else rows.get("t")
         known = None if time is None else np.isfinite(time)
         if time is None or known is None:
             return cls(chosen, rows)
@@ -456,12 +458,13 @@ def _first_cells(source: Readable, columns: Sequence[str]) -> dict[str, NDArray[
 
 def _first_rows(source: Readable, columns: Sequence[str]) -> dict[str, Array]:
     """Columns of the first rows as numbers."""
-    rows: dict[str, Array] = {}
-    for column, cells in _first_cells(source, columns).items():
-        values = seconds_from_cells(cells) if cells.dtype == object else cells
-        # squares of readings and their sums have room in a float64
-        rows[column] = np.where(np.abs(values) <= LARGEST_COVARIATE, values, np.nan)
-    return rows
+    return {column: _numbers(cells) for column, cells in _first_cells(source, columns).items()}
+
+
+def _numbers(cells: NDArray[Any]) -> Array:
+    """Cells as numbers; the squares of readings and their sums have room in a float64."""
+    values = seconds_from_cells(cells) if cells.dtype == object else cells
+    return np.where(np.abs(values) <= LARGEST_COVARIATE, values, np.nan)
 
 
 def _filled(t: Array, values: Array) -> Array:
