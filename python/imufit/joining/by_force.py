@@ -12,7 +12,7 @@ from imufit.joining.forces import REACH, Forces
 from imufit.joining.joined import Compared, RateTrace
 from imufit.joining.likeliest import RIVAL, SAME, Likeliest, Placed, of_these
 from imufit.joining.refine import Aligned
-from imufit.joining.search import USUAL_SKEW, Candidate, LagSearch
+from imufit.joining.search import LEAST_BINS, USUAL_SKEW, Candidate, LagSearch, likeliest_width, widths
 
 Array = NDArray[np.float64]
 
@@ -20,11 +20,6 @@ WIDTH: Final = 0.05
 """Shortest width of a mean force, s, as for rates: people, vehicles and robots shake slower than 10 Hz."""
 LEAST_SAMPLES: Final = 1.0
 """Samples of the slower recording in a width: with fewer, the position between samples is guessed."""
-WIDTHS: Final = 6
-"""Widths that are tried, each twice the one before: positions to a millimetre show the force in a tenth of a second,
-those of a satellite receiver in seconds. The likeliest lag of all widths counts."""
-LEAST_BINS: Final = 30
-"""Mean forces in the shorter recording; with fewer, some lag makes any two recordings agree."""
 OVERSAMPLED: Final = 4
 """Mean forces in a width by which the lag is refined: neighbours share samples, so that more say nothing new."""
 ROUNDS: Final = 10
@@ -54,12 +49,10 @@ def likeliest_by_force(
     Likeliest or None
         None where the recordings are too short, or no lag gives them forces in common.
     """
-    best: tuple[LagSearch, list[Candidate]] | None = None
-    for width in _widths(sensor, reference):
-        search = _search(sensor, reference, width, skew)
-        peaks = [search.at(near.lag)] if near is not None else search.peaks()
-        if peaks and (best is None or peaks[0].gain > best[1][0].gain):
-            best = search, peaks
+    best = likeliest_width(
+        (_search(sensor, reference, width, skew) for width in _widths(sensor, reference)),
+        near.lag if near is not None else None,
+    )
     if best is None:
         return None
     search, peaks = best
@@ -77,9 +70,7 @@ def likeliest_by_force(
 def _widths(sensor: Forces, reference: Forces) -> list[float]:
     times = sensor.stretches.t, reference.stretches.t
     shortest = max(WIDTH, *(LEAST_SAMPLES * float(np.median(np.diff(t))) for t in times))
-    length = min(float(np.ptp(t)) for t in times)
-    widths = [shortest * 2.0**k for k in range(WIDTHS)]
-    return [width for width in widths if length / width >= LEAST_BINS]
+    return widths(shortest, min(float(np.ptp(t)) for t in times))
 
 
 def _search(sensor: Forces, reference: Forces, width: float, skew: float | None) -> LagSearch:

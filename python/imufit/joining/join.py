@@ -15,7 +15,7 @@ from imufit.joining.course import Course, Stretches, reference_course
 from imufit.joining.forces import position_forces, sensor_forces
 from imufit.joining.gravity import mounted, vertical
 from imufit.joining.joined import Compared, Joined, RateTrace
-from imufit.joining.likeliest import Likeliest, Placed, likeliest, placed
+from imufit.joining.likeliest import Likeliest, Placed, likeliest_of_all_widths, placed
 from imufit.joining.mount import SMALL, nearest_square_turn, turned
 from imufit.joining.refine import Aligned, refine
 from imufit.joining.search import FASTER, LEAST_OVERLAP, Candidate, Correlation
@@ -78,21 +78,23 @@ def _join_attitude(log: Log, reference: Log, lag: float | None, skew: float | No
     sensor, body, rows = _courses(log, reference)
     if min(float(course.t[-1] - course.t[0]) for course in (sensor, body)) < LEAST_OVERLAP:
         raise _apart(reference)
-    rates = Correlation(sensor, body, skew)
+    rates = Correlation(sensor, body)
     if lag is None:
-        best, rival = _only_one(likeliest(sensor, body, rates, skew), (log, reference))
+        found, rival = _only_one(likeliest_of_all_widths(sensor, body, skew), (log, reference))
+        best = placed(sensor, body, rates, found.aligned)
     else:
+        rates = Correlation(sensor, body, skew)
         refined = refine(sensor, body, replace(rates.at(lag), lag=lag), skew is not None, lag_known=True)
         if refined is None:
             raise _apart(reference)
         best, rival = placed(sensor, body, rates, refined), 0.0
     aligned = best.aligned
     assert best.common is not None
-    found = mounted(best.common, aligned, log if by_gravity else log.with_fields(acc=None), reference, rows)
-    square, left = nearest_square_turn(found.matrix)
-    mount = square if left < SMALL else found.matrix
+    by_both = mounted(best.common, aligned, log if by_gravity else log.with_fields(acc=None), reference, rows)
+    square, left = nearest_square_turn(by_both.matrix)
+    mount = square if left < SMALL else by_both.matrix
     joined = _result(_joined(log, reference, rows, aligned, mount), best, rival)
-    return replace(joined, mount=mount, mount_error=found.error, by_gravity=found.by_gravity, left=left)
+    return replace(joined, mount=mount, mount_error=by_both.error, by_gravity=by_both.by_gravity, left=left)
 
 
 def _join_angle(log: Log, reference: Log, lag: float | None, skew: float | None) -> Joined:

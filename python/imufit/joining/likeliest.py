@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -12,7 +13,15 @@ from numpy.typing import NDArray
 from imufit.joining.course import Course
 from imufit.joining.joined import RateTrace
 from imufit.joining.refine import Aligned, refine
-from imufit.joining.search import Candidate, Correlation, LagSearch, turn_between
+from imufit.joining.search import (
+    Candidate,
+    Correlation,
+    LagSearch,
+    bin_width,
+    likeliest_width,
+    turn_between,
+    widths,
+)
 
 Array = NDArray[np.float64]
 
@@ -90,7 +99,12 @@ class Likeliest:
 
 
 def likeliest(
-    sensor: Course, body: Course, rates: Correlation, skew: float | None = None, most: int | None = None
+    sensor: Course,
+    body: Course,
+    rates: Correlation,
+    skew: float | None = None,
+    most: int | None = None,
+    peaks: Sequence[Candidate] | None = None,
 ) -> Likeliest | None:
     """Find the likeliest alignment.
 
@@ -104,13 +118,15 @@ def likeliest(
         Rate of the reference's clock over the sensor's, less one, where it is known.
     most : int, optional
         Blocks of the attitude to refine by, as in `refine`.
+    peaks : sequence of Candidate, optional
+        The peaks of `rates`, where they are known.
 
     Returns
     -------
     Likeliest or None
         None where no few seconds are common to both.
     """
-    peaks = rates.peaks()
+    peaks = peaks or rates.peaks()
     near = [peak for peak in peaks if peak.gain >= RIVAL * peaks[0].gain]
     some = most if len(near) == 1 else min(most or FEW, FEW)
     found: list[Placed] = []
@@ -129,6 +145,21 @@ def likeliest(
         if aligned is not None:
             return replace(answer, best=placed(sensor, body, rates, aligned))
     return answer
+
+
+def likeliest_of_all_widths(sensor: Course, body: Course, skew: float | None) -> Likeliest | None:
+    """Find the likeliest alignment in bins of the width that shows it best; arguments as for `likeliest`."""
+    shortest = bin_width(sensor, body)
+    length = min(float(course.t[-1] - course.t[0]) for course in (sensor, body))
+    searches = [Correlation(sensor, body, skew, width) for width in widths(shortest, length)]
+    best = likeliest_width(searches)
+    if best is None:
+        return None
+    chosen, peaks = best
+    # Narrower bins show each lag more closely, as refining needs it.
+    for wider, narrower in pairwise(searches[searches.index(chosen) :: -1]):
+        peaks = [replace(narrower.near(wider, peak), gain=peak.gain) for peak in peaks]
+    return likeliest(sensor, body, chosen, skew, peaks=peaks)
 
 
 def of_these(found: Sequence[Placed], search: LagSearch) -> Likeliest:

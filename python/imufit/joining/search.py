@@ -8,9 +8,9 @@ the reference stretched, in steps so small that the ends of the recordings stay 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,11 @@ USUAL_SKEW: Final = 1e-4
 MOST_STRETCHED: Final = 2**21
 """Bins of all stretched references together, a second or two of computing: all skews up to 1 % of ten minutes. Longer
 recordings are searched through smaller skews: up to 0.2 % at half an hour, 50 ppm at three hours."""
+WIDTHS: Final = 6
+"""Widths of bins that are tried, each twice the one before: positions to a millimetre show the force in a tenth of a
+second, those of a satellite receiver in seconds. The likeliest lag of all widths counts."""
+LEAST_BINS: Final = 30
+"""Bins in the shorter recording; with fewer, some lag makes any two recordings agree."""
 TURNS: Final = 15
 """Newton steps to the largest root. Where motion is about one axis, each halves the error, and 15 leave 3e-5 of it."""
 
@@ -136,13 +141,15 @@ class LagSearch:
         What sensor and reference show.
     skews : (k,) array
         Skews that are looked at, the smallest first.
+    spacing : float
+        Distance between neighbours of these.
     independent : float
         Time after which the products of both say something new if the recordings are unrelated, s.
     """
 
     def __init__(self, own: Rates, stretched: Callable[[float], Rates], skew: float | None) -> None:
         self.own, self.other, self.step = own, stretched(0.0), own.step
-        self._stretched = stretched
+        self._stretched, self._skew_known = stretched, skew is not None
         n, m = len(own.values), len(self.other.values)
         self._size = fft.next_fast_len(n + int(m * (1.0 + LARGEST_SKEW)) + 1, real=True)
         values, known = own.values, own.known.astype(float)
@@ -152,10 +159,12 @@ class LagSearch:
         self._sums = float(np.sum(values**2)), float(known.sum())
         other = fft.rfft(self.other.values.T, self._size)
         self.independent = self.step * _independent(self._rate, other, min(n, m))
-        spacing = 2.0 / max(1, min(n, m))
-        number = min(int(LARGEST_SKEW / spacing), int(MOST_STRETCHED / (2 * (n + m))))
+        self.spacing = 2.0 / max(1, min(n, m))
+        number = min(int(LARGEST_SKEW / self.spacing), int(MOST_STRETCHED / (2 * (n + m))))
         steps = np.arange(-number, number + 1)
-        self.skews = spacing * steps[np.argsort(np.abs(steps), kind="stable")] if skew is None else np.array([skew])
+        self.skews = (
+            self.spacing * steps[np.argsort(np.abs(steps), kind="stable")] if skew is None else np.array([skew])
+        )
 
     @property
     def tried(self) -> float:
@@ -196,6 +205,16 @@ class LagSearch:
     def at(self, lag: float) -> Candidate:
         """Return what there is at a lag, s; at the nearest one that the recordings allow, with the likeliest skew."""
         return max((self._candidate(each, self._place(each, lag)) for each in self._all()), key=lambda each: each.gain)
+
+    def near(self, wider: LagSearch, candidate: Candidate) -> Candidate:
+        """Return the likeliest lag and skew of those that a search in wider bins takes for one candidate."""
+        around = 0 if self._skew_known else round(wider.spacing / self.spacing)
+        skews = candidate.skew + self.spacing * np.arange(-around, around + 1)
+        found = []
+        for lags in (self._lags(float(skew)) for skew in skews):
+            first, last = (self._place(lags, candidate.lag + side * wider.step) for side in (1.0, -1.0))
+            found.append(self._candidate(lags, first + int(np.argmax(lags.gain[first : last + 1]))))
+        return max(found, key=lambda each: each.gain)
 
     def peaks(self, most: int = 8) -> list[Candidate]:
         """Return the likeliest maxima of the likelihood, `most` at most.
@@ -270,10 +289,12 @@ class Correlation(LagSearch):
         Integrated rates, each on its own clock.
     skew : float, optional
         As for `LagSearch`.
+    step : float, optional
+        Width of the bins, s; the shortest that there is by default.
     """
 
-    def __init__(self, sensor: Course, reference: Course, skew: float | None = 0.0) -> None:
-        step = bin_width(sensor, reference)
+    def __init__(self, sensor: Course, reference: Course, skew: float | None = 0.0, step: float | None = None) -> None:
+        step = step or bin_width(sensor, reference)
         edges = np.arange(sensor.t[0], sensor.t[-1], step)
         fastest = np.linalg.norm(np.diff(sensor.angle_at(edges), axis=0), axis=1) / step
         # Where the reference turns faster than the sensor ever does, a pose is wild.
@@ -281,6 +302,36 @@ class Correlation(LagSearch):
         super().__init__(
             Rates.of(sensor, step), lambda stretch: Rates.of(reference, step / (1.0 - stretch), most), skew
         )
+
+
+Search = TypeVar("Search", bound=LagSearch)
+
+
+def widths(shortest: float, length: float) -> list[float]:
+    """Give the widths of bins, s, from the shortest one to the longest that leaves enough of them in a `length`, s."""
+    octaves = [shortest * 2.0**k for k in range(WIDTHS)]
+    return [width for width in octaves if length / width >= LEAST_BINS]
+
+
+def likeliest_width(searches: Iterable[Search], lag: float | None = None) -> tuple[Search, list[Candidate]] | None:
+    """Return the search whose likeliest lag is the likeliest of all, and its peaks; None without any.
+
+    The noise of a reference is one of its poses: in wider bins it is less beside the motion, until the motion itself
+    averages out.
+
+    Parameters
+    ----------
+    searches : iterable of LagSearch
+        Over one pair of recordings, in bins of several widths.
+    lag : float, optional
+        The lag, s, where it is known.
+    """
+    best: tuple[Search, list[Candidate]] | None = None
+    for search in searches:
+        peaks = search.peaks() if lag is None else [search.at(lag)]
+        if peaks and (best is None or peaks[0].gain > best[1][0].gain):
+            best = search, peaks
+    return best
 
 
 class Clocks(Protocol):
