@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 
 RIVAL: Final = 0.3
 """A second lag with this share of the first one's log likelihood is looked at to a fraction of a sample as well."""
+RESOLVED: Final = 0.5
+"""Share of the motion's power that bins keep which resolve it: with half of it, two bins stand for a period. Two lags a
+period apart are in different bins then."""
 SAME: Final = 0.5
 """Two alignments that put one sample of the reference at the same time, to this many bins, are one."""
 FEW: Final = 100
@@ -151,7 +154,12 @@ def likeliest_of_all_widths(sensor: Course, body: Course, skew: float | None) ->
     """Find the likeliest alignment in bins of the width that shows it best; arguments as for `likeliest`."""
     shortest = bin_width(sensor, body)
     length = min(float(course.t[-1] - course.t[0]) for course in (sensor, body))
-    searches = [Correlation(sensor, body, skew, width) for width in widths(shortest, length)]
+    searches: list[Correlation] = []
+    for width in widths(shortest, length):
+        search = Correlation(sensor, body, skew, width)
+        if searches and search.own.power < RESOLVED * searches[0].own.power:
+            break
+        searches.append(search)
     best = likeliest_width(searches)
     if best is None:
         return None

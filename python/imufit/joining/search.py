@@ -77,6 +77,11 @@ class Rates:
         values -= values[known].mean(axis=0) if known.any() else 0.0
         return cls(float(edges[0]), step, np.where(known[:, None], values, 0.0), known)
 
+    @property
+    def power(self) -> float:
+        """Mean square of what is known; 0 where nothing is."""
+        return float(np.sum(self.values**2)) / max(1, int(self.known.sum()))
+
 
 @dataclass(frozen=True)
 class Candidate:

@@ -1,7 +1,8 @@
 """Log files: read, check, convert, write."""
 
 from imufit.errors import InputError
-from imufit.log.anything import AnyLog, AnyLogs, AnyTable, log_of, logs_of_any, pandas_of
+from imufit.log.any_table import AnyTable
+from imufit.log.anything import AnyLog, AnyLogs, log_of, logs_of_any, pandas_of
 from imufit.log.contents import Contents, contents
 from imufit.log.excerpt import judged_rows
 from imufit.log.frame import FrameSource

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 
 from imufit.errors import InputError
+from imufit.log.any_table import AnyTable
 from imufit.log.columns import GROUPS
 from imufit.log.log import METADATA, Log, LogSource
 from imufit.log.metadata import mapping_from_json
@@ -27,15 +28,6 @@ class LogHolder(Protocol):
         ...
 
 
-class ArrowTable(Protocol):
-    """A table that offers Arrow's stream: polars, pyarrow, duckdb, a log itself."""
-
-    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
-        """Give the columns as a stream of Arrow."""
-        ...
-
-
-AnyTable: TypeAlias = "pd.DataFrame | ArrowTable | Mapping[str, Any]"
 AnyLog: TypeAlias = "LogSource | LogHolder | str | PathLike[str] | AnyTable"
 AnyLogs: TypeAlias = "AnyLog | Sequence[AnyLog]"
 

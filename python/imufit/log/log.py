@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from scipy.spatial.transform import Rotation
 
-    from imufit.log.anything import AnyTable
+    from imufit.log.any_table import AnyTable
 
 Array = NDArray[np.float64]
 Text = NDArray[np.object_]

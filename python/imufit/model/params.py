@@ -4,14 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol, Self
 
 from imufit.errors import InputError
 from imufit.results.parameter import Parameter, parameter_table
 from imufit.results.params import Params
 
-if TYPE_CHECKING:
-    from imufit.model.effect_stack import EffectStack
+
+class Adjustable(Protocol):
+    """A model whose parameters can be set."""
+
+    @property
+    def params(self) -> ModelParams:
+        """Parameters by ``EFFECT.PARAM``."""
+
+    @property
+    def parameters(self) -> Mapping[str, Mapping[str, float]]:
+        """Values by effect and parameter, SI units."""
+
+    def listed(self) -> tuple[Parameter, ...]:
+        """Every parameter with its standard error, unit and typical size."""
+
+    def copy(self) -> Self:
+        """Return a model of its own with the same values."""
+
+    def adjust(
+        self,
+        effect_id: str,
+        name: str,
+        *,
+        value: float | None,
+        vary: bool | None,
+        lower: float | None,
+        upper: float | None,
+    ) -> None:
+        """Change one parameter in place."""
 
 
 @dataclass(frozen=True)
@@ -20,11 +47,11 @@ class ModelParameter(Parameter):
 
     Attributes
     ----------
-    model : EffectStack
+    model : Adjustable
         The model that it belongs to.
     """
 
-    model: EffectStack | None = field(default=None, repr=False, compare=False)
+    model: Adjustable | None = field(default=None, repr=False, compare=False)
 
     def set(
         self,
@@ -67,11 +94,11 @@ class ModelParams(Params):
 
     Parameters
     ----------
-    model : EffectStack
+    model : Adjustable
         The model.
     """
 
-    def __init__(self, model: EffectStack) -> None:
+    def __init__(self, model: Adjustable) -> None:
         self._model = model
 
     def __getitem__(self, key: str) -> ModelParameter:
@@ -99,13 +126,13 @@ class EffectParameters(Mapping[str, ModelParameter]):
 
     Parameters
     ----------
-    model : EffectStack
+    model : Adjustable
         The model.
     effect : str
         One of its effects.
     """
 
-    def __init__(self, model: EffectStack, effect: str) -> None:
+    def __init__(self, model: Adjustable, effect: str) -> None:
         self._model = model
         self._effect = effect
 

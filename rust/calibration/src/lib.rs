@@ -5,6 +5,7 @@
 //! diagonal (misalignment), K diagonal (scale). [`affine`] converts to the sensor model's `reading = G corrected + bias`.
 
 pub mod affine;
+pub mod criteria;
 pub mod moving_window;
 pub mod norm_cost;
 pub mod pose;

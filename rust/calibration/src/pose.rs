@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::pose_judge::Criteria;
+use crate::criteria::Criteria;
 use crate::side::Side;
 
 /// Length of the blocks whose means tell how far the mean of correlated readings can be trusted, s.

@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
+use crate::criteria::Criteria;
 use crate::pose::{Flaw, Pose};
-use crate::pose_judge::{Criteria, PoseJudge};
+use crate::pose_judge::PoseJudge;
 use crate::quantisation;
 use crate::side::Side;
 

@@ -53,6 +53,7 @@ pub mod vibration;
 pub use catalogue::{Description, FILTERS};
 pub use columns::{Columns, Row};
 pub use filter::Filter;
+pub use kalman::steady_state_gain;
 pub use parameter::Parameter;
 pub use replay::Replay;
 pub use rules::Rules;
@@ -60,7 +61,7 @@ pub use sample::{AngularRate, Environment, FluxDensity, Reading, Sample, Sensor,
 pub use skipped::Skipped;
 pub use smoother::Smoother;
 pub use start::Start;
-pub use steady_state::{SteadyState, steady_state_gain};
+pub use steady_state::SteadyState;
 
 /// What stops a filter before its first row.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

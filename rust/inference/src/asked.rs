@@ -3,8 +3,8 @@
 use imufit_fit::normal_equations::NormalEquations;
 use nalgebra::{DMatrix, DVector};
 
+use crate::criterion::Criterion;
 use crate::problem::indices;
-use crate::stack::Criterion;
 
 /// What the parameters of a question may be.
 #[derive(Clone, Debug)]

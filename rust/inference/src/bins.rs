@@ -8,8 +8,8 @@ use imufit_model::sensor_model::Slot;
 use nalgebra::{DMatrix, DVector};
 
 use crate::asked::Asked;
+use crate::criterion::Criterion;
 use crate::problem::{Problem, Question};
-use crate::stack::Criterion;
 
 /// Contrasts over the bins: polynomials of the bin's rank up to this degree.
 pub const CONTRASTS: usize = 5;

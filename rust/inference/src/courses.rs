@@ -9,7 +9,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::asked::Asked;
 use crate::bins::{self, Covariate};
-use crate::stack::{Beside, Criterion, Stack};
+use crate::criterion::Criterion;
+use crate::stack::{Beside, Stack};
 
 /// Courses of each family that are integrated over the noise, of those that stand out at the likeliest noise and without any.
 const LOOKED_AT: usize = 3;

@@ -13,9 +13,10 @@ use rayon::prelude::*;
 use crate::asked::{Asked, Prior};
 use crate::bins::{self, Covariate};
 use crate::courses;
+use crate::criterion::Criterion;
 use crate::problem::Problem;
 use crate::search::Search;
-use crate::stack::{Criterion, Stack};
+use crate::stack::Stack;
 
 /// What the covariates are called that hold the quantities that sensors measure, up to the axis.
 const OWN: [&str; 3] = ["f_", "omega_", "m_"];

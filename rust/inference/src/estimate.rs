@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::criterion::Criterion;
 use crate::problem::Problem;
 use crate::scatter::scatter;
-use crate::stack::{Criterion, Stack};
+use crate::stack::Stack;
 
 /// Fitted steps of a model's parameters.
 #[derive(Clone, Debug)]

@@ -8,6 +8,7 @@ pub mod agreement;
 pub mod asked;
 pub mod bins;
 pub mod courses;
+pub mod criterion;
 pub mod dictionary;
 pub mod estimate;
 pub mod held_out;

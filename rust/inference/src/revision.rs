@@ -3,9 +3,9 @@
 //! Effects are added one at a time, each when the others were still missing. Each is taken out in turn, to first order, and asked to come
 //! back in competition with all candidates. Where columns say little of their full size this is no more than a proposal.
 
+use crate::criterion::Criterion;
 use crate::problem::Problem;
 use crate::search::{self, Search, Weighed};
-use crate::stack::Criterion;
 
 /// Share of an effect's log Bayes factor from which on a fit may show that another candidate explains more (0.74 for a reference that is 85
 /// ms late, on a robot's arm; columns say that the accelerometer is).

@@ -11,12 +11,11 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::asked::{Asked, Prior};
-
+use crate::criterion::Criterion;
 use crate::problem::Question;
 use crate::problem::indices;
-use crate::stack::{Criterion, Stack, ln_prior, log_sum_exp};
+use crate::stack::{Stack, ln_prior, log_sum_exp};
 use crate::varying::{self, Varying};
-use crate::verdict::Plausible;
 
 /// Log odds that something is there before a name is given: one false name in a thousand logs, were all components of the noise right.
 const ODDS: f64 = 2.0;
@@ -49,6 +48,19 @@ pub struct Search<'a> {
     asked: HashMap<usize, Asked>,
     /// Log Bayes factor from which on a candidate is there: the odds against one of so many.
     pub threshold: f64,
+}
+
+/// Whether sensors can have what a candidate's parameters say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Plausible {
+    /// They can.
+    Yes,
+    /// With the other sign: it can be a rival, but is never named first.
+    OtherSign,
+    /// A parameter lies far beyond what such sensors have.
+    TooLarge,
+    /// A parameter has a sign that it cannot have.
+    No,
 }
 
 /// One candidate beside a stack.

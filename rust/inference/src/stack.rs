@@ -1,24 +1,18 @@
 //! A stack of effects with the likelihood of the log under it, and the Bayes factor of columns beside it.
 
 use imufit_fit::block_sums::ChannelSums;
-use imufit_fit::normal_equations::NormalEquations;
 use imufit_fit::whitening;
-use imufit_model::card::ReferencePart;
-use imufit_model::sensor_model::Slot;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 use crate::asked::{Asked, Prior};
-use crate::problem::{Problem, parameters_of};
+use crate::criterion::Criterion;
+use crate::problem::Problem;
 use crate::zeros::{self, Modes, Strength};
 
 /// Strengths of the noise whose log likelihood lies so far below the best one do not count, unless they are weaker than that:
 /// columns can explain what a stack charges to the noise, never the reverse.
 const NEGLIGIBLE: f64 = 30.0;
-/// By so many times its part of the mean square a gain may seem off where the reference is noisy (attenuation, see [`Problem::attenuated`]).
-const ATTENUATION: f64 = 1.5;
-/// Less of it no log shows.
-const ATTENUATION_SEEN: f64 = 1e-5;
 /// Sizes that an effect may have, in prior deviations: data sheets bound them, and better parts have a hundredth.
 const SIZES: [f64; 4] = [1.0, 0.2, 0.04, 0.008];
 /// Part of its own information that a column keeps beside others that make it up, so that equations can be solved.
@@ -30,90 +24,6 @@ const HEADING: usize = SENSORS;
 /// Deviations by which the heading of a reference may wander over a log, rad: from none, by that of a good gyroscope, to that of a filter
 /// that has not settled.
 const WANDERS: [f64; 7] = [0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3];
-
-/// What all questions of a problem share.
-pub struct Criterion<'a> {
-    /// The problem.
-    pub problem: &'a Problem,
-    /// Whitened equations of all blocks over all parameters.
-    pub total: NormalEquations,
-    /// Block means of every channel.
-    pub modes: Vec<Modes>,
-    /// Every strength of the noise.
-    pub strengths: Vec<Strength>,
-    /// Gains that the noise of the reference makes uncertain, and angles that its steps do: parameter and deviation.
-    uncertain: Vec<(usize, f64)>,
-    /// Parameters of a heading of the reference that wanders by one radian.
-    pub heading: Vec<usize>,
-    /// Number of samples of a channel, on average.
-    pub samples: f64,
-}
-
-/// Part of a quantity that a reference of limited bandwidth has lost to first order: what it has lost beyond that is of the second order, and
-/// with a coefficient that nobody knows may be as much of the part again.
-fn lost(problem: &Problem, total: &NormalEquations, gain: usize) -> f64 {
-    let known = total.gram[(gain, gain)];
-    let of = |slot: &Slot| {
-        let first = slot.parameters.first().copied().unwrap_or(0.0);
-        (first * total.gram[(slot.first, gain)] / known).abs()
-    };
-    let bandwidth =
-        |slot: &&Slot| slot.in_model && slot.effect.card().traits.reference == Some(ReferencePart::Bandwidth);
-    if known > 0.0 {
-        problem.slots.iter().filter(bandwidth).map(of).sum()
-    } else {
-        0.0
-    }
-}
-
-impl<'a> Criterion<'a> {
-    /// Of a problem.
-    pub fn new(problem: &'a Problem) -> Self {
-        let all: Vec<usize> = (0..problem.plausible.len()).collect();
-        let total = problem.total(&all);
-        let gains = problem.attenuated().into_iter().flat_map(|(slot, shares)| {
-            let first = problem.slots[slot].first;
-            (0..3).map(move |axis| (first + axis, shares[axis]))
-        });
-        let deviation = |(j, share): (usize, f64)| (j, (ATTENUATION * share).hypot(lost(problem, &total, j)));
-        let uncertain: Vec<(usize, f64)> = gains
-            .map(deviation)
-            .filter(|(_, deviation)| *deviation > ATTENUATION_SEEN)
-            .chain(problem.rounded())
-            .collect();
-        let wanders = |s: &&Slot| s.effect.card().traits.reference == Some(ReferencePart::Heading);
-        let heading = parameters_of(problem.slots.iter().filter(wanders));
-        let channels: usize = problem
-            .parts
-            .iter()
-            .map(|part| part.weights().iter().filter(|w| **w > 0.0).count())
-            .sum();
-        Self {
-            problem,
-            samples: total.n / channels.max(1) as f64 * problem.parts.len().max(1) as f64,
-            total,
-            modes: zeros::modes(problem),
-            strengths: zeros::strengths(),
-            uncertain,
-            heading,
-        }
-    }
-
-    /// Prior deviation of a parameter of a candidate: three times what is typical; where nobody can tell what that is, as much as makes a
-    /// signal as large as the noise of a sample (unit information, Kass and Wasserman 1995).
-    pub fn deviation(&self, parameter: usize) -> f64 {
-        if self.problem.typical[parameter] {
-            self.problem.plausible[parameter]
-        } else {
-            let information = self.total.gram[(parameter, parameter)];
-            if information > 0.0 {
-                (self.samples / information).sqrt()
-            } else {
-                0.0
-            }
-        }
-    }
-}
 
 /// The likelihood of a stack for one strength of the noise of one sensor, or of the heading, that of the others at their best.
 struct Point {

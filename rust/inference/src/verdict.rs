@@ -9,12 +9,13 @@ use rayon::prelude::*;
 use crate::agreement::{self, Disagreement};
 use crate::asked::Asked;
 use crate::bins::{self, Covariate};
+use crate::criterion::Criterion;
 use crate::dictionary::{self, Origin, Unnamed};
 use crate::held_out::{self, HeldOut};
 use crate::problem::{Problem, indices};
-use crate::search::{self, Search, Weighed};
+use crate::search::{self, Plausible, Search, Weighed};
 use crate::similarity;
-use crate::stack::{Criterion, Stack};
+use crate::stack::Stack;
 
 /// The four answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,19 +28,6 @@ pub enum Kind {
     Ambiguous,
     /// Something is missing that no effect of the catalogue explains.
     Unknown,
-}
-
-/// Whether sensors can have what a candidate's parameters say.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Plausible {
-    /// They can.
-    Yes,
-    /// With the other sign: it can be a rival, but is never named first.
-    OtherSign,
-    /// A parameter lies far beyond what such sensors have.
-    TooLarge,
-    /// A parameter has a sign that it cannot have.
-    No,
 }
 
 /// What became of a candidate.

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use crate::knots::usual_step;
+use crate::usual_step::usual_step;
 
 /// How the reference goes on in three rows.
 #[derive(Clone, Copy, Debug)]

@@ -29,5 +29,6 @@ pub mod sharpened;
 pub mod smoothing;
 pub mod temperature_course;
 pub mod triple;
+pub mod usual_step;
 pub mod vibration;
 pub mod window;

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use crate::knots::usual_step;
+use crate::usual_step::usual_step;
 
 /// Part of the usual step below which samples stand in one packet: no instrument samples ten times faster now and then.
 const PACKED: f64 = 0.1;

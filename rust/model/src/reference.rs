@@ -6,10 +6,11 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::interpolated::Course;
-use crate::knots::{Knots, usual_step};
+use crate::knots::Knots;
 use crate::reference_clock::ReferenceClock;
 use crate::rotation_rates::{RotationRates, rates};
 use crate::smoothing::{self, Derivatives, LocalFit, Smoothing, Weights};
+use crate::usual_step::usual_step;
 use crate::window::Window;
 
 /// State of the body at one time.

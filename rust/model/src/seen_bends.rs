@@ -9,6 +9,7 @@ use nalgebra::{Cholesky, SMatrix, Vector3};
 
 use crate::rotation_rates::rates;
 use crate::sensor::Sensor;
+use crate::usual_step::usual_step;
 use crate::window::Window;
 
 /// Readings further apart than so many usual steps have an unknown turn between them.
@@ -41,7 +42,7 @@ impl Turns {
             .filter(|i| rate(*i).iter().all(|v| v.is_finite()))
             .collect();
         let t: Vec<f64> = rows.iter().map(|i| window.t[*i]).collect();
-        let widest = GAP * crate::knots::usual_step(&t);
+        let widest = GAP * usual_step(&t);
         let (mut angle, mut stretch) = (vec![Vector3::zeros(); t.len()], vec![0; t.len()]);
         for k in 1..t.len() {
             let h = t[k] - t[k - 1];
@@ -69,7 +70,7 @@ impl Turns {
         };
         let scatter = rows.windows(5).map(fourth).sum::<f64>() / rows.len().saturating_sub(4).max(1) as f64;
         let mut turns = Self {
-            noise: scatter * crate::knots::usual_step(&t),
+            noise: scatter * usual_step(&t),
             step: apart,
             angles: Default::default(),
             stretch: Vec::with_capacity(times.len()),

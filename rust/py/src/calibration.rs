@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use imufit_calibration::CalibrationError;
 use imufit_calibration::affine::Affine;
+use imufit_calibration::criteria::Criteria;
 use imufit_calibration::norm_cost::{self, Weighing};
 use imufit_calibration::pose::{Flaw, Pose};
-use imufit_calibration::pose_judge::{Criteria, PoseJudge, State};
+use imufit_calibration::pose_judge::{PoseJudge, State};
 use imufit_calibration::rests::{self, Readings};
 use imufit_calibration::side::Side;
 use imufit_calibration::solution::{Elements, Form, Solution};

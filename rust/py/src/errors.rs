@@ -43,7 +43,7 @@ pub fn input_error_in_row(py: Python<'_>, problem: impl std::fmt::Display, row: 
 
 /// An error of an effect; a user's own exception comes out as it went in.
 pub fn from_effect(error: EffectError) -> PyErr {
-    match (&error, crate::python_effect::take_raised()) {
+    match (&error, crate::raised::take()) {
         (EffectError::User { .. }, Some(raised)) => raised,
         (EffectError::Contract { .. }, _) => Python::attach(|py| input_error(py, &error)),
         _ => value_error(error),

@@ -2,9 +2,10 @@
 
 use imufit_fit::part::Part;
 use imufit_fit::{residual, saturated};
+use imufit_inference::criterion::Criterion;
 use imufit_inference::problem::{Limit, Problem, parameters_of};
 use imufit_inference::search::{self, Search};
-use imufit_inference::stack::{self, Criterion};
+use imufit_inference::stack;
 use imufit_inference::{estimate, held_out, revision, verdict};
 use imufit_model::rest_channels;
 use imufit_model::sensor::CHANNELS;

@@ -14,6 +14,7 @@ mod fit;
 mod inference;
 mod model;
 mod python_effect;
+mod raised;
 mod replay_arguments;
 mod rests;
 mod trials;

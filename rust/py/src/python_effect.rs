@@ -1,6 +1,6 @@
 //! A user's Python function as an effect. Its exception comes out unchanged.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use imufit_model::card::{Affine, Card, Found, Parameter, Reach, Scope, Stage, Traits};
 use imufit_model::effect::{Columns, Effect, EffectError, Rows, Sign};
@@ -13,17 +13,10 @@ use pyo3::types::PyDict;
 
 use crate::errors::{input_error, value_error};
 use crate::model::PyEffect;
+use crate::raised;
 
 /// The column of a log that holds the sensor's temperature.
 const TEMPERATURE: &str = "temp";
-
-/// The exception a user's function raised last; taken by whoever turns the core error into a Python one.
-static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
-
-/// The exception behind an [`EffectError::User`].
-pub fn take_raised() -> Option<PyErr> {
-    RAISED.lock().unwrap_or_else(PoisonError::into_inner).take()
-}
 
 /// What a user's function is asked for; the word that it is told.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -144,7 +137,7 @@ impl PythonEffect {
         Python::attach(|py| {
             ask(py).map_err(|error| {
                 let message = error.to_string();
-                *RAISED.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                raised::keep(error);
                 EffectError::User {
                     effect: self.card.id.clone(),
                     message,
