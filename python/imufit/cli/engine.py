@@ -149,6 +149,29 @@ def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     return ladder(logs, model=model, progress=progress)
 
 
+def studio(logs: Sequence[Path], reading: Reading, *, port: int, ready: Callable[[str], None]) -> None:
+    """Serve the studio until Ctrl-C; `ready` receives the address.
+
+    Raises
+    ------
+    InputError
+        NiceGUI is not installed, the port is taken, or a log cannot be read.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+
+    try:
+        from imufit.studio import page, server  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("imufit"):
+            raise
+        raise InputError(
+            f"the studio needs the package {error.name}, which is not installed",
+            remedy="Install it with: pip install 'imufit[studio]'.",
+        ) from None
+    server.add_page("/", page.build)
+    server.serve(port, ready)
+
+
 def catalogue() -> list[EffectCard]:
     """Return every effect there is, the user's own included."""
     import imufit  # noqa: PLC0415
