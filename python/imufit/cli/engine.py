@@ -392,31 +392,11 @@ def hidden(scenario: str, seed: int, **settings: Any) -> Simulation:
     return simulation
 
 
-def log_of(simulation: Simulation) -> Log:
-    """Return the log of a simulation, without what is known of it."""
-    from imufit.log import Log  # noqa: PLC0415
-
-    return Log.from_arrays(
-        simulation.t,
-        acc=simulation.acc,
-        gyr=simulation.gyr,
-        mag=simulation.mag,
-        temp=simulation.temp,
-        reference=simulation.ref_q,
-        ref_p=simulation.ref_p,
-        ref_angle=simulation.ref_angle,
-        pose=None if simulation.pose is None else simulation.pose.tolist(),
-        covariates=simulation.covariates,
-        **simulation.metadata,
-    )
-
-
 def save_simulation(simulation: Simulation, path: Path) -> Path:
     """Write the log to `path` and its sealed truth beside it; return where that is."""
-    from imufit.lab.simulate import seal  # noqa: PLC0415
+    from imufit.lab.simulated_log import save_simulation  # noqa: PLC0415
 
-    log_of(simulation).write(path)
-    return seal(simulation.truth, path)
+    return save_simulation(simulation, path)
 
 
 def emulator(
