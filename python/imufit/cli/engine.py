@@ -149,6 +149,29 @@ def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     return ladder(logs, model=model, progress=progress)
 
 
+def studio(logs: Sequence[Path], reading: Reading, *, port: int, ready: Callable[[str], None]) -> None:
+    """Serve the studio until Ctrl-C; `ready` receives the address.
+
+    Raises
+    ------
+    InputError
+        NiceGUI is not installed, the port is taken, or a log cannot be read.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+
+    try:
+        from imufit.studio import page, server  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("imufit"):
+            raise
+        raise InputError(
+            f"the studio needs the package {error.name}, which is not installed",
+            remedy="Install it with: pip install 'imufit[studio]'.",
+        ) from None
+    server.add_page("/", page.build)
+    server.serve(port, ready)
+
+
 def catalogue() -> list[EffectCard]:
     """Return every effect there is, the user's own included."""
     import imufit  # noqa: PLC0415
@@ -369,31 +392,11 @@ def hidden(scenario: str, seed: int, **settings: Any) -> Simulation:
     return simulation
 
 
-def log_of(simulation: Simulation) -> Log:
-    """Return the log of a simulation, without what is known of it."""
-    from imufit.log import Log  # noqa: PLC0415
-
-    return Log.from_arrays(
-        simulation.t,
-        acc=simulation.acc,
-        gyr=simulation.gyr,
-        mag=simulation.mag,
-        temp=simulation.temp,
-        reference=simulation.ref_q,
-        ref_p=simulation.ref_p,
-        ref_angle=simulation.ref_angle,
-        pose=None if simulation.pose is None else simulation.pose.tolist(),
-        covariates=simulation.covariates,
-        **simulation.metadata,
-    )
-
-
 def save_simulation(simulation: Simulation, path: Path) -> Path:
     """Write the log to `path` and its sealed truth beside it; return where that is."""
-    from imufit.lab.simulate import seal  # noqa: PLC0415
+    from imufit.lab.simulated_log import save_simulation  # noqa: PLC0415
 
-    log_of(simulation).write(path)
-    return seal(simulation.truth, path)
+    return save_simulation(simulation, path)
 
 
 def emulator(
