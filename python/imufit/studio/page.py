@@ -7,7 +7,7 @@ from nicegui import ui
 
 def build() -> None:
     """Make the page."""
-    ui.label("imufit studio")
+    ui.label("imufit")
     with ui.element("main").classes("studio"):
         for region in ("left", "middle", "right", "bottom"):
             ui.element("section").classes(f"studio-{region}")

@@ -12,6 +12,7 @@ from fastapi import FastAPI
 from nicegui import app, ui
 
 from imufit.errors import InputError
+from imufit.remedy import keyword
 from imufit.studio.guard import HOST, Guard
 
 TOKEN_BYTES: Final = 24
@@ -22,7 +23,7 @@ BACKLOG: Final = 64
 _paths: set[str] = set()
 
 
-def add_page(path: str, build: Callable[[], None], title: str = "imufit studio") -> None:
+def add_page(path: str, build: Callable[[], None], title: str = "imufit") -> None:
     """Serve one more page.
 
     Parameters
@@ -81,7 +82,8 @@ def serve(port: int = 0, ready: Callable[[str], None] | None = None) -> None:
             listening.bind((HOST, port))
         except OSError as error:
             raise InputError(
-                f"port {port} cannot be used: {error.strerror}", remedy="Leave --port out, or choose another one."
+                f"port {port} cannot be used: {error.strerror}",
+                remedy="Leave out " + keyword("port") + ", or give another one.",
             ) from None
         listening.listen(BACKLOG)
         chosen = listening.getsockname()[1]

@@ -1,7 +1,7 @@
 """What a page of the studio shows and changes: logs, the stack of effects, its fits, and the way there.
 
-Nothing here draws. Every number is that of the fit which `imufit add`, `imufit ladder` and `imufit diagnose` make; where
-a fit has yet to be made, the evidence of the first pass gives the numbers to first order, and they say so.
+Nothing here draws. Every number is that of the fit which `imufit add`, `imufit ladder` and `imufit diagnose` make.
+Where a fit has yet to be made, the evidence of the first pass gives the numbers to first order, and they say so.
 """
 
 from __future__ import annotations
