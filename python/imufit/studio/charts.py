@@ -237,7 +237,7 @@ def fall(
     heights = [value for value in [*ratios, *(value for _, value in known)] if math.isfinite(value) and value > 0.0]
     top, low = max([*heights, 1.0]), min([*heights, 1.0])
     logarithmic = top / low > LOGARITHMIC_ABOVE
-    scale = (
+    scale: dict[str, Any] = (
         {"type": "log", "range": [math.log10(0.6 * low), math.log10(1.8 * top)], "dtick": "D1"}
         if logarithmic
         else {"range": [0.0, 1.22 * top]}
@@ -245,15 +245,15 @@ def fall(
     edge = [-0.6, len(places) - 0.4]
     floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
     ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": -25}
-    figure = _figure([*bars, *floor], "", "held-out error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
+    figure = _figure(
+        [*bars, *floor], "", "held-out error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True}
+    )
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
     return figure
 
 
-def trace(
-    channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual"
-) -> Figure:
+def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:
     """Draw quantities of one channel over time.
 
     Parameters
