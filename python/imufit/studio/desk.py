@@ -162,7 +162,8 @@ class Desk:
         self._working = True
         try:
             while (step := next(self._pending(), None)) is not None:
-                if await self._in_thread(*step) is None:
+                await self._in_thread(*step)
+                if self.trouble:
                     return
         finally:
             self._working = False
@@ -188,9 +189,10 @@ class Desk:
             for model in dict.fromkeys((stack.model, Stack())):
                 if model not in self.models:
                     yield "residuals over time", partial(self._drawn_model, model)
-        second = None if session.second is None or not session.has_reference else session.made(session.second)
-        if second is not None and second.comparison is None:
-            yield "comparing the second model", lambda: session.compare(session.second, self.progress)
+        if session.second is not None:
+            second = session.made(session.second)
+            if second is None or (second.comparison is None and session.has_reference):
+                yield "comparing the second model", lambda: session.compare(session.second, self.progress)
 
     def _drawn_rows(self) -> Traces:
         """Make the pass over the rows of the log that is drawn."""

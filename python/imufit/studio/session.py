@@ -22,7 +22,7 @@ from imufit.log import LogSource
 from imufit.loop import Fit, SensorModel
 from imufit.model.catalogue import each_log_has_its_own, find_effect
 from imufit.progress import Progress, silent
-from imufit.results import Comparison, Diagnosis, ModelComparison, Parameter
+from imufit.results import Comparison, Diagnosis, Parameter
 from imufit.results.comparison import Panel
 from imufit.studio.stack import Action, Stack, Step
 from imufit.studio.traces import ModelTraces, Traces
@@ -450,20 +450,6 @@ class Session:
             return []
         solved = analysis.problem.estimate([*analysis.fitted_slots, analysis.slots.index(effect)])
         return panels(analysis, solved["full_step"], self.shown)
-
-    def against(self, progress: Progress = silent) -> ModelComparison | None:
-        """Hold the second model against the present one; None where there is no second one.
-
-        Parameters
-        ----------
-        progress : callable
-            Called with (rows done, rows in all, what is being done).
-        """
-        if self.second is None or not self.has_reference:
-            return None
-        with self._work:
-            first = self._with_evidence(self.fit(self.second, progress))
-            return first.against(self._with_evidence(self.fit(None, progress)), progress)
 
     def _nearest(self) -> Made:
         """Return the fit of the last step up to the present one that was made."""

@@ -11,6 +11,7 @@ from imufit.model.catalogue import card_of, find_effect
 from imufit.printable import NAME, printable
 from imufit.results import Candidate, Diagnosis
 from imufit.results.diagnosis import NOT_TESTABLE, PASSED
+from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.view_panels import PanelView
 
@@ -35,7 +36,7 @@ class CandidateView:
         self._drawn: tuple[object, bool] | None = None
         ui.html("Missing effects", tag="h2", sanitize=False)
         self._list = ui.column().classes("w-full gap-0")
-        self._card = ui.column().classes("w-full gap-1 studio-item").mark("card")
+        self._card = ui.column().classes("w-full gap-1 studio-item").props("data-mark=card")
         self._card.visible = False
 
     def refresh(self) -> None:
@@ -71,7 +72,11 @@ class CandidateView:
         """Show one candidate; without a diagnosis the evidence stays hidden, as in a game."""
         desk, effect = self._desk, item.effect
         named = diagnosis is not None and effect in (diagnosis.best, *diagnosis.ambiguous_with)
-        row = ui.element("div").classes("studio-item" + (" studio-best" if named else "")).mark(f"candidate-{effect}")
+        row = (
+            ui.element("div")
+            .classes("studio-item" + (" studio-best" if named else ""))
+            .props(attribute("data-mark", f"candidate-{effect}"))
+        )
         row.on("mouseenter", lambda: self.look_at(effect))
         row.on("mouseleave", lambda: self.look_at(""))
         with row:
@@ -86,8 +91,8 @@ class CandidateView:
                         self.look_at("")
                         await desk.attempt(lambda: session.add(effect))
 
-                ui.button("Add", on_click=add).props("dense no-caps size=sm" + ("" if named else " outline")).mark(
-                    f"add-{effect}"
+                ui.button("Add", on_click=add).props("dense no-caps size=sm" + ("" if named else " outline")).props(
+                    attribute("data-mark", f"add-{effect}")
                 )
             if diagnosis is None:
                 return

@@ -7,6 +7,7 @@ from nicegui import ui
 from imufit.figures import quantity
 from imufit.printable import NAME, printable
 from imufit.results import Parameter
+from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.session import Numbers, Session
 from imufit.studio.stack import Entry
@@ -35,7 +36,7 @@ class ModelView:
                 ui.label("Open a log to begin.").classes("studio-muted")
                 return
             numbers = session.numbers()
-            ui.label(_state(session, numbers)).classes("studio-muted").mark("model-state")
+            ui.label(_state(session, numbers)).classes("studio-muted").props("data-mark=model-state")
             for entry in session.stack.entries:
                 self._entry(entry, numbers)
 
@@ -46,11 +47,15 @@ class ModelView:
             with ui.element("div").classes("studio-row"):
                 ui.switch(
                     value=entry.on, on_change=lambda event: desk.attempt(lambda: _switch(desk, entry, event.value))
-                ).props(f'dense aria-label="{_attribute(name)} in the model"').mark(f"switch-{entry.effect}")
+                ).props("dense " + attribute("aria-label", f"{entry.effect} in the model")).props(
+                    attribute("data-mark", f"switch-{entry.effect}")
+                )
                 ui.label(name).classes("studio-id")
                 ui.button(
                     icon="close", on_click=lambda: desk.attempt(lambda: _session(desk).remove(entry.effect))
-                ).props(f'flat dense round size=sm aria-label="Remove {_attribute(name)}"').tooltip("Remove")
+                ).props("flat dense round size=sm " + attribute("aria-label", f"Remove {entry.effect}")).tooltip(
+                    "Remove"
+                )
             if not entry.on:
                 return
             if numbers is None:
@@ -64,19 +69,19 @@ class ModelView:
         desk = self._desk
         with ui.element("div").classes("studio-parameter"):
             ui.label(printable(parameter.name, NAME)).classes("studio-muted")
-            value = ui.label(parameter.shown).mark(f"value-{parameter.key}")
+            value = ui.label(parameter.shown).props(attribute("data-mark", f"value-{parameter.key}"))
             if not fitted:
                 value.classes("studio-muted").tooltip("to first order, from the evidence")
             elif parameter.typical is not None:
                 value.tooltip(f"typical size {quantity.quantity(parameter.typical, parameter.unit)}")
             ui.button(icon="edit", on_click=lambda: self._edit(parameter)).props(
-                f'flat dense round size=xs aria-label="Edit {_attribute(parameter.key)}"'
-            ).tooltip("Edit the value").mark(f"edit-{parameter.key}")
+                "flat dense round size=xs " + attribute("aria-label", f"Edit {parameter.key}")
+            ).tooltip("Edit the value").props(attribute("data-mark", f"edit-{parameter.key}"))
             pin = "lock" if parameter.fixed else "lock_open"
             words = "Fit this parameter again" if parameter.fixed else "Fix at this value"
             ui.button(icon=pin, on_click=lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
-                f'flat dense round size=xs aria-label="{words}: {_attribute(parameter.key)}"'
-            ).tooltip(words).mark(f"pin-{parameter.key}")
+                "flat dense round size=xs " + attribute("aria-label", f"{words}: {parameter.key}")
+            ).tooltip(words).props(attribute("data-mark", f"pin-{parameter.key}"))
 
     def _edit(self, parameter: Parameter) -> None:
         """Ask for a value in the shown unit."""
@@ -84,7 +89,9 @@ class ModelView:
         factor, unit = quantity.shown_unit(parameter.unit)
         with ui.dialog() as dialog, ui.card():
             ui.label(f"{printable(parameter.key, NAME)}, {unit}").classes("studio-id")
-            given = ui.number(label=f"value, {unit}", value=float(f"{factor * parameter.value:.6g}")).mark("edit-value")
+            given = ui.number(label=f"value, {unit}", value=float(f"{factor * parameter.value:.6g}")).props(
+                "data-mark=edit-value"
+            )
             ui.label("The value stays fixed until you open the lock.").classes("studio-muted")
 
             async def take() -> None:
@@ -94,7 +101,7 @@ class ModelView:
                     await desk.attempt(lambda: _session(desk).hold(parameter.effect, parameter.name, value))
 
             with ui.row():
-                ui.button("Fix at this value", on_click=take).mark("edit-take")
+                ui.button("Fix at this value", on_click=take).props("data-mark=edit-take")
                 ui.button("Cancel", on_click=dialog.close).props("flat")
         dialog.on("hide", dialog.delete)
         dialog.open()
@@ -115,11 +122,6 @@ def _pin(desk: Desk, parameter: Parameter) -> None:
         session.free(parameter.effect, parameter.name)
     else:
         session.hold(parameter.effect, parameter.name, parameter.value)
-
-
-def _attribute(text: str) -> str:
-    """Return text that stands in a quoted attribute of a component."""
-    return printable(text, NAME).replace("\\", " ").replace('"', " ").replace("'", " ")
 
 
 def _state(session: Session, numbers: Numbers | None) -> str:

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from nicegui import events, run, ui
 
+from imufit.comparing.compare import MIN_SHARE
 from imufit.fitting.passes import UNITS
 from imufit.printable import NAME, printable
 from imufit.results import Comparison, Spectrum
@@ -18,6 +19,7 @@ from imufit.studio.stack import Stack
 
 PIXELS: Final = 1200
 """Points of a trace: as many as a wide screen shows beside each other."""
+TIME: Final = "t"
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
 
@@ -41,17 +43,19 @@ class PanelView:
         ui.html("Where it fails", tag="h2", sanitize=False)
         with ui.element("div").classes("studio-row flex-wrap"):
             self._channel = ui.select([], label="channel", on_change=self._chosen).props("dense outlined")
-            self._channel.classes("min-w-28").mark("channel")
+            self._channel.classes("min-w-28").props("data-mark=channel")
             self._covariate = ui.select([], label="against", on_change=self._chosen).props("dense outlined")
-            self._covariate.classes("min-w-36").mark("covariate")
+            self._covariate.classes("min-w-36").props("data-mark=covariate")
             self._trace_kind = ui.toggle(
                 {RESIDUAL: "residual", READING: "reading"}, value=RESIDUAL, on_change=self._other_kind
             ).props("dense no-caps")
         self._note = ui.label("").classes("studio-muted")
         with ui.element("div").classes("studio-charts"):
-            self._panel = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart").mark("panel")
-            self._spectrum = ui.plotly(charts.empty("")).classes("studio-chart").mark("spectrum")
-            self._trace = ui.plotly(charts.empty("")).classes("studio-chart studio-wide").mark("trace")
+            self._panel = (
+                ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart").props("data-mark=panel")
+            )
+            self._spectrum = ui.plotly(charts.empty("")).classes("studio-chart").props("data-mark=spectrum")
+            self._trace = ui.plotly(charts.empty("")).classes("studio-chart studio-wide").props("data-mark=trace")
         self._trace.on("plotly_relayout", self._zoomed, throttle=0.1)
         self._trace.on("plotly_doubleclick", lambda: self._zoom(None))
 
@@ -97,7 +101,11 @@ class PanelView:
 
     def _present_covariate(self, panels: list[Panel]) -> str | None:
         names = [panel.covariate for panel in panels]
-        return self._desk.covariate if self._desk.covariate in names else (names[0] if names else None)
+        if self._desk.covariate in names:
+            return self._desk.covariate
+        # Where no covariate explains a part worth naming, time shows what is constant and what is not.
+        told = panels and panels[0].share >= MIN_SHARE
+        return names[0] if told else TIME if TIME in names else next(iter(names), None)
 
     def _chosen(self) -> None:
         if not self._setting:

@@ -14,6 +14,7 @@ from imufit.printable import NAME, printable
 from imufit.remedy import Option
 from imufit.results import Diagnosis
 from imufit.studio import server
+from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.log_file import LogFile, option_words, remedies
 from imufit.studio.mystery import LEVELS, NOTHING
@@ -40,18 +41,20 @@ class Head:
         dark = ui.dark_mode(value=None)
         with ui.element("header").classes("studio-head"):
             ui.label("imufit").classes("studio-title")
-            self._logs = ui.label("").classes("studio-log").mark("logs")
-            _icon("folder_open", "Open a log", lambda: _upload(desk)).mark("open")
-            self._save = _icon("save", "Save the session", self._download).mark("save")
-            with _icon("content_copy", "Copy the model", None).mark("copy") as self._copy, ui.menu():
-                ui.menu_item("Copy as Python", lambda: self._show("Python")).mark("copy-python")
-                ui.menu_item("Copy as shell", lambda: self._show("shell")).mark("copy-shell")
-            with _icon("psychology_alt", "Mystery log", None).mark("mystery"), ui.menu():
+            self._logs = ui.label("").classes("studio-log").props("data-mark=logs")
+            _icon("folder_open", "Open a log", lambda: _upload(desk)).props("data-mark=open")
+            self._save = _icon("save", "Save the session", self._download).props("data-mark=save")
+            with _icon("content_copy", "Copy the model", None).props("data-mark=copy") as self._copy, ui.menu():
+                ui.menu_item("Copy as Python", lambda: self._show("Python")).props("data-mark=copy-python")
+                ui.menu_item("Copy as shell", lambda: self._show("shell")).props("data-mark=copy-shell")
+            with _icon("psychology_alt", "Mystery log", None).props("data-mark=mystery"), ui.menu():
                 for number, level in LEVELS.items():
-                    ui.menu_item(f"Level {number}: {level.title}", _player(desk, number)).mark(f"level-{number}")
+                    ui.menu_item(f"Level {number}: {level.title}", _player(desk, number)).props(
+                        attribute("data-mark", f"level-{number}")
+                    )
             for path, title in server.other_pages():
                 ui.link(title, path).classes("studio-link")
-            _icon("dark_mode", "Light or dark", lambda: _turn(dark)).mark("dark")
+            _icon("dark_mode", "Light or dark", lambda: _turn(dark)).props("data-mark=dark")
 
     def refresh(self) -> None:
         """Show the names of the logs."""
@@ -81,7 +84,7 @@ class Head:
         with ui.dialog() as dialog, ui.card().style("max-width: 92vw"):
             ui.label(f"The present model as {form}").classes("studio-id")
             ui.label("Run the text in the folder of the log.").classes("studio-muted")
-            ui.label(text).classes("studio-copy").mark("copied")
+            ui.label(text).classes("studio-copy").props("data-mark=copied")
             ui.button("Close", on_click=dialog.close).props("flat")
         dialog.on("hide", dialog.delete)
         dialog.open()
@@ -100,7 +103,7 @@ class Top:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._state: tuple[object, ...] = ()
-        with ui.row().classes("w-full items-center gap-2 no-wrap").mark("busy") as self._busy:
+        with ui.row().classes("w-full items-center gap-2 no-wrap").props("data-mark=busy") as self._busy:
             ui.spinner(size="sm")
             self._work = ui.label("").classes("studio-muted")
         self._busy.visible = False
@@ -148,13 +151,15 @@ class Top:
     def _verdict(self, diagnosis: Diagnosis) -> None:
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
             ui.icon(ICONS[diagnosis.verdict], size="sm").props(f'aria-label="{diagnosis.verdict}"')
-            ui.label(printable(diagnosis.sentence or diagnosis.verdict)).classes("studio-sentence").mark("verdict")
+            ui.label(printable(diagnosis.sentence or diagnosis.verdict)).classes("studio-sentence").props(
+                "data-mark=verdict"
+            )
         if diagnosis.experiment:
             ui.label(printable(f"Next: {diagnosis.experiment}")).classes("studio-muted")
         for fault in diagnosis.data_faults:
             number = _number_of(self._desk, fault.file)
             with ui.element("div").classes("studio-error"):
-                ui.label(printable(str(fault))).classes("studio-muted").mark("fault")
+                ui.label(printable(str(fault))).classes("studio-muted").props("data-mark=fault")
                 for option in remedies(fault.advice):
                     self._cure(option, number, "mend")
         if diagnosis.notes:
@@ -168,12 +173,14 @@ class Top:
         async def apply() -> None:
             await self._desk.mend(option, number)
 
-        ui.button(printable(option_words(option)), on_click=apply).props("dense outline no-caps size=sm").mark(mark)
+        ui.button(printable(option_words(option)), on_click=apply).props("dense outline no-caps size=sm").props(
+            attribute("data-mark", mark)
+        )
 
     def _problem(self) -> None:
         desk = self._desk
         with ui.element("div").classes("studio-error").props('role="alert"'):
-            ui.label(printable(desk.trouble)).mark("trouble")
+            ui.label(printable(desk.trouble)).props("data-mark=trouble")
             with ui.row():
                 for option in desk.cures:
                     self._cure(option, 0, "cure")
@@ -182,7 +189,9 @@ class Top:
     def _choice(self) -> None:
         desk = self._desk
         for item in desk.arrivals:
-            ui.label(f"{printable(item.file.name, NAME)}: {item.words}").classes("studio-muted").mark("arrival")
+            ui.label(f"{printable(item.file.name, NAME)}: {item.words}").classes("studio-muted").props(
+                "data-mark=arrival"
+            )
             for note in item.notes:
                 ui.label(printable(note)).classes("studio-muted")
         offers = desk.offers
@@ -191,14 +200,14 @@ class Top:
         for offer in offers:
             ui.button(printable(offer.words, 2 * NAME), on_click=lambda offer=offer: desk.open(offer.files)).props(
                 "no-caps outline"
-            ).mark(f"offer-{offer.way.value}")
+            ).props(attribute("data-mark", f"offer-{offer.way.value}"))
 
     def _game(self, judged: bool) -> None:
         desk = self._desk
         game = desk.mystery
         assert game is not None
         level = LEVELS[game.level]
-        ui.label(f"Mystery log, level {game.level}: {level.words}").classes("studio-sentence").mark("game")
+        ui.label(f"Mystery log, level {game.level}: {level.words}").classes("studio-sentence").props("data-mark=game")
         if game.verdict is None:
             if not judged:
                 ui.label("The evidence is being taken.").classes("studio-muted")
@@ -208,15 +217,15 @@ class Top:
             choices = {NOTHING: "nothing is missing"} | {name: printable(name, NAME) for name in names}
             with ui.row().classes("items-center"):
                 answer = ui.select(choices, value=NOTHING, label="Your answer", with_input=True).props("dense outlined")
-                answer.classes("min-w-56").mark("answer")
-                ui.button("Reveal", on_click=lambda: desk.reveal(answer.value or NOTHING)).props("no-caps").mark(
-                    "reveal"
+                answer.classes("min-w-56").props("data-mark=answer")
+                ui.button("Reveal", on_click=lambda: desk.reveal(answer.value or NOTHING)).props("no-caps").props(
+                    "data-mark=reveal"
                 )
             return
         for sentence in game.verdict.sentences:
-            ui.label(printable(sentence)).classes("studio-sentence").mark("truth")
-        ui.label(game.verdict.lesson).classes("studio-muted").mark("lesson")
-        ui.button("Play again", on_click=_player(desk, game.level)).props("no-caps outline").mark("again")
+            ui.label(printable(sentence)).classes("studio-sentence").props("data-mark=truth")
+        ui.label(game.verdict.lesson).classes("studio-muted").props("data-mark=lesson")
+        ui.button("Play again", on_click=_player(desk, game.level)).props("no-caps outline").props("data-mark=again")
 
 
 def _number_of(desk: Desk, name: str | None) -> int:
@@ -256,7 +265,7 @@ def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
 
     ui.upload(
         label="Drop files or press +", multiple=True, auto_upload=True, on_multi_upload=take, max_total_size=MOST_BYTES
-    ).props("flat bordered").mark("upload")
+    ).props("flat bordered").props("data-mark=upload")
 
 
 def _icon(icon: str, words: str, action: Callable[[], object] | None) -> ui.button:
