@@ -182,7 +182,7 @@ def test_python_and_shell_make_the_same_model(session, folder, tmp_path):
         program = as_python(files, made.way) + "import json\nprint(json.dumps(fit.to_dict()))\n"
         done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
         assert json.loads(done.stdout.splitlines()[-1]) == strict_json(json.dumps(made.fit.to_dict()))
-        text = as_shell(files, made.way[-1]).replace("imufit ", f"{sys.executable} -m imufit ")
+        text = f'imufit() {{ {sys.executable} -m imufit "$@"; }}\n' + as_shell(files, made.way[-1])
         subprocess.run(["sh", "-ec", text], cwd=tmp_path, capture_output=True, text=True, check=True)
         model = imufit.SensorModel.load(tmp_path / "model.toml")
         assert model.effects == made.fit.model.effects
