@@ -161,6 +161,7 @@ def studio(logs: Sequence[Path], reading: Reading, *, port: int, ready: Callable
 
     try:
         from imufit.studio import page, server  # noqa: PLC0415
+        from imufit.studio.live import page as live  # noqa: PLC0415
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("imufit"):
             raise
@@ -169,6 +170,7 @@ def studio(logs: Sequence[Path], reading: Reading, *, port: int, ready: Callable
             remedy="Install it with: pip install 'imufit[studio]'.",
         ) from None
     server.add_page("/", page.build)
+    server.add_page("/live", live.build, "imufit live")
     server.serve(port, ready)
 
 
