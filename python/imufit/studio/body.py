@@ -33,6 +33,8 @@ LOOKS: Final[Mapping[str, tuple[str, float, bool]]] = {
 """Colour, opacity, and whether only the edges are drawn, by name of an attitude."""
 GROWN: Final = {"measured": 1.0, "predicted": 1.02, "reference": 1.04, "wanted": 1.0}
 """Sizes by name: surfaces of equal attitudes would flicker through one another."""
+GROUND: Final = 3
+"""Half the width of the ground, in its squares."""
 PICTURES: Final = 15.0
 """Pictures a second of the player."""
 SPEEDS: Final = (0.25, 0.5, 1.0, 2.0, 5.0, 20.0)
@@ -79,14 +81,18 @@ class Body:
         self._hidden: set[str] = set()
         self._bodies: dict[str, Object3D] = {}
         camera = ui.scene.perspective_camera(fov=42)
-        scene = ui.scene(width=360, height=280, grid=(6, 6), camera=camera, fps=int(PICTURES), background_color="#fff")
+        # The scene's own ground is a plane in its background's colour, which a dark page would show as a white one.
+        scene = ui.scene(width=360, height=280, grid=False, camera=camera, fps=int(PICTURES), background_color="#fff")
         # The canvas follows its frame, and the page's colour shines through it in light and dark.
         scene.classes("studio-body w-full").style("width: 100% !important; max-width: 100%; touch-action: pan-y")
         scene.on("init", lambda: ui.run_javascript(f"getElement({scene.id})?.renderer?.setClearColor(0xffffff, 0)"))
         self.scene = scene
         with scene:
+            for k in range(-GROUND, GROUND + 1):
+                scene.line([k, -GROUND, 0], [k, GROUND, 0]).material(GREY, 0.6)
+                scene.line([-GROUND, k, 0], [GROUND, k, 0]).material(GREY, 0.6)
             if compass:
-                for word, place in (("N", (0.0, 2.75)), ("E", (2.75, 0.0))):
+                for word, place in (("N", (0.0, GROUND + 0.3)), ("E", (GROUND + 0.3, 0.0))):
                     scene.text(word, "font-weight: 600; opacity: 0.7").move(place[0], place[1], 0.0)
             for name in names:
                 self._bodies[name] = self._body(name)

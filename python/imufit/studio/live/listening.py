@@ -128,8 +128,8 @@ class Listening:
         The last rows; None before the columns are known.
     rests : deque of Rest
         Rests so far, the last ones.
-    resting : bool
-        Whether the device lies still now.
+    rest : Rest or None
+        The present rest; None while the device moves.
     problem : str
         Why following ended by itself; empty while it runs.
     stage : Stage or None
@@ -143,7 +143,7 @@ class Listening:
         self.state: MonitorState | None = None
         self.rolling: Rolling | None = None
         self.rests: deque[Rest] = deque(maxlen=RESTS)
-        self.resting = False
+        self.rest: Rest | None = None
         self.problem = ""
         self.stage: Stage | None = None
         self.calibrated: tuple[str, ...] = ()
@@ -296,7 +296,8 @@ class Listening:
         gyr = np.column_stack([batch[name] for name in GROUPS["gyr"]]).tolist() if "gyr" in sensors else None
         for row, t in enumerate(batch["t"].tolist()):
             judged = self._judge.step(t, acc[row], None if gyr is None else gyr[row])
-            self.resting = judged["state"] != "moving"
+            begin = t if self.rest is None else self.rest.begin
+            self.rest = None if judged["state"] == "moving" else Rest(begin, t, judged["state"] == "held")
             closed = judged["closed"]
             if closed is not None:
                 self.rests.append(Rest(*closed["time"], closed["flaw"] is None))

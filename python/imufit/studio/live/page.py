@@ -263,7 +263,7 @@ class _LivePage:
         waiting = state.trouble if state.trouble and not state.n else ""
         line = "line lost, trying again" if not state.connected else waiting
         self._name.text = ", ".join(each for each in (printable(state.device) or "device", line) if each)
-        self._rest.text = "" if not state.n else "at rest" if listening.resting else "moving"
+        self._rest.text = "" if not state.n else "at rest" if listening.rest is not None else "moving"
         self._show_readings(listening)
 
     def _show_readings(self, listening: Listening) -> None:
@@ -272,7 +272,7 @@ class _LivePage:
             return
         if rolling.columns != self._columns:
             self._make_panels(rolling.columns)
-        rests = list(listening.rests)
+        rests = [*listening.rests, *([listening.rest] if listening.rest is not None else [])]
         for title, names, plot in self._plots:
             plot.update_figure(panel(rolling, title, names, self._seconds, rests))
         name, q = _attitude(state.angles)

@@ -41,7 +41,8 @@ def groups(columns: Sequence[str]) -> list[tuple[str, tuple[str, ...]]]:
     grouped = {name for _, names in found for name in names}
     reference = {name for group in ("ref_q", "ref_p") for name in GROUPS[group]}
     single = [name for name in columns if name not in grouped and name not in reference]
-    return [*found, *((printable(name, NAME), (name,)) for name in single)][:MOST]
+    titles = {"temp": "temperature"}
+    return [*found, *((titles.get(name, printable(name, NAME)), (name,)) for name in single)][:MOST]
 
 
 def panel(rolling: Rolling, title: str, names: Sequence[str], seconds: float, rests: Sequence[Rest]) -> dict[str, Any]:
