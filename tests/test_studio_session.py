@@ -136,17 +136,6 @@ def test_an_effect_is_refused_with_the_reason(session):
     assert session.position == 1
 
 
-def test_two_models_side_by_side(session):
-    session.add("acc.bias")
-    session.fit()
-    session.second = session.stack
-    session.add("gyr.scale")
-    found = session.against()
-    assert found.preferred == "second"
-    assert found.first_ratio == session.numbers(session.second).ratio
-    assert found.second_ratio == session.numbers().ratio
-
-
 def test_what_a_candidate_would_explain_needs_no_pass(session):
     before = {(p.channel, p.covariate): p for p in session.compare().panels}
     begin = time.perf_counter()

@@ -149,8 +149,8 @@ def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     return ladder(logs, model=model, progress=progress)
 
 
-def studio(logs: Sequence[Path], reading: Reading, *, port: int, ready: Callable[[str], None]) -> None:
-    """Serve the studio until Ctrl-C; `ready` receives the address.
+def studio(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, ready: Callable[[str], None]) -> None:
+    """Serve the studio on logs, or on the log of a demonstration, until Ctrl-C; `ready` receives the address.
 
     Raises
     ------
@@ -160,8 +160,7 @@ def studio(logs: Sequence[Path], reading: Reading, *, port: int, ready: Callable
     from imufit.errors import InputError  # noqa: PLC0415
 
     try:
-        from imufit.studio import page, server  # noqa: PLC0415
-        from imufit.studio.live import page as live  # noqa: PLC0415
+        from imufit.studio.start import start  # noqa: PLC0415
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("imufit"):
             raise
@@ -169,9 +168,7 @@ def studio(logs: Sequence[Path], reading: Reading, *, port: int, ready: Callable
             f"the studio needs the package {error.name}, which is not installed",
             remedy="Install it with: pip install 'imufit[studio]'.",
         ) from None
-    server.add_page("/", page.build)
-    server.add_page("/live", live.build, "imufit live")
-    server.serve(port, ready)
+    start(logs, reading, demo, port=port, ready=ready)
 
 
 def catalogue() -> list[EffectCard]:

@@ -23,8 +23,10 @@ from imufit.results.comparison import Panel
 Figure = dict[str, Any]
 Array = NDArray[np.float64]
 
-HEIGHT: Final = 270
+HEIGHT: Final = 240
 """Height of a figure, px: two of them and the sentence fit on a laptop's screen."""
+SLOTS: Final = 6
+"""Bars that have room in the fall of the error at least: as many steps as most logs take."""
 LINE: Final = 1.6
 """Width of a line, px."""
 LOGARITHMIC_ABOVE: Final = 8.0
@@ -102,7 +104,7 @@ def residual_panel(panel: Panel, after: Panel | None = None, effect: str = "", o
     reach = float(np.max(np.abs(mean[known]) + band[known])) if known.any() else 0.0
     limit = 1.15 * max(reach, min(floor, 3.0 * reach)) or 1.0
     traces = [
-        _area(x[[0, -1]], np.array([-floor, -floor]), np.array([floor, floor]), GREY, 0.18, "noise of one sample"),
+        _area(x[[0, -1]], np.array([-floor, -floor]), np.array([floor, floor]), GREY, 0.18, "noise"),
         _area(x[known], (mean - band)[known], (mean + band)[known], SKY, 0.4, "95 % band"),
         _line(x, mean, BLUE, "now", mode="lines+markers"),
     ]
@@ -192,9 +194,6 @@ def fall(
             "name": "held-out error",
             "x": places,
             "y": _numbers(np.array(ratios, dtype=float)),
-            "text": texts,
-            "textposition": "outside",
-            "cliponaxis": False,
             "width": 0.62,
             "marker": {"color": colours, "opacity": [1.0 if k <= position else 0.35 for k in places]},
             "hovertemplate": "%{customdata}<br>%{y:.3f} times the noise floor<extra></extra>",
@@ -234,26 +233,32 @@ def fall(
                 "showlegend": True,
             }
         )
+    tops = [
+        max(value, mark or 0.0) if math.isfinite(value) else 0.0 for value, mark in zip(ratios, expected, strict=True)
+    ]
+    # The number stands over the bar and over its diamond.
+    above = {"x": places[: len(ratios)], "y": tops, "text": texts, "textposition": "top center", "showlegend": False}
+    unseen = {"size": 13, "opacity": 0.0}
+    bars.append({"type": "scatter", "mode": "markers+text", **above, "marker": unseen, "hoverinfo": "skip"})
     heights = [value for value in [*ratios, *(value for _, value in known)] if math.isfinite(value) and value > 0.0]
     top, low = max([*heights, 1.0]), min([*heights, 1.0])
     logarithmic = top / low > LOGARITHMIC_ABOVE
-    scale = (
+    scale: dict[str, Any] = (
         {"type": "log", "range": [math.log10(0.6 * low), math.log10(1.8 * top)], "dtick": "D1"}
         if logarithmic
         else {"range": [0.0, 1.22 * top]}
     )
-    edge = [-0.6, len(places) - 0.4]
+    # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
+    edge = [-0.6, max(len(places), SLOTS) - 0.4]
     floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
-    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": -25}
-    figure = _figure([*bars, *floor], "", "held-out error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
+    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": "auto"}
+    figure = _figure([*bars, *floor], "", "error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
     return figure
 
 
-def trace(
-    channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual"
-) -> Figure:
+def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:
     """Draw quantities of one channel over time.
 
     Parameters

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -17,6 +17,8 @@ from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, offers
 from imufit.studio.mystery import Mystery
 from imufit.studio.session import Session
 from imufit.studio.session_file import Kept, as_toml, read_session
+from imufit.studio.stack import Stack
+from imufit.studio.traces import ModelTraces, Traces
 
 Answer = TypeVar("Answer")
 
@@ -39,6 +41,10 @@ class Desk:
         The game, while one is played.
     channel, covariate : str or None
         The panel that the person chose; None is the worst one.
+    traces : Traces or None
+        Columns of the log over time.
+    models : dict of Stack to ModelTraces
+        Residuals of the ideal sensor and of the present model over time.
     busy : str
         The present work, in words; empty where there is none.
     share : float or None
@@ -58,6 +64,8 @@ class Desk:
         self.mystery: Mystery | None = None
         self.channel: str | None = None
         self.covariate: str | None = None
+        self.traces: Traces | None = None
+        self.models: dict[Stack, ModelTraces] = {}
         self.busy = ""
         self.share: float | None = None
         self.trouble = ""
@@ -71,6 +79,25 @@ class Desk:
     def folder(self) -> Path:
         """Folder of the files that the browser sent; it goes with the server."""
         return Path(self._folder.name)
+
+    @property
+    def guessing(self) -> bool:
+        """Whether a game is on whose truth is not revealed: the evidence's names stay hidden."""
+        return self.mystery is not None and self.mystery.verdict is None
+
+    def reveal(self, answer: str) -> None:
+        """End the game with an answer.
+
+        Parameters
+        ----------
+        answer : str
+            Id of an effect; empty answers that nothing is missing.
+        """
+        session, game = self.session, self.mystery
+        first = None if session is None else session.made(Stack())
+        if game is not None and first is not None and first.diagnosis is not None:
+            game.reveal(answer, first.diagnosis)
+            self.changed.emit()
 
     @property
     def offers(self) -> list[Offer]:
@@ -91,8 +118,7 @@ class Desk:
         self.busy, self.share = words, None
         self.changed.emit()
         try:
-            found: Answer = await run.io_bound(work)
-            return found
+            return await run.io_bound(work)
         except InputError as error:
             self._note(str(error), remedies(error.advice), file)
         except (OSError, MemoryError) as error:
@@ -135,32 +161,55 @@ class Desk:
             return
         self._working = True
         try:
-            while (step := self._next()) is not None:
-                if await self._in_thread(*step) is None:
+            while (step := next(self._pending(), None)) is not None:
+                await self._in_thread(*step)
+                if self.trouble:
                     return
         finally:
             self._working = False
 
-    def _next(self) -> tuple[str, Callable[[], object]] | None:
-        """Return the next piece of work; None where all is up to date."""
+    def _pending(self) -> Iterator[tuple[str, Callable[[], object]]]:
+        """List the pieces of work that are to be done for the present model, in order."""
         session = self.session
         if session is None or not session.begun:
-            return None
+            return
         stack = session.stack
         made = session.made(stack)
         words = " + ".join(stack.model.effects) or "the ideal sensor"
         if made is None:
-            return f"fitting {words}", lambda: session.fit(stack, self.progress)
+            yield f"fitting {words}", lambda: session.fit(stack, self.progress)
+            return
         if made.comparison is None and session.has_reference:
-            return f"comparing {words}", lambda: session.compare(stack, self.progress)
+            yield f"comparing {words}", lambda: session.compare(stack, self.progress)
         if made.diagnosis is None:
-            return f"effects missing in {words}", lambda: session.diagnose(stack, self.progress)
-        second = session.second
-        if second is not None and second.model != stack.model and session.has_reference:
-            other = session.made(second)
-            if other is None or other.comparison is None:
-                return "comparing the second model", lambda: session.compare(second, self.progress)
-        return None
+            yield f"effects missing in {words}", lambda: session.diagnose(stack, self.progress)
+        if self.traces is None:
+            yield "reading the rows", self._drawn_rows
+        elif session.has_reference:
+            for model in dict.fromkeys((stack.model, Stack())):
+                if model not in self.models:
+                    yield "residuals over time", partial(self._drawn_model, model)
+        if session.second is not None:
+            second = session.made(session.second)
+            if second is None or (second.comparison is None and session.has_reference):
+                yield "comparing the second model", lambda: session.compare(session.second, self.progress)
+
+    def _drawn_rows(self) -> Traces:
+        """Make the pass over the rows of the log that is drawn."""
+        assert self.session is not None
+        traces = Traces(self.session.logs[self.session.shown])
+        traces.build(self.progress)
+        self.traces = traces
+        return traces
+
+    def _drawn_model(self, model: Stack) -> ModelTraces:
+        """Compute the residuals of a model over time, and forget those of models that are not shown."""
+        assert self.session is not None
+        assert self.traces is not None
+        found = self.session.model_traces(self.traces, model)
+        kept = {Stack(), self.session.stack.model}
+        self.models = {key: value for key, value in self.models.items() if key in kept} | {model: found}
+        return found
 
     # --- files
 
@@ -215,6 +264,9 @@ class Desk:
         return await self._in_thread(f"taking the evidence of {names}", work, files[0])
 
     def _take(self, session: Session, files: Sequence[LogFile], mystery: Mystery | None = None) -> None:
+        if self.traces is not None:
+            self.traces.close()
+        self.traces, self.models = None, {}
         self.session, self.files, self.mystery = session, tuple(files), mystery
         self.arrivals, self.channel, self.covariate = [], None, None
         self.trouble, self.cures, self._troubled = "", [], None

@@ -48,7 +48,7 @@ LEVELS: Final[dict[int, Level]] = {
     ),
     3: Level(
         "Two effects that look alike",
-        "The sensor was turned about one axis only, and one effect is hidden. Name an effect that the log allows.",
+        "One effect is hidden, and this motion leaves it a rival. Name an effect that the log allows.",
         "A log cannot separate effects that its motion does not separate: the remedy is another motion, not more rows.",
     ),
 }
@@ -61,9 +61,8 @@ RATE: Final = 50.0
 SURE: Final = 0.95
 """Probability from which on the evidence names one effect: odds of about 20 to 1."""
 
-_ALIKE: Final = (("acc.bias", "ref.tilt"), ("acc.scale", "acc.bias"), ("mag.hard_iron", "mag.soft_iron"))
-"""Pairs of which a motion about one axis separates neither member from the other."""
-_SIZES: Final = {"acc.bias": {"x": 0.12, "y": -0.09, "z": 0.0}, "acc.scale": {"x": 0.0, "y": 0.0, "z": 0.012}}
+_ALIKE: Final = (("tilt", "mag.hard_iron"), ("arm", "gyr.delay"), ("arm", "gyr.lowpass"))
+"""Scenarios and effects that have a rival there: of 24 logs of these three, all were `ambiguous`."""
 
 
 @dataclass(frozen=True)
@@ -133,9 +132,8 @@ class Mystery:
         elif level == 2:
             simulation, _ = hidden("handheld", seed, size="small", allow_nothing=True, duration=DURATION, rate=RATE)
         else:
-            effects = list(_SIZES)
-            effect = effects[seed % len(effects)]
-            simulation = simulate("tilt", {effect: _SIZES[effect]}, seed, duration=DURATION, rate=RATE)
+            scenario, effect = _ALIKE[seed % len(_ALIKE)]
+            simulation = simulate(scenario, {effect: None}, seed, duration=DURATION, rate=RATE, size="large")
         save_simulation(simulation, path)
         return cls(level, seed, path)
 
@@ -152,19 +150,22 @@ class Mystery:
         truth = unseal(self.log)
         hidden_effects = tuple(truth.effects)
         right = answer in hidden_effects if hidden_effects else answer == NOTHING
+        alike = (first.best, *first.ambiguous_with) if first.verdict == "ambiguous" else ()
+        rival = not right and answer in alike and not set(hidden_effects).isdisjoint(alike)
         self.verdict = Verdict(
             right,
             hidden_effects,
-            (_said(hidden_effects, answer, right), _evidence(truth, first), _sureness(first)),
+            (_said(hidden_effects, answer, right, rival), _evidence(truth, first), _sureness(first)),
             LEVELS[self.level].lesson,
         )
         return self.verdict
 
 
-def _said(truth: Sequence[str], answer: str, right: bool) -> str:
+def _said(truth: Sequence[str], answer: str, right: bool, rival: bool) -> str:
     hid = f"{' and '.join(truth)} was hidden" if truth else "Nothing was hidden"
     named = f"you named {answer}" if answer else "you answered that nothing is missing"
-    return f"{'Right' if right else 'Not right'}: {hid}, and {named}."
+    mark = "Right" if right else "Allowed, as the log separates the two no better" if rival else "Not right"
+    return f"{mark}: {hid}, and {named}."
 
 
 def _evidence(truth: Truth, first: Diagnosis) -> str:

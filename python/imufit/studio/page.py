@@ -1,13 +1,54 @@
-"""The studio's main page: regions left, middle, right and bottom, one below the other on a phone."""
+"""The studio's main page: sentence, model, panels, candidates, and the fall of the error."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib.resources import files
+
 from nicegui import ui
 
+from imufit.studio.desk import Desk
+from imufit.studio.view_candidates import CandidateView
+from imufit.studio.view_fall import FallView
+from imufit.studio.view_model import ModelView
+from imufit.studio.view_panels import PanelView
+from imufit.studio.view_top import Head, Top
 
-def build() -> None:
-    """Make the page."""
-    ui.label("imufit")
-    with ui.element("main").classes("studio"):
-        for region in ("left", "middle", "right", "bottom"):
-            ui.element("section").classes(f"studio-{region}")
+
+def page_of(desk: Desk) -> Callable[[], None]:
+    """Return what builds the page of a desk for one browser.
+
+    Parameters
+    ----------
+    desk : Desk
+        The state that all pages share.
+    """
+    style = files("imufit.studio").joinpath("studio.css").read_text(encoding="utf-8")
+
+    def build() -> None:
+        ui.add_css(style)
+        head = Head(desk)
+        with ui.element("main").classes("studio"):
+            with _region("top"):
+                top = Top(desk)
+            with _region("middle"):
+                panels = PanelView(desk)
+            with _region("right"):
+                candidates = CandidateView(desk, panels)
+            with _region("bottom"):
+                fall = FallView(desk)
+            with _region("left"):
+                model = ModelView(desk)
+
+        def refresh() -> None:
+            for view in (head, top, model, panels, candidates, fall):
+                view.refresh()
+
+        desk.changed.subscribe(refresh)
+        refresh()
+
+    return build
+
+
+def _region(name: str) -> ui.element:
+    return ui.element("section").classes(f"studio-region studio-{name}")

@@ -20,7 +20,8 @@ TOKEN_BYTES: Final = 24
 BACKLOG: Final = 64
 """Connections that may wait: one page opens about 40 at once."""
 
-_paths: set[str] = set()
+_paths: dict[str, str] = {}
+"""Titles of the pages by path."""
 
 
 def add_page(path: str, build: Callable[[], None], title: str = "imufit") -> None:
@@ -42,9 +43,14 @@ def add_page(path: str, build: Callable[[], None], title: str = "imufit") -> Non
     """
     if path in _paths:
         raise ValueError(f"the path {path} has a page already")
-    _paths.add(path)
+    _paths[path] = title
     # Light or dark follows the computer until the person chooses.
     ui.page(path, title=title, dark=None)(build)
+
+
+def other_pages() -> list[tuple[str, str]]:
+    """Return path and title of every page but the first, for links."""
+    return [(path, title) for path, title in _paths.items() if path != "/"]
 
 
 def address_of(port: int, token: str) -> str:

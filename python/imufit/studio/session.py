@@ -22,9 +22,10 @@ from imufit.log import LogSource
 from imufit.loop import Fit, SensorModel
 from imufit.model.catalogue import each_log_has_its_own, find_effect
 from imufit.progress import Progress, silent
-from imufit.results import Comparison, Diagnosis, ModelComparison, Parameter
+from imufit.results import Comparison, Diagnosis, Parameter
 from imufit.results.comparison import Panel
 from imufit.studio.stack import Action, Stack, Step
+from imufit.studio.traces import ModelTraces, Traces
 
 FULL: Final = 4
 """Fits that keep their evidence: the first, the present, the one before, and the second of two models. The evidence of
@@ -391,13 +392,40 @@ class Session:
             made = self.fit(stack, progress)
             if made.comparison is None and self.has_reference:
                 fit = self._with_evidence(made)
-                made.comparison = comparison(fit.analysis, fit.estimate.step, fit.worst)
+                made.comparison = comparison(fit.analysis, fit.estimate.step, self.shown)
             return made.comparison
 
     @cached_property
     def has_reference(self) -> bool:
         """Whether every row is judged by a reference, so that residuals can be drawn."""
         return self.start.analysis.judged_by == "reference"
+
+    @property
+    def shown(self) -> int:
+        """Number of the log whose residuals are drawn: of several the one that stands highest at the start."""
+        return self.start.worst
+
+    def model_traces(self, traces: Traces, stack: Stack) -> ModelTraces:
+        """Return residual and predicted readings of a stack over time, after a pass over the rows.
+
+        Parameters
+        ----------
+        traces : Traces
+            The log that is drawn.
+        stack : Stack
+            The stack.
+
+        Raises
+        ------
+        InputError
+            The log has no reference attitude.
+        """
+        with self._work:
+            fit = self._with_evidence(self.fit(stack))
+            step = fit.analysis.own_step(self.shown, fit.estimate.step)
+            found = ModelTraces(traces, fit.analysis.logs[self.shown], step)
+        found.build()
+        return found
 
     def explained(self, effect: str) -> list[Panel]:
         """Return the residuals that adding an effect to the present model would leave, to first order; no pass.
@@ -412,29 +440,16 @@ class Session:
         list of Panel
             Empty where the evidence around the present model is not at hand, or has no such candidate.
         """
-        with self._work:
-            made = self.made()
-            if made is None or not made.fit.has_evidence or not self.has_reference:
-                return []
-            analysis = made.fit.analysis
-            if effect not in analysis.candidates:
-                return []
-            solved = analysis.problem.estimate([*analysis.fitted_slots, analysis.slots.index(effect)])
-            return panels(analysis, solved["full_step"], made.fit.worst)
-
-    def against(self, progress: Progress = silent) -> ModelComparison | None:
-        """Hold the second model against the present one; None where there is no second one.
-
-        Parameters
-        ----------
-        progress : callable
-            Called with (rows done, rows in all, what is being done).
-        """
-        if self.second is None or not self.has_reference:
-            return None
-        with self._work:
-            first = self._with_evidence(self.fit(self.second, progress))
-            return first.against(self._with_evidence(self.fit(None, progress)), progress)
+        made = self.made()
+        # A fit does not change; the thread at work may only put another one in its place.
+        fit = None if made is None else made.fit
+        if fit is None or not fit.has_evidence or not self.has_reference:
+            return []
+        analysis = fit.analysis
+        if effect not in analysis.candidates:
+            return []
+        solved = analysis.problem.estimate([*analysis.fitted_slots, analysis.slots.index(effect)])
+        return panels(analysis, solved["full_step"], self.shown)
 
     def _nearest(self) -> Made:
         """Return the fit of the last step up to the present one that was made."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -31,18 +32,6 @@ EMULATED: Final = "emulate "
 """Begin of the entries of the list of devices that are emulated."""
 FRAMES: Final = {"NED": "NED: lies z down", "NWU": "NWU: lies z up", "ENU": "ENU: lies z up, yaw from east"}
 """Frames by name, with the way a level device lies."""
-
-STYLE: Final = """
-.studio-live { width: 100%; max-width: 82rem; margin: 0 auto; padding: 0.75rem; gap: 0.75rem; }
-.studio-live-columns { display: grid; grid-template-columns: minmax(0, 1fr); gap: 0.75rem; width: 100%; }
-@media (min-width: 60rem) { .studio-live-columns { grid-template-columns: minmax(0, 25rem) minmax(0, 1fr); } }
-.studio-live-figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(5.5rem, 1fr)); gap: 0.5rem; }
-.studio-live-value { font-size: 1.05rem; font-weight: 600; font-variant-numeric: tabular-nums; }
-.studio-live .q-card { width: 100%; box-shadow: none; border: 1px solid rgba(128, 128, 128, 0.35); }
-.studio-live .js-plotly-plot text { fill: currentColor !important; }
-.studio-live .js-plotly-plot .gridlayer path { stroke: rgba(128, 128, 128, 0.3) !important; }
-.studio-live .js-plotly-plot .plotly { background: transparent !important; }
-"""
 
 
 class _Device:
@@ -85,7 +74,8 @@ class _LivePage:
     """The elements of one browser's page."""
 
     def __init__(self) -> None:
-        ui.add_css(STYLE)
+        for sheet in ("studio.css", "live/live.css"):
+            ui.add_css(files("imufit.studio").joinpath(sheet).read_text(encoding="utf-8"))
         self._columns: tuple[str, ...] = ()
         self._plots: list[tuple[str, tuple[str, ...], ui.plotly]] = []
         self._body: Body | None = None
@@ -94,9 +84,9 @@ class _LivePage:
         self._figures: dict[str, ui.label] = {}
         with ui.column().classes("studio-live"):
             with ui.row().classes("w-full items-center"):
-                ui.label("Live device").classes("text-xl font-medium")
+                ui.label("Live device").classes("studio-title")
                 ui.space()
-                ui.link("Studio", "./").classes("text-sm")
+                ui.link("Studio", "./").classes("studio-link text-sm")
             self._connection()
             with ui.element("div").classes("studio-live-columns"):
                 with ui.column().classes("gap-3 min-w-0"):
@@ -110,7 +100,7 @@ class _LivePage:
     # --- elements
 
     def _connection(self) -> None:
-        with ui.card().classes("p-3 gap-2"):
+        with ui.column().classes("studio-region gap-2"):
             with ui.row().classes("w-full items-end gap-3"):
                 choices = [*ports(), *(EMULATED + name for name in SCENARIOS)]
                 self._choice = (
@@ -133,7 +123,7 @@ class _LivePage:
             self._problem = ui.label().classes("text-negative text-sm")
 
     def _status(self) -> None:
-        with ui.card().classes("p-3 gap-2"):
+        with ui.column().classes("studio-region gap-2"):
             self._name = ui.label("Not connected").classes("text-sm")
             with ui.element("div").classes("studio-live-figures w-full"):
                 for key, words in (
@@ -151,7 +141,7 @@ class _LivePage:
             self._angles = ui.label().classes("text-sm")
 
     def _recorder(self) -> None:
-        with ui.card().classes("p-3 gap-2"):
+        with ui.column().classes("studio-region gap-2"):
             with ui.row().classes("w-full items-center no-wrap gap-3"):
                 self._red = ui.button(icon="fiber_manual_record", on_click=self._record_or_stop)
                 self._red.props('round color=red-8 aria-label="record" data-testid="record"')
@@ -161,7 +151,7 @@ class _LivePage:
             self._recorded.props('data-testid="recorded"')
 
     def _guide(self) -> None:
-        with ui.card().classes("p-3 gap-2"):
+        with ui.column().classes("studio-region gap-2"):
             with ui.row().classes("w-full items-center no-wrap gap-3"):
                 self._start = ui.button("Calibrate", on_click=self._calibrate_or_stop).props("outline")
                 self._message = ui.label("Six sides on a table, then free rotation.").classes("text-sm font-medium")
@@ -174,7 +164,7 @@ class _LivePage:
             self._result = ui.column().classes("w-full gap-1")
 
     def _traces(self) -> None:
-        with ui.card().classes("p-3 gap-1"):
+        with ui.column().classes("studio-region gap-1"):
             with ui.row().classes("w-full items-center"):
                 ui.label("Readings").classes("font-medium")
                 ui.space()
