@@ -15,9 +15,7 @@ def studio(folder, *arguments):
     """Start `imufit studio` in a folder; gives the address that it prints."""
     command = [sys.executable, "-m", "imufit", "studio", "--no-browser", *map(str, arguments)]
     with (folder / "studio.err").open("w") as errors:
-        process = subprocess.Popen(
-            command, cwd=folder, stdout=subprocess.PIPE, stderr=errors, text=True, env=os.environ
-        )
+        process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=errors, text=True)
         try:
             yield process.stdout.readline().strip()
         finally:

@@ -42,6 +42,27 @@ def connect(page, scenario):
     wait_until(page, lambda: number(page, "rows") > 50)
 
 
+def test_unusable_port_and_hostile_names_are_text(served):
+    folder, address, browser = served
+    page = browser.new_page(viewport={"width": 380, "height": 800})
+    wrong = problems(page)
+    page.goto(f"{address}live")
+    page.get_by_test_id("record").click()
+    page.get_by_text("Connect a device first.").wait_for(timeout=PATIENCE)
+    field = page.get_by_label("device")
+    field.click()
+    field.fill("/dev/<img src=x onerror=document.title='taken'>")
+    field.press("Enter")
+    page.get_by_role("button", name="Connect", exact=True).click()
+    page.get_by_text("cannot be opened").or_(page.get_by_text("does not exist")).wait_for(timeout=PATIENCE)
+    assert page.title() == "imufit live"
+    # nothing is wider than a phone
+    assert page.evaluate("document.documentElement.scrollWidth") <= 380
+    assert wrong == []
+    assert not list(folder.glob("recording*"))
+    page.close()
+
+
 def test_emulated_device_is_followed_recorded_and_guided(served):
     folder, address, browser = served
     page = browser.new_page(viewport={"width": 1280, "height": 900})
@@ -53,13 +74,13 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     first = number(page, "rows")
     wait_until(page, lambda: number(page, "rows") > first + 50)
     wait_until(page, lambda: page.get_by_test_id("rate").inner_text().endswith("Hz"))
-    titles = page.locator(".js-plotly-plot .gtitle").all_inner_texts()
+    titles = page.locator(".js-plotly-plot .gtitle").all_text_contents()
     assert [title.strip() for title in titles] == ["accelerometer", "gyroscope", "magnetometer", "temperature"]
-    units = page.locator(".js-plotly-plot .ytitle").all_inner_texts()
+    units = page.locator(".js-plotly-plot .ytitle").all_text_contents()
     assert [unit.strip() for unit in units] == ["m/s²", "deg/s", "µT", "°C"]
     drawn = page.evaluate("[...document.querySelectorAll('.js-plotly-plot')].map(p => p.data[0].x.length)")
     assert min(drawn) > 50
-    assert page.get_by_text("at rest", exact=True).is_visible()
+    page.get_by_text("at rest", exact=True).wait_for(timeout=PATIENCE)
     assert page.get_by_text("roll", exact=False).first.is_visible()
     assert page.locator(".studio-body canvas").count() == 1
 
@@ -89,25 +110,4 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     page.get_by_text("Not connected").wait_for(timeout=PATIENCE)
     assert asked == []
     assert wrong == []
-    page.close()
-
-
-def test_unusable_port_and_hostile_names_are_text(served):
-    folder, address, browser = served
-    page = browser.new_page(viewport={"width": 380, "height": 800})
-    wrong = problems(page)
-    page.goto(f"{address}live")
-    page.get_by_test_id("record").click()
-    page.get_by_text("Connect a device first.").wait_for(timeout=PATIENCE)
-    field = page.get_by_label("device")
-    field.click()
-    field.fill("/dev/<img src=x onerror=document.title='taken'>")
-    field.press("Enter")
-    page.get_by_role("button", name="Connect", exact=True).click()
-    page.get_by_text("cannot be opened").or_(page.get_by_text("does not exist")).wait_for(timeout=PATIENCE)
-    assert page.title() == "imufit live"
-    # nothing is wider than a phone
-    assert page.evaluate("document.documentElement.scrollWidth") <= 380
-    assert wrong == []
-    assert not list(folder.glob("recording*"))
     page.close()
