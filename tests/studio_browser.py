@@ -1,48 +1,92 @@
-"""The studio in a process of its own and a browser on it, for tests of its pages."""
+"""A studio in a process of its own, and a browser that looks at it."""
 
+import os
+import signal
 import subprocess
 import sys
-from contextlib import contextmanager, suppress
-from urllib.parse import urlsplit
+from contextlib import contextmanager
+from pathlib import Path
 
-CHROMIUM = "/usr/bin/chromium"
-# WebGL by software: machines that run tests have no graphics card.
-ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+CHROMIUM = Path("/usr/bin/chromium")
+SLOW_MS = 60_000
+"""Time that a step may take on a busy machine, ms: ten times what the slowest takes on a quiet one."""
 
 
 @contextmanager
 def studio(folder, *arguments):
-    """Start `imufit studio` in a folder; gives the address that it prints."""
-    command = [sys.executable, "-m", "imufit", "studio", "--no-browser", *map(str, arguments)]
-    with (folder / "studio.err").open("w") as errors:
-        process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=errors, text=True)
+    """Run `imufit studio`; the address it prints."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "imufit", "studio", *arguments, "--no-browser"],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "IMUFIT_DEBUG": "1"},
+    )
+    try:
+        yield process.stdout.readline().strip()
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(timeout=30)
+        process.stdout.close()
+
+
+@contextmanager
+def browser():
+    """Debian's Chromium without a window."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
         try:
-            yield process.stdout.readline().strip()
+            yield running
         finally:
-            process.terminate()
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(10.0)
-            process.kill()
-            process.stdout.close()
+            running.close()
 
 
-def strangers(page):
-    """List that fills with the addresses outside this computer that a page asks for."""
-    found = []
-
-    def look(request):
-        parts = urlsplit(request.url)
-        if parts.scheme not in ("data", "blob") and parts.hostname != "127.0.0.1":
-            found.append(request.url)
-
-    page.on("request", look)
-    page.on("websocket", lambda socket: look(type("Asked", (), {"url": socket.url})))
-    return found
+def marked(page, mark):
+    """The element with a mark."""
+    return page.locator(f'[data-mark="{mark}"]').first
 
 
-def problems(page):
-    """List that fills with the errors of a page."""
-    found = []
-    page.on("pageerror", lambda error: found.append(str(error)))
-    page.on("console", lambda message: found.append(message.text) if message.type == "error" else None)
-    return found
+def figure(page, mark):
+    """Data and layout of a figure as Plotly holds them."""
+    return page.evaluate(
+        """mark => {
+            const found = document.querySelector(`[data-mark="${mark}"]`);
+            const plot = found.data ? found : found.querySelector('.js-plotly-plot');
+            return JSON.parse(JSON.stringify({data: plot.data, layout: plot.layout}));
+        }""",
+        mark,
+    )
+
+
+def bars(page):
+    """Heights of the bars of the fall of the error, the expected one left out."""
+    return next(trace["y"] for trace in figure(page, "fall")["data"] if trace["name"] == "held-out error")
+
+
+def wait_for_bars(page, count):
+    """Wait until so many bars stand, and all work is done; return their heights."""
+    page.wait_for_function(
+        """count => {
+            const found = document.querySelector('[data-mark="fall"]');
+            const plot = found && (found.data ? found : found.querySelector('.js-plotly-plot'));
+            const trace = plot && plot.data && plot.data.find(item => item.name === 'held-out error');
+            return trace && trace.y.length === count && trace.y.every(value => value !== null);
+        }""",
+        arg=count,
+        timeout=SLOW_MS,
+    )
+    idle(page)
+    return bars(page)
+
+
+def idle(page):
+    """Wait until no work is under way: twice, since one piece follows another."""
+    for _ in range(2):
+        page.wait_for_timeout(450)
+        page.wait_for_function(
+            """() => { const busy = document.querySelector('[data-mark="busy"]');
+                       return !busy || busy.offsetParent === null; }""",
+            timeout=SLOW_MS,
+        )

@@ -1,15 +1,14 @@
 """The live page in Chromium: an emulated device is followed, recorded and guided through a calibration."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from imufit.log import read
-from studio_browser import ARGUMENTS, CHROMIUM, problems, strangers, studio
+from studio_browser import CHROMIUM, studio
+from studio_watched import WEBGL, problems, strangers
 
 pytest.importorskip("nicegui")
 sync_api = pytest.importorskip("playwright.sync_api")
-pytestmark = pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="Debian's Chromium is not installed")
+pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason="Debian's Chromium is not installed")
 PATIENCE = 30_000  # ms
 
 
@@ -17,7 +16,7 @@ PATIENCE = 30_000  # ms
 def served(tmp_path_factory):
     folder = tmp_path_factory.mktemp("live")
     with studio(folder) as address, sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=WEBGL)
         yield folder, address, browser
         browser.close()
 

@@ -234,12 +234,25 @@ class Player:
             self._words[name].text = angles_in_words(q) + off
         self._clock.text = f"{self.time:.2f} s of {self.end:.1f} s"
 
-    def _tick(self) -> None:
-        self.time += self.speed / PICTURES
-        if self.time >= self.end:
-            self.time = self.end
-            self.toggle()
+    def seek(self, time: float) -> None:
+        """Move the slider, and show the attitudes of that time.
+
+        Parameters
+        ----------
+        time : float
+            s of the log.
+        """
+        self.time = min(max(time, self.begin), self.end)
         self._slider.value = self.time
+
+    def close(self) -> None:
+        """Stop playing for good."""
+        self._timer.cancel()
+
+    def _tick(self) -> None:
+        self.seek(self.time + self.speed / PICTURES)
+        if self.time >= self.end:
+            self.toggle()
 
     def _faster(self, event: object) -> None:
         self.speed = float(getattr(event, "value", 1.0))
@@ -255,5 +268,6 @@ def angles_in_words(q: Array | None) -> str:
     """
     if q is None or not np.isfinite(q).all():
         return "not known"
-    roll, pitch, yaw = np.degrees(_imufit.euler_from_quaternion(np.ascontiguousarray(q.reshape(1, 4)))[0])
+    euler = np.degrees(_imufit.euler_from_quaternion(np.ascontiguousarray(q.reshape(1, 4)))[0])
+    roll, pitch, yaw = np.round(euler, 1) + 0.0  # no minus before a zero
     return f"roll {roll:.1f}°, pitch {pitch:.1f}°, yaw {yaw:.1f}°"

@@ -72,7 +72,7 @@ class Desk:
         self.cures: list[Option] = []
         self.changed: Event[[]] = Event()
         self._folder = tempfile.TemporaryDirectory(prefix="imufit-")
-        self._working = False
+        self._working = self._failed = False
         self._troubled: LogFile | None = None
 
     @property
@@ -134,6 +134,7 @@ class Desk:
 
     def _note(self, problem: str, cures: list[Option], file: LogFile | None) -> None:
         self.trouble, self.cures, self._troubled = problem, cures if file is not None else [], file
+        self._failed = True
 
     def forget_trouble(self) -> None:
         """Put the last problem away."""
@@ -148,6 +149,7 @@ class Desk:
         action : callable
             The change; a quick one.
         """
+        self.trouble, self.cures, self._troubled = "", [], None
         try:
             action()
         except InputError as error:
@@ -162,8 +164,9 @@ class Desk:
         self._working = True
         try:
             while (step := next(self._pending(), None)) is not None:
+                self._failed = False
                 await self._in_thread(*step)
-                if self.trouble:
+                if self._failed:
                     return
         finally:
             self._working = False
@@ -176,9 +179,12 @@ class Desk:
         stack = session.stack
         made = session.made(stack)
         words = " + ".join(stack.model.effects) or "the ideal sensor"
-        if made is None:
-            yield f"fitting {words}", lambda: session.fit(stack, self.progress)
-            return
+        for step in session.steps[: session.position + 1]:
+            # Earlier ones first: a session that was reopened goes the same way again.
+            if session.made(step.stack) is None:
+                yield f"fitting {words}", partial(session.fit, step.stack, self.progress)
+                return
+        assert made is not None
         if made.comparison is None and session.has_reference:
             yield f"comparing {words}", lambda: session.compare(stack, self.progress)
         if made.diagnosis is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Final
 
 import uvicorn
@@ -97,5 +98,7 @@ def serve(port: int = 0, ready: Callable[[str], None] | None = None) -> None:
         ui.run_with(outer, mount_path=f"/{token}", show_welcome_message=False, reconnect_timeout=30.0)
         if ready is not None:
             app.on_startup(lambda: ready(address_of(chosen, token)))
-        settings = uvicorn.Config(Guard(outer, token, chosen), log_level="error", access_log=False, ws="websockets")
-        uvicorn.Server(settings).run(sockets=[listening])
+        settings = uvicorn.Config(Guard(outer, token, chosen), log_level="error", access_log=False)
+        # Ctrl-C is how a person ends the server, and no interruption of its work.
+        with suppress(KeyboardInterrupt):
+            uvicorn.Server(settings).run(sockets=[listening])

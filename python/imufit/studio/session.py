@@ -359,7 +359,7 @@ class Session:
         target = (self.stack if stack is None else stack).model
         with self._work:
             if target not in self._made:
-                self._keep(target, self._moved(self._nearest(), target, progress))
+                self._keep(target, self._moved(self._nearest(target), target, progress))
             return self._made[target]
 
     def diagnose(self, stack: Stack | None = None, progress: Progress = silent) -> Diagnosis:
@@ -451,9 +451,11 @@ class Session:
         solved = analysis.problem.estimate([*analysis.fitted_slots, analysis.slots.index(effect)])
         return panels(analysis, solved["full_step"], self.shown)
 
-    def _nearest(self) -> Made:
-        """Return the fit of the last step up to the present one that was made."""
-        for step in self.steps[self.position :: -1]:
+    def _nearest(self, target: Stack) -> Made:
+        """Return the fit of the last step before a stack that was made."""
+        models = [step.stack.model for step in self.steps[: self.position + 1]]
+        at = models.index(target) if target in models else self.position
+        for step in self.steps[at::-1]:
             if (found := self._made.get(step.stack.model)) is not None:
                 return found
         return self._made[Stack()]

@@ -111,7 +111,9 @@ def _two_models(second: Made, present: Made) -> None:
         f"Held-out error: {quantity.ratio(second.numbers.ratio)} times the noise floor with the second model, "
         f"{quantity.ratio(present.numbers.ratio)} with the present one. The {lower} model stands lower."
     ).classes("studio-sentence").props("data-mark=two-sentence")
-    rows = [("held-out error", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))]
+    rows: list[tuple[str, ...]] = [
+        ("held-out error", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))
+    ]
     levels = [
         {item.channel: item.ratio for item in (made.comparison.channels if made.comparison is not None else ())}
         for made in (second, present)
