@@ -8,6 +8,7 @@ from importlib.resources import files
 from nicegui import ui
 
 from imufit.studio.desk import Desk
+from imufit.studio.view_body import BodyView
 from imufit.studio.view_candidates import CandidateView
 from imufit.studio.view_fall import FallView
 from imufit.studio.view_model import ModelView
@@ -33,6 +34,7 @@ def page_of(desk: Desk) -> Callable[[], None]:
                 top = Top(desk)
             with _region("middle"):
                 panels = PanelView(desk)
+                body = BodyView(desk)
             with _region("right"):
                 candidates = CandidateView(desk, panels)
             with _region("bottom"):
@@ -43,6 +45,7 @@ def page_of(desk: Desk) -> Callable[[], None]:
         def refresh() -> None:
             for view in (head, top, model, panels, candidates, fall):
                 view.refresh()
+            body.renew()
 
         desk.changed.subscribe(refresh)
         refresh()

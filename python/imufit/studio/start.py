@@ -11,6 +11,7 @@ from nicegui import app, background_tasks
 from imufit.log import Reading
 from imufit.studio import server
 from imufit.studio.desk import SESSION_ENDING, Desk
+from imufit.studio.live import page as live
 from imufit.studio.log_file import LogFile
 from imufit.studio.page import page_of
 
@@ -41,6 +42,7 @@ def start(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, read
     """
     desk = Desk()
     server.add_page("/", page_of(desk))
+    server.add_page("/live", live.build, "imufit live")
 
     async def first() -> None:
         if demo:
