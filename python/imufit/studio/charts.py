@@ -244,7 +244,7 @@ def fall(
     top, low = max([*heights, 1.0]), min([*heights, 1.0])
     logarithmic = top / low > LOGARITHMIC_ABOVE
     scale: dict[str, Any] = (
-        {"type": "log", "range": [math.log10(0.6 * low), math.log10(1.8 * top)], "dtick": "D1"}
+        {"type": "log", "range": [math.log10(0.6 * low), math.log10(3.0 * top)], "tickvals": _decades(low, top)}
         if logarithmic
         else {"range": [0.0, 1.22 * top]}
     )
@@ -256,6 +256,12 @@ def fall(
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
     return figure
+
+
+def _decades(low: float, top: float) -> list[float]:
+    """Return 1 and 10 and so on, with 3 between them, over the range of a logarithmic axis."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(top)) + 1)
+    return [value for power in powers for value in (10.0**power, 3.0 * 10.0**power)]
 
 
 def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:

@@ -53,7 +53,7 @@ class Head:
                         attribute("data-mark", f"level-{number}")
                     )
             for path, title in server.other_pages():
-                ui.link(title, path).classes("studio-link")
+                ui.link(title.removeprefix("imufit ").capitalize(), path).classes("studio-link")
             _icon("dark_mode", "Light or dark", lambda: _turn(dark)).props("data-mark=dark")
 
     def refresh(self) -> None:
