@@ -277,7 +277,8 @@ def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *,
         The quantity.
     """
     factor, shown = quantity.shown_unit(unit)
-    looks = ((GREY, "solid"), (BLUE, "solid"), (ORANGE, "dash"), (GREEN, "dashdot"))
+    # Dashes let the line beneath be seen where two lines agree.
+    looks = ((GREY, "solid"), (BLUE, "dash" if title == "reading" else "solid"))
     drawn: list[Figure] = []
     for (name, t, values), (colour, dash) in zip(lines, looks, strict=False):
         drawn += _line(t, factor * values, colour, name, dash=dash)
