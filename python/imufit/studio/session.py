@@ -51,7 +51,7 @@ class Numbers:
     fitted: bool
 
 
-@dataclass
+@dataclass(eq=False)
 class Made:
     """A model that was fitted, and what was asked of it.
 

@@ -33,6 +33,7 @@ class FallView:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
+        self._shown: tuple[object, ...] = ()
         with ui.element("div").classes("studio-row flex-wrap"):
             ui.html("Fall of the error", tag="h2", sanitize=False).style("flex: 1")
             self._undo = _button("undo", "Undo", lambda: desk.attempt(lambda: _session(desk).undo())).props(
@@ -64,15 +65,15 @@ class FallView:
         if made is not None and made.diagnosis is not None and not session.can_redo and not self._desk.guessing:
             candidate = made.diagnosis.best_candidate
             best = None if candidate is None else (candidate.effect, candidate.held_out_after)
-        self._chart.update_figure(
-            charts.fall(
-                [step.label for step in session.steps],
-                ratios,
-                [step.expected for step in session.steps],
-                session.position,
-                best=best,
-            )
+        figure = charts.fall(
+            [step.label for step in session.steps],
+            ratios,
+            [step.expected for step in session.steps],
+            session.position,
+            best=best,
         )
+        if figure != self._chart.figure:
+            self._chart.update_figure(figure)
         self._floor.set_text(
             "" if made is None or made.diagnosis is None else _floor_words(session, made.diagnosis.noise)
         )
@@ -88,9 +89,14 @@ class FallView:
 
     def _show_two(self, session: Session) -> None:
         """Lay out the second model and the present one beside each other."""
-        self._two.clear()
         second = None if session.second is None else session.made(session.second)
         present = session.made()
+        levels = tuple(made is not None and made.comparison is not None for made in (second, present))
+        state = (session.second, session.stack, second, present, levels)
+        if state == self._shown:
+            return
+        self._shown = state
+        self._two.clear()
         if session.second is None:
             return
         with self._two:

@@ -25,17 +25,24 @@ class ModelView:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         ui.html("Model", tag="h2", sanitize=False)
+        self._state: tuple[object, ...] = ()
         self._list = ui.column().classes("w-full gap-0")
 
     def refresh(self) -> None:
         """Show the present stack."""
-        self._list.clear()
         session = self._desk.session
+        begun = session is not None and session.begun
+        numbers = session.numbers() if session is not None and begun else None
+        # A list that stays as it is keeps its elements: a click never falls on one that is being replaced.
+        state = (begun, None if session is None else session.stack, numbers)
+        if state == self._state:
+            return
+        self._state = state
+        self._list.clear()
         with self._list:
-            if session is None or not session.begun:
+            if session is None or not begun:
                 ui.label("Open a log to begin.").classes("studio-muted")
                 return
-            numbers = session.numbers()
             ui.label(_state(session, numbers)).classes("studio-muted").props("data-mark=model-state")
             for entry in session.stack.entries:
                 self._entry(entry, numbers)
