@@ -26,7 +26,7 @@ AXIS: Final = 1.45
 """Length of the drawn axes from the centre."""
 LOOKS: Final[Mapping[str, tuple[str, float, bool]]] = {
     "measured": (SKY, 1.0, False),
-    "predicted": (ORANGE, 0.55, False),
+    "predicted": (ORANGE, 0.35, False),
     "reference": (GREY, 1.0, True),
     "wanted": (ORANGE, 0.55, False),
 }
