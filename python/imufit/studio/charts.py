@@ -251,7 +251,7 @@ def fall(
     # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
     edge = [-0.6, max(len(places), SLOTS) - 0.4]
     floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
-    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": "auto"}
+    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": 20}
     figure = _figure([*bars, *floor], "", "error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
