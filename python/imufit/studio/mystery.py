@@ -38,7 +38,7 @@ class Level:
 LEVELS: Final[dict[int, Level]] = {
     1: Level(
         "A large effect",
-        "One large effect is hidden in two minutes of a hand-held sensor. Name the effect.",
+        "One large effect is hidden in one minute of a hand-held sensor. Name the effect.",
         "An effect is named by the shape of the residual: the covariate that the residual follows points to the cause.",
     ),
     2: Level(
