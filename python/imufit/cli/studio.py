@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import NamedFile, Whole
+from imufit.cli.arguments import NamedFile, Whole, effects_from_option
 from imufit.cli.output import Output
 from imufit.cli.reading import reading_options
 
@@ -32,6 +32,7 @@ class LogOrDemo(NamedFile):
 @click.command()
 @click.argument("logs", metavar="[LOG...|demo]", type=LogOrDemo(exists=True, folder=True), nargs=-1)
 @reading_options
+@effects_from_option
 @click.option("--port", type=Whole(0, LARGEST_PORT), default=0, help="Port of 127.0.0.1; without it a free one.")
 @click.option("--browser/--no-browser", default=True, help="Open the address in the browser, or only print it.")
 def studio(logs: tuple[Path, ...], *, reading: Reading, port: int, browser: bool) -> None:

@@ -75,10 +75,17 @@ class Desk:
         self._working = self._failed = False
         self._troubled: LogFile | None = None
 
-    @property
-    def folder(self) -> Path:
-        """Folder of the files that the browser sent; it goes with the server."""
-        return Path(self._folder.name)
+    def new_folder(self) -> Path:
+        """Make a folder for files that come together; it goes with the server.
+
+        An open log stays as it is where another file of its name is brought later.
+        """
+        return Path(tempfile.mkdtemp(dir=self._folder.name))
+
+    def _folders(self) -> list[Path]:
+        """List the folders of the files that the browser sent, the latest first."""
+        folders = [path for path in Path(self._folder.name).iterdir() if path.is_dir()]
+        return sorted(folders, key=lambda path: -path.stat().st_mtime_ns)
 
     @property
     def guessing(self) -> bool:
@@ -307,7 +314,7 @@ class Desk:
         path : Path
             The file of the session.
         """
-        kept = await self._in_thread(f"opening {path.name}", lambda: read_session(path, [self.folder]))
+        kept = await self._in_thread(f"opening {path.name}", lambda: read_session(path, self._folders()))
         if kept is None:
             return
         session = await self._opened(kept.files)
@@ -342,6 +349,6 @@ class Desk:
         seed : int
             Picks the log.
         """
-        game = await self._in_thread("hiding an effect", lambda: Mystery.hidden(level, seed, self.folder))
+        game = await self._in_thread("hiding an effect", lambda: Mystery.hidden(level, seed, self.new_folder()))
         if game is not None:
             await self.open([LogFile(game.log, game.log.name)], game)

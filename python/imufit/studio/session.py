@@ -18,6 +18,7 @@ import numpy as np
 
 from imufit.comparing import comparison, panels
 from imufit.errors import InputError
+from imufit.fitting.analysis import pooled
 from imufit.log import LogSource
 from imufit.loop import Fit, SensorModel
 from imufit.model.catalogue import each_log_has_its_own, find_effect
@@ -323,13 +324,12 @@ class Session:
         for key in model.effects:
             effect, count = find_effect(key), self._count(key)
             # Logs that have their own values follow one another.
-            values = solved["step"][at : at + count].reshape(-1, len(effect.parameters)).mean(axis=0)
-            spread = errors[at : at + count].reshape(-1, len(effect.parameters))
+            shape = (-1, len(effect.parameters))
+            part = slice(at, at + count)
+            values, spread = pooled(solved["step"][part].reshape(shape), errors[part].reshape(shape))
             parameters += [
                 Parameter(key, name, float(value), float(error), unit, typical)
-                for (name, unit, typical), value, error in zip(
-                    effect.parameters, values, np.sqrt((spread**2).sum(axis=0)) / len(spread), strict=True
-                )
+                for (name, unit, typical), value, error in zip(effect.parameters, values, spread, strict=True)
             ]
             at += count
         return Numbers(float(solved["held_out"]), tuple(parameters), False)

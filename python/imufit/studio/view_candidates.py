@@ -82,9 +82,10 @@ class CandidateView:
         row.on("mouseleave", lambda: self.look_at(""))
         with row:
             with ui.element("div").classes("studio-row"):
-                ui.label(printable(effect, NAME)).classes("studio-id cursor-pointer").on(
-                    "click", lambda: self.look_at("" if self._looked_at == effect else effect)
-                )
+                name = ui.label(printable(effect, NAME)).classes("studio-id cursor-pointer")
+                name.props("tabindex=0 role=button")
+                for event in ("click", "keydown.enter"):
+                    name.on(event, lambda: self.look_at("" if self._looked_at == effect else effect))
 
                 async def add() -> None:
                     session = desk.session

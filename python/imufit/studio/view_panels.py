@@ -68,8 +68,11 @@ class PanelView:
             return
         made = session.made()
         found = None if made is None else made.comparison
+        for element in (self._panel, self._spectrum, self._covariate, self._trace_kind):
+            element.visible = session.has_reference
         if not session.has_reference:
-            self._note.set_text("The log has no reference: the rests are judged, and no residual can be drawn.")
+            self._note.set_text("The log has no reference: the rests are judged, and the readings are drawn.")
+            self._refresh_readings()
             return
         if found is None:
             return
@@ -84,6 +87,21 @@ class PanelView:
             return
         self._offer(found, channel)
         self._draw(found, None if second is None else second.comparison, channel)
+
+    def _refresh_readings(self) -> None:
+        """Show the readings of a log without a reference over time."""
+        desk = self._desk
+        channels = [] if desk.traces is None else [item.name for item in desk.traces.channels if item.name[:3] in UNITS]
+        state = (desk.traces, desk.channel)
+        if not channels or state == self._state:
+            return
+        self._state = state
+        channel = desk.channel if desk.channel in channels else channels[0]
+        self._setting = True
+        self._kind = self._trace_kind.value = READING
+        self._channel.set_options(channels, value=channel)
+        self._setting = False
+        ui.timer(0, lambda: self._draw_trace(channel), once=True)
 
     def _offer(self, found: Comparison, channel: str) -> None:
         """Fill the two lists, the worst first."""
@@ -113,6 +131,8 @@ class PanelView:
             self._desk.changed.emit()
 
     def _other_kind(self) -> None:
+        if self._setting:
+            return
         self._kind = self._trace_kind.value
         self._state = ()
         self.refresh()

@@ -255,10 +255,11 @@ def _upload(desk: Desk) -> None:
 def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
     async def take(event: events.MultiUploadEventArguments) -> None:
         files = []
+        folder = desk.new_folder()
         for sent in event.files:
-            # The browser decides the name: only its last part counts.
-            name = Path(sent.name.replace("\\", "/")).name or "log"
-            path = desk.folder / name
+            # The browser decides the name: only its last part counts, and it names a file.
+            name = Path(sent.name.replace("\\", "/")).name.lstrip(".") or "log"
+            path = folder / name
             await sent.save(path)
             files.append(LogFile(path, name))
         if done is not None:
