@@ -63,7 +63,7 @@ def start(page: Page, _folder: Path) -> None:
 def failing(page: Page, folder: Path) -> None:
     """Open a log and look at the effect that is missing."""
     drop(page, folder / "walk.parquet")
-    marked(page, "candidate-acc.bias").hover()
+    marked(page, "candidate-gyr.scale").hover()
     marked(page, "card").wait_for()
     page.wait_for_timeout(900)
 

@@ -244,18 +244,24 @@ def fall(
     top, low = max([*heights, 1.0]), min([*heights, 1.0])
     logarithmic = top / low > LOGARITHMIC_ABOVE
     scale: dict[str, Any] = (
-        {"type": "log", "range": [math.log10(0.6 * low), math.log10(1.8 * top)], "dtick": "D1"}
+        {"type": "log", "range": [math.log10(0.6 * low), math.log10(3.0 * top)], "tickvals": _decades(low, top)}
         if logarithmic
         else {"range": [0.0, 1.22 * top]}
     )
     # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
     edge = [-0.6, max(len(places), SLOTS) - 0.4]
     floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
-    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": "auto"}
+    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": 20}
     figure = _figure([*bars, *floor], "", "error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
     return figure
+
+
+def _decades(low: float, top: float) -> list[float]:
+    """Return 1 and 10 and so on, with 3 between them, over the range of a logarithmic axis."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(top)) + 1)
+    return [value for power in powers for value in (10.0**power, 3.0 * 10.0**power)]
 
 
 def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:
@@ -271,7 +277,8 @@ def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *,
         The quantity.
     """
     factor, shown = quantity.shown_unit(unit)
-    looks = ((GREY, "solid"), (BLUE, "solid"), (ORANGE, "dash"), (GREEN, "dashdot"))
+    # Dashes let the line beneath be seen where two lines agree.
+    looks = ((GREY, "solid"), (BLUE, "dash" if title == "reading" else "solid"))
     drawn: list[Figure] = []
     for (name, t, values), (colour, dash) in zip(lines, looks, strict=False):
         drawn += _line(t, factor * values, colour, name, dash=dash)

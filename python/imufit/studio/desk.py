@@ -27,7 +27,7 @@ SESSION_ENDING: Final = ".toml"
 
 
 class Desk:
-    """What lies before the person: a session on its logs, files that were brought, a game.
+    """The state of the studio: a session on its logs, files that were brought, a game.
 
     Attributes
     ----------
@@ -323,11 +323,11 @@ class Desk:
         Raises
         ------
         InputError
-            There is no session.
+            No log is open.
         """
         session = self.session
         if session is None:
-            raise InputError("there is no session yet", remedy="Open a log first.")
+            raise InputError("no log is open yet", remedy="Open a log first.")
         return as_toml(Kept(self.files, tuple(session.steps), session.position, session.second))
 
     # --- the game

@@ -38,7 +38,7 @@ class Level:
 LEVELS: Final[dict[int, Level]] = {
     1: Level(
         "A large effect",
-        "One large effect is hidden in two minutes of a hand-held sensor. Name the effect.",
+        "One large effect is hidden in one minute of a hand-held sensor. Name the effect.",
         "An effect is named by the shape of the residual: the covariate that the residual follows points to the cause.",
     ),
     2: Level(
@@ -125,7 +125,7 @@ class Mystery:
             The level is unknown.
         """
         if level not in LEVELS:
-            raise InputError(f"there is no level {level}", remedy="Choose 1, 2 or 3.")
+            raise InputError(f"the level {level} is unknown", remedy="Choose 1, 2 or 3.")
         path = folder / f"mystery-{level}-{seed}.parquet"
         if level == 1:
             simulation, _ = hidden("handheld", seed, size="large", duration=DURATION, rate=RATE)
@@ -186,7 +186,7 @@ def _sureness(first: Diagnosis) -> str:
     """Say how sure one could have been."""
     best = first.candidates[0].probability if first.candidates else math.nan
     if first.verdict == "adequate":
-        return "Nobody could have named an effect here: no effect stands out of the noise of this log."
+        return "You could not have named an effect: no effect stands out of the noise of this log."
     if first.verdict == "missing" and best >= SURE:
         return f"You could have been sure: one effect stands out, with {quantity.share(best)}."
     if first.verdict == "ambiguous":

@@ -32,17 +32,19 @@ def page_of(desk: Desk) -> Callable[[], None]:
         with ui.element("main").classes("studio"):
             with _region("top"):
                 top = Top(desk)
-            with _region("middle"):
+            with _region("middle") as middle:
                 panels = PanelView(desk)
                 body = BodyView(desk)
-            with _region("right"):
+            with _region("right") as right:
                 candidates = CandidateView(desk, panels)
-            with _region("bottom"):
+            with _region("bottom") as bottom:
                 fall = FallView(desk)
-            with _region("left"):
+            with _region("left") as left:
                 model = ModelView(desk)
 
         def refresh() -> None:
+            for region in (middle, right, bottom, left):
+                region.visible = desk.session is not None
             for view in (head, top, model, panels, candidates, fall):
                 view.refresh()
             body.renew()

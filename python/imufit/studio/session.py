@@ -1,4 +1,4 @@
-"""What a page of the studio shows and changes: logs, the stack of effects, its fits, and the way there.
+"""Content of the studio without a page: logs, the stack of effects, its fits, and the way there.
 
 Nothing here draws. Every number is that of the fit which `imufit add`, `imufit ladder` and `imufit diagnose` make.
 Where a fit has yet to be made, the evidence of the first pass gives the numbers to first order, and they say so.

@@ -49,6 +49,7 @@ class CandidateView:
             return
         self._drawn = state
         self._list.clear()
+        self._list.classes(**({"add": "studio-long"} if self._desk.guessing else {"remove": "studio-long"}))
         with self._list:
             if diagnosis is None:
                 ui.label("The candidates stand here once they are judged.").classes("studio-muted")

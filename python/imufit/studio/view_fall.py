@@ -141,12 +141,12 @@ def _floor_words(session: Session, noise: tuple[NoisePart, ...]) -> str:
     """Say which parts make the noise floor of the worst channel."""
     made = session.made(session.steps[0].stack)
     channel = None if made is None or made.comparison is None else worst_channel(made.comparison)
-    parts = sorted((part for part in noise if part.channel == channel), key=lambda part: -part.share)
+    # A missing effect passes for slow noise: parts above the white one wait for the effect.
+    parts = [part for part in noise if part.channel == channel and SMALL <= part.share <= 1.0]
+    parts.sort(key=lambda part: -part.share)
     if not parts:
         return ""
-    names = [
-        f"{part.component.replace('_', ' ')} {quantity.share(part.share)}" for part in parts if part.share >= SMALL
-    ]
+    names = [f"{part.component.replace('_', ' ')} {quantity.share(part.share)}" for part in parts[:4]]
     white, *slow = names or ["not known"]
     return f"Noise floor of {channel}: {white}{'; beside it ' if slow else ''}{', '.join(slow)} of its variance."
 

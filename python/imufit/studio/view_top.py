@@ -53,7 +53,7 @@ class Head:
                         attribute("data-mark", f"level-{number}")
                     )
             for path, title in server.other_pages():
-                ui.link(title, path).classes("studio-link")
+                ui.link(title.removeprefix("imufit ").capitalize(), path).classes("studio-link")
             _icon("dark_mode", "Light or dark", lambda: _turn(dark)).props("data-mark=dark")
 
     def refresh(self) -> None:
@@ -159,7 +159,9 @@ class Top:
         for fault in diagnosis.data_faults:
             number = _number_of(self._desk, fault.file)
             with ui.element("div").classes("studio-error"):
-                ui.label(printable(str(fault))).classes("studio-muted").props("data-mark=fault")
+                # The sentence on top holds the words of a fault that spoils the log.
+                words = f"Data fault ({fault.fault})." if fault.spoils else str(fault)
+                ui.label(printable(words)).classes("studio-muted").props("data-mark=fault")
                 for option in remedies(fault.advice):
                     self._cure(option, number, "mend")
         if diagnosis.notes:
