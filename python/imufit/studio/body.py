@@ -103,7 +103,7 @@ class Body:
         colour, opacity, edges = LOOKS[name]
         length, width, height = (GROWN[name] * each for each in SIZE)
         scene = self.scene
-        group = scene.group().move(0.0, 0.0, HEIGHT)
+        group = scene.group().with_name(name).move(0.0, 0.0, HEIGHT)
         with group:
             scene.box(length, width, height, wireframe=edges).material(colour, opacity)
             nose = scene.cylinder(0.0, 0.3, 0.5, 24, wireframe=edges).material(colour, opacity)

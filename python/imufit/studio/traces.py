@@ -9,6 +9,7 @@ from __future__ import annotations
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -218,10 +219,18 @@ class Traces:
         self.built = True
 
     def _fed(self, progress: Progress) -> Iterator[Log]:
-        for chunk in self.log.chunks(BLOCK_ROWS):
-            self._columns.feed(chunk.core.t, chunk.core.table())
-            progress(self.rows, self.log.n, "drawing")
-            yield chunk.core
+        # The next rows are read while these are taken: both leave the interpreter to the other one.
+        with ThreadPoolExecutor(1) as feeder:
+            fed: Future[None] | None = None
+            for chunk in self.log.chunks(BLOCK_ROWS):
+                if fed is not None:
+                    fed.result()
+                    progress(self.rows, self.log.n, "drawing")
+                fed = feeder.submit(self._columns.feed, chunk.core.t, chunk.core.table())
+                yield chunk.core
+            if fed is not None:
+                fed.result()
+                progress(self.rows, self.log.n, "drawing")
 
     def window(self, names: Sequence[str], begin: float, end: float, pixels: int) -> dict[str, Points]:
         """Return the points of some columns in a window of time.

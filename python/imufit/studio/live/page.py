@@ -55,11 +55,12 @@ class _Device:
 
 
 _device = _Device()
+# The end of the server ends a recording, and makes the log of it.
+app.on_shutdown(_device.disconnect)
 
 
 def build() -> None:
     """Make the page."""
-    app.on_shutdown(_device.disconnect)
     _LivePage()
 
 
