@@ -1,4 +1,7 @@
-"""The studio's session without a browser: its numbers are those of the command line, and what it copies makes them."""
+"""The studio's session without a browser: its numbers are those of the command line, and what it copies makes them.
+
+The time of an answer is that of the processor, which other work on the machine does not lengthen.
+"""
 
 import json
 import subprocess
@@ -6,6 +9,7 @@ import sys
 import time
 
 import imufit
+import numpy as np
 import pytest
 from cli_stand_in import strict_json
 from imufit.errors import InputError
@@ -50,6 +54,12 @@ def command(folder, *arguments):
     return done.stdout
 
 
+def sorted_like(panels, others):
+    """The panels in the order of others."""
+    by_key = {(panel.channel, panel.covariate): panel for panel in panels}
+    return [by_key[panel.channel, panel.covariate] for panel in others]
+
+
 def climb(session):
     """Add what is best until nothing is missing; return the effects."""
     added = []
@@ -79,10 +89,14 @@ def test_a_switch_needs_no_pass_and_is_quick(session):
     climb(session)
     for effect in session.stack.effects:
         session.switch(effect, False)
-        begin = time.perf_counter()
+        begin = time.process_time()
         numbers = session.numbers()
-        assert time.perf_counter() - begin < 0.1
+        assert time.process_time() - begin < 0.1
+        drawn = session.panels_at_once()
+        assert time.process_time() - begin < 0.1
         fitted = session.fit().numbers
+        for quick, exact in zip(drawn, sorted_like(session.compare().panels, drawn), strict=True):
+            assert np.abs(quick.mean - exact.mean).max() < 0.05 * quick.noise_floor
         assert numbers.ratio == pytest.approx(fitted.ratio, rel=1e-3)
         for quick, exact in zip(numbers.parameters, fitted.parameters, strict=True):
             assert abs(quick.value - exact.value) < 0.2 * exact.standard_error
@@ -138,9 +152,9 @@ def test_an_effect_is_refused_with_the_reason(session):
 
 def test_what_a_candidate_would_explain_needs_no_pass(session):
     before = {(p.channel, p.covariate): p for p in session.compare().panels}
-    begin = time.perf_counter()
+    begin = time.process_time()
     after = session.explained("acc.bias")
-    assert time.perf_counter() - begin < 0.1
+    assert time.process_time() - begin < 0.1
     worst = worst_channel(session.compare())
     mean = {key: float(abs(panel.mean).mean()) for key, panel in before.items()}
     left = {(p.channel, p.covariate): float(abs(p.mean).mean()) for p in after}

@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imufit.comparing import comparison, panels
 from imufit.errors import InputError
@@ -27,6 +28,8 @@ from imufit.results import Comparison, Diagnosis, Parameter
 from imufit.results.comparison import Panel
 from imufit.studio.stack import Action, Stack, Step
 from imufit.studio.traces import ModelTraces, Traces
+
+Array = NDArray[np.float64]
 
 FULL: Final = 4
 """Fits that keep their evidence: the first, the present, the one before, and the second of two models. The evidence of
@@ -102,7 +105,7 @@ class Session:
         self.second: Stack | None = None
         self._made: dict[Stack, Made] = {}
         self._full: OrderedDict[Stack, None] = OrderedDict()
-        self._quick: dict[Stack, Numbers] = {}
+        self._quick: dict[Stack, tuple[Numbers, Array]] = {}
         self._work = threading.RLock()
         self._start: Fit | None = None
 
@@ -296,7 +299,14 @@ class Session:
             if self.needs_pass(model):
                 return None
             self._quick[model] = self._first_order(model)
-        return self._quick[model]
+        return self._quick[model][0]
+
+    def panels_at_once(self) -> list[Panel]:
+        """Return the residuals of the present stack to first order, without a pass; empty where a pass is needed."""
+        model = self.stack.model
+        if not self.has_reference or self.numbers() is None or model not in self._quick:
+            return []
+        return panels(self.start.analysis, self._quick[model][1], self.shown)
 
     def needs_pass(self, stack: Stack) -> bool:
         """Return whether only a pass over the logs gives the numbers of a stack that was not fitted.
@@ -313,8 +323,8 @@ class Session:
             for effect in model.effects
         )
 
-    def _first_order(self, model: Stack) -> Numbers:
-        """Solve for the parameters of some effects in the evidence around the ideal sensor."""
+    def _first_order(self, model: Stack) -> tuple[Numbers, Array]:
+        """Solve for some effects in the evidence around the ideal sensor: numbers, and the step of all parameters."""
         analysis = self.start.analysis
         slots = [analysis.slots.index(effect) for effect in model.effects]
         solved = analysis.problem.estimate([*analysis.fitted_slots, *slots])
@@ -332,7 +342,7 @@ class Session:
                 for (name, unit, typical), value, error in zip(effect.parameters, values, spread, strict=True)
             ]
             at += count
-        return Numbers(float(solved["held_out"]), tuple(parameters), False)
+        return Numbers(float(solved["held_out"]), tuple(parameters), False), solved["full_step"]
 
     def _count(self, effect: str) -> int:
         """Return the number of parameters that an effect has in the evidence of all logs."""

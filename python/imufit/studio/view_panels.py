@@ -14,7 +14,7 @@ from imufit.results import Comparison, Spectrum
 from imufit.results.comparison import Panel
 from imufit.studio import charts
 from imufit.studio.desk import Desk
-from imufit.studio.session import worst_channel
+from imufit.studio.session import Session, worst_channel
 from imufit.studio.stack import Stack
 
 PIXELS: Final = 1200
@@ -36,6 +36,7 @@ class PanelView:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._proposed = ""
+        self._session: Session | None = None
         self._window: tuple[float, float] | None = None
         self._kind = RESIDUAL
         self._state: tuple[Any, ...] = ()
@@ -66,6 +67,8 @@ class PanelView:
         session = self._desk.session
         if session is None or not session.begun:
             return
+        if session is not self._session:
+            self._session, self._window = session, None
         made = session.made()
         found = None if made is None else made.comparison
         for element in (self._panel, self._spectrum, self._covariate, self._trace_kind):
@@ -75,10 +78,12 @@ class PanelView:
             self._refresh_readings()
             return
         if found is None:
+            self._draw_at_once(session)
             return
         second = None if session.second is None else session.made(session.second)
         desk = self._desk
-        state = (found, second and second.comparison, desk.channel, desk.covariate, self._proposed, len(desk.models))
+        traced = (desk.models.get(Stack()), desk.models.get(session.stack.model))
+        state = (found, second and second.comparison, desk.channel, desk.covariate, self._proposed, *traced)
         if all(a is b or a == b for a, b in zip(state, self._state, strict=False)) and len(state) == len(self._state):
             return
         self._state = state
@@ -87,6 +92,14 @@ class PanelView:
             return
         self._offer(found, channel)
         self._draw(found, None if second is None else second.comparison, channel)
+
+    def _draw_at_once(self, session: Session) -> None:
+        """Show the residual that the evidence gives to first order, until the fit is there."""
+        shown = session.panels_at_once()
+        panel = _panel_of(shown, self._channel.value, self._covariate.value)
+        if panel is not None:
+            self._state = ()
+            self._panel.update_figure(charts.residual_panel(panel))
 
     def _refresh_readings(self) -> None:
         """Show the readings of a log without a reference over time."""
