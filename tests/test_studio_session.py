@@ -127,6 +127,17 @@ def test_undo_redo_and_a_step_after_undo(session):
     assert session.stack.effects == ("acc.bias",)
 
 
+def test_a_step_that_cannot_be_fitted_is_given_up(session):
+    session.add("acc.bias")
+    session.add("gyr.scale")
+    session.give_up()
+    assert session.stack.effects == ("acc.bias",)
+    assert not session.can_redo
+    session.give_up()
+    session.give_up()
+    assert [step.action for step in session.steps] == [Action.START]
+
+
 def test_a_fixed_value_stays_and_is_fitted_again(session):
     session.add("acc.bias")
     fitted = session.fit().numbers

@@ -174,6 +174,9 @@ class Desk:
                 self._failed = False
                 await self._in_thread(*step)
                 if self._failed:
+                    if self.session is not None and self.session.made() is None:
+                        self.session.give_up()
+                        self.changed.emit()
                     return
         finally:
             self._working = False

@@ -170,6 +170,12 @@ class Session:
         """Make the step that was undone last."""
         self.position = min(len(self.steps) - 1, self.position + 1)
 
+    def give_up(self) -> None:
+        """Return to the step before one whose model cannot be fitted, and forget that step."""
+        if self.can_undo:
+            del self.steps[self.position :]
+            self.position -= 1
+
     def add(self, effect: str) -> None:
         """Add an effect.
 
