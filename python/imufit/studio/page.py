@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from importlib.resources import files
+from typing import Final
 
 from nicegui import ui
 
@@ -14,6 +16,9 @@ from imufit.studio.view_fall import FallView
 from imufit.studio.view_model import ModelView
 from imufit.studio.view_panels import PanelView
 from imufit.studio.view_top import Head, Top
+
+AHEAD_S: Final = 0.02
+"""Time that the server has for sending the numbers of a change, s."""
 
 
 def page_of(desk: Desk) -> Callable[[], None]:
@@ -42,15 +47,26 @@ def page_of(desk: Desk) -> Callable[[], None]:
             with _region("left") as left:
                 model = ModelView(desk)
 
-        def refresh() -> None:
+        def numbers() -> None:
             for region in (middle, right, bottom, left):
                 region.visible = desk.session is not None
-            for view in (head, top, model, panels, candidates, fall):
+            for view in (head, model, fall):
+                view.refresh()
+
+        def pictures() -> None:
+            for view in (top, candidates, panels):
                 view.refresh()
             body.renew()
 
-        desk.changed.subscribe(refresh)
-        refresh()
+        async def pictures_after() -> None:
+            # Numbers are on their way to the browser before figures are made, which takes longer.
+            await asyncio.sleep(AHEAD_S)
+            pictures()
+
+        desk.changed.subscribe(numbers)
+        desk.changed.subscribe(pictures_after)
+        numbers()
+        pictures()
 
     return build
 
