@@ -64,11 +64,11 @@ def build() -> None:
     _LivePage()
 
 
-def ports() -> list[str]:
-    """Return the serial ports of this computer."""
+def devices() -> list[str]:
+    """Return the serial ports of this computer, and the devices that can be emulated."""
     from serial.tools import list_ports  # noqa: PLC0415 - only this page needs it
 
-    return sorted(found.device for found in list_ports.comports())
+    return [*sorted(found.device for found in list_ports.comports()), *(EMULATED + name for name in SCENARIOS)]
 
 
 class _LivePage:
@@ -103,7 +103,7 @@ class _LivePage:
     def _connection(self) -> None:
         with ui.column().classes("studio-region gap-2"):
             with ui.row().classes("w-full items-end gap-3"):
-                choices = [*ports(), *(EMULATED + name for name in SCENARIOS)]
+                choices = devices()
                 self._choice = (
                     ui.select(
                         choices,
@@ -191,6 +191,12 @@ class _LivePage:
             self._problem.text = printable(str(error))
         finally:
             self._connect.enable()
+
+    def _look_for_devices(self) -> None:
+        named = [self._choice.value] if self._choice.value else []
+        choices = list(dict.fromkeys([*devices(), *named]))
+        if set(choices) != set(self._choice.options):
+            self._choice.set_options(choices)
 
     def _source(self) -> Source:
         choice = str(self._choice.value or "").strip()
