@@ -273,11 +273,28 @@ def test_a_second_origin_cannot_open_the_page(chromium, address):
     page.close()
 
 
-def test_the_demonstration_opens_on_a_hidden_effect(chromium, folder):
+def test_the_demonstration_leads_to_a_named_effect_and_a_fallen_error(chromium, folder):
     with studio(folder, "demo") as address:
         page = chromium.new_page(viewport={"width": 380, "height": 800})
         page.set_default_timeout(SLOW_MS)
         page.goto(address)
-        marked(page, "reveal").wait_for()
+        (start,) = wait_for_bars(page, 1)
         assert page.evaluate("document.documentElement.scrollWidth") <= 380
+        page.get_by_role("button", name="Add", exact=True).first.click()
+        after = wait_for_bars(page, 2)[-1]
+        assert after < 1.1 < start
+        marked(page, "reveal").click()
+        marked(page, "truth").wait_for()
+        assert marked(page, "truth").inner_text().startswith("Right")
         page.close()
+
+
+def test_a_button_applies_the_remedy_of_a_fault(page, folder):
+    log_of(simulate("handheld", {}, duration=40.0, rate=50.0, seed=6, frame="ENU")).write(folder / "frame.csv")
+    sidecar = folder / "frame.toml"
+    sidecar.write_text(sidecar.read_text().replace('"ENU"', '"NED"'))
+    drop(page, folder / "frame.csv", sidecar)
+    page.get_by_role("button", name="Read in frame ENU").click()
+    page.wait_for_function("() => !document.querySelector('[data-mark=fault]')")
+    idle(page)
+    assert bars(page)[0] < 1.1

@@ -14,7 +14,7 @@ from nicegui import Event, run
 from imufit.errors import InputError
 from imufit.remedy import Option
 from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, offers, remedies
-from imufit.studio.mystery import Mystery
+from imufit.studio.mystery import DEMONSTRATION, Mystery
 from imufit.studio.session import Session
 from imufit.studio.session_file import Kept, as_toml, read_session
 from imufit.studio.stack import Stack
@@ -90,7 +90,8 @@ class Desk:
     @property
     def guessing(self) -> bool:
         """Whether a game is on whose truth is not revealed: the evidence's names stay hidden."""
-        return self.mystery is not None and self.mystery.verdict is None
+        game = self.mystery
+        return game is not None and game.verdict is None and game.level != DEMONSTRATION
 
     def reveal(self, answer: str) -> None:
         """End the game with an answer.
@@ -348,7 +349,7 @@ class Desk:
         Parameters
         ----------
         level : int
-            1 to 3.
+            One of `imufit.studio.mystery.LEVELS`.
         seed : int
             Picks the log.
         """

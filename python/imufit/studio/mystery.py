@@ -35,7 +35,15 @@ class Level:
     lesson: str
 
 
+DEMONSTRATION: Final = 0
+"""Level that hides no name of the evidence: the loop is shown, and the truth at its end."""
 LEVELS: Final[dict[int, Level]] = {
+    DEMONSTRATION: Level(
+        "Demonstration",
+        "One effect is hidden in one minute of a simulated hand-held sensor. The sentence below names the effect. "
+        "Press Add beside the effect, see the error fall, then reveal the truth.",
+        "The loop on your own log is the same: compare, name, add, and stop where the error stands at the noise floor.",
+    ),
     1: Level(
         "A large effect",
         "One large effect is hidden in one minute of a hand-held sensor. Name the effect.",
@@ -94,7 +102,7 @@ class Mystery:
     Attributes
     ----------
     level, seed : int
-        Level and the number that picked the log.
+        Level, `DEMONSTRATION` included, and the number that picked the log.
     log : Path
         The log; its sealed truth lies beside it.
     verdict : Verdict or None
@@ -113,7 +121,7 @@ class Mystery:
         Parameters
         ----------
         level : int
-            1 to 3.
+            One of `LEVELS`.
         seed : int
             Picks effect, size, motion and noise.
         folder : Path
@@ -127,7 +135,7 @@ class Mystery:
         if level not in LEVELS:
             raise InputError(f"the level {level} is unknown", remedy="Choose 1, 2 or 3.")
         path = folder / f"mystery-{level}-{seed}.parquet"
-        if level == 1:
+        if level in (DEMONSTRATION, 1):
             simulation, _ = hidden("handheld", seed, size="large", duration=DURATION, rate=RATE)
         elif level == 2:
             simulation, _ = hidden("handheld", seed, size="small", allow_nothing=True, duration=DURATION, rate=RATE)

@@ -13,6 +13,7 @@ from imufit.studio import server
 from imufit.studio.desk import SESSION_ENDING, Desk
 from imufit.studio.live import page as live
 from imufit.studio.log_file import LogFile
+from imufit.studio.mystery import DEMONSTRATION
 from imufit.studio.page import page_of
 
 DEMO_SEED: Final = 3
@@ -46,7 +47,7 @@ def start(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, read
 
     async def first() -> None:
         if demo:
-            await desk.play(1, DEMO_SEED)
+            await desk.play(DEMONSTRATION, DEMO_SEED)
         elif len(logs) == 1 and logs[0].suffix.lower() == SESSION_ENDING:
             await desk.reopen(logs[0])
         elif logs:

@@ -17,7 +17,7 @@ from imufit.studio import server
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.log_file import LogFile, option_words, remedies
-from imufit.studio.mystery import LEVELS, NOTHING
+from imufit.studio.mystery import DEMONSTRATION, LEVELS, NOTHING
 from imufit.studio.recipe import as_python, as_shell
 
 SEEDS: Final = 1_000_000
@@ -49,6 +49,8 @@ class Head:
                 ui.menu_item("Copy as shell", lambda: self._show("shell")).props("data-mark=copy-shell")
             with _icon("psychology_alt", "Mystery log", None).props("data-mark=mystery"), ui.menu():
                 for number, level in LEVELS.items():
+                    if number == DEMONSTRATION:
+                        continue
                     ui.menu_item(f"Level {number}: {level.title}", _player(desk, number)).props(
                         attribute("data-mark", f"level-{number}")
                     )
@@ -209,12 +211,17 @@ class Top:
         game = desk.mystery
         assert game is not None
         level = LEVELS[game.level]
-        ui.label(f"Mystery log, level {game.level}: {level.words}").classes("studio-sentence").props("data-mark=game")
+        title = level.title if game.level == DEMONSTRATION else f"Mystery log, level {game.level}"
+        ui.label(f"{title}: {level.words}").classes("studio-sentence").props("data-mark=game")
         if game.verdict is None:
             if not judged:
                 ui.label("The evidence is being taken.").classes("studio-muted")
                 return
             assert desk.session is not None
+            if game.level == DEMONSTRATION:
+                reveal = ui.button("Reveal the truth", on_click=lambda: desk.reveal(_named(desk)))
+                reveal.props("no-caps outline").props("data-mark=reveal")
+                return
             names = sorted(desk.session.start.analysis.candidates)
             choices = {NOTHING: "nothing is missing"} | {name: printable(name, NAME) for name in names}
             with ui.row().classes("items-center"):
@@ -228,6 +235,12 @@ class Top:
             ui.label(printable(sentence)).classes("studio-sentence").props("data-mark=truth")
         ui.label(game.verdict.lesson).classes("studio-muted").props("data-mark=lesson")
         ui.button("Play again", on_click=_player(desk, game.level)).props("no-caps outline").props("data-mark=again")
+
+
+def _named(desk: Desk) -> str:
+    """Return the effect that the present model names: the first one added."""
+    effects = () if desk.session is None else desk.session.stack.model.effects
+    return effects[0] if effects else NOTHING
 
 
 def _number_of(desk: Desk, name: str | None) -> int:
