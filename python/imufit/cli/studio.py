@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import webbrowser
+from html import escape
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -42,11 +44,22 @@ def studio(logs: tuple[Path, ...], *, reading: Reading, port: int, browser: bool
     ends the server.
     """
     out = Output()
+    with TemporaryDirectory(prefix="imufit-") as folder:
 
-    def ready(address: str) -> None:
-        out.lines([address])
-        if browser:
-            webbrowser.open(address)
+        def ready(address: str) -> None:
+            out.lines([address])
+            if browser:
+                webbrowser.open(_leading_to(address, Path(folder)))
 
-    demo = [str(log) for log in logs] == [DEMO] and not logs[0].exists()
-    engine.studio(() if demo else logs, reading, demo, port=port, ready=ready)
+        demo = [str(log) for log in logs] == [DEMO] and not logs[0].exists()
+        engine.studio(() if demo else logs, reading, demo, port=port, ready=ready)
+
+
+def _leading_to(address: str, folder: Path) -> str:
+    """Write a page that leads to the address; its own address holds no token.
+
+    Other users of the computer see the arguments of programs, the browser's too. They cannot read the folder.
+    """
+    page = folder / "studio.html"
+    page.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={escape(address)}">', encoding="utf-8")
+    return page.as_uri()

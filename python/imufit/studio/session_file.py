@@ -133,7 +133,8 @@ def _file(table: Mapping[str, Any], folders: Sequence[Path]) -> LogFile:
 def _found(name: str, folders: Sequence[Path]) -> Path:
     """Return where a log is: as the file states, or under its bare name in one of the folders."""
     for path in (Path(name), *(folder / Path(name).name for folder in folders)):
-        if path.exists():
+        # A device or a pipe is no log: reading one might never end.
+        if path.is_file() or path.is_dir():
             return path
     raise InputError(
         "the log of the session is not there", file=name, remedy="Lay the log beside the session, or drop both files."
