@@ -136,10 +136,13 @@ def plot(log: Any, progress: Progress, **options: Any) -> Figure:
 
 
 def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
-    """Return the model kept in the file `path`, or a stack of `effects`; no effects is the ideal sensor."""
+    """Return the model kept in the file `path`, or the ideal sensor, with these `effects` on top."""
     import imufit  # noqa: PLC0415
 
-    return imufit.SensorModel.load(path) if path is not None else imufit.SensorModel(list(effects))
+    model = imufit.SensorModel() if path is None else imufit.SensorModel.load(path)
+    for effect in effects:
+        model = model.with_effect(effect)
+    return model
 
 
 def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:

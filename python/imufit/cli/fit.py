@@ -59,17 +59,16 @@ def fit(
     check_effects(names)
     out = Output(json_file)
     with ProgressBar() as progress:
-        start = engine.sensor_model(path=model)
-        for name in names:
-            start = start.with_effect(name)
+        start = engine.sensor_model(names, model)
         fitted = start.fit(engine.open_logs(logs, reading), progress=progress)
-    stack = " + ".join(fitted.model.effects)
+    found = fitted.to_dict()
+    stack = " + ".join(found["model"])
     out.say(f"{stack}: residual {quantity.ratio(fitted.ratio)} times the noise floor.", bold=True)
     out.table(parameter_table(fitted.parameters, "Fitted parameters"))
     out.table(log_table(fitted.by_log))
     if output is not None:
         fitted.save(output)
         out.wrote(output)
-    out.json(fitted.to_dict())
+    out.json(found)
     if plot_file is not None:
         out.plot(plot_file, drawn_parameters(fitted.parameters).root)
