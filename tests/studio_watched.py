@@ -1,4 +1,4 @@
-"""What a page of the studio asks for and complains about, for tests in a browser."""
+"""Requests and errors of a page of the studio, for tests in a browser."""
 
 from urllib.parse import urlsplit
 

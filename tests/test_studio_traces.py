@@ -127,6 +127,26 @@ def test_wide_residual_comes_from_the_pyramid_and_keeps_the_extremes(log, monkey
     np.testing.assert_allclose(narrow.low[inside], exact[(log.t >= 30.0) & (log.t <= 31.0)], rtol=0.0, atol=1e-9)
 
 
+def test_rows_that_an_excerpt_leaves_out_have_a_residual_in_a_narrow_window(log, monkeypatch):
+    """A long log is judged by stretches; where a person looks between them, the model is evaluated all the same."""
+    exact = SensorModel().fit(log).residuals("acc")[:, 1]
+    monkeypatch.setattr("imufit.log.excerpt.MOST_ROWS", 2400)
+    monkeypatch.setattr(module, "EVALUATED", 500)
+    fit = SensorModel().fit(log)
+    judged = fit.analysis.logs[0].passes.log
+    assert judged.n == 2400 < log.n
+    traces = Traces(log)
+    traces.build()
+    model = ModelTraces(traces, fit.analysis.logs[0], fit.analysis.own_step(0, fit.estimate.step))
+    model.build()
+    wide, _ = model.window(["acc_y"], *traces.span, 400)["acc_y"]
+    assert np.isnan(wide.low).sum() > 20  # between the stretches
+    narrow, _ = model.window(["acc_y"], 20.0, 22.0, 500)["acc_y"]
+    inside = (narrow.t >= 20.0) & (narrow.t <= 22.0)
+    assert not np.isnan(narrow.low).any()
+    np.testing.assert_allclose(narrow.low[inside], exact[(log.t >= 20.0) & (log.t <= 22.0)], rtol=0.0, atol=1e-9)
+
+
 def test_model_of_a_log_without_reference_is_refused_in_words():
     log = simulate("six_sides", {}, 1, 60.0).to_log().with_fields(ref_q=None)
     fit = SensorModel().fit(log)
