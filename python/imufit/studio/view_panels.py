@@ -19,6 +19,8 @@ from imufit.studio.stack import Stack
 
 PIXELS: Final = 1200
 """Points of a trace: as many as a wide screen shows beside each other."""
+FAILS: Final = 1.05
+"""Residual over noise floor from which on a channel fails: below, the excess is a tenth of the noise's variance."""
 TIME: Final = "t"
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
@@ -87,11 +89,24 @@ class PanelView:
         if all(a is b or a == b for a, b in zip(state, self._state, strict=False)) and len(state) == len(self._state):
             return
         self._state = state
-        channel = desk.channel or _worst_at_start(desk) or worst_channel(found)
+        channel = desk.channel or self._failing(found)
         if channel is None:
             return
         self._offer(found, channel)
         self._draw(found, None if second is None else second.comparison, channel)
+
+    def _failing(self, found: Comparison) -> str | None:
+        """Return the channel that fails most; where none fails any more, the one that failed at the start."""
+        worst = worst_channel(found)
+        start = self._at_start()
+        if start is None or any(item.channel == worst and item.ratio > FAILS for item in found.channels):
+            return worst
+        return worst_channel(start)
+
+    def _at_start(self) -> Comparison | None:
+        """Return where the ideal sensor fails."""
+        made = None if self._session is None else self._session.made(Stack())
+        return None if made is None else made.comparison
 
     def _draw_at_once(self, session: Session) -> None:
         """Show the residual that the evidence gives to first order, until the fit is there."""
@@ -120,7 +135,7 @@ class PanelView:
         """Fill the two lists, the worst first."""
         ratios = sorted(found.channels, key=lambda item: -item.ratio if np.isfinite(item.ratio) else np.inf)
         panels = [panel for panel in found.panels if panel.channel == channel]
-        covariate = self._present_covariate(panels)
+        covariate = self._present_covariate(found, channel)
         self._setting = True
         self._channel.set_options(
             {item.channel: f"{item.channel} ({item.ratio:.2f})" for item in ratios}, value=channel
@@ -130,13 +145,21 @@ class PanelView:
         )
         self._setting = False
 
-    def _present_covariate(self, panels: list[Panel]) -> str | None:
-        names = [panel.covariate for panel in panels]
+    def _present_covariate(self, found: Comparison, channel: str) -> str | None:
+        """Return the covariate that the person chose, or the one that explains most of a channel's residual.
+
+        Where the channel does not fail any more, this is the covariate of the start: the panel shows the residual gone.
+        """
+        names = [panel.covariate for panel in found.panels if panel.channel == channel]
         if self._desk.covariate in names:
             return self._desk.covariate
+        fails = any(item.channel == channel and item.ratio > FAILS for item in found.channels)
+        judged = found if fails else self._at_start() or found
+        top = next((panel for panel in judged.panels if panel.channel == channel), None)
         # Where no covariate explains a part worth naming, time shows what is constant and what is not.
-        told = panels and panels[0].share >= MIN_SHARE
-        return names[0] if told else TIME if TIME in names else next(iter(names), None)
+        if top is not None and top.share >= MIN_SHARE and top.covariate in names:
+            return top.covariate
+        return TIME if TIME in names else next(iter(names), None)
 
     def _chosen(self) -> None:
         if not self._setting:
@@ -165,7 +188,7 @@ class PanelView:
 
     def _draw(self, found: Comparison, second: Comparison | None, channel: str) -> None:
         panels = [panel for panel in found.panels if panel.channel == channel]
-        covariate = self._present_covariate(panels)
+        covariate = self._present_covariate(found, channel)
         panel = next((item for item in panels if item.covariate == covariate), None)
         after = None
         if self._proposed and self._desk.session is not None:
@@ -228,12 +251,6 @@ class PanelView:
             self._window = window
             if self._channel.value is not None:
                 await self._draw_trace(self._channel.value)
-
-
-def _worst_at_start(desk: Desk) -> str | None:
-    """Return the channel that failed most with the ideal sensor: its panel shows the error go."""
-    start = None if desk.session is None else desk.session.made(Stack())
-    return None if start is None or start.comparison is None else worst_channel(start.comparison)
 
 
 def _panel_of(panels: Any, channel: str, covariate: str | None) -> Panel | None:
