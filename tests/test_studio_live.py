@@ -10,6 +10,8 @@ pytest.importorskip("nicegui")
 sync_api = pytest.importorskip("playwright.sync_api")
 pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason="Debian's Chromium is not installed")
 PATIENCE = 30_000  # ms
+DRAWN = "[...document.querySelectorAll('.js-plotly-plot')].map(plot => plot.data[0].x.length)"
+"""Points of the first trace of every figure."""
 
 
 @pytest.fixture(scope="module")
@@ -23,6 +25,11 @@ def served(tmp_path_factory):
 
 def number(page, name):
     return int(page.get_by_test_id(name).inner_text().replace(" ", "") or 0)
+
+
+def words(page, part):
+    """Text of one part of every figure."""
+    return [text.strip() for text in page.locator(f".js-plotly-plot .{part}").all_text_contents()]
 
 
 def wait_until(page, holds):
@@ -73,14 +80,12 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     first = number(page, "rows")
     wait_until(page, lambda: number(page, "rows") > first + 50)
     wait_until(page, lambda: page.get_by_test_id("rate").inner_text().endswith("Hz"))
-    titles = page.locator(".js-plotly-plot .gtitle").all_text_contents()
-    assert [title.strip() for title in titles] == ["accelerometer", "gyroscope", "magnetometer", "temperature"]
-    units = page.locator(".js-plotly-plot .ytitle").all_text_contents()
-    assert [unit.strip() for unit in units] == ["m/s²", "deg/s", "µT", "°C"]
-    drawn = page.evaluate("[...document.querySelectorAll('.js-plotly-plot')].map(p => p.data[0].x.length)")
-    assert min(drawn) > 50
+    panels = ["accelerometer", "gyroscope", "magnetometer", "temperature"]
+    wait_until(page, lambda: words(page, "gtitle") == panels)
+    assert words(page, "ytitle") == ["m/s²", "deg/s", "µT", "°C"]
+    wait_until(page, lambda: min(page.evaluate(DRAWN)) > 50)
     page.get_by_text("at rest", exact=True).wait_for(timeout=PATIENCE)
-    assert page.get_by_text("roll", exact=False).first.is_visible()
+    page.get_by_text("roll", exact=False).first.wait_for(timeout=PATIENCE)
     assert page.locator(".studio-body canvas").count() == 1
 
     # the red button records a log that imufit reads back; a page that is loaded again finds the recording running
