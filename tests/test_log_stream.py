@@ -97,3 +97,28 @@ def test_coarse_clock_pair_across_blocks(tmp_path: Path) -> None:
     np.testing.assert_allclose(whole.t[65_536], (whole.t[65_535] + whole.t[65_537]) / 2)
     parts = open_log(tmp_path / "a.parquet", stream=True).chunks(777, 3)
     np.testing.assert_array_equal(np.concatenate([chunk.core.t for chunk in parts]), whole.t)
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".npz", ".csv"])
+def test_rows_are_those_of_the_whole_log_wherever_they_lie(tmp_path: Path, suffix: str) -> None:
+    log = long_log(300_000)
+    log.write(tmp_path / f"a{suffix}")
+    stream = LogStream(tmp_path / f"a{suffix}")
+    assert stream.seeks == (suffix == ".parquet")
+    for start, stop in ((0, 10), (131_000, 131_100), (200_000, 262_200), (299_990, 400_000), (5, 5)):
+        rows, part = stream.rows(start, stop), log.rows(start, min(stop, log.n))
+        np.testing.assert_array_equal(rows.t, part.t)
+        np.testing.assert_allclose(rows.gyr, part.gyr, rtol=1e-12)
+    some = stream.rows(1000, 1100, ["gyr_x"])
+    assert some.acc is None
+    np.testing.assert_allclose(some.gyr, log.gyr[1000:1100], rtol=1e-12)
+
+
+def test_rows_of_a_part_have_the_attitude_that_other_columns_make(tmp_path: Path) -> None:
+    log = long_log(1000)
+    frame = log.to_dataframe().assign(ref_roll=0.1, ref_pitch=0.0, ref_yaw=np.linspace(0.0, 1.0, 1000))
+    frame.to_parquet(tmp_path / "a.parquet", row_group_size=300)
+    stream = LogStream(tmp_path / "a.parquet")
+    part = stream.rows(500, 700, ["ref_qw"])
+    assert part.gyr is None
+    np.testing.assert_array_equal(part.ref_q, stream.read().ref_q[500:700])

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cli_stand_in import run, strict_json
-from imufit.cli import engine
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
+from imufit.lab.simulated_log import log_of
 from imufit.log import Log
 from imufit.replaying import FILTERS, read_settings, replay
 from imufit.tuning import tune
@@ -19,7 +19,7 @@ BIASED = {"gyr.bias": {"x": 0.01, "y": -0.02, "z": 0.01}}
 
 
 def handheld(seed: int = 3, duration: float = 30.0, effects=BIASED) -> Log:
-    return engine.log_of(simulate("handheld", effects, duration=duration, rate=50.0, seed=seed))
+    return log_of(simulate("handheld", effects, duration=duration, rate=50.0, seed=seed))
 
 
 @pytest.fixture(scope="module")

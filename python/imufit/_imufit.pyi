@@ -24,6 +24,7 @@ __all__ = [
     "PoseJudge",
     "Problem",
     "Profile",
+    "Pyramid",
     "Status",
     "Survey",
     "Verdict",
@@ -69,6 +70,7 @@ __all__ = [
     "smooth",
     "sphere",
     "table_attitudes",
+    "thinned",
     "tilt_angles",
     "turn_calibration",
     "unnamed_effects",
@@ -739,3 +741,23 @@ def table_attitudes(
     matrix: Sequence[Sequence[float]],
 ) -> _Array | None: ...
 def sphere(readings: _Array) -> tuple[list[float], float] | None: ...
+
+# --- pyramid: columns thinned to pixels; times ascending s, NaN where a sample is missing, gaps as longest steps in s
+
+_Points = tuple[_Array, _Array, _Array]
+"""Times, smallest and largest values of the points, at most twice as many as pixels; NaN interrupts the line."""
+
+@final
+class Pyramid:
+    def __new__(cls, gaps: Sequence[float], block: int = 128) -> Pyramid: ...
+    def feed(self, t: _Array, values: list[_Array]) -> None: ...
+    def lines(self, columns: Sequence[int], begin: float, end: float, pixels: int) -> list[_Points]: ...
+    def rows_between(self, begin: float, end: float) -> tuple[int, int]: ...
+    @property
+    def rows(self) -> int: ...
+    @property
+    def span(self) -> tuple[float, float] | None: ...
+    @property
+    def bytes(self) -> int: ...
+
+def thinned(t: _Array, values: _Array, gap: float, begin: float, end: float, pixels: int) -> _Points: ...

@@ -103,4 +103,5 @@ class InputError(ValueError):
 
 def _shown(remedy: Remedy) -> Remedy:
     """Words that a person may see."""
-    return Remedy(printable(remedy.python, keep="\n\t\r"), printable(remedy.shell, keep="\n\t\r"))
+    python, shell = (printable(text, keep="\n\t\r") for text in (remedy.python, remedy.shell))
+    return Remedy(python, shell, remedy.options)

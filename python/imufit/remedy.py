@@ -9,10 +9,10 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 
 class Reader(Enum):
@@ -42,6 +42,10 @@ def told_to(reader: Reader) -> Iterator[None]:
         _reader = before
 
 
+Option = tuple[str, Any]
+"""A keyword argument of the library and its value: ``("frame", "ENU")``, ``("mapping", {"acc_x": "AccX[g]"})``."""
+
+
 @dataclass(frozen=True)
 class Remedy:
     """A remedy in both languages; text before it or after it is added with ``+``.
@@ -50,10 +54,13 @@ class Remedy:
     ----------
     python, shell : str
         The words of Python, such as ``frame='ENU'``, and those of the command line, such as ``--frame ENU``.
+    options : tuple of Option
+        The options that the words name with a value, for a program that applies them.
     """
 
     python: str
     shell: str
+    options: tuple[Option, ...] = field(default=(), compare=False)
 
     @classmethod
     def of(cls, words: str | Remedy) -> Remedy:
@@ -68,7 +75,7 @@ class Remedy:
 
     def __add__(self, other: str | Remedy) -> Remedy:
         more = Remedy.of(other)
-        return Remedy(self.python + more.python, self.shell + more.shell)
+        return Remedy(self.python + more.python, self.shell + more.shell, self.options + more.options)
 
     def __radd__(self, before: str) -> Remedy:
         return Remedy.of(before) + self
@@ -114,7 +121,7 @@ def option(name: str, value: str | float, *, shell: str | None = None) -> Remedy
         The option's value, where it is written in another way.
     """
     given = str(value) if shell is None else shell
-    return Remedy(f"{name}={value!r}", f"--{name} {shlex.quote(given)}")
+    return Remedy(f"{name}={value!r}", f"--{name} {shlex.quote(given)}", ((name, value),))
 
 
 def recovering(part: str | Path, port: str | None = None) -> Remedy:
@@ -147,7 +154,7 @@ def mapped(columns: Mapping[str, str], shell: str = "--map") -> Remedy:
     quoted = shlex.quote(text)
     # Also where a shell needs no quotes: they show where the mapping ends and the sentence goes on.
     quoted = f"'{text}'" if quoted == text else quoted
-    return Remedy(f"mapping={dict(columns)!r}", f"{shell} {quoted}".lstrip())
+    return Remedy(f"mapping={dict(columns)!r}", f"{shell} {quoted}".lstrip(), (("mapping", dict(columns)),))
 
 
 def template(sensor: str) -> Remedy:
@@ -172,8 +179,8 @@ def reading(file: str | Path | None, how: Remedy) -> Remedy:
         Keyword argument and option.
     """
     if file is None:
-        return Remedy(f"imufit.Log.from_dataframe(df, {how.python})", how.shell)
-    return Remedy(f"imufit.read({str(file)!r}, {how.python})", how.shell)
+        return Remedy(f"imufit.Log.from_dataframe(df, {how.python})", how.shell, how.options)
+    return Remedy(f"imufit.read({str(file)!r}, {how.python})", how.shell, how.options)
 
 
 _READERS: Final = " in imufit.read or imufit.Log.from_dataframe"

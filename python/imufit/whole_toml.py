@@ -34,6 +34,17 @@ AGAIN = "Copy or save it again."
 HOW_TO_END = "If nothing is missing, end it with the lines [end] and complete = true."
 
 
+def toml_text(document: Mapping[str, Any]) -> str:
+    """Return the text of a TOML file with the mark at its end.
+
+    Parameters
+    ----------
+    document : mapping
+        The content of the file.
+    """
+    return tomli_w.dumps({LAST: f"[{END}]", **document, END: COMPLETE})
+
+
 def write_toml(path: str | Path, document: Mapping[str, Any]) -> None:
     """Write a TOML file with the mark at its end, whole or not at all.
 
@@ -50,7 +61,7 @@ def write_toml(path: str | Path, document: Mapping[str, Any]) -> None:
         The file cannot be written.
     """
     try:
-        write_text(path, tomli_w.dumps({LAST: f"[{END}]", **document, END: COMPLETE}))
+        write_text(path, toml_text(document))
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror or error})", file=path) from None
 

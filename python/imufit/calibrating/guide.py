@@ -35,6 +35,8 @@ class Advice:
         Side of a pose that was accepted with this sample.
     message : str
         One line: which side next, hold still, or why not.
+    wanted : str or None
+        Side to lay up next, or to hold still now; None once all sides are known or held.
     """
 
     state: str
@@ -43,6 +45,7 @@ class Advice:
     missing: tuple[str, ...]
     accepted: str | None
     message: str
+    wanted: str | None
 
 
 class PoseGuide:
@@ -102,6 +105,7 @@ class PoseGuide:
             self._ordered(side),
             accepted,
             self._message(judged["state"], side, judged["progress"], judged["unrest"], refused),
+            self._wanted(judged["state"], side),
         )
 
     def finish(self) -> str | None:
@@ -134,17 +138,21 @@ class PoseGuide:
             return self.missing
         return tuple(sorted(self.missing, key=lambda s: (s != side, s[1] == side[1])))
 
+    def _wanted(self, state: str, side: str | None) -> str | None:
+        """Return the side to lay up next: a missing one that is held long enough leads to another one."""
+        held = side if state == "held" else None
+        return next((each for each in self._ordered(side) if each != held), None)
+
     def _message(self, state: str, side: str | None, progress: float, unrest: float, refused: str) -> str:
         if refused:
             return refused
         if self.complete:
             return "All six sides are known."
-        wanted = self._ordered(side)[0]
+        wanted = self._wanted(state, side)
         if state == "moving":
             return f"{side} up: hold still." if side in self.missing and unrest < NEARLY else f"Turn {wanted} up."
         if side in self.missing:
             if state == "held":
-                rest = [s for s in self._ordered(side) if s != side]
-                return f"{side} up: done. " + (f"Turn {rest[0]} up." if rest else "Pick it up.")
+                return f"{side} up: done. " + (f"Turn {wanted} up." if wanted else "Pick it up.")
             return f"{side} up: hold still, {100 * progress:.0f} %."
         return f"Turn {wanted} up."

@@ -41,6 +41,8 @@ class Stage:
         Samples so far.
     t : float
         Time of the last one, s.
+    side : str or None
+        Side to lay up next; None where no side is wanted.
     """
 
     message: str
@@ -50,6 +52,7 @@ class Stage:
     directions: int | None
     rows: int
     t: float
+    side: str | None
 
 
 class Wizard:
@@ -78,6 +81,7 @@ class Wizard:
         self._accepted: list[str] = []
         self._rows, self._t = 0, 0.0
         self._message, self._progress = "Waiting for the device.", 0.0
+        self._side: str | None = None
 
     @property
     def sides_known(self) -> bool:
@@ -128,7 +132,7 @@ class Wizard:
             advice = self.guide.step(time, acc[row], None if gyr is None else gyr[row])
             if advice.accepted:
                 self._accepted.append(advice.accepted)
-            self._message, self._progress = advice.message, advice.progress
+            self._message, self._progress, self._side = advice.message, advice.progress, advice.wanted
         if self.sides_known:
             self._free()
         elif self.guide.complete:
@@ -165,4 +169,5 @@ class Wizard:
             self._turning.seen if self._turning is not None and self._has_mag else None,
             self._rows,
             self._t,
+            None if self.sides_known else self._side,
         )

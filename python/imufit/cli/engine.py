@@ -136,10 +136,13 @@ def plot(log: Any, progress: Progress, **options: Any) -> Figure:
 
 
 def sensor_model(effects: Sequence[str] = (), path: Path | None = None) -> Any:
-    """Return the model kept in the file `path`, or a stack of `effects`; no effects is the ideal sensor."""
+    """Return the model kept in the file `path`, or the ideal sensor, with these `effects` on top."""
     import imufit  # noqa: PLC0415
 
-    return imufit.SensorModel.load(path) if path is not None else imufit.SensorModel(list(effects))
+    model = imufit.SensorModel() if path is None else imufit.SensorModel.load(path)
+    for effect in effects:
+        model = model.with_effect(effect)
+    return model
 
 
 def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
@@ -147,6 +150,28 @@ def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     from imufit.verbs import ladder  # noqa: PLC0415
 
     return ladder(logs, model=model, progress=progress)
+
+
+def studio(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, ready: Callable[[str], None]) -> None:
+    """Serve the studio on logs, or on the log of a demonstration, until Ctrl-C; `ready` receives the address.
+
+    Raises
+    ------
+    InputError
+        NiceGUI is not installed, the port is taken, or a log cannot be read.
+    """
+    from imufit.errors import InputError  # noqa: PLC0415
+
+    try:
+        from imufit.studio.start import start  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("imufit"):
+            raise
+        raise InputError(
+            f"the studio needs the package {error.name}, which is not installed",
+            remedy="Install it with: pip install 'imufit[studio]'.",
+        ) from None
+    start(logs, reading, demo, port=port, ready=ready)
 
 
 def catalogue() -> list[EffectCard]:
@@ -369,31 +394,11 @@ def hidden(scenario: str, seed: int, **settings: Any) -> Simulation:
     return simulation
 
 
-def log_of(simulation: Simulation) -> Log:
-    """Return the log of a simulation, without what is known of it."""
-    from imufit.log import Log  # noqa: PLC0415
-
-    return Log.from_arrays(
-        simulation.t,
-        acc=simulation.acc,
-        gyr=simulation.gyr,
-        mag=simulation.mag,
-        temp=simulation.temp,
-        reference=simulation.ref_q,
-        ref_p=simulation.ref_p,
-        ref_angle=simulation.ref_angle,
-        pose=None if simulation.pose is None else simulation.pose.tolist(),
-        covariates=simulation.covariates,
-        **simulation.metadata,
-    )
-
-
 def save_simulation(simulation: Simulation, path: Path) -> Path:
     """Write the log to `path` and its sealed truth beside it; return where that is."""
-    from imufit.lab.simulate import seal  # noqa: PLC0415
+    from imufit.lab.simulated_log import save_simulation  # noqa: PLC0415
 
-    log_of(simulation).write(path)
-    return seal(simulation.truth, path)
+    return save_simulation(simulation, path)
 
 
 def emulator(

@@ -19,6 +19,7 @@ SUMMARIES: Final = {
     "diagnose": "Name the missing effect, with its expected gain.",
     "add": "Add an effect, refit, show the error before, expected and after.",
     "ladder": "Repeat diagnose and add until nothing is missing.",
+    "studio": "The same loop in the browser.",
     "fit": "Fit a stack of effects.",
     "apply": "A log with the model's effects removed from its readings.",
     "export": "A model as C, Arduino sketch, Python for imufusion or ahrs, JSON.",

@@ -1,7 +1,7 @@
 """Where a model fails: the residual by channel, covariate, segment and frequency, and a filter's attitude."""
 
 from imufit.comparing.attitude import attitude_comparison
-from imufit.comparing.compare import compare, compare_model, comparison
+from imufit.comparing.compare import compare, compare_model, comparison, panels
 from imufit.comparing.judged import judged
 from imufit.comparing.noise_budget import noise_budget
 from imufit.comparing.notes import notes
@@ -17,5 +17,6 @@ __all__ = [
     "judged",
     "noise_budget",
     "notes",
+    "panels",
     "unexplained",
 ]

@@ -133,7 +133,7 @@ def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
             for b, rms in enumerate(item["block_rms"])
             if np.isfinite(rms)
         ]
-    panels = [_panel(item, floors, facts) for item in result["panels"]]
+    panels = _panels(result, evidence)
     ratios = {channel.channel: channel.ratio for channel in channels}
     for panel in panels:
         if panel.share >= MIN_SHARE and stands_out[panel.channel]:
@@ -159,6 +159,25 @@ def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
         notes=notes(evidence),
         data_faults=evidence.faults,
     )
+
+
+def panels(analysis: Analysis, step: Array, log: int = 0) -> list[Panel]:
+    """Binned residuals of one log after a step of all parameters, from the evidence alone: no row is read.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        The evidence.
+    step : ndarray
+        (p,) step of every parameter, SI units.
+    log : int
+        Number of the log.
+    """
+    return _panels(analysis.problem.residual(step, log), analysis.logs[log])
+
+
+def _panels(result: Mapping[str, Any], evidence: LogEvidence) -> list[Panel]:
+    return [_panel(item, evidence.floors, evidence.facts) for item in result["panels"]]
 
 
 def _rounded(mean: float, floor: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -106,6 +107,20 @@ class FittedStack(Plotted, Result):
         if isinstance(self._analysis, KeptAnalysis):
             self._analysis = self._analysis.restored()
         return self._analysis
+
+    def without_evidence(self) -> Self:
+        """Return the same fit without its evidence, which the logs give again when it is requested.
+
+        The results stay as they are and take little memory; the evidence of one fit takes megabytes.
+        """
+        light = copy(self)
+        light.__dict__.update(self.__getstate__())
+        return light
+
+    @property
+    def has_evidence(self) -> bool:
+        """Whether questions are answered without another pass over the logs."""
+        return not isinstance(self._analysis, KeptAnalysis)
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the evidence, which the logs give again when it is requested."""

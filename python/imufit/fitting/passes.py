@@ -102,13 +102,24 @@ class Passes:
     def chunks(self, margin: int, label: str) -> Iterator[dict[str, Any]]:
         """Chunks of the log for the compiled core, with reports of progress."""
         for chunk in self.log.chunks(CHUNK_ROWS, margin):
-            arrays = chunk_arrays(chunk, self.covariates)
-            angle = chunk.log.ref_angle
-            if self.commanded is not None and angle is not None:
-                arrays["ref_q"] = self.commanded.attitude(angle)
+            arrays = self.arrays_of(chunk)
             self._leave_out(arrays)
             yield arrays
             self._progress(chunk.start + chunk.end - chunk.begin, self.log.n, label)
+
+    def arrays_of(self, chunk: Chunk) -> dict[str, Any]:
+        """Return a chunk as the compiled core takes it, with every sample.
+
+        Parameters
+        ----------
+        chunk : Chunk
+            Of this log, or of the one that this log is an excerpt of.
+        """
+        arrays = chunk_arrays(chunk, self.covariates)
+        angle = chunk.log.ref_angle
+        if self.commanded is not None and angle is not None:
+            arrays["ref_q"] = self.commanded.attitude(angle)
+        return arrays
 
     def _leave_out(self, arrays: dict[str, Any]) -> None:
         """Blank the samples that are certain to be wrong; the log itself stays as it is."""

@@ -13,6 +13,7 @@ from imufit.errors import InputError
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS
 from imufit.fitting.rest_passes import RestPasses
+from imufit.log import Chunk
 
 Array = NDArray[np.float64]
 
@@ -51,12 +52,7 @@ def row_residuals(evidence: LogEvidence, step: Array) -> dict[str, Array]:
         The log has no reference, so that no row has a model.
     """
     log = evidence.surveyed.log
-    if isinstance(evidence.passes, RestPasses):
-        raise InputError(
-            "the log has no reference attitude, from which the readings of its rows would follow",
-            file=log.path,
-            remedy="Add a reference (ref_qw ref_qx ref_qy ref_qz); rests are judged by their means alone.",
-        )
+    check_reference(evidence)
     out: dict[str, Array] = {}
     for arrays, residuals in residual_chunks(evidence, step, "taking residuals"):
         rows = slice(arrays["offset"] + arrays["begin"], arrays["offset"] + arrays["end"])
@@ -65,3 +61,45 @@ def row_residuals(evidence: LogEvidence, step: Array) -> dict[str, Array]:
                 sensor = CHANNELS[channel][:3]
                 out.setdefault(sensor, np.full((log.n, 3), np.nan))[rows, channel % 3] = values
     return out
+
+
+def check_reference(evidence: LogEvidence) -> None:
+    """Refuse evidence of rests, which has no residual of a row.
+
+    Parameters
+    ----------
+    evidence : LogEvidence
+        Evidence of the log.
+
+    Raises
+    ------
+    InputError
+        The log has no reference, so that no row has a model.
+    """
+    if isinstance(evidence.passes, RestPasses):
+        raise InputError(
+            "the log has no reference attitude, from which the readings of its rows would follow",
+            file=evidence.surveyed.log.path,
+            remedy="Add a reference (ref_qw ref_qx ref_qy ref_qz); rests are judged by their means alone.",
+        )
+
+
+def residuals_of_chunk(evidence: LogEvidence, step: Array, chunk: Chunk) -> dict[str, Array]:
+    """Return measured minus modelled of any chunk of a log, also where the evidence is of an excerpt of the log.
+
+    Parameters
+    ----------
+    evidence : LogEvidence
+        Evidence of the log, which has a reference.
+    step : ndarray
+        (p,) step of every parameter of the evidence, SI units.
+    chunk : Chunk
+        Rows of the log with as many rows more on either side as `Passes.margin` states.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Each of the nine channels that is judged, (n,) of the core rows, SI units; NaN where no reference is around.
+    """
+    residuals = _imufit.evaluate(evidence.raw, evidence.passes.arrays_of(chunk), step)
+    return {name: values for name, values in zip(CHANNELS, residuals, strict=True) if values is not None}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any, Final
 
@@ -21,6 +23,8 @@ from imufit.remedy import command
 _KEY: Final = b"imufit"
 ROW_GROUP: Final = 131_072
 """Rows of a row group that is written: what a reader has to hold at least."""
+SOUGHT: Final = 1 << 20
+"""Rows of a row group up to which a row within it is found fast enough to be drawn: pyarrow's groups have as many."""
 _BROKEN: Final = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
 """Errors of the reader about damaged bytes; a schema's size may be anything."""
 _DAMAGED: Final = (
@@ -38,6 +42,9 @@ class ParquetSource:
                 self._schema = file.schema_arrow
                 self.n: int = file.metadata.num_rows
                 self._check_text(file.metadata)
+                sizes = [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)]
+                self._groups = [0, *accumulate(sizes)][: len(sizes)]
+                self._largest_group = max(sizes, default=0)
         except InputError:
             raise
         except UnicodeDecodeError:
@@ -92,7 +99,17 @@ class ParquetSource:
 
     def blocks(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
         """Give the named columns block by block."""
-        start = 0
+        yield from self.blocks_from(columns, 0)
+
+    @property
+    def seeks(self) -> bool:
+        """Whether any row is found without reading many others."""
+        return self._largest_group <= SOUGHT
+
+    def blocks_from(self, columns: Sequence[str], row: int) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
+        """Give the named columns block by block, from the row group that holds a row."""
+        group = max(bisect_right(self._groups, row) - 1, 0)
+        start = self._groups[group] if self._groups else 0
         text = [name for name in columns if name in self.text]
         rows = rows_at_once(NUMBER * (len(columns) - len(text)) + TEXT_CELL * len(text))
         try:
@@ -104,7 +121,8 @@ class ParquetSource:
                 read_dictionary=text,
             ) as file:
                 wanted = list(columns) or None
-                for batch in file.iter_batches(batch_size=rows, columns=wanted, use_threads=False):
+                groups = range(group, len(self._groups))
+                for batch in file.iter_batches(rows, groups, columns=wanted, use_threads=False):
                     yield start, batch.num_rows, {name: _array(batch.column(name)) for name in columns}
                     start += batch.num_rows
         except _BROKEN as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
@@ -75,6 +75,20 @@ class Source(Protocol):
 
     def line_of(self, row: int) -> int | None:
         """Line of the file, from 1, of a data row; None for binary files."""
+        ...
+
+
+@runtime_checkable
+class SeekingSource(Source, Protocol):
+    """A source of which any rows can be read without those before them."""
+
+    @property
+    def seeks(self) -> bool:
+        """Whether that is fast."""
+        ...
+
+    def blocks_from(self, columns: Sequence[str], row: int) -> Iterator[Block]:
+        """Pass over the file from a block that begins at or before a row, with the named columns."""
         ...
 
 

@@ -12,10 +12,10 @@ from typing import Any, Self
 from numpy.typing import NDArray
 
 from imufit.log.assemble import check_truth_values, fields_of, time_of
-from imufit.log.columns import CONTRACT, EULER
+from imufit.log.columns import CONTRACT, EULER, GROUPS
 from imufit.log.completed import completed
 from imufit.log.cut import cut
-from imufit.log.foreign import plan_columns
+from imufit.log.foreign import Plan, plan_columns
 from imufit.log.log import HEAD_ROWS, LINE, Chunk, Log, concatenate, gathered
 from imufit.log.metadata import Frame, Metadata, read_metadata, read_sidecar, sidecar_path
 from imufit.log.parquet import ROW_GROUP
@@ -23,7 +23,7 @@ from imufit.log.place import Place
 from imufit.log.reading import Reading
 from imufit.log.recognise import Readable, recognise
 from imufit.log.size import HELD, KEPT, NUMBER, TEXT_CELL, size_in_words
-from imufit.log.source import Source, open_source
+from imufit.log.source import SeekingSource, Source, open_source
 from imufit.log.tables import TablesSource
 from imufit.log.time_order import Copies, TimeRepair, TimeScan
 from imufit.log.unit_check import HEAD, Clock, check_units
@@ -192,18 +192,64 @@ class LogStream:
     def pieces(self) -> Iterator[Log]:
         """Give the checked rows in blocks of whatever size the file offers."""
         for start, rows, block in self._source.blocks(self._plan.sources):
-            fields = fields_of(
-                self._plan,
-                block,
-                start,
-                rows,
-                repair=self._repair,
-                metadata=self._metadata,
-                place=self._place,
-                unmeasured=self._unmeasured,
-            )
-            yield Log.of_fields(**fields, metadata=self._metadata, path=self._path)
+            yield self._checked(self._plan, start, rows, block, self._unmeasured)
         self._unmeasured.check()
+
+    def _checked(
+        self, plan: Plan, start: int, rows: int, block: dict[str, NDArray[Any]], unmeasured: Unmeasured
+    ) -> Log:
+        fields = fields_of(
+            plan,
+            block,
+            start,
+            rows,
+            repair=self._repair,
+            metadata=self._metadata,
+            place=self._place,
+            unmeasured=unmeasured,
+        )
+        return Log.of_fields(**fields, metadata=self._metadata, path=self._path)
+
+    @property
+    def seeks(self) -> bool:
+        """Whether `rows` reads any rows without a pass over those before them."""
+        return isinstance(self._source, SeekingSource) and self._source.seeks
+
+    def rows(self, start: int, stop: int, columns: Collection[str] | None = None) -> Log:
+        """Rows ``start <= row < stop`` in memory.
+
+        Parameters
+        ----------
+        start, stop : int
+            First row, and the row after the last one, counted from 0.
+        columns : collection of str, optional
+            Columns of the log that are wanted, and the time; those that belong together come together.
+        """
+        start, stop = max(start, 0), min(stop, self.n)
+        plan = self._plan if columns is None else self._part_of_plan(columns)
+        source = self._source
+        found = source.blocks_from(plan.sources, start) if isinstance(source, SeekingSource) else None
+        blocks = source.blocks(plan.sources) if found is None else found
+        # Impossible readings have been counted when the log was read as a whole.
+        unmeasured = Unmeasured(self._place)
+        pieces: list[Log] = []
+        for first, rows, block in blocks:
+            if first >= stop and pieces:
+                break
+            if first + rows > start:
+                piece = self._checked(plan, first, rows, block, unmeasured)
+                pieces.append(piece.rows(max(start - first, 0), max(stop - first, 0)))
+        return concatenate(pieces)
+
+    def _part_of_plan(self, columns: Collection[str]) -> Plan:
+        """Return the plan of some columns, the time, and whatever belongs to them."""
+        wanted = {"t", *columns}
+        for group in GROUPS.values():
+            if wanted.intersection(group):
+                wanted.update(group)
+        if wanted.intersection(GROUPS["ref_q"]):
+            wanted.update((*EULER, "ref_angle"))  # of which the attitude may be made
+        return replace(self._plan, columns=tuple(each for each in self._plan.columns if each.target in wanted))
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:
         """Cut into chunks of `rows` rows with up to `margin` rows more on either side.

@@ -20,6 +20,9 @@ AXES: Final = "xyz"
 PARTS: Final = "wxyz"
 UNITS: Final = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
 
+UNKNOWN: Final = "S"
+"""A lag that only the user knows."""
+
 Words = tuple[str, str | Remedy]
 """Evidence and remedy."""
 
@@ -176,9 +179,10 @@ def skew(lag: float, rate: float, correlation: float, declared: float, path: Pat
 def _joined(path: Path | None, lag: str, rate: float | None = None) -> Remedy:
     """Name the call that joins a log with itself: its reference is moved by a lag, s, and a rate of its clock."""
     python, shell = ("log", "LOG") if path is None else (repr(str(path)), shlex.quote(str(path)))
-    known = Remedy(f"imufit.join({python}, {python}, lag={lag}", f"imufit join {shell} {shell} --lag {lag}")
+    options = () if lag == UNKNOWN else (("lag", float(lag)),)
+    known = Remedy(f"imufit.join({python}, {python}, lag={lag}", f"imufit join {shell} {shell} --lag {lag}", options)
     if rate is not None:
-        known += Remedy(f", skew={rate:.6f}", f" --skew {1e6 * rate:.0f}")
+        known += Remedy(f", skew={rate:.6f}", f" --skew {1e6 * rate:.0f}", (("skew", round(rate, 6)),))
     return known + Remedy(").log", " -o joined.parquet")
 
 
@@ -191,7 +195,9 @@ def another_motion(declared: float, lags: Sequence[tuple[float, float]], *, fits
             f"not one lag alone puts them together, but each of {shown} as well as the other: the motion repeats "
             "itself, or the reference was put together from another recording."
         )
-        return text, "Look whether it is the right file; where the lag is known, " + _joined(None, "S") + " moves it."
+        return text, "Look whether it is the right file; where the lag is known, " + _joined(
+            None, UNKNOWN
+        ) + " moves it."
     text = (
         "ref_q belongs to another motion: its rates and those of the gyroscope have nothing in common at any time "
         f"(correlation {declared:.2f} as declared{f', at best after a lag of {shown}' if shown else ''})."

@@ -13,6 +13,7 @@ mod filters;
 mod fit;
 mod inference;
 mod model;
+mod pyramid;
 mod python_effect;
 mod raised;
 mod replay_arguments;
@@ -41,5 +42,6 @@ fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     rests::register(m)?;
     inference::register(m)?;
     verdict::register(m)?;
+    pyramid::register(m)?;
     Ok(())
 }

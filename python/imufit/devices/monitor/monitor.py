@@ -101,8 +101,10 @@ class Monitor:
         Time from one state to the next, s.
     stopped : callable, optional
         Iteration ends when it returns True.
+    see : callable, optional
+        Called with each batch of rows, (n,) arrays by name, that the filters have taken, the model's effects taken out.
     **options
-        As for `imufit.devices.record.LiveRows`: `baud`, `form`, `header`, `mapping`, `duration`, `give_up`.
+        As for `imufit.devices.record.LiveRows`: `baud`, `form`, `header`, `mapping`, `duration`, `give_up`, `watch`.
 
     Raises
     ------
@@ -119,12 +121,14 @@ class Monitor:
         frame: Frame = "NED",
         every: float = 0.1,
         stopped: Callable[[], bool] = lambda: False,
+        see: Callable[[dict[str, Array]], None] = lambda batch: None,
         **options: Any,
     ) -> None:
         self._filters = tuple(filters)
         self._correction = None if model is None else LiveCorrection(model)
         self._frame: Frame = frame
         self._every = every
+        self._see = see
         self._rows = LiveRows(port, idle=True, stopped=stopped, **options)
         self._attitude: LiveAttitude | None = None
         self._columns: tuple[str, ...] = ()
@@ -172,6 +176,7 @@ class Monitor:
             self._columns = self._rows.columns
             self._attitude = LiveAttitude(self._columns, self._filters, frame=self._frame)
         self._attitude.add(batch)
+        self._see(batch)
         self._n += batch["t"].size
         self._t = float(batch["t"][-1])
         for name, values in batch.items():

@@ -69,6 +69,8 @@ class Journal:
             "mapping": None if mapping is None else dict(mapping),
             "frame": frame,
         }
+        # A recording may begin while the device has been listened to for long.
+        self._counts_before = reception.counts
         self._rig = rig
         if rig is not None:
             self._about["rig"] = {"axis": rig.axis, "angle": _plain(rig.angle)}
@@ -204,7 +206,8 @@ class Journal:
         if part.announced is None:
             self._texts = texts
             return
-        told: dict[str, Any] = {"counts": self._reception.counts, "now": now, "lost_since": self._lost_since, **more}
+        counts = {name: n - self._counts_before.get(name, 0) for name, n in self._reception.counts.items()}
+        told: dict[str, Any] = {"counts": counts, "now": now, "lost_since": self._lost_since, **more}
         if texts:
             told["texts"] = texts
         if self._angles:

@@ -48,6 +48,8 @@ class LiveRows:
         Whether to give a batch of no rows when nothing came for 0.1 s, so that the caller can look at other things.
     stopped : callable, optional
         Iteration ends when it returns True.
+    watch : callable, optional
+        Called after each read with the reception and the rows as they arrived, such as a `Recorder` takes.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class LiveRows:
         give_up: float | None = None,
         idle: bool = False,
         stopped: Callable[[], bool] = lambda: False,
+        watch: Callable[[Reception, list[Arrived]], None] | None = None,
     ) -> None:
         self._line = Line(port, baud)
         self._reception = Reception(self._line, form, header)
@@ -81,6 +84,7 @@ class LiveRows:
         self._give_up = give_up
         self._idle = idle
         self._stopped = stopped
+        self._watch = watch
         self._converter = LiveConverter(mapping)
 
     def __enter__(self) -> Self:
@@ -97,6 +101,8 @@ class LiveRows:
         last = time.monotonic()
         over = {"duration": self._duration, "give_up": self._give_up}
         for parts in listen(self._reception, stopped=self._stopped, **over):
+            if self._watch is not None:
+                self._watch(self._reception, parts)
             for rows in parts:
                 yield self._converter.batch(rows)
             now = time.monotonic()

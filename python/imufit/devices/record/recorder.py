@@ -156,8 +156,98 @@ def _run(
     return why, None
 
 
+class Recorder:
+    """Records rows that come anyway, from one moment to another: the caller reads the line and hands the rows on.
+
+    The rows are as safe as those of `record`: they are appended to ``LOG.part``, and `recover` makes a log of what a
+    crash leaves.
+
+    Parameters
+    ----------
+    log : str or Path
+        Log to write: ``.parquet``, ``.csv`` or ``.npz``.
+    reception : Reception
+        Where the rows come from.
+    mapping : mapping, optional
+        Source text for target columns.
+    frame : {"NED", "ENU", "NWU"}
+        Reference frame that the log names.
+
+    Raises
+    ------
+    InputError
+        The log is in the way, or cannot be written.
+    """
+
+    def __init__(
+        self, log: str | Path, reception: Reception, *, mapping: Mapping[str, str] | None = None, frame: Frame = "NED"
+    ) -> None:
+        self.path = Path(log)
+        check_target(self.path, force=False)
+        self._reception = reception
+        self._journal = Journal(self.path, reception, mapping, frame)
+        self._begin = time.monotonic()
+
+    @property
+    def n(self) -> int:
+        """Rows that are written."""
+        return self._journal.n
+
+    @property
+    def seconds(self) -> float:
+        """Time since the beginning, s."""
+        return time.monotonic() - self._begin
+
+    def take(self, rows: list[Arrived], texts: list[str]) -> None:
+        """Keep rows, and messages of the device.
+
+        Parameters
+        ----------
+        rows : list of Arrived
+            As they came.
+        texts : list of str
+            Messages of the device.
+
+        Raises
+        ------
+        InputError
+            The disk is full, or the device sends other columns of which no log can be made: call `finish` with it.
+        """
+        self._journal.take(rows, texts)
+
+    def finish(self, problem: InputError | None = None) -> Recording:
+        """Make the log.
+
+        Parameters
+        ----------
+        problem : InputError, optional
+            The error that ended the recording.
+
+        Raises
+        ------
+        InputError
+            Nothing was recorded, the disk is full, or `problem`; the message says where the rows are.
+        """
+        why = "stopped"
+        try:
+            if problem is None:
+                self._journal.end(why, self._reception.line.lost_since)
+        except DiskError as error:
+            problem = error
+        finally:
+            self._journal.close()
+        if problem is not None:
+            why = "disk full" if isinstance(problem, DiskError) else "other columns"
+        return _finished(self.path, self._journal, self._reception, end=(why, problem))
+
+
 def _finished(
-    path: Path, journal: Journal, reception: Reception, *, end: tuple[str, InputError | None], share: float
+    path: Path,
+    journal: Journal,
+    reception: Reception,
+    *,
+    end: tuple[str, InputError | None],
+    share: float | None = None,
 ) -> Recording:
     """Make the log of the parts, and delete them."""
     why, problem = end

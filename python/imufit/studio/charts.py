@@ -1,0 +1,285 @@
+"""Figures of the studio, as Plotly takes them: residual against covariate, spectrum, the fall of the error.
+
+Names of channels, columns and effects may come from files. `words` makes them text: Plotly reads part of HTML.
+Colours of text and grid stand in the page's style sheet, which knows whether the page is light or dark.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.figures import quantity
+from imufit.figures.style import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
+from imufit.printable import NAME, printable
+from imufit.results import Spectrum
+from imufit.results.comparison import Panel
+
+Figure = dict[str, Any]
+Array = NDArray[np.float64]
+
+HEIGHT: Final = 240
+"""Height of a figure, px: two of them and the sentence fit on a laptop's screen."""
+SLOTS: Final = 6
+"""Bars that have room in the fall of the error at least: as many steps as most logs take."""
+LINE: Final = 1.6
+"""Width of a line, px."""
+LOGARITHMIC_ABOVE: Final = 8.0
+"""Fall of the error, as a ratio, from which on the axis is logarithmic: smaller steps can be seen then as well."""
+
+
+def words(text: str) -> str:
+    """Return text from a file as text for a figure: no markup, no marks of direction, no formula.
+
+    Parameters
+    ----------
+    text : str
+        For instance the name of a column.
+    """
+    return html.escape(printable(text, NAME), quote=False).replace("$", "&#36;")
+
+
+def _figure(traces: list[dict[str, Any]], x: str, y: str, **more: Any) -> Figure:
+    """Lay out traces with a title on each axis."""
+    axis = {"zeroline": False, "automargin": True, "fixedrange": False}
+    layout = {
+        "height": HEIGHT,
+        "margin": {"l": 56, "r": 12, "t": 8, "b": 44},
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "xaxis": {**axis, "title": {"text": x, "standoff": 6}, **more.pop("xaxis", {})},
+        "yaxis": {**axis, "title": {"text": y, "standoff": 6}, **more.pop("yaxis", {})},
+        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
+        "hoverlabel": {"namelength": -1},
+        "showlegend": True,
+        **more,
+    }
+    return {"data": traces, "layout": layout, "config": {"displaylogo": False, "responsive": True}}
+
+
+def empty(sentence: str) -> Figure:
+    """Return a figure that states why there is nothing to draw.
+
+    Parameters
+    ----------
+    sentence : str
+        The reason.
+    """
+    note = {"text": words(sentence), "showarrow": False, "x": 0.5, "y": 0.5, "xref": "paper", "yref": "paper"}
+    hidden = {"visible": False}
+    return _figure([], "", "", annotations=[note], xaxis=hidden, yaxis=hidden, showlegend=False)
+
+
+def _axis(name: str, unit: str) -> tuple[float, str]:
+    """Return factor and title of an axis."""
+    factor, shown = (1.0, "") if unit in ("", "1") else quantity.shown_unit(unit)
+    return factor, f"{words(name)}, {shown}" if shown else words(name)
+
+
+def residual_panel(panel: Panel, after: Panel | None = None, effect: str = "", other: Panel | None = None) -> Figure:
+    """Draw the residual of one channel against one covariate.
+
+    Parameters
+    ----------
+    panel : Panel
+        With the present model.
+    after : Panel, optional
+        With one effect more.
+    effect : str
+        That effect.
+    other : Panel, optional
+        With the second of two models.
+    """
+    x_factor, x_title = _axis(panel.covariate, panel.covariate_unit)
+    factor, unit = quantity.shown_unit(panel.channel_unit)
+    x, mean = x_factor * panel.centre, factor * panel.mean
+    band = factor * np.nan_to_num(panel.band)
+    floor = factor * panel.noise_floor
+    known = np.isfinite(mean)
+    reach = float(np.max(np.abs(mean[known]) + band[known])) if known.any() else 0.0
+    limit = 1.15 * max(reach, min(floor, 3.0 * reach)) or 1.0
+    traces = [
+        _area(x[[0, -1]], np.array([-floor, -floor]), np.array([floor, floor]), GREY, 0.18, "noise"),
+        _area(x[known], (mean - band)[known], (mean + band)[known], SKY, 0.4, "95 % band"),
+        _line(x, mean, BLUE, "now", mode="lines+markers"),
+    ]
+    if other is not None:
+        traces.append(_line(x_factor * other.centre, factor * other.mean, GREEN, "second model", dash="dashdot"))
+    if after is not None:
+        name = f"with {words(effect)}"
+        traces.append(_line(x_factor * after.centre, factor * after.mean, ORANGE, name, dash="dash"))
+    y_title = f"residual of {words(panel.channel)}, {unit}"
+    return _figure([trace for part in traces for trace in part], x_title, y_title, yaxis={"range": [-limit, limit]})
+
+
+def _line(x: Array, y: Array, colour: str, name: str, *, mode: str = "lines", dash: str = "solid") -> list[Figure]:
+    line = {"color": colour, "width": LINE, "dash": dash}
+    points = {"x": _numbers(x), "y": _numbers(y), "mode": mode, "name": name}
+    return [{"type": "scatter", **points, "line": line, "marker": {"color": colour, "size": 5}}]
+
+
+def _area(x: Array, low: Array, high: Array, colour: str, opacity: float, name: str) -> list[Figure]:
+    """Fill between two lines: one closed outline, so that the legend has one entry."""
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    outline = {"x": _numbers(np.concatenate([x, x[::-1]])), "y": _numbers(np.concatenate([high, low[::-1]]))}
+    fill = {"fill": "toself", "fillcolor": f"rgba({red},{green},{blue},{opacity})", "line": {"width": 0}}
+    return [{"type": "scatter", "mode": "lines", **outline, **fill, "name": name, "hoverinfo": "skip"}]
+
+
+def _numbers(values: Array) -> list[float | None]:
+    """Return numbers for JSON; None interrupts a line."""
+    return [float(value) if math.isfinite(value) else None for value in values]
+
+
+def spectrum(found: Spectrum, other: Spectrum | None = None) -> Figure:
+    """Draw the density of one channel's residual over its noise floor.
+
+    Parameters
+    ----------
+    found : Spectrum
+        With the present model.
+    other : Spectrum, optional
+        With the second of two models.
+    """
+    base = found.unit.removeprefix("(").partition(")^2/Hz")[0]
+    factor, unit = quantity.shown_unit(base)
+    # The amplitude density has the unit in which sensors are specified.
+    lines = _line(found.frequency, factor * np.sqrt(found.density), BLUE, "residual now")
+    if other is not None:
+        lines += _line(other.frequency, factor * np.sqrt(other.density), GREEN, "second model", dash="dashdot")
+    ends = found.frequency[[0, -1]]
+    lines += _line(ends, np.full(2, factor * math.sqrt(found.floor)), GREY, "noise floor", dash="dash")
+    log = {"type": "log"}
+    # Decades alone carry numbers: the others would lie upon one another on a phone.
+    ticks = {**log, "dtick": 1}
+    title = f"residual of {words(found.channel)}, {unit}/√Hz"
+    return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=log)
+
+
+def fall(
+    labels: Sequence[str],
+    ratios: Sequence[float],
+    expected: Sequence[float | None],
+    position: int,
+    *,
+    best: tuple[str, float] | None = None,
+) -> Figure:
+    """Draw the held-out error of every step over the noise floor.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        (k,) steps.
+    ratios : sequence of float
+        (k,) held-out error over the noise floor after each step; NaN where it is not known yet.
+    expected : sequence of float or None
+        (k,) error that was predicted before the step.
+    position : int
+        Number of the present step; later ones were undone.
+    best : (str, float), optional
+        Effect that is missing, and the error that is expected with it.
+    """
+    places = list(range(len(ratios)))
+    names = [words(label) for label in labels]
+    texts = [quantity.ratio(value) if math.isfinite(value) else "…" for value in ratios]
+    colours = [VERMILION if k == 0 else BLUE for k in places]
+    bars: list[Figure] = [
+        {
+            "type": "bar",
+            "name": "held-out error",
+            "x": places,
+            "y": _numbers(np.array(ratios, dtype=float)),
+            "width": 0.62,
+            "marker": {"color": colours, "opacity": [1.0 if k <= position else 0.35 for k in places]},
+            "hovertemplate": "%{customdata}<br>%{y:.3f} times the noise floor<extra></extra>",
+            "customdata": names,
+            "showlegend": False,
+        }
+    ]
+    known = [(k, value) for k, value in enumerate(expected) if value is not None]
+    if known:
+        bars.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": "expected",
+                "x": [k for k, _ in known],
+                "y": [value for _, value in known],
+                "marker": {"symbol": "diamond-open", "size": 11, "color": ORANGE, "line": {"width": 2}},
+                "hovertemplate": "expected %{y:.3f}<extra></extra>",
+            }
+        )
+    if best is not None:
+        effect, value = best
+        places.append(len(places))
+        names.append(f"+ {words(effect)}?")
+        bars.append(
+            {
+                "type": "bar",
+                "name": "expected next",
+                "x": places[-1:],
+                "y": [value],
+                "text": [quantity.ratio(value)],
+                "textposition": "outside",
+                "cliponaxis": False,
+                "width": 0.62,
+                "marker": {"color": "rgba(0,0,0,0)", "line": {"color": ORANGE, "width": 2}},
+                "hovertemplate": "%{y:.3f} expected<extra></extra>",
+                "showlegend": True,
+            }
+        )
+    tops = [
+        max(value, mark or 0.0) if math.isfinite(value) else 0.0 for value, mark in zip(ratios, expected, strict=True)
+    ]
+    # The number stands over the bar and over its diamond.
+    above = {"x": places[: len(ratios)], "y": tops, "text": texts, "textposition": "top center", "showlegend": False}
+    unseen = {"size": 13, "opacity": 0.0}
+    bars.append({"type": "scatter", "mode": "markers+text", **above, "marker": unseen, "hoverinfo": "skip"})
+    heights = [value for value in [*ratios, *(value for _, value in known)] if math.isfinite(value) and value > 0.0]
+    top, low = max([*heights, 1.0]), min([*heights, 1.0])
+    logarithmic = top / low > LOGARITHMIC_ABOVE
+    scale: dict[str, Any] = (
+        {"type": "log", "range": [math.log10(0.6 * low), math.log10(3.0 * top)], "tickvals": _decades(low, top)}
+        if logarithmic
+        else {"range": [0.0, 1.22 * top]}
+    )
+    # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
+    edge = [-0.6, max(len(places), SLOTS) - 0.4]
+    floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
+    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": 20}
+    figure = _figure([*bars, *floor], "", "error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
+    figure["layout"]["xaxis"]["showgrid"] = False
+    figure["layout"]["bargap"] = 0.3
+    return figure
+
+
+def _decades(low: float, top: float) -> list[float]:
+    """Return 1 and 10 and so on, with 3 between them, over the range of a logarithmic axis."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(top)) + 1)
+    return [value for power in powers for value in (10.0**power, 3.0 * 10.0**power)]
+
+
+def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:
+    """Draw quantities of one channel over time.
+
+    Parameters
+    ----------
+    channel, unit : str
+        Channel and its SI unit.
+    lines : sequence of (str, ndarray, ndarray)
+        Name, times in s, and values in `unit` of each line.
+    title : str
+        The quantity.
+    """
+    factor, shown = quantity.shown_unit(unit)
+    # Dashes let the line beneath be seen where two lines agree.
+    looks = ((GREY, "solid"), (BLUE, "dash" if title == "reading" else "solid"))
+    drawn: list[Figure] = []
+    for (name, t, values), (colour, dash) in zip(lines, looks, strict=False):
+        drawn += _line(t, factor * values, colour, name, dash=dash)
+    return _figure(drawn, "time, s", f"{title} of {words(channel)}, {shown}")

@@ -1,0 +1,358 @@
+"""The state that all pages of one server share, and the work that runs beside them in a thread."""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final, TypeVar
+
+from nicegui import Event, run
+
+from imufit.errors import InputError
+from imufit.remedy import Option
+from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, offers, remedies
+from imufit.studio.mystery import DEMONSTRATION, Mystery
+from imufit.studio.session import Session
+from imufit.studio.session_file import Kept, as_toml, read_session
+from imufit.studio.stack import Stack
+from imufit.studio.traces import ModelTraces, Traces
+
+Answer = TypeVar("Answer")
+
+SESSION_ENDING: Final = ".toml"
+"""Ending of the file of a session."""
+
+
+class Desk:
+    """The state of the studio: a session on its logs, files that were brought, a game.
+
+    Attributes
+    ----------
+    session : Session or None
+        The session; None before a log is there.
+    files : tuple of LogFile
+        Its logs.
+    arrivals : list of Arrival
+        Files that were brought and await a choice.
+    mystery : Mystery or None
+        The game, while one is played.
+    channel, covariate : str or None
+        The panel that the person chose; None is the worst one.
+    traces : Traces or None
+        Columns of the log over time.
+    models : dict of Stack to ModelTraces
+        Residuals of the ideal sensor and of the present model over time.
+    busy : str
+        The present work, in words; empty where there is none.
+    share : float or None
+        Share of the work that is done, where this is known.
+    trouble : str
+        The last problem; empty where there is none.
+    cures : list of Option
+        Options of reading that the problem's remedy names.
+    changed : Event
+        Fires when something of this is new.
+    """
+
+    def __init__(self) -> None:
+        self.session: Session | None = None
+        self.files: tuple[LogFile, ...] = ()
+        self.arrivals: list[Arrival] = []
+        self.mystery: Mystery | None = None
+        self.channel: str | None = None
+        self.covariate: str | None = None
+        self.traces: Traces | None = None
+        self.models: dict[Stack, ModelTraces] = {}
+        self.busy = ""
+        self.share: float | None = None
+        self.trouble = ""
+        self.cures: list[Option] = []
+        self.changed: Event[[]] = Event()
+        self._folder = tempfile.TemporaryDirectory(prefix="imufit-")
+        self._working = self._failed = False
+        self._troubled: LogFile | None = None
+
+    def new_folder(self) -> Path:
+        """Make a folder for files that come together; it goes with the server.
+
+        An open log stays as it is where another file of its name is brought later.
+        """
+        return Path(tempfile.mkdtemp(dir=self._folder.name))
+
+    def _folders(self) -> list[Path]:
+        """List the folders of the files that the browser sent, the latest first."""
+        folders = [path for path in Path(self._folder.name).iterdir() if path.is_dir()]
+        return sorted(folders, key=lambda path: -path.stat().st_mtime_ns)
+
+    @property
+    def guessing(self) -> bool:
+        """Whether a game is on whose truth is not revealed: the evidence's names stay hidden."""
+        game = self.mystery
+        return game is not None and game.verdict is None and game.level != DEMONSTRATION
+
+    def reveal(self, answer: str) -> None:
+        """End the game with an answer.
+
+        Parameters
+        ----------
+        answer : str
+            Id of an effect; empty answers that nothing is missing.
+        """
+        session, game = self.session, self.mystery
+        first = None if session is None else session.made(Stack())
+        if game is not None and first is not None and first.diagnosis is not None:
+            game.reveal(answer, first.diagnosis)
+            self.changed.emit()
+
+    @property
+    def offers(self) -> list[Offer]:
+        """Uses of the files that were brought."""
+        return offers(self.arrivals)
+
+    # --- work
+
+    def progress(self, done: int, total: int, label: str) -> None:
+        """Note how far the work is; pages look at it a few times a second."""
+        if (done, total) == (0, 1):
+            self.busy, self.share = label, None
+        else:
+            self.share = done / total if done < total else None
+
+    async def _in_thread(self, words: str, work: Callable[[], Answer], file: LogFile | None = None) -> Answer | None:
+        """Run work in a thread; a problem is noted and gives None."""
+        self.busy, self.share = words, None
+        self.changed.emit()
+        try:
+            return await run.io_bound(work)
+        except InputError as error:
+            self._note(str(error), remedies(error.advice), file)
+        except (OSError, MemoryError) as error:
+            self._note(f"{type(error).__name__}: {error}", [], file)
+        except Exception as error:
+            # A fault of the program must not end the page: the person may save the session.
+            logging.getLogger(__name__).exception("the studio's work failed")
+            self._note(f"internal error: {type(error).__name__}: {error}", [], file)
+        finally:
+            self.busy, self.share = "", None
+            self.changed.emit()
+        return None
+
+    def _note(self, problem: str, cures: list[Option], file: LogFile | None) -> None:
+        self.trouble, self.cures, self._troubled = problem, cures if file is not None else [], file
+        self._failed = True
+
+    def forget_trouble(self) -> None:
+        """Put the last problem away."""
+        self.trouble, self.cures, self._troubled = "", [], None
+        self.changed.emit()
+
+    async def attempt(self, action: Callable[[], None]) -> None:
+        """Change the session, then bring fit, diagnosis and comparison up to date.
+
+        Parameters
+        ----------
+        action : callable
+            The change; a quick one.
+        """
+        self.trouble, self.cures, self._troubled = "", [], None
+        try:
+            action()
+        except InputError as error:
+            self._note(str(error), [], None)
+        self.changed.emit()
+        await self.update()
+
+    async def update(self) -> None:
+        """Bring fit, diagnosis and comparison of the present model up to date; further changes join the work."""
+        if self._working:
+            return
+        self._working = True
+        try:
+            while (step := next(self._pending(), None)) is not None:
+                self._failed = False
+                await self._in_thread(*step)
+                if self._failed:
+                    if self.session is not None and self.session.made() is None:
+                        self.session.give_up()
+                        self.changed.emit()
+                    return
+        finally:
+            self._working = False
+
+    def _pending(self) -> Iterator[tuple[str, Callable[[], object]]]:
+        """List the pieces of work that are to be done for the present model, in order."""
+        session = self.session
+        if session is None or not session.begun:
+            return
+        stack = session.stack
+        made = session.made(stack)
+        words = " + ".join(stack.model.effects) or "the ideal sensor"
+        for step in session.steps[: session.position + 1]:
+            # Earlier ones first: a session that was reopened goes the same way again.
+            if session.made(step.stack) is None:
+                yield f"fitting {words}", partial(session.fit, step.stack, self.progress)
+                return
+        assert made is not None
+        if made.comparison is None and session.has_reference:
+            yield f"comparing {words}", lambda: session.compare(stack, self.progress)
+        if made.diagnosis is None:
+            yield f"effects missing in {words}", lambda: session.diagnose(stack, self.progress)
+        if self.traces is None:
+            yield "reading the rows", self._drawn_rows
+        elif session.has_reference:
+            for model in dict.fromkeys((stack.model, Stack())):
+                if model not in self.models:
+                    yield "residuals over time", partial(self._drawn_model, model)
+        if session.second is not None:
+            second = session.made(session.second)
+            if second is None or (second.comparison is None and session.has_reference):
+                yield "comparing the second model", lambda: session.compare(session.second, self.progress)
+
+    def _drawn_rows(self) -> Traces:
+        """Make the pass over the rows of the log that is drawn."""
+        assert self.session is not None
+        traces = Traces(self.session.logs[self.session.shown])
+        traces.build(self.progress)
+        self.traces = traces
+        return traces
+
+    def _drawn_model(self, model: Stack) -> ModelTraces:
+        """Compute the residuals of a model over time, and forget those of models that are not shown."""
+        assert self.session is not None
+        assert self.traces is not None
+        found = self.session.model_traces(self.traces, model)
+        kept = {Stack(), self.session.stack.model}
+        self.models = {key: value for key, value in self.models.items() if key in kept} | {model: found}
+        return found
+
+    # --- files
+
+    async def bring(self, files: Sequence[LogFile]) -> None:
+        """Recognise files that were brought; a session is opened, and so is a single log.
+
+        Parameters
+        ----------
+        files : sequence of LogFile
+            The files.
+        """
+        self.forget_trouble()
+        for file in files:
+            if file.path.suffix.lower() == SESSION_ENDING and not any(
+                other.path != file.path and other.path.stem == file.path.stem for other in files
+            ):
+                await self.reopen(file.path)
+                return
+        for file in files:
+            if file.path.suffix.lower() == SESSION_ENDING:
+                continue
+            found = await self._in_thread(f"reading {file.name}", lambda file=file: arrived(file), file)  # type: ignore[misc]
+            if found is not None:
+                self.arrivals = [item for item in self.arrivals if item.file.path != file.path] + [found]
+        waiting = [offer for offer in self.offers if offer.way is not Way.OPEN]
+        if len(self.arrivals) == 1 and not waiting and self.arrivals[0].sensors:
+            await self.open(self.offers[0].files)
+        self.changed.emit()
+
+    async def open(self, files: Sequence[LogFile], mystery: Mystery | None = None) -> None:
+        """Begin a session on logs.
+
+        Parameters
+        ----------
+        files : sequence of LogFile
+            The logs.
+        mystery : Mystery, optional
+            The game that is played on them.
+        """
+        session = await self._opened(files)
+        if session is not None:
+            self._take(session, files, mystery)
+            await self.update()
+
+    async def _opened(self, files: Sequence[LogFile]) -> Session | None:
+        def work() -> Session:
+            session = Session([file.open() for file in files])
+            session.begin(self.progress)
+            return session
+
+        names = " and ".join(file.name for file in files)
+        return await self._in_thread(f"taking the evidence of {names}", work, files[0])
+
+    def _take(self, session: Session, files: Sequence[LogFile], mystery: Mystery | None = None) -> None:
+        if self.traces is not None:
+            self.traces.close()
+        self.traces, self.models = None, {}
+        self.session, self.files, self.mystery = session, tuple(files), mystery
+        self.arrivals, self.channel, self.covariate = [], None, None
+        self.trouble, self.cures, self._troubled = "", [], None
+        self.changed.emit()
+
+    async def mend(self, option: Option, number: int = 0) -> None:
+        """Read a log of the session anew with one option of a fault's remedy, or the file that gave trouble.
+
+        Parameters
+        ----------
+        option : Option
+            The option.
+        number : int
+            Number of the log of the session.
+        """
+        try:
+            if self._troubled is not None and option in self.cures:
+                await self.bring([self._troubled.mended(option)])
+                return
+            files = [file.mended(option) if k == number else file for k, file in enumerate(self.files)]
+        except InputError as error:
+            self._note(str(error), [], None)
+            self.changed.emit()
+            return
+        await self.open(files)
+
+    async def reopen(self, path: Path) -> None:
+        """Take up a session that was saved: its logs, its way, its models.
+
+        Parameters
+        ----------
+        path : Path
+            The file of the session.
+        """
+        kept = await self._in_thread(f"opening {path.name}", lambda: read_session(path, self._folders()))
+        if kept is None:
+            return
+        session = await self._opened(kept.files)
+        if session is not None:
+            session.go(kept.steps, kept.position)
+            session.second = kept.second
+            self._take(session, kept.files)
+            await self.update()
+
+    def saved(self) -> str:
+        """Return the text of the session's file.
+
+        Raises
+        ------
+        InputError
+            No log is open.
+        """
+        session = self.session
+        if session is None:
+            raise InputError("no log is open yet", remedy="Open a log first.")
+        return as_toml(Kept(self.files, tuple(session.steps), session.position, session.second))
+
+    # --- the game
+
+    async def play(self, level: int, seed: int) -> None:
+        """Begin a game: a simulated log with a hidden effect.
+
+        Parameters
+        ----------
+        level : int
+            One of `imufit.studio.mystery.LEVELS`.
+        seed : int
+            Picks the log.
+        """
+        game = await self._in_thread("hiding an effect", lambda: Mystery.hidden(level, seed, self.new_folder()))
+        if game is not None:
+            await self.open([LogFile(game.log, game.log.name)], game)

@@ -1,0 +1,361 @@
+"""The page of a running device: connect, look on, record, and calibrate by a guide."""
+
+from __future__ import annotations
+
+import asyncio
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final, cast
+
+import numpy as np
+from nicegui import app, ui
+from numpy.typing import NDArray
+
+from imufit import _imufit
+from imufit.calibrating import Stage
+from imufit.errors import InputError
+from imufit.lab.simulate import SCENARIOS
+from imufit.log.metadata import Frame
+from imufit.printable import printable
+from imufit.rests.poses import SIDES
+from imufit.studio.body import Body, angles_in_words, side_rotation
+from imufit.studio.live.listening import Listening, Source, free_name, shown_state
+from imufit.studio.live.panels import groups, panel
+
+Array = NDArray[np.float64]
+
+EVERY: Final = 0.25
+"""Time between two pictures of the traces, s: the eye follows, and the browser has time for other work."""
+WINDOWS: Final = (5, 10, 20, 60)
+"""Lengths of the traces, s."""
+EMULATED: Final = "emulate "
+"""Begin of the entries of the list of devices that are emulated."""
+FRAMES: Final = {"NED": "NED: lies z down", "NWU": "NWU: lies z up", "ENU": "ENU: lies z up, yaw from east"}
+"""Frames by name, with the way a level device lies."""
+
+
+class _Device:
+    """The one device of the server: a page that is loaded again finds the recording running."""
+
+    def __init__(self) -> None:
+        self.listening: Listening | None = None
+
+    async def connect(self, source: Source) -> None:
+        """Follow a device."""
+        await self.disconnect()
+        made = Listening(source)
+        await asyncio.to_thread(made.open)
+        self.listening = made
+
+    async def disconnect(self) -> None:
+        """Let go of the device."""
+        held, self.listening = self.listening, None
+        if held is not None:
+            await asyncio.to_thread(held.close)
+
+
+_device = _Device()
+# The end of the server ends a recording, and makes the log of it.
+app.on_shutdown(_device.disconnect)
+
+
+def build() -> None:
+    """Make the page."""
+    _LivePage()
+
+
+def devices() -> list[str]:
+    """Return the serial ports of this computer, and the devices that can be emulated."""
+    from serial.tools import list_ports  # noqa: PLC0415 - only this page needs it
+
+    return [*sorted(found.device for found in list_ports.comports()), *(EMULATED + name for name in SCENARIOS)]
+
+
+class _LivePage:
+    """The elements of one browser's page."""
+
+    def __init__(self) -> None:
+        for sheet in ("studio.css", "live/live.css"):
+            ui.add_css(files("imufit.studio").joinpath(sheet).read_text(encoding="utf-8"))
+        self._columns: tuple[str, ...] = ()
+        self._plots: list[tuple[str, tuple[str, ...], ui.plotly]] = []
+        self._body: Body | None = None
+        self._wanted: Body | None = None
+        self._seconds = 10
+        self._figures: dict[str, ui.label] = {}
+        with ui.column().classes("studio-live"):
+            with ui.row().classes("w-full items-center"):
+                ui.label("Live device").classes("studio-title")
+                ui.space()
+                ui.link("Studio", "./").classes("studio-link text-sm")
+            self._connection()
+            with ui.element("div").classes("studio-live-columns"):
+                with ui.column().classes("gap-3 min-w-0"):
+                    self._status()
+                    self._recorder()
+                    self._guide()
+                with ui.column().classes("gap-3 min-w-0"):
+                    self._traces()
+        self._timer = ui.timer(EVERY, self._refresh)
+
+    # --- elements
+
+    def _connection(self) -> None:
+        with ui.column().classes("studio-region gap-2"):
+            with ui.row().classes("w-full items-end gap-3"):
+                choices = devices()
+                self._choice = (
+                    ui.select(
+                        choices,
+                        value=choices[0],
+                        label="device",
+                        with_input=True,
+                        new_value_mode="add-unique",
+                    )
+                    .classes("grow")
+                    .style("min-width: 13rem")
+                    .props('data-testid="device"')
+                )
+                self._frame = ui.select(FRAMES, value="NED", label="frame").style("min-width: 11rem")
+                self._baud = ui.number("bits per second", value=115200, min=300, format="%d").style("width: 8rem")
+                self._connect = ui.button("Connect", on_click=self._connect_or_not).props("unelevated")
+            with ui.expansion("Text without a header").props("dense").classes("w-full text-sm"):
+                self._header = ui.input("names of the columns", placeholder="t_ms,acc_x,acc_y,acc_z").classes("w-full")
+            self._problem = ui.label().classes("text-negative text-sm")
+
+    def _status(self) -> None:
+        with ui.column().classes("studio-region gap-2"):
+            self._name = ui.label("Not connected").classes("text-sm")
+            with ui.element("div").classes("studio-live-figures w-full"):
+                for key, words in (
+                    ("rate", "rate"),
+                    ("rows", "rows"),
+                    ("lost", "lost frames"),
+                    ("damaged", "damaged"),
+                    ("time", "time"),
+                ):
+                    with ui.element("div"):
+                        self._figures[key] = ui.label().classes("studio-live-value").props(f'data-testid="{key}"')
+                        ui.label(words).classes("text-xs opacity-75")
+            self._rest = ui.label().classes("text-sm")
+            self._scene = ui.column().classes("w-full gap-0")
+            self._angles = ui.label().classes("text-sm")
+
+    def _recorder(self) -> None:
+        with ui.column().classes("studio-region gap-2"):
+            with ui.row().classes("w-full items-center no-wrap gap-3"):
+                self._red = ui.button(icon="fiber_manual_record", on_click=self._record_or_stop)
+                self._red.props('round color=red-8 aria-label="record" data-testid="record"')
+                self._file = ui.input("log to record", value=str(free_name(Path.cwd(), "recording").name))
+                self._file.classes("grow").props('data-testid="file"')
+            self._recorded = ui.label("The red button records what comes from now on.").classes("text-sm")
+            self._recorded.props('data-testid="recorded"')
+
+    def _guide(self) -> None:
+        with ui.column().classes("studio-region gap-2"):
+            with ui.row().classes("w-full items-center no-wrap gap-3"):
+                self._start = ui.button("Calibrate", on_click=self._calibrate_or_stop).props("outline")
+                self._message = ui.label("Six sides on a table, then free rotation.").classes("text-sm font-medium")
+            self._progress = ui.linear_progress(0.0, show_value=False).props("rounded")
+            self._progress.visible = False
+            with ui.row().classes("gap-1") as self._sides:
+                self._chips = {side: ui.chip(side, color="grey-6").props("dense square") for side in SIDES}
+            self._sides.visible = False
+            self._drawn = ui.column().classes("w-full gap-0")
+            self._result = ui.column().classes("w-full gap-1")
+
+    def _traces(self) -> None:
+        with ui.column().classes("studio-region gap-1"):
+            with ui.row().classes("w-full items-center"):
+                ui.label("Readings").classes("font-medium")
+                ui.space()
+                ui.label("green: at rest").classes("text-sm")
+                ui.select(
+                    {seconds: f"{seconds} s" for seconds in WINDOWS}, value=self._seconds, on_change=self._longer
+                ).props('dense options-dense aria-label="length of the traces"')
+            self._panels = ui.column().classes("w-full gap-0")
+            with self._panels:
+                ui.label("Connect a device to see its readings.").classes("text-sm")
+
+    # --- what a person does
+
+    async def _connect_or_not(self) -> None:
+        if _device.listening is not None:
+            await _device.disconnect()
+            return
+        self._connect.disable()
+        try:
+            await _device.connect(self._source())
+            self._problem.text = ""
+        except InputError as error:
+            self._problem.text = printable(str(error))
+        finally:
+            self._connect.enable()
+
+    def _look_for_devices(self) -> None:
+        named = [self._choice.value] if self._choice.value else []
+        choices = list(dict.fromkeys([*devices(), *named]))
+        if set(choices) != set(self._choice.options):
+            self._choice.set_options(choices)
+
+    def _source(self) -> Source:
+        choice = str(self._choice.value or "").strip()
+        emulated = choice.removeprefix(EMULATED) if choice.startswith(EMULATED) else ""
+        frame = cast(Frame, self._frame.value)
+        return Source(
+            port="" if emulated else choice,
+            scenario=emulated,
+            baud=int(self._baud.value or 115200),
+            header=str(self._header.value or ""),
+            frame=frame,
+        )
+
+    def _record_or_stop(self) -> None:
+        listening = _device.listening
+        if listening is None:
+            self._recorded.text = "Connect a device first."
+        elif listening.recorded.running:
+            listening.stop()
+        else:
+            listening.record(self._path("recording"))
+
+    def _path(self, stem: str) -> Path:
+        """Return the log to record: the one named, in the folder that the studio was started in, or a free name."""
+        named = str(self._file.value or "").strip()
+        return Path.cwd() / named if named else free_name(Path.cwd(), stem)
+
+    def _calibrate_or_stop(self) -> None:
+        listening = _device.listening
+        if listening is None:
+            self._message.text = "Connect a device first."
+        elif listening.stage is not None:
+            listening.stop()
+        elif not listening.recorded.running:
+            listening.guide(free_name(Path.cwd(), "calibration"))
+
+    def _longer(self, event: Any) -> None:
+        self._seconds = int(event.value)
+
+    # --- pictures
+
+    def _refresh(self) -> None:
+        listening = _device.listening
+        self._connect.text = "Connect" if listening is None else "Disconnect"
+        for element in (self._choice, self._frame, self._baud, self._header):
+            element.set_enabled(listening is None)
+        state = None if listening is None else listening.state
+        for key, words in shown_state(state).items():
+            self._figures[key].text = words
+        self._show_recording(listening)
+        self._show_guide(listening)
+        if listening is None:
+            self._name.text = "Not connected"
+            self._rest.text = ""
+            return
+        if listening.problem:
+            self._problem.text = printable(listening.problem)
+        if state is None:
+            self._name.text = "Waiting for rows"
+            return
+        waiting = state.trouble if state.trouble and not state.n else ""
+        line = "line lost, trying again" if not state.connected else waiting
+        self._name.text = ", ".join(each for each in (printable(state.device) or "device", line) if each)
+        self._rest.text = "" if not state.n else "at rest" if listening.rest is not None else "moving"
+        self._show_readings(listening)
+
+    def _show_readings(self, listening: Listening) -> None:
+        rolling, state = listening.rolling, listening.state
+        if rolling is None or state is None:
+            return
+        if rolling.columns != self._columns:
+            self._make_panels(rolling.columns)
+        rests = [*listening.rests, *([listening.rest] if listening.rest is not None else [])]
+        for title, names, plot in self._plots:
+            plot.update_figure(panel(rolling, title, names, self._seconds, rests))
+        name, q = _attitude(state.angles)
+        if self._body is not None:
+            self._body.show("measured", q, listening.source.frame)
+        self._angles.text = f"{angles_in_words(q)} ({name})" if q is not None else "The attitude is not known yet."
+
+    def _make_panels(self, columns: tuple[str, ...]) -> None:
+        """Make the panels and the body of the device's columns."""
+        self._columns = columns
+        self._panels.clear()
+        self._plots = []
+        with self._panels:
+            for title, names in groups(columns):
+                plot = ui.plotly({"data": [], "layout": {}}).classes("w-full")
+                self._plots.append((title, names, plot))
+        self._scene.clear()
+        with self._scene:
+            self._body = Body(("measured",), compass="mag_x" in columns)
+
+    def _show_recording(self, listening: Listening | None) -> None:
+        if listening is None:
+            return
+        recorded = listening.recorded
+        self._red.props(f"icon={'stop' if recorded.running else 'fiber_manual_record'}")
+        self._red.props(f'aria-label="{"stop" if recorded.running else "record"}"')
+        self._file.set_enabled(not recorded.running)
+        if recorded.path is None:
+            return
+        name = printable(recorded.path.name)
+        if recorded.running:
+            said = recorded.message or "recording"
+            self._recorded.text = f"{said} {name}: {recorded.rows} rows, {recorded.seconds:.0f} s"
+        elif self._recorded.text != f"{name}: {recorded.message}":
+            self._recorded.text = f"{name}: {recorded.message}"
+            self._file.value = free_name(Path.cwd(), "recording").name
+
+    def _show_guide(self, listening: Listening | None) -> None:
+        stage = None if listening is None else listening.stage
+        self._start.text = "Calibrate" if stage is None else "Stop"
+        self._progress.visible = self._sides.visible = stage is not None
+        if stage is None:
+            self._draw_side(None)
+            if listening is not None and listening.calibrated:
+                self._show_result(listening.calibrated)
+            elif self._message.text.startswith("Turn") or listening is None:
+                self._message.text = "Six sides on a table, then free rotation."
+            return
+        self._message.text = stage.message
+        self._progress.value = stage.progress
+        self._mark(stage)
+        self._draw_side(stage.side)
+
+    def _mark(self, stage: Stage) -> None:
+        for side, chip in self._chips.items():
+            chip.props(f"color={'green-8' if side in stage.done else 'grey-6'} text-color=white")
+            chip.text = f"✓ {side}" if side in stage.done else side
+
+    def _draw_side(self, side: str | None) -> None:
+        """Draw the way to lay the device."""
+        if side is None:
+            if self._wanted is not None:
+                self._drawn.clear()
+                self._wanted = None
+            return
+        if self._wanted is None:
+            with self._drawn:
+                ui.label("Lay it like this:").classes("text-sm")
+                self._wanted = Body(("wanted",), compass=False)
+        self._wanted.turn("wanted", side_rotation(side))
+
+    def _show_result(self, sentences: tuple[str, ...]) -> None:
+        shown = tuple(child.text for child in self._result.default_slot.children if isinstance(child, ui.label))
+        said = tuple(printable(sentence) for sentence in sentences)
+        if shown != said:
+            self._message.text = "Calibrated."
+            self._result.clear()
+            with self._result:
+                for sentence in said:
+                    ui.label(sentence).classes("text-sm")
+
+
+def _attitude(angles: dict[str, Array]) -> tuple[str, Array | None]:
+    """Return the last filter that knows the attitude, and the attitude: filters stand from the simplest on."""
+    known = [name for name, three in angles.items() if np.isfinite(three).all()]
+    if not known:
+        return "", None
+    name = known[-1]
+    return name, np.asarray(_imufit.quaternion_from_euler(np.ascontiguousarray(angles[name].reshape(1, 3)))[0])

@@ -1,0 +1,203 @@
+"""Mystery log: a game of three levels with a hidden effect, which teaches what evidence can and cannot show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from imufit.errors import InputError
+from imufit.figures import quantity
+from imufit.lab.simulate import hidden, simulate, unseal
+from imufit.lab.simulated_log import save_simulation
+from imufit.results import Diagnosis
+
+if TYPE_CHECKING:
+    from imufit.lab.simulate import Truth
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of the game.
+
+    Attributes
+    ----------
+    title, words : str
+        Its name, and the task.
+    lesson : str
+        The sentence on the method that the level teaches.
+    """
+
+    title: str
+    words: str
+    lesson: str
+
+
+DEMONSTRATION: Final = 0
+"""Level that hides no name of the evidence: the loop is shown, and the truth at its end."""
+LEVELS: Final[dict[int, Level]] = {
+    DEMONSTRATION: Level(
+        "Demonstration",
+        "One effect is hidden in one minute of a simulated hand-held sensor. The sentence below names the effect. "
+        "Press Add beside the effect, see the error fall, then reveal the truth.",
+        "The loop on your own log is the same: compare, name, add, and stop where the error stands at the noise floor.",
+    ),
+    1: Level(
+        "A large effect",
+        "One large effect is hidden in one minute of a hand-held sensor. Name the effect.",
+        "An effect is named by the shape of the residual: the covariate that the residual follows points to the cause.",
+    ),
+    2: Level(
+        "A small effect, or none",
+        "A small effect is hidden, or nothing at all. Name the effect, or answer that nothing is missing.",
+        "Absence has evidence too: where the error stands at the noise floor, every named effect is a false alarm.",
+    ),
+    3: Level(
+        "Two effects that look alike",
+        "One effect is hidden, and this motion leaves it a rival. Name an effect that the log allows.",
+        "A log cannot separate effects that its motion does not separate: the remedy is another motion, not more rows.",
+    ),
+}
+NOTHING: Final = ""
+"""The answer that nothing is missing."""
+DURATION: Final = 60.0
+"""Length of a log, s: the evidence of 60 s at 50 Hz is taken in two seconds."""
+RATE: Final = 50.0
+"""Samples a second."""
+SURE: Final = 0.95
+"""Probability from which on the evidence names one effect: odds of about 20 to 1."""
+
+_ALIKE: Final = (("tilt", "mag.hard_iron"), ("arm", "gyr.delay"), ("arm", "gyr.lowpass"))
+"""Scenarios and effects that have a rival there: of 24 logs of these three, all were `ambiguous`."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The end of a game.
+
+    Attributes
+    ----------
+    right : bool
+        Whether the answer is the hidden effect.
+    truth : tuple of str
+        The hidden effects; empty where nothing was hidden.
+    sentences : tuple of str
+        Truth, answer, evidence, and how sure one could have been.
+    lesson : str
+        What the level teaches.
+    """
+
+    right: bool
+    truth: tuple[str, ...]
+    sentences: tuple[str, ...]
+    lesson: str
+
+
+@dataclass
+class Mystery:
+    """A game on one log.
+
+    Attributes
+    ----------
+    level, seed : int
+        Level, `DEMONSTRATION` included, and the number that picked the log.
+    log : Path
+        The log; its sealed truth lies beside it.
+    verdict : Verdict or None
+        After the reveal.
+    """
+
+    level: int
+    seed: int
+    log: Path
+    verdict: Verdict | None = None
+
+    @classmethod
+    def hidden(cls, level: int, seed: int, folder: Path) -> Mystery:
+        """Simulate the log of a game.
+
+        Parameters
+        ----------
+        level : int
+            One of `LEVELS`.
+        seed : int
+            Picks effect, size, motion and noise.
+        folder : Path
+            Where log and sealed truth are written.
+
+        Raises
+        ------
+        InputError
+            The level is unknown.
+        """
+        if level not in LEVELS:
+            raise InputError(f"the level {level} is unknown", remedy="Choose 1, 2 or 3.")
+        path = folder / f"mystery-{level}-{seed}.parquet"
+        if level in (DEMONSTRATION, 1):
+            simulation, _ = hidden("handheld", seed, size="large", duration=DURATION, rate=RATE)
+        elif level == 2:
+            simulation, _ = hidden("handheld", seed, size="small", allow_nothing=True, duration=DURATION, rate=RATE)
+        else:
+            scenario, effect = _ALIKE[seed % len(_ALIKE)]
+            simulation = simulate(scenario, {effect: None}, seed, duration=DURATION, rate=RATE, size="large")
+        save_simulation(simulation, path)
+        return cls(level, seed, path)
+
+    def reveal(self, answer: str, first: Diagnosis) -> Verdict:
+        """Open the truth and judge an answer.
+
+        Parameters
+        ----------
+        answer : str
+            Id of an effect; empty answers that nothing is missing.
+        first : Diagnosis
+            What the evidence says of the ideal sensor on this log.
+        """
+        truth = unseal(self.log)
+        hidden_effects = tuple(truth.effects)
+        right = answer in hidden_effects if hidden_effects else answer == NOTHING
+        alike = (first.best, *first.ambiguous_with) if first.verdict == "ambiguous" else ()
+        rival = not right and answer in alike and not set(hidden_effects).isdisjoint(alike)
+        self.verdict = Verdict(
+            right,
+            hidden_effects,
+            (_said(hidden_effects, answer, right, rival), _evidence(truth, first), _sureness(first)),
+            LEVELS[self.level].lesson,
+        )
+        return self.verdict
+
+
+def _said(truth: Sequence[str], answer: str, right: bool, rival: bool) -> str:
+    hid = f"{' and '.join(truth)} was hidden" if truth else "Nothing was hidden"
+    named = f"you named {answer}" if answer else "you answered that nothing is missing"
+    mark = "Right" if right else "Allowed, as the log separates the two no better" if rival else "Not right"
+    return f"{mark}: {hid}, and {named}."
+
+
+def _evidence(truth: Truth, first: Diagnosis) -> str:
+    """Say which probability the evidence gives to the truth."""
+    if not truth.effects:
+        largest = max((item.probability for item in first.candidates), default=0.0)
+        return f"The evidence gives its likeliest candidate a probability of {quantity.share(largest)}."
+    effect = next(iter(truth.effects))
+    found = next((item for item in first.candidates if item.effect == effect), None)
+    if found is None:
+        return f"The log cannot show {effect}: the evidence holds no such candidate."
+    rivals = [name for name in (first.best, *first.ambiguous_with) if name not in (None, effect)]
+    beside = f", its rivals are {', '.join(map(str, rivals))}" if rivals else ""
+    return f"The evidence gives {effect} a probability of {quantity.share(found.probability)}{beside}."
+
+
+def _sureness(first: Diagnosis) -> str:
+    """Say how sure one could have been."""
+    best = first.candidates[0].probability if first.candidates else math.nan
+    if first.verdict == "adequate":
+        return "You could not have named an effect: no effect stands out of the noise of this log."
+    if first.verdict == "missing" and best >= SURE:
+        return f"You could have been sure: one effect stands out, with {quantity.share(best)}."
+    if first.verdict == "ambiguous":
+        alike = ", ".join(str(name) for name in (first.best, *first.ambiguous_with) if name)
+        return f"You could not have been sure: {alike} explain this log equally well."
+    return "You could not have been sure: the evidence names no single effect."

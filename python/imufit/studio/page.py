@@ -1,0 +1,75 @@
+"""The studio's main page: sentence, model, panels, candidates, and the fall of the error."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from importlib.resources import files
+from typing import Final
+
+from nicegui import ui
+
+from imufit.studio.desk import Desk
+from imufit.studio.view_body import BodyView
+from imufit.studio.view_candidates import CandidateView
+from imufit.studio.view_fall import FallView
+from imufit.studio.view_model import ModelView
+from imufit.studio.view_panels import PanelView
+from imufit.studio.view_top import Head, Top
+
+AHEAD_S: Final = 0.02
+"""Time that the server has for sending the numbers of a change, s."""
+
+
+def page_of(desk: Desk) -> Callable[[], None]:
+    """Return what builds the page of a desk for one browser.
+
+    Parameters
+    ----------
+    desk : Desk
+        The state that all pages share.
+    """
+    style = files("imufit.studio").joinpath("studio.css").read_text(encoding="utf-8")
+
+    def build() -> None:
+        ui.add_css(style)
+        head = Head(desk)
+        with ui.element("main").classes("studio"):
+            with _region("top"):
+                top = Top(desk)
+            with _region("middle") as middle:
+                panels = PanelView(desk)
+                body = BodyView(desk)
+            with _region("right") as right:
+                candidates = CandidateView(desk, panels)
+            with _region("bottom") as bottom:
+                fall = FallView(desk)
+            with _region("left") as left:
+                model = ModelView(desk)
+
+        def numbers() -> None:
+            for region in (middle, right, bottom, left):
+                region.visible = desk.session is not None
+            for view in (head, model, fall):
+                view.refresh()
+
+        def pictures() -> None:
+            for view in (top, candidates, panels):
+                view.refresh()
+            body.renew()
+
+        async def pictures_after() -> None:
+            # Numbers are on their way to the browser before figures are made, which takes longer.
+            await asyncio.sleep(AHEAD_S)
+            pictures()
+
+        desk.changed.subscribe(numbers)
+        desk.changed.subscribe(pictures_after)
+        numbers()
+        pictures()
+
+    return build
+
+
+def _region(name: str) -> ui.element:
+    return ui.element("section").classes(f"studio-region studio-{name}")

@@ -1,0 +1,543 @@
+"""Content of the studio without a page: logs, the stack of effects, its fits, and the way there.
+
+Nothing here draws. Every number is that of the fit which `imufit add`, `imufit ladder` and `imufit diagnose` make.
+Where a fit has yet to be made, the evidence of the first pass gives the numbers to first order, and they say so.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit.comparing import comparison, panels
+from imufit.errors import InputError
+from imufit.fitting.analysis import pooled
+from imufit.log import LogSource
+from imufit.loop import Fit, SensorModel
+from imufit.model.catalogue import each_log_has_its_own, find_effect
+from imufit.progress import Progress, silent
+from imufit.results import Comparison, Diagnosis, Parameter
+from imufit.results.comparison import Panel
+from imufit.studio.stack import Action, Stack, Step
+from imufit.studio.traces import ModelTraces, Traces
+
+Array = NDArray[np.float64]
+
+FULL: Final = 4
+"""Fits that keep their evidence: the first, the present, the one before, and the second of two models. The evidence of
+two minutes at 100 Hz takes some 20 MB."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Error and parameters of a model.
+
+    Attributes
+    ----------
+    ratio : float
+        Held-out residual RMS over the noise floor; NaN before anything is known.
+    parameters : tuple of Parameter
+        Of every effect of the model.
+    fitted : bool
+        True if they are those of a fit, False if the evidence gives them to first order.
+    """
+
+    ratio: float
+    parameters: tuple[Parameter, ...]
+    fitted: bool
+
+
+@dataclass(eq=False)
+class Made:
+    """A model that was fitted, and what was asked of it.
+
+    Attributes
+    ----------
+    fit : Fit
+        The fit, with or without its evidence.
+    way : tuple of Stack
+        Models from the ideal sensor to this one, each fitted from the one before.
+    """
+
+    fit: Fit
+    way: tuple[Stack, ...]
+    numbers: Numbers = field(init=False)
+    diagnosis: Diagnosis | None = None
+    comparison: Comparison | None = None
+
+    def __post_init__(self) -> None:
+        """Keep the numbers of the fit."""
+        self.numbers = Numbers(self.fit.ratio, self.fit.parameters, True)
+
+
+class Session:
+    """A model on its way, on one log or on several of one sensor.
+
+    Parameters
+    ----------
+    logs : sequence of LogSource
+        Logs with a reference, or with rests that stand in for one.
+
+    Attributes
+    ----------
+    logs : tuple of LogSource
+        The logs.
+    steps : list of Step
+        The way so far, with the steps that were undone at its end.
+    position : int
+        Number of the present step.
+    second : Stack or None
+        The other of two models side by side.
+    """
+
+    def __init__(self, logs: Sequence[LogSource]) -> None:
+        self.logs = tuple(logs)
+        self.steps = [Step(Action.START, "", Stack())]
+        self.position = 0
+        self.second: Stack | None = None
+        self._made: dict[Stack, Made] = {}
+        self._full: OrderedDict[Stack, None] = OrderedDict()
+        self._quick: dict[Stack, tuple[Numbers, Array]] = {}
+        self._work = threading.RLock()
+        self._start: Fit | None = None
+
+    # --- the evidence
+
+    def begin(self, progress: Progress = silent) -> None:
+        """Take the evidence of the logs: the one pass that everything else rests on.
+
+        Parameters
+        ----------
+        progress : callable
+            Called with (rows done, rows in all, what is being done).
+
+        Raises
+        ------
+        InputError
+            The logs have no usable reference and no rests.
+        """
+        with self._work:
+            self._start = SensorModel().fit(self.logs, progress=progress)
+            self._made[Stack()] = Made(self._start, (Stack(),))
+
+    @property
+    def begun(self) -> bool:
+        """Whether the evidence is there."""
+        return self._start is not None
+
+    @property
+    def start(self) -> Fit:
+        """The ideal sensor, with the evidence of every candidate."""
+        if self._start is None:
+            raise InputError("the evidence of the log is not there yet", remedy="Wait until the log is read.")
+        return self._start
+
+    # --- the way
+
+    @property
+    def step(self) -> Step:
+        """The present step."""
+        return self.steps[self.position]
+
+    @property
+    def stack(self) -> Stack:
+        """The present stack."""
+        return self.step.stack
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether a step was made."""
+        return self.position > 0
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether a step was undone."""
+        return self.position + 1 < len(self.steps)
+
+    def undo(self) -> None:
+        """Return to the step before."""
+        self.position = max(0, self.position - 1)
+
+    def redo(self) -> None:
+        """Make the step that was undone last."""
+        self.position = min(len(self.steps) - 1, self.position + 1)
+
+    def give_up(self) -> None:
+        """Return to the step before one whose model cannot be fitted, and forget that step."""
+        if self.can_undo:
+            del self.steps[self.position :]
+            self.position -= 1
+
+    def add(self, effect: str) -> None:
+        """Add an effect.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+
+        Raises
+        ------
+        InputError
+            The effect is unknown, in the model already, or cannot be tested on these logs.
+        """
+        find_effect(effect)
+        if effect in self.stack.model.effects:
+            raise InputError(f"effect {effect} is in the model already", remedy="Nothing needs to be added.")
+        analysis = self.start.analysis
+        if effect not in analysis.slots:
+            reason = analysis.refusal(find_effect(effect)) or "the log does not show it"
+            raise InputError(f"effect {effect} cannot be added: {reason}", file=self.logs[0].path)
+        made = self.made()
+        found = None if made is None or made.diagnosis is None else made.diagnosis.candidates
+        expected = next((item.held_out_after for item in found or () if item.effect == effect), None)
+        self._go(Action.ADD, effect, self.stack.with_effect(effect), expected)
+
+    def remove(self, effect: str) -> None:
+        """Take an effect out of the stack.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+        """
+        self._go(Action.REMOVE, effect, self.stack.without_effect(effect))
+
+    def switch(self, effect: str, on: bool) -> None:
+        """Switch an effect on or off; it stays in the stack.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+        on : bool
+            Whether the model has it.
+        """
+        if self.stack.entry(effect).on != on:
+            self._go(Action.ON if on else Action.OFF, effect, self.stack.switched(effect, on))
+
+    def hold(self, effect: str, name: str, value: float) -> None:
+        """Fix a parameter at a value.
+
+        Parameters
+        ----------
+        effect, name : str
+            The parameter.
+        value : float
+            SI unit.
+
+        Raises
+        ------
+        InputError
+            The parameter is unknown, or cannot have this value.
+        """
+        SensorModel([effect]).adjust(effect, name, value=value, vary=False)
+        held = dict(self.stack.entry(effect).held) | {name: float(value)}
+        self._go(Action.HOLD, effect, self.stack.held(effect, held))
+
+    def free(self, effect: str, name: str) -> None:
+        """Let fits choose a parameter that was fixed.
+
+        Parameters
+        ----------
+        effect, name : str
+            The parameter.
+        """
+        held = {key: value for key, value in self.stack.entry(effect).held if key != name}
+        self._go(Action.FREE, effect, self.stack.held(effect, held))
+
+    def go(self, steps: Sequence[Step], position: int) -> None:
+        """Take over a way that was kept.
+
+        Parameters
+        ----------
+        steps : sequence of Step
+            The way, from the ideal sensor on.
+        position : int
+            Number of the present step.
+        """
+        self.steps, self.position = list(steps), position
+
+    def _go(self, action: Action, effect: str, stack: Stack, expected: float | None = None) -> None:
+        del self.steps[self.position + 1 :]
+        self.steps.append(Step(action, effect, stack, expected))
+        self.position += 1
+
+    # --- answers
+
+    def made(self, stack: Stack | None = None) -> Made | None:
+        """Return the fit of a stack (default: the present one) and what was asked of it; None before it is made.
+
+        Parameters
+        ----------
+        stack : Stack, optional
+            The stack.
+        """
+        return self._made.get((self.stack if stack is None else stack).model)
+
+    def numbers(self, stack: Stack | None = None) -> Numbers | None:
+        """Return error and parameters of a stack at once, without a pass over the logs.
+
+        Parameters
+        ----------
+        stack : Stack, optional
+            The stack; default the present one.
+
+        Returns
+        -------
+        Numbers or None
+            Those of the fit if it was made; else to first order from the evidence of the first pass; None where this
+            does not give them: a parameter stays at a value, or an effect is not linear in its parameters.
+        """
+        model = (self.stack if stack is None else stack).model
+        made = self._made.get(model)
+        if made is not None:
+            return made.numbers
+        if model not in self._quick:
+            if self.needs_pass(model):
+                return None
+            self._quick[model] = self._first_order(model)
+        return self._quick[model][0]
+
+    def panels_at_once(self) -> list[Panel]:
+        """Return the residuals of the present stack to first order, without a pass; empty where a pass is needed."""
+        model = self.stack.model
+        if not self.has_reference or self.numbers() is None or model not in self._quick:
+            return []
+        return panels(self.start.analysis, self._quick[model][1], self.shown)
+
+    def needs_pass(self, stack: Stack) -> bool:
+        """Return whether only a pass over the logs gives the numbers of a stack that was not fitted.
+
+        Parameters
+        ----------
+        stack : Stack
+            The stack.
+        """
+        model = stack.model
+        slots = self.start.analysis.slots
+        return model.holds or any(
+            effect not in slots or find_effect(effect).nonlinear or find_effect(effect).tried_at_full_size
+            for effect in model.effects
+        )
+
+    def _first_order(self, model: Stack) -> tuple[Numbers, Array]:
+        """Solve for some effects in the evidence around the ideal sensor: numbers, and the step of all parameters."""
+        analysis = self.start.analysis
+        slots = [analysis.slots.index(effect) for effect in model.effects]
+        solved = analysis.problem.estimate([*analysis.fitted_slots, *slots])
+        errors = np.sqrt(np.maximum(np.diag(solved["covariance"]), 0.0))
+        parameters: list[Parameter] = []
+        at = len(solved["step"]) - sum(self._count(effect) for effect in model.effects)
+        for key in model.effects:
+            effect, count = find_effect(key), self._count(key)
+            # Logs that have their own values follow one another.
+            shape = (-1, len(effect.parameters))
+            part = slice(at, at + count)
+            values, spread = pooled(solved["step"][part].reshape(shape), errors[part].reshape(shape))
+            parameters += [
+                Parameter(key, name, float(value), float(error), unit, typical)
+                for (name, unit, typical), value, error in zip(effect.parameters, values, spread, strict=True)
+            ]
+            at += count
+        return Numbers(float(solved["held_out"]), tuple(parameters), False), solved["full_step"]
+
+    def _count(self, effect: str) -> int:
+        """Return the number of parameters that an effect has in the evidence of all logs."""
+        logs = len(self.start.analysis.having(effect)) if each_log_has_its_own(effect) else 1
+        return logs * len(find_effect(effect).parameters)
+
+    # --- work that takes passes: from a thread
+
+    def fit(self, stack: Stack | None = None, progress: Progress = silent) -> Made:
+        """Fit a stack (default: the present one), from the nearest one that was fitted.
+
+        Parameters
+        ----------
+        stack : Stack, optional
+            The stack.
+        progress : callable
+            Called with (rows done, rows in all, what is being done).
+
+        Raises
+        ------
+        InputError
+            An effect cannot be tested on these logs.
+        """
+        target = (self.stack if stack is None else stack).model
+        with self._work:
+            if target not in self._made:
+                self._keep(target, self._moved(self._nearest(target), target, progress))
+            return self._made[target]
+
+    def diagnose(self, stack: Stack | None = None, progress: Progress = silent) -> Diagnosis:
+        """Say what is missing from a stack (default: the present one).
+
+        Parameters
+        ----------
+        stack : Stack, optional
+            The stack.
+        progress : callable
+            Called with (rows done, rows in all, what is being done).
+        """
+        with self._work:
+            made = self.fit(stack, progress)
+            if made.diagnosis is None:
+                made.diagnosis = self._with_evidence(made).diagnose(progress=progress)
+            return made.diagnosis
+
+    def compare(self, stack: Stack | None = None, progress: Progress = silent) -> Comparison | None:
+        """Say where a stack (default: the present one) fails; None for logs without a reference.
+
+        Parameters
+        ----------
+        stack : Stack, optional
+            The stack.
+        progress : callable
+            Called with (rows done, rows in all, what is being done).
+        """
+        with self._work:
+            made = self.fit(stack, progress)
+            if made.comparison is None and self.has_reference:
+                fit = self._with_evidence(made)
+                made.comparison = comparison(fit.analysis, fit.estimate.step, self.shown)
+            return made.comparison
+
+    @cached_property
+    def has_reference(self) -> bool:
+        """Whether every row is judged by a reference, so that residuals can be drawn."""
+        return self.start.analysis.judged_by == "reference"
+
+    @property
+    def shown(self) -> int:
+        """Number of the log whose residuals are drawn: of several the one that stands highest at the start."""
+        return self.start.worst
+
+    def model_traces(self, traces: Traces, stack: Stack) -> ModelTraces:
+        """Return residual and predicted readings of a stack over time, after a pass over the rows.
+
+        Parameters
+        ----------
+        traces : Traces
+            The log that is drawn.
+        stack : Stack
+            The stack.
+
+        Raises
+        ------
+        InputError
+            The log has no reference attitude.
+        """
+        with self._work:
+            fit = self._with_evidence(self.fit(stack))
+            step = fit.analysis.own_step(self.shown, fit.estimate.step)
+            found = ModelTraces(traces, fit.analysis.logs[self.shown], step)
+        found.build()
+        return found
+
+    def explained(self, effect: str) -> list[Panel]:
+        """Return the residuals that adding an effect to the present model would leave, to first order; no pass.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+
+        Returns
+        -------
+        list of Panel
+            Empty where the evidence around the present model is not at hand, or has no such candidate.
+        """
+        made = self.made()
+        # A fit does not change; the thread at work may only put another one in its place.
+        fit = None if made is None else made.fit
+        if fit is None or not fit.has_evidence or not self.has_reference:
+            return []
+        analysis = fit.analysis
+        if effect not in analysis.candidates:
+            return []
+        solved = analysis.problem.estimate([*analysis.fitted_slots, analysis.slots.index(effect)])
+        return panels(analysis, solved["full_step"], self.shown)
+
+    def _nearest(self, target: Stack) -> Made:
+        """Return the fit of the last step before a stack that was made."""
+        models = [step.stack.model for step in self.steps[: self.position + 1]]
+        at = models.index(target) if target in models else self.position
+        for step in self.steps[at::-1]:
+            if (found := self._made.get(step.stack.model)) is not None:
+                return found
+        return self._made[Stack()]
+
+    def _moved(self, base: Made, target: Stack, progress: Progress) -> Made:
+        fit = self._with_evidence(base)
+        progress(0, 1, f"fitting {' + '.join(target.effects) or 'the ideal sensor'}")
+        return Made(moved(fit, target), (*base.way, target))
+
+    def _with_evidence(self, made: Made) -> Fit:
+        """Return a fit whose evidence is at hand, and note that it was used last."""
+        made.fit.analysis  # noqa: B018  takes the evidence again if it was laid down
+        model = made.way[-1]
+        if model != Stack():
+            self._full[model] = None
+            self._full.move_to_end(model)
+            while len(self._full) > FULL - 1:
+                old = self._made[self._full.popitem(last=False)[0]]
+                old.fit = old.fit.without_evidence()
+        return made.fit
+
+    def _keep(self, model: Stack, made: Made) -> None:
+        self._made[model] = made
+        self._with_evidence(made)
+
+
+def moved(fit: Fit, target: Stack) -> Fit:
+    """Fit a stack, from another one that was fitted to the same logs.
+
+    Parameters
+    ----------
+    fit : Fit
+        Where to start.
+    target : Stack
+        The stack; all of it is switched on.
+    """
+    present = fit.model.effects
+    new = [effect for effect in target.effects if effect not in present]
+    gone = [effect for effect in present if effect not in target.effects]
+    if len(new) == 1 and not gone and not target.holds and not fit.model.limits:
+        # The same call as `imufit add`: to the last digit the same numbers.
+        added: Fit = fit.add(new[0]).fit
+        return added
+    model = fit.model.copy()
+    for effect in gone:
+        model = model.without_effect(effect)
+    for effect in new:
+        model = model.with_effect(effect)
+    for entry in target.entries:
+        held = dict(entry.held)
+        for name in model.parameters[entry.effect]:
+            fixed = model.limits.get(entry.effect, {}).get(name)
+            if name in held:
+                model.adjust(entry.effect, name, value=held[name], vary=False)
+            elif fixed is not None and fixed.fixed:
+                model.adjust(entry.effect, name, vary=True)
+    return fit.moved(model)
+
+
+def worst_channel(found: Comparison) -> str | None:
+    """Return the channel that stands highest above its noise floor.
+
+    Parameters
+    ----------
+    found : Comparison
+        The residuals.
+    """
+    known = [item for item in found.channels if math.isfinite(item.ratio)]
+    return max(known, key=lambda item: item.ratio).channel if known else None

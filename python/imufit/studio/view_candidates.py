@@ -1,0 +1,127 @@
+"""Right region: what is missing, with probability, expected drop and rivals, and the card of the effect looked at."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from nicegui import ui
+
+from imufit.figures import quantity
+from imufit.model.catalogue import card_of, find_effect
+from imufit.printable import NAME, printable
+from imufit.results import Candidate, Diagnosis
+from imufit.results.diagnosis import NOT_TESTABLE, PASSED
+from imufit.studio.attribute import attribute
+from imufit.studio.desk import Desk
+from imufit.studio.view_panels import PanelView
+
+FIRST: Final = 5
+"""Candidates that are shown at once: the best and its rivals; the others fold away."""
+
+
+class CandidateView:
+    """The candidates on one page.
+
+    Parameters
+    ----------
+    desk : Desk
+        The state that it shows.
+    panels : PanelView
+        Where the effect looked at draws what it would explain.
+    """
+
+    def __init__(self, desk: Desk, panels: PanelView) -> None:
+        self._desk, self._panels = desk, panels
+        self._looked_at = ""
+        self._drawn: tuple[object, bool] | None = None
+        ui.html("Missing effects", tag="h2", sanitize=False)
+        self._list = ui.column().classes("w-full gap-0")
+        self._card = ui.column().classes("w-full gap-1 studio-item").props("data-mark=card")
+        self._card.visible = False
+
+    def refresh(self) -> None:
+        """Show the candidates on top of the present model."""
+        session = self._desk.session
+        made = None if session is None or not session.begun else session.made()
+        diagnosis = None if made is None else made.diagnosis
+        state = (diagnosis, self._desk.guessing)
+        if state == self._drawn:
+            return
+        self._drawn = state
+        self._list.clear()
+        self._list.classes(**({"add": "studio-long"} if self._desk.guessing else {"remove": "studio-long"}))
+        with self._list:
+            if diagnosis is None:
+                ui.label("The candidates stand here once they are judged.").classes("studio-muted")
+                return
+            shown = [item for item in diagnosis.candidates if item.status != NOT_TESTABLE]
+            if self._desk.guessing:
+                ui.label("Rest on an effect to see what the effect would explain.").classes("studio-muted")
+                for item in sorted(shown, key=lambda item: item.effect):
+                    self._candidate(item, None)
+                return
+            if not shown:
+                ui.label("No effect was judged on these data.").classes("studio-muted")
+            for item in shown[:FIRST]:
+                self._candidate(item, diagnosis)
+            if shown[FIRST:]:
+                with ui.expansion(f"{len(shown) - FIRST} more candidates").classes("w-full").props("dense"):
+                    for item in shown[FIRST:]:
+                        self._candidate(item, diagnosis)
+
+    def _candidate(self, item: Candidate, diagnosis: Diagnosis | None) -> None:
+        """Show one candidate; without a diagnosis the evidence stays hidden, as in a game."""
+        desk, effect = self._desk, item.effect
+        named = diagnosis is not None and effect in (diagnosis.best, *diagnosis.ambiguous_with)
+        row = (
+            ui.element("div")
+            .classes("studio-item" + (" studio-best" if named else ""))
+            .props(attribute("data-mark", f"candidate-{effect}"))
+        )
+        row.on("mouseenter", lambda: self.look_at(effect))
+        row.on("mouseleave", lambda: self.look_at(""))
+        with row:
+            with ui.element("div").classes("studio-row"):
+                name = ui.label(printable(effect, NAME)).classes("studio-id cursor-pointer")
+                name.props("tabindex=0 role=button")
+                for event in ("click", "keydown.enter"):
+                    name.on(event, lambda: self.look_at("" if self._looked_at == effect else effect))
+
+                async def add() -> None:
+                    session = desk.session
+                    if session is not None:
+                        self.look_at("")
+                        await desk.attempt(lambda: session.add(effect))
+
+                ui.button("Add", on_click=add).props("dense no-caps size=sm" + ("" if named else " outline")).props(
+                    attribute("data-mark", f"add-{effect}")
+                )
+            if diagnosis is None:
+                return
+            drop = f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}"
+            words = f"{quantity.share(item.probability)} probable, error {drop}"
+            ui.label(words if item.status == PASSED else f"{words}, {item.status}").classes("studio-muted")
+            if named and item.confounded_with:
+                rivals = ", ".join(str(rival) for rival in item.confounded_with[:2])
+                ui.label(f"Rivals: {printable(rivals)}").classes("studio-muted")
+
+    def look_at(self, effect: str) -> None:
+        """Show the card of an effect, and what it would explain; empty puts both away.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+        """
+        if effect == self._looked_at:
+            return
+        self._looked_at = effect
+        self._card.clear()
+        self._card.visible = bool(effect)
+        if effect:
+            card = card_of(find_effect(effect))
+            with self._card:
+                ui.label(printable(f"{card.id}: {card.name}")).classes("studio-id")
+                for heading, text in card.lines():
+                    ui.label(printable(f"{heading}: {text}")).classes("studio-muted")
+        self._panels.propose(effect)

@@ -1,0 +1,161 @@
+"""Bottom region: the fall of the error step by step, undo, redo, and two models side by side."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from nicegui import ui
+
+from imufit.figures import quantity
+from imufit.printable import NAME, printable
+from imufit.results.noise_part import NoisePart
+from imufit.studio import charts
+from imufit.studio.desk import Desk
+from imufit.studio.session import Made, Session, worst_channel
+
+SMALL: Final = 0.005
+"""Share of the noise floor's variance below which a part is not listed."""
+
+
+CHANGED: Final = 0.005
+"""Change of a channel's residual over its noise floor from which on the channel is listed: the last digit shown."""
+
+
+class FallView:
+    """The fall of the error on one page.
+
+    Parameters
+    ----------
+    desk : Desk
+        The state that it shows.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._shown: tuple[object, ...] = ()
+        with ui.element("div").classes("studio-row flex-wrap"):
+            ui.html("Fall of the error", tag="h2", sanitize=False).style("flex: 1")
+            self._undo = _button("undo", "Undo", lambda: desk.attempt(lambda: _session(desk).undo())).props(
+                "data-mark=undo"
+            )
+            self._redo = _button("redo", "Redo", lambda: desk.attempt(lambda: _session(desk).redo())).props(
+                "data-mark=redo"
+            )
+            self._keep = ui.button("Keep as second model", icon="splitscreen", on_click=self._keep_second)
+            self._keep.props("flat dense no-caps size=sm").props("data-mark=second")
+        self._chart = ui.plotly(charts.empty("The error stands here once a log is open.")).classes("studio-chart")
+        self._chart.props("data-mark=fall")
+        self._floor = ui.label("").classes("studio-muted").props("data-mark=floor")
+        self._two = ui.column().classes("w-full gap-1").props("data-mark=two")
+
+    def refresh(self) -> None:
+        """Show the steps up to the present one, those that were undone paler."""
+        session = self._desk.session
+        begun = session is not None and session.begun
+        self._undo.set_enabled(session is not None and begun and session.can_undo)
+        self._redo.set_enabled(session is not None and begun and session.can_redo)
+        self._keep.set_enabled(begun)
+        if session is None or not begun:
+            return
+        numbers = [session.numbers(step.stack) for step in session.steps]
+        ratios = [math.nan if item is None else item.ratio for item in numbers]
+        made = session.made()
+        best = None
+        if made is not None and made.diagnosis is not None and not session.can_redo and not self._desk.guessing:
+            candidate = made.diagnosis.best_candidate
+            best = None if candidate is None else (candidate.effect, candidate.held_out_after)
+        figure = charts.fall(
+            [step.label for step in session.steps],
+            ratios,
+            [step.expected for step in session.steps],
+            session.position,
+            best=best,
+        )
+        if figure != self._chart.figure:
+            self._chart.update_figure(figure)
+        self._floor.set_text(
+            "" if made is None or made.diagnosis is None else _floor_words(session, made.diagnosis.noise)
+        )
+        self._keep.set_text("Put the second model away" if session.second is not None else "Keep as second model")
+        self._show_two(session)
+
+    async def _keep_second(self) -> None:
+        """Keep the present model beside later ones, or put the kept one away."""
+        session = _session(self._desk)
+        session.second = None if session.second is not None else session.stack
+        self._desk.changed.emit()
+        await self._desk.update()
+
+    def _show_two(self, session: Session) -> None:
+        """Lay out the second model and the present one beside each other."""
+        second = None if session.second is None else session.made(session.second)
+        present = session.made()
+        levels = tuple(made is not None and made.comparison is not None for made in (second, present))
+        state = (session.second, session.stack, second, present, levels)
+        if state == self._shown:
+            return
+        self._shown = state
+        self._two.clear()
+        if session.second is None:
+            return
+        with self._two:
+            if session.second.model == session.stack.model:
+                ui.label("The second model is the present one. Change the present one to compare.").classes(
+                    "studio-muted"
+                )
+            elif second is None or present is None:
+                ui.label("The two models are being compared.").classes("studio-muted")
+            else:
+                _two_models(second, present)
+
+
+def _two_models(second: Made, present: Made) -> None:
+    """Lay out two models: held-out error, residual of each channel that changes, parameters."""
+    lower = "second" if second.numbers.ratio < present.numbers.ratio else "present"
+    ui.label(
+        f"Held-out error: {quantity.ratio(second.numbers.ratio)} times the noise floor with the second model, "
+        f"{quantity.ratio(present.numbers.ratio)} with the present one. The {lower} model stands lower."
+    ).classes("studio-sentence").props("data-mark=two-sentence")
+    rows: list[tuple[str, ...]] = [
+        ("held-out error", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))
+    ]
+    levels = [
+        {item.channel: item.ratio for item in (made.comparison.channels if made.comparison is not None else ())}
+        for made in (second, present)
+    ]
+    changed = [name for name in levels[0] if abs(levels[0][name] - levels[1].get(name, math.nan)) >= CHANGED]
+    rows += [(f"{name} over its floor", *(quantity.ratio(level[name]) for level in levels)) for name in changed]
+    values = [{item.key: item.shown for item in made.numbers.parameters} for made in (second, present)]
+    keys = dict.fromkeys([*values[0], *values[1]])
+    rows += [(printable(key, NAME), values[0].get(key, "–"), values[1].get(key, "–")) for key in keys]
+    with ui.element("table").classes("studio-table"):
+        for k, row in enumerate([("", "second model", "present model"), *rows]):
+            with ui.element("tr"):
+                for cell in row:
+                    with ui.element("th" if k == 0 else "td"):
+                        ui.label(cell)
+
+
+def _floor_words(session: Session, noise: tuple[NoisePart, ...]) -> str:
+    """Say which parts make the noise floor of the worst channel."""
+    made = session.made(session.steps[0].stack)
+    channel = None if made is None or made.comparison is None else worst_channel(made.comparison)
+    # A missing effect passes for slow noise: parts above the white one wait for the effect.
+    parts = [part for part in noise if part.channel == channel and SMALL <= part.share <= 1.0]
+    parts.sort(key=lambda part: -part.share)
+    if not parts:
+        return ""
+    names = [f"{part.component.replace('_', ' ')} {quantity.share(part.share)}" for part in parts[:4]]
+    white, *slow = names or ["not known"]
+    return f"Noise floor of {channel}: {white}{'; beside it ' if slow else ''}{', '.join(slow)} of its variance."
+
+
+def _session(desk: Desk) -> Session:
+    assert desk.session is not None
+    return desk.session
+
+
+def _button(icon: str, words: str, action: object) -> ui.button:
+    button = ui.button(icon=icon, on_click=action).props(f'flat dense round aria-label="{words}"')  # type: ignore[arg-type]
+    return button.tooltip(words)

@@ -1,0 +1,264 @@
+"""Middle region: residual against a covariate, spectrum, and trace over time of one channel."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from nicegui import events, run, ui
+
+from imufit.comparing.compare import MIN_SHARE
+from imufit.fitting.passes import UNITS
+from imufit.printable import NAME, printable
+from imufit.results import Comparison, Spectrum
+from imufit.results.comparison import Panel
+from imufit.studio import charts
+from imufit.studio.desk import Desk
+from imufit.studio.session import Session, worst_channel
+from imufit.studio.stack import Stack
+
+PIXELS: Final = 1200
+"""Points of a trace: as many as a wide screen shows beside each other."""
+FAILS: Final = 1.05
+"""Residual over noise floor from which on a channel fails: below, the excess is a tenth of the noise's variance."""
+TIME: Final = "t"
+RESIDUAL: Final = "residual"
+READING: Final = "reading"
+
+
+class PanelView:
+    """The panels on one page.
+
+    Parameters
+    ----------
+    desk : Desk
+        The state that it shows.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._proposed = ""
+        self._session: Session | None = None
+        self._window: tuple[float, float] | None = None
+        self._kind = RESIDUAL
+        self._state: tuple[Any, ...] = ()
+        self._setting = False
+        ui.html("Where it fails", tag="h2", sanitize=False)
+        with ui.element("div").classes("studio-row flex-wrap"):
+            self._channel = ui.select([], label="channel", on_change=self._chosen).props("dense outlined")
+            self._channel.classes("min-w-28").props("data-mark=channel")
+            self._covariate = ui.select([], label="against", on_change=self._chosen).props("dense outlined")
+            self._covariate.classes("min-w-36").props("data-mark=covariate")
+            self._trace_kind = ui.toggle(
+                {RESIDUAL: "residual", READING: "reading"}, value=RESIDUAL, on_change=self._other_kind
+            ).props("dense no-caps")
+        self._note = ui.label("").classes("studio-muted")
+        with ui.element("div").classes("studio-charts"):
+            self._panel = (
+                ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart").props("data-mark=panel")
+            )
+            self._spectrum = ui.plotly(charts.empty("")).classes("studio-chart").props("data-mark=spectrum")
+            self._trace = ui.plotly(charts.empty("")).classes("studio-chart studio-wide").props("data-mark=trace")
+        self._trace.on("plotly_relayout", self._zoomed, throttle=0.1)
+        self._trace.on("plotly_doubleclick", lambda: self._zoom(None))
+
+    # --- choice of channel and covariate
+
+    def refresh(self) -> None:
+        """Show the panels of the present model."""
+        session = self._desk.session
+        if session is None or not session.begun:
+            return
+        if session is not self._session:
+            self._session, self._window = session, None
+        made = session.made()
+        found = None if made is None else made.comparison
+        for element in (self._panel, self._spectrum, self._covariate, self._trace_kind):
+            element.visible = session.has_reference
+        if not session.has_reference:
+            self._note.set_text("The log has no reference: the rests are judged, and the readings are drawn.")
+            self._refresh_readings()
+            return
+        if found is None:
+            self._draw_at_once(session)
+            return
+        second = None if session.second is None else session.made(session.second)
+        desk = self._desk
+        traced = (desk.models.get(Stack()), desk.models.get(session.stack.model))
+        state = (found, second and second.comparison, desk.channel, desk.covariate, self._proposed, *traced)
+        if all(a is b or a == b for a, b in zip(state, self._state, strict=False)) and len(state) == len(self._state):
+            return
+        self._state = state
+        channel = desk.channel or self._failing(found)
+        if channel is None:
+            return
+        self._offer(found, channel)
+        self._draw(found, None if second is None else second.comparison, channel)
+
+    def _failing(self, found: Comparison) -> str | None:
+        """Return the channel that fails most; where none fails any more, the one that failed at the start."""
+        worst = worst_channel(found)
+        start = self._at_start()
+        if start is None or any(item.channel == worst and item.ratio > FAILS for item in found.channels):
+            return worst
+        return worst_channel(start)
+
+    def _at_start(self) -> Comparison | None:
+        """Return where the ideal sensor fails."""
+        made = None if self._session is None else self._session.made(Stack())
+        return None if made is None else made.comparison
+
+    def _draw_at_once(self, session: Session) -> None:
+        """Show the residual that the evidence gives to first order, until the fit is there."""
+        shown = session.panels_at_once()
+        panel = _panel_of(shown, self._channel.value, self._covariate.value)
+        if panel is not None:
+            self._state = ()
+            self._panel.update_figure(charts.residual_panel(panel))
+
+    def _refresh_readings(self) -> None:
+        """Show the readings of a log without a reference over time."""
+        desk = self._desk
+        channels = [] if desk.traces is None else [item.name for item in desk.traces.channels if item.name[:3] in UNITS]
+        state = (desk.traces, desk.channel)
+        if not channels or state == self._state:
+            return
+        self._state = state
+        channel = desk.channel if desk.channel in channels else channels[0]
+        self._setting = True
+        self._kind = self._trace_kind.value = READING
+        self._channel.set_options(channels, value=channel)
+        self._setting = False
+        ui.timer(0, lambda: self._draw_trace(channel), once=True)
+
+    def _offer(self, found: Comparison, channel: str) -> None:
+        """Fill the two lists, the worst first."""
+        ratios = sorted(found.channels, key=lambda item: -item.ratio if np.isfinite(item.ratio) else np.inf)
+        panels = [panel for panel in found.panels if panel.channel == channel]
+        covariate = self._present_covariate(found, channel)
+        self._setting = True
+        self._channel.set_options(
+            {item.channel: f"{item.channel} ({item.ratio:.2f})" for item in ratios}, value=channel
+        )
+        self._covariate.set_options(
+            {panel.covariate: printable(panel.covariate, NAME) for panel in panels}, value=covariate
+        )
+        self._setting = False
+
+    def _present_covariate(self, found: Comparison, channel: str) -> str | None:
+        """Return the covariate that the person chose, or the one that explains most of a channel's residual.
+
+        Where the channel does not fail any more, this is the covariate of the start: the panel shows the residual gone.
+        """
+        names = [panel.covariate for panel in found.panels if panel.channel == channel]
+        if self._desk.covariate in names:
+            return self._desk.covariate
+        fails = any(item.channel == channel and item.ratio > FAILS for item in found.channels)
+        judged = found if fails else self._at_start() or found
+        top = next((panel for panel in judged.panels if panel.channel == channel), None)
+        # Where no covariate explains a part worth naming, time shows what is constant and what is not.
+        if top is not None and top.share >= MIN_SHARE and top.covariate in names:
+            return top.covariate
+        return TIME if TIME in names else next(iter(names), None)
+
+    def _chosen(self) -> None:
+        if not self._setting:
+            self._desk.channel, self._desk.covariate = self._channel.value, self._covariate.value
+            self._desk.changed.emit()
+
+    def _other_kind(self) -> None:
+        if self._setting:
+            return
+        self._kind = self._trace_kind.value
+        self._state = ()
+        self.refresh()
+
+    def propose(self, effect: str) -> None:
+        """Draw what an effect would explain; empty draws nothing of that kind.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+        """
+        self._proposed = effect
+        self.refresh()
+
+    # --- drawing
+
+    def _draw(self, found: Comparison, second: Comparison | None, channel: str) -> None:
+        panels = [panel for panel in found.panels if panel.channel == channel]
+        covariate = self._present_covariate(found, channel)
+        panel = next((item for item in panels if item.covariate == covariate), None)
+        after = None
+        if self._proposed and self._desk.session is not None:
+            explained = self._desk.session.explained(self._proposed)
+            after = _panel_of(explained, channel, covariate)
+        other = None if second is None else _panel_of(second.panels, channel, covariate)
+        figure = charts.empty("No covariate is seen in this channel.")
+        if panel is not None:
+            figure = charts.residual_panel(panel, after, self._proposed, other)
+        self._panel.update_figure(figure)
+        spectrum = _spectrum_of(found, channel)
+        both = None if second is None else _spectrum_of(second, channel)
+        self._spectrum.update_figure(
+            charts.empty("The log has no stretch without a gap for a spectrum.")
+            if spectrum is None
+            else charts.spectrum(spectrum, both)
+        )
+        level = next(item for item in found.channels if item.channel == channel)
+        self._note.set_text(f"{channel} stands at {level.ratio:.2f} times its noise floor.")
+        ui.timer(0, lambda: self._draw_trace(channel), once=True)
+
+    async def _draw_trace(self, channel: str) -> None:
+        """Draw the visible points of the window."""
+        desk = self._desk
+        traces, session = desk.traces, desk.session
+        if traces is None or session is None or (span := traces.span) is None:
+            self._trace.update_figure(charts.empty("The rows are being read."))
+            return
+        begin, end = self._window or span
+        start, now = desk.models.get(Stack()), desk.models.get(session.stack.model)
+        kind = self._kind
+
+        def work() -> list[tuple[str, Any, Any]]:
+            lines = []
+            if kind == READING:
+                lines.append(("measured", *traces.window([channel], begin, end, PIXELS)[channel].line()))
+                if now is not None:
+                    lines.append(("predicted", *now.window([channel], begin, end, PIXELS)[channel][1].line()))
+            else:
+                for name, model in (("ideal sensor", start), ("now", now if now is not start else None)):
+                    if model is not None:
+                        lines.append((name, *model.window([channel], begin, end, PIXELS)[channel][0].line()))
+            return lines
+
+        lines = await run.io_bound(work)
+        figure = charts.trace(channel, UNITS[channel[:3]], lines or [], title=kind)
+        figure["layout"]["xaxis"]["range"] = [begin, end]
+        self._trace.update_figure(figure)
+
+    async def _zoomed(self, event: events.GenericEventArguments) -> None:
+        given = event.args if isinstance(event.args, dict) else {}
+        ends = [given.get(f"xaxis.range[{k}]") for k in (0, 1)]
+        if all(isinstance(end, int | float) for end in ends):
+            await self._zoom((float(ends[0]), float(ends[1])))  # type: ignore[arg-type]
+        elif given.get("xaxis.autorange"):
+            await self._zoom(None)
+
+    async def _zoom(self, window: tuple[float, float] | None) -> None:
+        if window != self._window:
+            self._window = window
+            if self._channel.value is not None:
+                await self._draw_trace(self._channel.value)
+
+
+def _panel_of(panels: Any, channel: str, covariate: str | None) -> Panel | None:
+    found: Panel | None = next(
+        (item for item in panels if (item.channel, item.covariate) == (channel, covariate)), None
+    )
+    return found
+
+
+def _spectrum_of(found: Comparison, channel: str) -> Spectrum | None:
+    return next((item for item in found.spectra if item.channel == channel), None)

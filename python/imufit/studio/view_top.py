@@ -1,0 +1,296 @@
+"""Top of the page: the logs, the verdict in a sentence, files that were brought, faults of the data, and the game."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from nicegui import events, ui
+
+from imufit.errors import InputError
+from imufit.printable import NAME, printable
+from imufit.remedy import Option
+from imufit.results import Diagnosis
+from imufit.studio import server
+from imufit.studio.attribute import attribute
+from imufit.studio.desk import Desk
+from imufit.studio.log_file import LogFile, option_words, remedies
+from imufit.studio.mystery import DEMONSTRATION, LEVELS, NOTHING
+from imufit.studio.recipe import as_python, as_shell
+
+SEEDS: Final = 1_000_000
+"""Logs of the game: none is met twice."""
+MOST_BYTES: Final = 4 * 2**30
+"""Largest file that the browser may send: 20 million rows of 14 columns take 2.2 GB."""
+ICONS: Final = {"adequate": "check_circle", "missing": "help", "ambiguous": "call_split", "unknown": "error"}
+
+
+class Head:
+    """Buttons over the page.
+
+    Parameters
+    ----------
+    desk : Desk
+        The state that they change.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        dark = ui.dark_mode(value=None)
+        with ui.element("header").classes("studio-head"):
+            ui.label("imufit").classes("studio-title")
+            self._logs = ui.label("").classes("studio-log").props("data-mark=logs")
+            _icon("folder_open", "Open a log", lambda: _upload(desk)).props("data-mark=open")
+            self._save = _icon("save", "Save the session", self._download).props("data-mark=save")
+            with _icon("content_copy", "Copy the model", None).props("data-mark=copy") as self._copy, ui.menu():
+                ui.menu_item("Copy as Python", lambda: self._show("Python")).props("data-mark=copy-python")
+                ui.menu_item("Copy as shell", lambda: self._show("shell")).props("data-mark=copy-shell")
+            with _icon("psychology_alt", "Mystery log", None).props("data-mark=mystery"), ui.menu():
+                for number, level in LEVELS.items():
+                    if number == DEMONSTRATION:
+                        continue
+                    ui.menu_item(f"Level {number}: {level.title}", _player(desk, number)).props(
+                        attribute("data-mark", f"level-{number}")
+                    )
+            for path, title in server.other_pages():
+                ui.link(title.removeprefix("imufit ").capitalize(), path).classes("studio-link")
+            _icon("dark_mode", "Light or dark", lambda: _turn(dark)).props("data-mark=dark")
+
+    def refresh(self) -> None:
+        """Show the names of the logs."""
+        desk = self._desk
+        names = " + ".join(printable(file.name, NAME) for file in desk.files)
+        self._logs.set_text(names or "no log")
+        for button in (self._save, self._copy):
+            button.set_enabled(desk.session is not None and desk.session.begun)
+
+    def _download(self) -> None:
+        try:
+            text = self._desk.saved()
+        except InputError as error:
+            ui.notify(str(error))
+            return
+        ui.download.content(text.encode(), f"{Path(self._desk.files[0].name).stem}-session.toml")
+
+    def _show(self, form: str) -> None:
+        """Show the text that makes the present model, and lay a copy in the clipboard."""
+        desk = self._desk
+        session = desk.session
+        made = None if session is None else session.made()
+        if session is None or made is None:
+            ui.notify("The model is being fitted: copy it once that is done.")
+            return
+        text = as_python(desk.files, made.way) if form == "Python" else as_shell(desk.files, session.stack.model)
+        with ui.dialog() as dialog, ui.card().style("max-width: 92vw"):
+            ui.label(f"The present model as {form}").classes("studio-id")
+            ui.label("Run the text in the folder of the log.").classes("studio-muted")
+            ui.label(text).classes("studio-copy").props("data-mark=copied")
+            ui.button("Close", on_click=dialog.close).props("flat")
+        dialog.on("hide", dialog.delete)
+        dialog.open()
+        ui.clipboard.write(text)
+
+
+class Top:
+    """Sentences over the regions.
+
+    Parameters
+    ----------
+    desk : Desk
+        The state that they show.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._state: tuple[object, ...] = ()
+        with ui.row().classes("w-full items-center gap-2 no-wrap").props("data-mark=busy") as self._busy:
+            ui.spinner(size="sm")
+            self._work = ui.label("").classes("studio-muted")
+        self._busy.visible = False
+        self._column = ui.column().classes("w-full gap-2")
+        ui.timer(0.2, self._show_work)
+
+    def _show_work(self) -> None:
+        desk = self._desk
+        self._busy.visible = bool(desk.busy)
+        share = "" if desk.share is None else f" {100.0 * desk.share:.0f} %"
+        self._work.set_text(f"{printable(desk.busy)}{share}" if desk.busy else "")
+
+    def refresh(self) -> None:
+        """Show the verdict, what awaits a choice, problems and the game."""
+        desk = self._desk
+        session = desk.session
+        made = None if session is None or not session.begun else session.made()
+        diagnosis = None if made is None else made.diagnosis
+        verdict = None if desk.mystery is None else desk.mystery.verdict
+        state = (diagnosis, desk.trouble, tuple(item.file for item in desk.arrivals), desk.mystery, verdict)
+        if state == self._state and self._state:
+            return
+        self._state = state
+        self._column.clear()
+        with self._column:
+            if desk.trouble:
+                self._problem()
+            if desk.arrivals:
+                self._choice()
+            if desk.mystery is not None:
+                self._game(made is not None and diagnosis is not None)
+            if diagnosis is not None and not desk.guessing:
+                self._verdict(diagnosis)
+            if session is None and not desk.arrivals:
+                self._welcome()
+
+    def _welcome(self) -> None:
+        desk = self._desk
+        ui.label("Drop a log here, or two files that belong together.").classes("studio-sentence")
+        _uploader(desk)
+        ui.label("No log at hand? The mystery log hides an effect in a simulated one: choose a level above.").classes(
+            "studio-muted"
+        )
+
+    def _verdict(self, diagnosis: Diagnosis) -> None:
+        with ui.row().classes("w-full items-start gap-2 no-wrap"):
+            ui.icon(ICONS[diagnosis.verdict], size="sm").props(f'aria-label="{diagnosis.verdict}"')
+            ui.label(printable(diagnosis.sentence or diagnosis.verdict)).classes("studio-sentence").props(
+                "data-mark=verdict"
+            )
+        if diagnosis.experiment:
+            ui.label(printable(f"Next: {diagnosis.experiment}")).classes("studio-muted")
+        for fault in diagnosis.data_faults:
+            number = _number_of(self._desk, fault.file)
+            with ui.element("div").classes("studio-error"):
+                # The sentence on top holds the words of a fault that spoils the log.
+                words = f"Data fault ({fault.fault})." if fault.spoils else str(fault)
+                ui.label(printable(words)).classes("studio-muted").props("data-mark=fault")
+                for option in remedies(fault.advice):
+                    self._cure(option, number, "mend")
+        if diagnosis.notes:
+            with ui.expansion(f"{len(diagnosis.notes)} notes on these data").classes("w-full").props("dense"):
+                for note in diagnosis.notes:
+                    ui.label(printable(note)).classes("studio-muted")
+
+    def _cure(self, option: Option, number: int, mark: str) -> None:
+        """Offer an option of a remedy."""
+
+        async def apply() -> None:
+            await self._desk.mend(option, number)
+
+        ui.button(printable(option_words(option)), on_click=apply).props("dense outline no-caps size=sm").props(
+            attribute("data-mark", mark)
+        )
+
+    def _problem(self) -> None:
+        desk = self._desk
+        with ui.element("div").classes("studio-error").props('role="alert"'):
+            ui.label(printable(desk.trouble)).props("data-mark=trouble")
+            with ui.row():
+                for option in desk.cures:
+                    self._cure(option, 0, "cure")
+                ui.button("Dismiss", on_click=desk.forget_trouble).props("dense flat no-caps size=sm")
+
+    def _choice(self) -> None:
+        desk = self._desk
+        for item in desk.arrivals:
+            ui.label(f"{printable(item.file.name, NAME)}: {item.words}").classes("studio-muted").props(
+                "data-mark=arrival"
+            )
+            for note in item.notes:
+                ui.label(printable(note)).classes("studio-muted")
+        offers = desk.offers
+        if not offers:
+            ui.label("This file holds a reference alone: drop the sensor's file as well.").classes("studio-sentence")
+        for offer in offers:
+            ui.button(printable(offer.words, 2 * NAME), on_click=lambda offer=offer: desk.open(offer.files)).props(
+                "no-caps outline"
+            ).props(attribute("data-mark", f"offer-{offer.way.value}"))
+
+    def _game(self, judged: bool) -> None:
+        desk = self._desk
+        game = desk.mystery
+        assert game is not None
+        level = LEVELS[game.level]
+        title = level.title if game.level == DEMONSTRATION else f"Mystery log, level {game.level}"
+        ui.label(f"{title}: {level.words}").classes("studio-sentence").props("data-mark=game")
+        if game.verdict is None:
+            if not judged:
+                ui.label("The evidence is being taken.").classes("studio-muted")
+                return
+            assert desk.session is not None
+            if game.level == DEMONSTRATION:
+                reveal = ui.button("Reveal the truth", on_click=lambda: desk.reveal(_named(desk)))
+                reveal.props("no-caps outline").props("data-mark=reveal")
+                return
+            names = sorted(desk.session.start.analysis.candidates)
+            choices = {NOTHING: "nothing is missing"} | {name: printable(name, NAME) for name in names}
+            with ui.row().classes("items-center"):
+                answer = ui.select(choices, value=NOTHING, label="Your answer", with_input=True).props("dense outlined")
+                answer.classes("min-w-56").props("data-mark=answer")
+                ui.button("Reveal", on_click=lambda: desk.reveal(answer.value or NOTHING)).props("no-caps").props(
+                    "data-mark=reveal"
+                )
+            return
+        for sentence in game.verdict.sentences:
+            ui.label(printable(sentence)).classes("studio-sentence").props("data-mark=truth")
+        ui.label(game.verdict.lesson).classes("studio-muted").props("data-mark=lesson")
+        ui.button("Play again", on_click=_player(desk, game.level)).props("no-caps outline").props("data-mark=again")
+
+
+def _named(desk: Desk) -> str:
+    """Return the effect that the present model names: the first one added."""
+    effects = () if desk.session is None else desk.session.stack.model.effects
+    return effects[0] if effects else NOTHING
+
+
+def _number_of(desk: Desk, name: str | None) -> int:
+    """Return the number of the log with a name that a fault gives; the first where there is one log."""
+    names = [file.path.name for file in desk.files]
+    return names.index(name) if name in names else 0
+
+
+def _player(desk: Desk, level: int) -> Callable[[], object]:
+    return lambda: desk.play(level, secrets.randbelow(SEEDS))
+
+
+def _upload(desk: Desk) -> None:
+    """Ask for files."""
+    with ui.dialog() as dialog, ui.card():
+        ui.label("Drop a log, or two files that belong together. A saved session opens with its log.").classes(
+            "studio-muted"
+        )
+        _uploader(desk, dialog.close)
+        ui.button("Cancel", on_click=dialog.close).props("flat")
+    dialog.on("hide", dialog.delete)
+    dialog.open()
+
+
+def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
+    async def take(event: events.MultiUploadEventArguments) -> None:
+        files = []
+        folder = desk.new_folder()
+        for sent in event.files:
+            # The browser decides the name: only its last part counts, and it names a file.
+            name = Path(sent.name.replace("\\", "/")).name.lstrip(".") or "log"
+            path = folder / name
+            await sent.save(path)
+            files.append(LogFile(path, name))
+        if done is not None:
+            done()
+        await desk.bring(files)
+
+    ui.upload(
+        label="Drop files or press +", multiple=True, auto_upload=True, on_multi_upload=take, max_total_size=MOST_BYTES
+    ).props("flat bordered").props("data-mark=upload")
+
+
+def _icon(icon: str, words: str, action: Callable[[], object] | None) -> ui.button:
+    button = ui.button(icon=icon, on_click=action).props(f'flat dense round aria-label="{words}"')
+    with button:
+        ui.tooltip(words)
+    return button
+
+
+def _turn(dark: ui.dark_mode) -> None:
+    """Go from the computer's own choice to dark, then to light and back."""
+    dark.value = True if dark.value is None else not dark.value

@@ -1,0 +1,300 @@
+"""The studio in Debian's Chromium: the loop, undo, two models, dropped files, the game, and what is refused."""
+
+import json
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from urllib.parse import urlsplit
+
+import pytest
+
+pytest.importorskip("nicegui")
+pytest.importorskip("playwright")
+
+import imufit
+from imufit.figures import quantity
+from imufit.lab.simulate import simulate
+from imufit.lab.simulated_log import log_of
+from studio_browser import CHROMIUM, SLOW_MS, bars, browser, figure, idle, marked, studio, wait_for_bars
+
+pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason="Debian's chromium is not installed")
+
+EFFECTS = {"acc.bias": {"x": 0.08, "y": -0.05, "z": 0.03}, "gyr.scale": {"x": 0.03, "y": -0.02, "z": 0.02}}
+HOSTILE = (
+    "<script>window.broken=1</script>",
+    "<img src=x onerror=window.broken=1>",
+    "=HYPERLINK(0)",
+    "\u202egnp.exe",
+    "{{constructor}}",
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("browser")
+    log = log_of(simulate("handheld", EFFECTS, duration=40.0, rate=50.0, seed=4))
+    log.write(path / "walk.parquet")
+    log.with_fields(ref_q=None, ref_p=None).write(path / "sensor.csv")
+    imufit.Log.from_arrays(log.t + 0.5, ref_q=log.ref_q).write(path / "mocap.csv")
+    (path / "broken.csv").write_text("t,acc_x,acc_y,acc_z\n0,1,2,9\n1,1,no,9\n")
+    log.with_fields(covariates=dict.fromkeys(HOSTILE, log.t % 1.0)).write(path / "hostile.parquet")
+    return path
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def address(folder):
+    with studio(folder) as found:
+        yield found
+
+
+@pytest.fixture
+def page(chromium, address):
+    context = chromium.new_context(viewport={"width": 1280, "height": 900}, accept_downloads=True)
+    opened = context.new_page()
+    asked, problems = [], []
+    opened.on("request", lambda request: asked.append(request.url))
+    opened.on("pageerror", lambda error: problems.append(str(error)))
+    opened.set_default_timeout(SLOW_MS)
+    opened.goto(address)
+    yield opened
+    context.close()
+    assert asked
+    hosts = {urlsplit(url).hostname for url in asked if urlsplit(url).scheme not in ("data", "blob")}
+    assert hosts == {"127.0.0.1"}
+    assert problems == []
+
+
+def drop(page, *paths):
+    """Give files to the page as a drop does."""
+    if marked(page, "open").is_visible() and not marked(page, "upload").is_visible():
+        marked(page, "open").click()
+    page.locator('[data-mark="upload"] input[type=file]').last.set_input_files([str(path) for path in paths])
+
+
+def answer(folder, *arguments):
+    """Run the program; its JSON."""
+    done = subprocess.run(
+        [sys.executable, "-m", "imufit", *arguments, "--json", "-"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout)
+
+
+def test_the_loop_gives_the_numbers_of_the_command_line(page, folder):
+    drop(page, folder / "walk.parquet")
+    (start,) = wait_for_bars(page, 1)
+    ladder = answer(folder, "ladder", "walk.parquet")
+    assert start == ladder["ratio_start"]
+    # The failing panel: the residual leaves the noise of one sample.
+    panel = figure(page, "panel")
+    now = next(trace for trace in panel["data"] if trace["name"] == "now")
+    noise = next(trace for trace in panel["data"] if trace["name"] == "noise")
+    assert max(abs(value) for value in now["y"]) > max(noise["y"])
+    assert "residual of" in panel["layout"]["yaxis"]["title"]["text"]
+    for count, step in enumerate(ladder["steps"], 2):
+        marked(page, f"candidate-{step['effect']}").hover()
+        marked(page, "card").wait_for()
+        page.wait_for_function(
+            """() => document.querySelector('[data-mark="panel"] .legend')
+                     && document.querySelector('[data-mark="panel"]').textContent.includes('with ')"""
+        )
+        marked(page, f"add-{step['effect']}").click()
+        heights = wait_for_bars(page, count)
+        assert heights[-1] == step["after"] < heights[-2]
+        expected = next(trace for trace in figure(page, "fall")["data"] if trace["name"] == "expected")
+        assert expected["y"][-1] == step["expected"]
+    for effect, parameters in ladder["parameters"].items():
+        for name, item in parameters.items():
+            shown = marked(page, f"value-{effect}.{name}").inner_text()
+            assert shown == quantity.with_error(item["value"], item["standard_error"], item["unit"])
+    assert "noise floor" in marked(page, "verdict").inner_text()
+
+    step_back_and_compare(page, ladder)
+    copy_and_save(page, folder)
+
+
+def step_back_and_compare(page, ladder):
+    """Undo, redo, switch an effect off beside the second model, and fix a value."""
+    marked(page, "undo").click()
+    idle(page)
+    assert marked(page, f"switch-{ladder['steps'][-1]['effect']}").count() == 0
+    marked(page, "redo").click()
+    idle(page)
+    marked(page, "second").click()
+    first = ladder["steps"][0]["effect"]
+    marked(page, f"switch-{first}").click()
+    wait_for_bars(page, len(ladder["steps"]) + 2)
+    assert "The second model stands lower" in marked(page, "two-sentence").inner_text()
+    marked(page, "second").click()
+    marked(page, f"switch-{first}").click()
+    heights = wait_for_bars(page, len(ladder["steps"]) + 3)
+    assert heights[-1] == ladder["ratio_end"]
+    marked(page, f"edit-{first}.x").click()
+    marked(page, "edit-value").locator("input").or_(page.locator("input[data-mark=edit-value]")).first.fill("0.25")
+    marked(page, "edit-take").click()
+    heights = wait_for_bars(page, len(ladder["steps"]) + 4)
+    assert heights[-1] > heights[-2]
+    assert "fixed" in marked(page, f"value-{first}.x").inner_text()
+
+
+def copy_and_save(page, folder):
+    """Copy the model as Python; save the session and drop its file."""
+    before = bars(page)
+    page.get_by_role("button", name="Copy the model").click()
+    marked(page, "copy-python").click()
+    assert "import imufit" in marked(page, "copied").inner_text()
+    page.get_by_role("button", name="Close").click()
+    with page.expect_download() as download:
+        marked(page, "save").click()
+    saved = folder / "walk-session.toml"
+    download.value.save_as(saved)
+    assert 'kind = "imufit session"' in saved.read_text()
+    drop(page, saved)
+    page.wait_for_timeout(1000)
+    assert wait_for_bars(page, len(before)) == before
+
+
+def test_two_files_are_joined_and_a_broken_one_is_refused(page, folder):
+    drop(page, folder / "broken.csv")
+    marked(page, "trouble").wait_for()
+    assert "row" in marked(page, "trouble").inner_text()
+    page.get_by_role("button", name="Dismiss").click()
+    drop(page, folder / "sensor.csv", folder / "mocap.csv")
+    marked(page, "offer-join").click()
+    marked(page, "verdict").wait_for()
+    idle(page)
+    assert "sensor.csv" in marked(page, "logs").inner_text()
+
+
+def test_names_from_a_file_are_text(page, folder):
+    drop(page, folder / "hostile.parquet")
+    page.wait_for_function("() => document.querySelector('[data-mark=logs]').textContent.includes('hostile')")
+    marked(page, "verdict").wait_for()
+    idle(page)
+    page.get_by_text("more candidates").click()
+    for name in HOSTILE[:3]:
+        assert page.get_by_text(f"acc.column:{name}").count() > 0
+    page.get_by_text(f"acc.column:{HOSTILE[0]}", exact=True).first.click()
+    marked(page, "covariate").click()
+    page.get_by_role("option", name=HOSTILE[0]).click()
+    idle(page)
+    panel = figure(page, "panel")
+    assert "&lt;script&gt;" in panel["layout"]["xaxis"]["title"]["text"]
+    assert HOSTILE[0] in marked(page, "panel").text_content()
+    assert page.evaluate("window.broken") is None
+    assert "\u202e" not in page.content()
+
+
+def test_a_game_is_played_and_revealed(page):
+    marked(page, "mystery").click()
+    marked(page, "level-1").click()
+    marked(page, "reveal").wait_for()
+    idle(page)
+    assert page.get_by_text("probable").count() == 0
+    marked(page, "answer").click()
+    page.get_by_role("option").nth(1).click()
+    marked(page, "reveal").click()
+    marked(page, "truth").wait_for()
+    text = page.locator('[data-mark="truth"]').all_inner_texts()
+    assert len(text) == 3
+    assert "was hidden" in text[0]
+    assert "%" in text[1]
+    assert marked(page, "lesson").inner_text()
+    assert page.get_by_text("probable").count() > 0
+
+
+def status(address, **headers):
+    """The answer's code to a request."""
+    try:
+        return urllib.request.urlopen(urllib.request.Request(address, headers=headers), timeout=10).status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def handshake(address, path, origin):
+    """The first line that a websocket's handshake is answered with."""
+    parts = urlsplit(address)
+    with socket.create_connection((parts.hostname, parts.port), timeout=10) as connection:
+        lines = (
+            f"GET {path}/_nicegui_ws/socket.io/?EIO=4&transport=websocket HTTP/1.1",
+            f"Host: {parts.netloc}",
+            f"Origin: {origin}",
+            "Connection: Upgrade",
+            "Upgrade: websocket",
+            "Sec-WebSocket-Version: 13",
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+        )
+        connection.sendall("\r\n".join([*lines, "", ""]).encode())
+        return connection.recv(4096).decode("latin-1").splitlines()[0]
+
+
+def test_a_wrong_token_host_or_origin_is_refused(address):
+    parts = urlsplit(address)
+    own, bare = f"http://{parts.netloc}", f"http://{parts.netloc}/"
+    token = parts.path.strip("/")
+    assert status(address) == 200
+    assert status(address, Origin=own) == 200
+    assert status(bare) == 403
+    assert status(f"{bare}{token[:-1]}x/") == 403
+    assert status(address, Host=f"evil.example:{parts.port}") == 403
+    assert status(address, Origin="http://evil.example") == 403
+    assert status(address, Origin="null") == 403
+    assert status(address, Origin=f"http://127.0.0.1:{parts.port + 1}") == 403
+    assert " 101 " in handshake(address, f"/{token}", own)
+    assert " 403 " in handshake(address, f"/{token}", "http://evil.example")
+    assert " 403 " in handshake(address, "/wrong", own)
+    with socket.socket() as outside:
+        # Other addresses of this computer are not listened on.
+        outside.settimeout(2.0)
+        assert outside.connect_ex(("127.0.0.2", parts.port)) != 0
+
+
+def test_a_second_origin_cannot_open_the_page(chromium, address):
+    page = chromium.new_page()
+    page.goto("data:text/html,<p>another page</p>")
+    outcome = page.evaluate(
+        "address => fetch(address).then(answer => answer.type + answer.status).catch(error => 'refused')", address
+    )
+    assert outcome == "refused"
+    page.set_content(f'<iframe src="{address}"></iframe>')
+    page.wait_for_timeout(500)
+    assert page.frames[1].locator(".studio").count() == 0
+    page.close()
+
+
+def test_the_demonstration_leads_to_a_named_effect_and_a_fallen_error(chromium, folder):
+    with studio(folder, "demo") as address:
+        page = chromium.new_page(viewport={"width": 380, "height": 800})
+        page.set_default_timeout(SLOW_MS)
+        page.goto(address)
+        (start,) = wait_for_bars(page, 1)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 380
+        page.get_by_role("button", name="Add", exact=True).first.click()
+        after = wait_for_bars(page, 2)[-1]
+        assert after < 1.1 < start
+        marked(page, "reveal").click()
+        marked(page, "truth").wait_for()
+        assert marked(page, "truth").inner_text().startswith("Right")
+        page.close()
+
+
+def test_a_button_applies_the_remedy_of_a_fault(page, folder):
+    log_of(simulate("handheld", {}, duration=40.0, rate=50.0, seed=6, frame="ENU")).write(folder / "frame.csv")
+    sidecar = folder / "frame.toml"
+    sidecar.write_text(sidecar.read_text().replace('"ENU"', '"NED"'))
+    drop(page, folder / "frame.csv", sidecar)
+    page.get_by_role("button", name="Read in frame ENU").click()
+    page.wait_for_function("() => !document.querySelector('[data-mark=fault]')")
+    idle(page)
+    assert bars(page)[0] < 1.1

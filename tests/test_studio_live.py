@@ -1,0 +1,117 @@
+"""The live page in Chromium: an emulated device is followed, recorded and guided through a calibration."""
+
+import numpy as np
+import pytest
+from imufit.log import read
+from studio_browser import CHROMIUM, studio
+from studio_watched import WEBGL, problems, strangers
+
+pytest.importorskip("nicegui")
+sync_api = pytest.importorskip("playwright.sync_api")
+pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason="Debian's Chromium is not installed")
+PATIENCE = 30_000  # ms
+DRAWN = "[...document.querySelectorAll('.js-plotly-plot')].map(plot => plot.data[0].x.length)"
+"""Points of the first trace of every figure."""
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("live")
+    with studio(folder) as address, sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=WEBGL)
+        yield folder, address, browser
+        browser.close()
+
+
+def number(page, name):
+    return int(page.get_by_test_id(name).inner_text().replace(" ", "") or 0)
+
+
+def words(page, part):
+    """Text of one part of every figure."""
+    return [text.strip() for text in page.locator(f".js-plotly-plot .{part}").all_text_contents()]
+
+
+def wait_until(page, holds):
+    """Look again until it holds."""
+    for _ in range(PATIENCE // 100):
+        if holds():
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError("it did not come to that")
+
+
+def connect(page, scenario):
+    page.get_by_label("device").click()
+    page.get_by_role("option", name=f"emulate {scenario}", exact=True).click()
+    page.get_by_role("button", name="Connect", exact=True).click()
+    wait_until(page, lambda: number(page, "rows") > 50)
+
+
+def test_unusable_port_and_hostile_names_are_text(served):
+    folder, address, browser = served
+    page = browser.new_page(viewport={"width": 380, "height": 800})
+    wrong = problems(page)
+    page.goto(f"{address}live")
+    page.get_by_test_id("record").click()
+    page.get_by_text("Connect a device first.").wait_for(timeout=PATIENCE)
+    field = page.get_by_label("device")
+    field.click()
+    field.fill("/dev/<img src=x onerror=document.title='taken'>")
+    field.press("Enter")
+    page.get_by_role("button", name="Connect", exact=True).click()
+    page.get_by_text("cannot be opened").or_(page.get_by_text("does not exist")).wait_for(timeout=PATIENCE)
+    assert page.title() == "imufit live"
+    # nothing is wider than a phone
+    assert page.evaluate("document.documentElement.scrollWidth") <= 380
+    assert wrong == []
+    assert not list(folder.glob("recording*"))
+    page.close()
+
+
+def test_emulated_device_is_followed_recorded_and_guided(served):
+    folder, address, browser = served
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    asked, wrong = strangers(page), problems(page)
+    page.goto(f"{address}live")
+    connect(page, "six_sides")
+
+    # rows arrive, and so do the traces of every sensor and the attitude
+    first = number(page, "rows")
+    wait_until(page, lambda: number(page, "rows") > first + 50)
+    wait_until(page, lambda: page.get_by_test_id("rate").inner_text().endswith("Hz"))
+    panels = ["accelerometer", "gyroscope", "magnetometer", "temperature"]
+    wait_until(page, lambda: words(page, "gtitle") == panels)
+    assert words(page, "ytitle") == ["m/s²", "deg/s", "µT", "°C"]
+    wait_until(page, lambda: min(page.evaluate(DRAWN)) > 50)
+    page.get_by_text("at rest", exact=True).wait_for(timeout=PATIENCE)
+    page.get_by_text("roll", exact=False).first.wait_for(timeout=PATIENCE)
+    assert page.locator(".studio-body canvas").count() == 1
+
+    # the red button records a log that imufit reads back; a page that is loaded again finds the recording running
+    page.get_by_test_id("file").fill("walk.parquet")
+    page.get_by_test_id("record").click()
+    wait_until(page, lambda: "recording walk.parquet" in page.get_by_test_id("recorded").inner_text())
+    page.wait_for_timeout(1500)
+    page.reload()
+    wait_until(page, lambda: "recording walk.parquet" in page.get_by_test_id("recorded").inner_text())
+    page.get_by_test_id("record").click()
+    wait_until(page, lambda: page.get_by_test_id("recorded").inner_text().startswith("walk.parquet: "))
+    log = read(folder / "walk.parquet")
+    assert log.n > 100
+    assert np.linalg.norm(log.acc, axis=1).mean() == pytest.approx(9.8, abs=0.2)
+    assert f"{log.n} rows" in page.get_by_test_id("recorded").inner_text()
+
+    # the guide names a side and draws it; stopping keeps the rows
+    page.get_by_role("button", name="Calibrate").click()
+    page.get_by_text("Lay it like this:").wait_for(timeout=PATIENCE)
+    wait_until(page, lambda: page.locator(".studio-body canvas").count() == 2)
+    page.get_by_role("button", name="Stop", exact=True).click()
+    wait_until(page, lambda: page.locator(".studio-body canvas").count() == 1)
+    wait_until(page, (folder / "calibration-1.parquet").exists)
+
+    page.get_by_role("button", name="Disconnect").click()
+    page.get_by_text("Not connected").wait_for(timeout=PATIENCE)
+    assert asked == []
+    assert wrong == []
+    page.close()

@@ -1,0 +1,62 @@
+"""The game: the evidence finds what can be found, and the reveal says how sure one could have been."""
+
+import pytest
+from imufit.errors import InputError
+from imufit.lab.simulate import unseal
+from imufit.studio.log_file import LogFile
+from imufit.studio.mystery import LEVELS, NOTHING, Mystery
+from imufit.studio.session import Session
+
+
+def played(level, seed, folder):
+    """A game, and the evidence on its log."""
+    game = Mystery.hidden(level, seed, folder)
+    session = Session([LogFile(game.log, game.log.name).open()])
+    session.begin()
+    return game, session.diagnose()
+
+
+def test_a_large_effect_is_named_by_the_evidence(tmp_path):
+    game, first = played(1, 3, tmp_path)
+    (truth,) = unseal(game.log).effects
+    assert first.best == truth
+    right = game.reveal(truth, first)
+    assert right.right
+    assert right.truth == (truth,)
+    assert right.sentences[0] == f"Right: {truth} was hidden, and you named {truth}."
+    assert "100 %" in right.sentences[1]
+    assert "You could have been sure" in right.sentences[2]
+    assert right.lesson == LEVELS[1].lesson
+    wrong = game.reveal(NOTHING, first)
+    assert not wrong.right
+    assert wrong.sentences[0].startswith("Not right")
+
+
+def test_nothing_may_be_hidden(tmp_path):
+    game, first = played(2, 0, tmp_path)
+    assert not unseal(game.log).effects
+    assert game.reveal(NOTHING, first).right
+    false_alarm = game.reveal("acc.bias", first)
+    assert not false_alarm.right
+    assert "You could not have named an effect" in false_alarm.sentences[2]
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_rival_is_allowed_where_the_log_does_not_separate_it(tmp_path, seed):
+    game, first = played(3, seed, tmp_path)
+    (truth,) = unseal(game.log).effects
+    assert first.verdict == "ambiguous"
+    alike = [first.best, *first.ambiguous_with]
+    assert truth in alike
+    rival = next(effect for effect in alike if effect != truth)
+    answer = game.reveal(rival, first)
+    assert not answer.right
+    assert answer.sentences[0].startswith("Allowed")
+    assert "You could not have been sure" in answer.sentences[2]
+
+
+def test_the_same_number_is_the_same_game(tmp_path):
+    first, second = (Mystery.hidden(1, 8, tmp_path / name) for name in ("a", "b") if (tmp_path / name).mkdir() is None)
+    assert unseal(first.log).effects == unseal(second.log).effects
+    with pytest.raises(InputError, match="level 4 is unknown"):
+        Mystery.hidden(4, 1, tmp_path)
