@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from imufit.lab.simulate import Grade, Simulation, Truth
     from imufit.log import Contents, Log, Reading
     from imufit.log.metadata import Frame
-    from imufit.results import EffectCard, Ladder, LogInfo, Recording
+    from imufit.results import EffectCard, Ladder, LogInfo, LogRows, Recording
 
 Progress = Callable[[int, int, str], None]
 
@@ -147,6 +147,20 @@ def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     from imufit.verbs import ladder  # noqa: PLC0415
 
     return ladder(logs, model=model, progress=progress)
+
+
+def rows_of_fit(fit: Any, first: Any = None, candidate: str | None = None, *, progress: Progress) -> LogRows:
+    """Return the rows of a fit's log that a report shows."""
+    from imufit.comparing import rows_of_fit  # noqa: PLC0415
+
+    return rows_of_fit(fit, first, candidate, progress)
+
+
+def rows_of_model(model: Any, log: Any, progress: Progress) -> LogRows:
+    """Return the rows of a log that a report shows, with a model as it is."""
+    from imufit.comparing import rows_of_model  # noqa: PLC0415
+
+    return rows_of_model(model, log, progress)
 
 
 def catalogue() -> list[EffectCard]:

@@ -3,6 +3,7 @@
 from imufit.comparing.attitude import attitude_comparison
 from imufit.comparing.compare import compare, compare_model, comparison
 from imufit.comparing.judged import judged
+from imufit.comparing.log_rows import rows_of_fit, rows_of_model
 from imufit.comparing.noise_budget import noise_budget
 from imufit.comparing.notes import notes
 from imufit.comparing.two_models import compare_two
@@ -17,5 +18,7 @@ __all__ = [
     "judged",
     "noise_budget",
     "notes",
+    "rows_of_fit",
+    "rows_of_model",
     "unexplained",
 ]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from imufit.figures import place, quantity, style
@@ -84,6 +85,10 @@ def _sensor(axes: Axes, sensor: str, spectra: Sequence[SpectrumLike]) -> None:
     if peak > 0.0:
         axes.set_xscale("log")
         axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        for scale in (axes.xaxis, axes.yaxis):
+            scale.set_major_formatter(lambda value, _: quantity.number(float(value), 1))
+            scale.set_minor_formatter(NullFormatter())
         axes.legend(frameon=False, fontsize=8, ncols=3, loc="best")
     name = SENSOR_NAMES.get(sensor, sensor)
     style.title(

@@ -104,7 +104,7 @@ def waterfall(
         )
     _values(axes, places, np.concatenate([[start], before]), np.concatenate([[start], after]))
     axes.axhline(1.0, color=style.INK, linewidth=1.4, zorder=3, label="noise floor")
-    slanted = count > 4
+    slanted = count > (1 if drawing.narrow else 4)
     axes.set_xticks(
         places,
         ["start", *(f"+ {effect}" for effect in effects)],
@@ -115,7 +115,7 @@ def waterfall(
     edge = 0.6 if count else 1.6
     axes.set_xlim(-edge, count + edge)
     axes.set_ylabel("held-out error over noise floor", fontsize=9)
-    drawing.legend(loc="outside lower center", ncols=3)
+    drawing.legend(loc="outside lower center", ncols=1 if drawing.narrow else 3)
     if count:
         effect_word = "effect takes" if count == 1 else "effects take"
         sentence = (
