@@ -104,6 +104,7 @@ def install(monkeypatch):
         ("contents", contents(two_rows)),
         ("sensor_model", model),
         ("ladder", ladder_result),
+        ("compared", comparison()),
         ("rows_of_fit", rows()),
         ("rows_of_model", rows()),
         ("explain", card()),

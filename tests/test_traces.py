@@ -8,6 +8,7 @@ import pytest
 from imufit.comparing import rows_of_fit, rows_of_model
 from imufit.comparing.traces import STRETCHES, _Kept
 from imufit.diagnosing.ladder import ladder
+from imufit.figures.spectrum import lines
 from imufit.log import Log
 from imufit.results import ResidualTrace
 from imufit.results.residual_trace import extreme_rows, stretches_of
@@ -132,3 +133,12 @@ def test_missing_values_are_never_extremes() -> None:
     values = np.array([np.nan, 3.0, 1.0, np.nan, np.nan, np.nan, 2.0, 2.0])
     stretch = np.array([0, 0, 0, 1, 1, 2, 2, 2])
     assert extreme_rows(stretch, [values]).tolist() == [1, 2, 6]
+
+
+def test_a_line_in_a_spectrum_is_marked_and_noise_is_not() -> None:
+    rng = np.random.default_rng(8)
+    assert sum(len(lines(rng.exponential(size=256))) for _ in range(300)) <= 3
+    density = rng.exponential(size=256)
+    density[100] += 60.0
+    assert lines(density) == [100]
+    assert lines(1.0 / np.arange(1.0, 257.0) ** 3) == []

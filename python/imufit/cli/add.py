@@ -60,6 +60,7 @@ def add(
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
         addition = fit.add(effect, progress=progress)
         shown = html_file is not None or plots is not None
+        comparison = engine.compared(fit, progress) if shown else None
         rows = engine.rows_of_fit(addition.fit, fit, progress=progress) if shown else None
     out.say(addition.sentence, bold=True)
     out.say(addition.warning)
@@ -70,4 +71,6 @@ def add(
     out.json(addition.to_dict())
     if plot_file is not None:
         out.plot(plot_file, addition.plot())
-    out.report(html_file, plots, f"{title_of(logs)}: {effect} added", addition=addition, rows=rows)
+    out.report(
+        html_file, plots, f"{title_of(logs)}: {effect} added", comparison=comparison, addition=addition, rows=rows
+    )

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from imufit.lab.simulate import Grade, Simulation, Truth
     from imufit.log import Contents, Log, Reading
     from imufit.log.metadata import Frame
-    from imufit.results import EffectCard, Ladder, LogInfo, LogRows, Recording
+    from imufit.results import Comparison, EffectCard, Ladder, LogInfo, LogRows, Recording
 
 Progress = Callable[[int, int, str], None]
 
@@ -147,6 +147,11 @@ def ladder(logs: Sequence[Any], model: Any, progress: Progress) -> Ladder:
     from imufit.verbs import ladder  # noqa: PLC0415
 
     return ladder(logs, model=model, progress=progress)
+
+
+def compared(fit: Any, progress: Progress) -> Comparison | None:
+    """Return where a fit fails on its own log; None where rests stand in for a reference."""
+    return fit.compare(progress=progress) if fit.analysis.judged_by == "reference" else None
 
 
 def rows_of_fit(fit: Any, first: Any = None, candidate: str | None = None, *, progress: Progress) -> LogRows:

@@ -79,7 +79,7 @@ def parameter_sizes(
     axes.set_yticks(places, [labels[index] for index in drawn])
     axes.set_ylim(len(drawn) - 0.5, -0.5)
     between = "\n" if drawing.narrow else " "
-    axes.set_xlabel(f"value over typical size{between}(shaded: up to the typical size; bars: 95 %)", fontsize=9)
+    axes.set_xlabel(f"value over typical size{between}(shaded: up to that size; bars: 95 %)", fontsize=9)
     count = int((~ordinary).sum())
     if count == 0:
         sentence = "Every parameter is of a plausible size"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -69,7 +70,7 @@ def misaligned_axes(matrix: Array, sensor: str, ax: Place | None = None) -> Draw
             va="center",
         )
     axes.set_axis_off()
-    _cube(axes, -0.2, 1.25)
+    _cube(axes, -0.2, 1.25, zoom=1.2)
     times = "" if factor == 1.0 else f", drawn {factor:g} times as large"
     off = f"{quantity.number(math.degrees(largest), 2)} deg"
     _headed(axes, f"The axes of the {SENSOR_NAMES[sensor]} are off by up to {off}{times} (dashed: the body)")
@@ -113,7 +114,7 @@ def field_ellipsoid(centre: Array, matrix: Array, points: Array | None, ax: Plac
         shown = ideal + factor * (known - ideal)
         axes.plot(*shown.T, linestyle="none", marker=".", markersize=2.5, color=style.ORANGE)
     axes.plot(*np.stack([np.zeros(3), factor * np.asarray(centre)], axis=1), color=style.VERMILION, linewidth=2.0)
-    _cube(axes, -1.35 * length, 1.35 * length, zoom=0.85)
+    _cube(axes, -1.35 * length, 1.35 * length, zoom=1.05)
     for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y"), (axes.zaxis, "z")):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis.set_label_text(f"mag_{name}, µT", fontsize=8)
@@ -127,15 +128,15 @@ def field_ellipsoid(centre: Array, matrix: Array, points: Array | None, ax: Plac
     return drawing
 
 
-def pose_sphere(directions: Array, names: tuple[str, ...] = (), ax: Place | None = None) -> Drawing:
+def pose_sphere(directions: Array, names: Sequence[str], ax: Place | None = None) -> Drawing:
     """Draw where up was in the sensor's axes at each rest.
 
     Parameters
     ----------
     directions : (k, 3) array
         Mean specific force of each rest, any length.
-    names : tuple of str
-        (k,) labels of the poses; empty without labels.
+    names : sequence of str
+        (k,) labels of the poses.
     ax : Figure or SubFigure, optional
         Where to draw.
 
@@ -159,10 +160,11 @@ def pose_sphere(directions: Array, names: tuple[str, ...] = (), ax: Place | None
     near = unit @ towards > 0.0
     for chosen, colour in ((near, style.BLUE), (~near, style.SKY)):
         axes.plot(*unit[chosen].T, linestyle="none", marker="o", markersize=5, color=colour)
-    for at, name in zip(unit, names, strict=False):
+    # Poses of one name lie close together: the first stands for all.
+    for name, at in dict(zip(reversed(names), unit[::-1], strict=True)).items():
         axes.text(*(1.25 * at), name, fontsize=8, color=style.INK, ha="center", va="center")
     axes.set_axis_off()
-    _cube(axes, -1.0, 1.0, zoom=1.1)
+    _cube(axes, -1.0, 1.0, zoom=1.4)
     count = len(unit)
     _headed(axes, f"{count} {'rest' if count == 1 else 'rests'}: the direction up in the sensor's axes")
     return drawing

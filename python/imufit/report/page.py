@@ -15,7 +15,7 @@ from imufit.remedy import command
 from imufit.report.inline_svg import caption_of, inline_svg
 from imufit.report.interactive import STILL, interactive
 from imufit.report.pictures import PHONE, SMALL, WIDE, Picture, fitted_parameters, in_order, pictures, worst_first
-from imufit.report.words import with_words
+from imufit.report.words import shown, with_words
 from imufit.results.diagnosis import PASSED, VERDICTS
 from imufit.results.noise_part import noise_table
 from imufit.results.parameter import in_lines, parameter_table
@@ -69,7 +69,7 @@ def page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals.update(q=quantity, in_lines=in_lines, wide=_filling, small=_beside)
+    environment.globals.update(q=quantity, shown=shown, wide=_filling, small=_beside)
     end = ladder.comparison_end if ladder is not None and ladder.steps else None
     ends = {item.channel: item.ratio for item in end.channels} if end is not None else {}
     candidates = diagnosis.candidates[:_CANDIDATES] if diagnosis is not None else ()

@@ -367,7 +367,7 @@ def _axes(sensor: str, values: dict[str, float]) -> Picture:
 
         misaligned_axes(_matrix(values), sensor, figure)
 
-    return _sized(f"axes_{sensor}", f"Sensitive axes of {sensor} beside those of the body", 3.6, drawn, SMALL)
+    return _sized(f"axes_{sensor}", f"Sensitive axes of {sensor} beside those of the body", 3.8, drawn, SMALL)
 
 
 def _iron(hard: dict[str, float], soft: dict[str, float], rows: LogRows | None) -> Picture:
