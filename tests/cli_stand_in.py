@@ -106,7 +106,7 @@ def install(monkeypatch):
         ("ladder", ladder_result),
         ("compared", comparison()),
         ("rows_of_fit", rows()),
-        ("rows_of_model", rows()),
+        ("compare_with_rows", (comparison(), rows())),
         ("explain", card()),
         ("load_effects", None),
         ("replay", Replay()),

@@ -123,7 +123,7 @@ def test_the_chart_zooms_into_what_is_dragged_over_and_shows_values(browser: Bro
     box = picture.bounding_box()
     assert box is not None
     x_range = """(() => {
-        const found = [...Bokeh.documents[0]._all_models.values()].find((each) => each.type === 'Figure');
+        const found = [...Bokeh.documents[0].roots()[0].references()].find((each) => each.type === 'Figure');
         return [found.x_range.start, found.x_range.end];
     })()"""
     before = shown.evaluate(x_range)
@@ -140,6 +140,14 @@ def test_the_chart_zooms_into_what_is_dragged_over_and_shows_values(browser: Bro
     shown.wait_for_timeout(200)
     after = shown.evaluate(x_range)
     assert after[1] - after[0] < 0.4 * (before[1] - before[0])
+    shown.close()
+
+
+def test_a_finger_on_the_chart_scrolls_the_page(browser: Browser, report: Path) -> None:
+    shown = opened(browser, report, 380, has_touch=True, is_mobile=True)
+    layers = shown.locator("#chart-picture .bk-events")
+    assert layers.count() == 2
+    assert {layers.nth(k).evaluate("(each) => getComputedStyle(each).touchAction") for k in range(2)} == {"auto"}
     shown.close()
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import imufit
 import numpy as np
 import pytest
-from imufit.comparing import rows_of_fit, rows_of_model
+from imufit.comparing import compare_with_rows, rows_of_fit
 from imufit.comparing.traces import STRETCHES, _Kept
 from imufit.diagnosing.ladder import ladder
 from imufit.figures.spectrum import lines
@@ -73,7 +73,9 @@ def test_a_candidate_explains_what_the_evidence_predicts(log: Log, climbed: imuf
 
 
 def test_a_model_as_it_stands_has_one_residual(log: Log) -> None:
-    rows = rows_of_model(imufit.SensorModel(), log)
+    comparison, rows = compare_with_rows(imufit.SensorModel(), log)
+    assert comparison.to_dict() == imufit.compare(log).to_dict()
+    assert {part.channel for part in rows.noise} == {trace.channel for trace in rows.traces}
     assert {trace.before for trace in rows.traces} == {None}
     assert rows.field is not None
     assert rows.field.shape[1] == 3
@@ -85,7 +87,8 @@ def test_a_stream_has_the_traces_of_the_log_in_memory(tmp_path: Path, log: Log) 
     path = tmp_path / "log.parquet"
     log.write(path)
     held, streamed = (
-        rows_of_model(imufit.SensorModel(), imufit.open_log(path, stream=stream)).traces for stream in (False, True)
+        compare_with_rows(imufit.SensorModel(), imufit.open_log(path, stream=stream))[1].traces
+        for stream in (False, True)
     )
     for one, other in zip(held, streamed, strict=True):
         np.testing.assert_array_equal(one.t, other.t)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import imufit
-from imufit.comparing import rows_of_fit, rows_of_model
+from imufit.comparing import compare_with_rows, rows_of_fit
 from imufit.report import page
 from PIL import Image
 from playwright.sync_api import sync_playwright
@@ -38,12 +38,12 @@ def reports(folder: Path) -> dict[str, Path]:
     poses = imufit.simulate("poses", {"acc.bias": None, "acc.scale": None}, 2, 60.0, size="large").to_log()
     poses = poses.with_fields(ref_q=None, ref_p=None, ref_angle=None)
     at_rest = imufit.SensorModel().fit(poses)
-    before = start.compare()
+    before, rows = compare_with_rows(start.model, log)
     pages = {
         "ladder": page(ladder=ladder, rows=rows_of_fit(ladder.fit, ladder.start), title="The error ladder"),
         "diagnose": page(before, diagnosis, rows=rows_of_fit(start, candidate=diagnosis.best), title="Which effect"),
         "add": page(before, addition=added, rows=rows_of_fit(added.fit, start), title=f"{added.effect} added"),
-        "compare": page(before, rows=rows_of_model(start.model, log), title="Where the model fails"),
+        "compare": page(before, rows=rows, title="Where the model fails"),
         "rests": page(diagnosis=at_rest.diagnose(), rows=rows_of_fit(at_rest), title="Without a reference"),
     }
     found = {}

@@ -50,9 +50,11 @@ def compare(
     with ProgressBar() as progress:
         opened = engine.open_log(log, reading)
         held = engine.sensor_model(path=model)
-        comparison = held.compare(opened, progress=progress)
-        shown = html_file is not None or plots is not None
-        rows = engine.rows_of_model(held, opened, progress) if shown else None
+        rows = None
+        if html_file is None and plots is None:
+            comparison = held.compare(opened, progress=progress)
+        else:
+            comparison, rows = engine.compare_with_rows(held, opened, progress)
     output.result(comparison, verbose)
     output.json(comparison.to_dict())
     if plot_file is not None:

@@ -161,11 +161,11 @@ def rows_of_fit(fit: Any, first: Any = None, candidate: str | None = None, *, pr
     return rows_of_fit(fit, first, candidate, progress)
 
 
-def rows_of_model(model: Any, log: Any, progress: Progress) -> LogRows:
-    """Return the rows of a log that a report shows, with a model as it is."""
-    from imufit.comparing import rows_of_model  # noqa: PLC0415
+def compare_with_rows(model: Any, log: Any, progress: Progress) -> tuple[Comparison, LogRows]:
+    """Compare a model as it is with a log, and return the rows of the log that a report shows."""
+    from imufit.comparing import compare_with_rows  # noqa: PLC0415
 
-    return rows_of_model(model, log, progress)
+    return compare_with_rows(model, log, progress)
 
 
 def catalogue() -> list[EffectCard]:

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.allan_deviation import allan
+from imufit.comparing.compare import compare_held, held_model
+from imufit.comparing.noise_budget import noise_budget
 from imufit.comparing.traces import Held, traces
 from imufit.errors import InputError
-from imufit.fitting.analysis import Analysis
 from imufit.fitting.rest_passes import RestPasses
 from imufit.log import Log
+from imufit.log.several import name_of
 from imufit.progress import Progress, silent
 from imufit.rests.poses import find_poses
 from imufit.results.log_rows import LogRows
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from imufit.fitting import FittedStack
     from imufit.log import LogSource
     from imufit.model import EffectStack
+    from imufit.results import Comparison
 
 FIELD_POINTS: Final = 400
 """Readings of the field that a figure of 400 pixels keeps apart."""
@@ -56,8 +59,8 @@ def rows_of_fit(
     return _rows(held, other, log, fit.logs[log], progress)
 
 
-def rows_of_model(model: EffectStack, log: LogSource, progress: Progress = silent) -> LogRows:
-    """Return the rows of a log with a model, its parameters as they are.
+def compare_with_rows(model: EffectStack, log: LogSource, progress: Progress = silent) -> tuple[Comparison, LogRows]:
+    """Compare a model with a log, its parameters as they are, and return the rows of the log besides.
 
     Parameters
     ----------
@@ -68,14 +71,21 @@ def rows_of_model(model: EffectStack, log: LogSource, progress: Progress = silen
     progress : callable
         Called with (rows done, rows in all, what is being done).
     """
-    analysis = Analysis.of(model, (log,), progress, keep_constants=True)
-    held = Held(analysis, analysis.estimate_unnamed().step, analysis.model.effects)
-    return _rows(held, None, 0, log, progress)
+    held = held_model(model, log, progress)
+    return compare_held(held, model, progress), _rows(held, None, 0, log, progress)
 
 
 def _rows(held: Held, first: Held | None, number: int, log: LogSource, progress: Progress) -> LogRows:
     rests = _rests(log) if isinstance(held.analysis.logs[number].passes, RestPasses) else ()
-    return LogRows(traces(held, first, number), _field(log), rests, _allan(log, progress))
+    logs = held.analysis.logs
+    return LogRows(
+        traces=traces(held, first, number),
+        field=_field(log),
+        rests=rests,
+        noise=noise_budget(held.analysis),
+        allan=_allan(log, progress),
+        log=name_of(log, number) if len(logs) > 1 else "",
+    )
 
 
 def _rests(log: LogSource) -> tuple[tuple[str, NDArray[np.float64]], ...]:

@@ -14,7 +14,17 @@ from imufit.figures import quantity
 from imufit.remedy import command
 from imufit.report.inline_svg import caption_of, inline_svg
 from imufit.report.interactive import STILL, interactive
-from imufit.report.pictures import PHONE, SMALL, WIDE, Picture, fitted_parameters, in_order, pictures, worst_first
+from imufit.report.pictures import (
+    PHONE,
+    SMALL,
+    WIDE,
+    Picture,
+    fitted_parameters,
+    in_order,
+    noise_of,
+    pictures,
+    worst_first,
+)
 from imufit.report.words import shown, with_words
 from imufit.results.diagnosis import PASSED, VERDICTS
 from imufit.results.noise_part import noise_table
@@ -81,6 +91,7 @@ def page(
         chart=chart,
         policy=STILL if chart is None else chart.policy,
         stretches=STRETCHES,
+        log=rows.log if rows is not None else "",
         verdict=_verdict(comparison, last, ladder, addition),
         judged=_judged(comparison, last),
         faults=_faults(comparison, last),
@@ -99,7 +110,7 @@ def page(
         final=last if last is not diagnosis else None,
         ladder=ladder,
         addition=addition,
-        noise=noise_table(last.noise) if last is not None else None,
+        noise=noise_table(noise_of(ladder, diagnosis, rows)),
         fitted=parameter_table(fitted_parameters(ladder, addition)),
         next_steps=_next_steps(last, ladder),
     )

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         Diagnosis,
         Ladder,
         LogRows,
+        NoisePart,
         Panel,
         Parameter,
         ResidualTrace,
@@ -130,20 +131,12 @@ def pictures(
     if ladder is not None:
         comparison = comparison or ladder.comparison_start
         diagnosis = diagnosis or ladder.first or ladder.diagnosis
-    last = ladder.diagnosis if ladder is not None else diagnosis
     best = None if diagnosis is None else diagnosis.best_candidate
     fitted = fitted_parameters(ladder, addition)
     order = worst_first(comparison)
     return Pictures(
         fall=_fall(ladder, addition),
-        noise=_sized(
-            "noise_floor_parts",
-            "Parts of the noise floor of each channel",
-            1.6 + 0.26 * len({part.channel for part in last.noise}),
-            lambda figure: drawn_noise(last.noise, figure),
-        )
-        if last is not None and last.noise
-        else None,
+        noise=_noise(noise_of(ladder, diagnosis, rows)),
         candidates=_sized(
             "candidates",
             "Expected held-out error of the ranked candidates",
@@ -176,6 +169,26 @@ def worst_first(comparison: Comparison | None) -> list[str]:
     channels = comparison.channels if comparison is not None else ()
     ranked = sorted(channels, key=lambda item: -item.ratio if math.isfinite(item.ratio) else math.inf)
     return [item.channel for item in ranked]
+
+
+def noise_of(ladder: Ladder | None, diagnosis: Diagnosis | None, rows: LogRows | None) -> tuple[NoisePart, ...]:
+    """Return the parts of the noise floor, from the last answer or else from the rows.
+
+    Parameters
+    ----------
+    ladder, diagnosis, rows : optional
+        The results.
+    """
+    last = ladder.diagnosis if ladder is not None else diagnosis
+    return (last.noise if last is not None else ()) or (rows.noise if rows is not None else ())
+
+
+def _noise(parts: Sequence[NoisePart]) -> Picture | None:
+    if not parts:
+        return None
+    height = 1.6 + 0.26 * len({part.channel for part in parts})
+    words = "Parts of the noise floor of each channel"
+    return _sized("noise_floor_parts", words, height, lambda figure: drawn_noise(parts, figure))
 
 
 def in_order(traces: Sequence[ResidualTrace], order: Sequence[str]) -> list[ResidualTrace]:

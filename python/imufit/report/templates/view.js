@@ -54,6 +54,10 @@
       target.replaceChildren();
       const views = await Bokeh.embed.embed_item(JSON.parse(colours(JSON.stringify(data.item), data.palette)), target);
       shown = [...views][0] ?? views.roots?.[0];
+      // A finger scrolls the page until its owner chooses the zoom.
+      if (matchMedia("(pointer: coarse)").matches) {
+        for (const each of shown.model.references()) if (each.type === "BoxZoomTool") each.active = false;
+      }
       fill();
     };
 
