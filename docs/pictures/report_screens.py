@@ -84,7 +84,7 @@ def for_docs(browser: "Browser", path: Path) -> None:
         shown.locator(section).screenshot(path=target)
         picture = Image.open(target).convert("RGB")
         scaled = picture.resize((kept, round(picture.height * kept / picture.width)))
-        scaled.quantize(64).save(target, optimize=True)
+        scaled.quantize(200).save(target, optimize=True)
         shown.close()
 
 

@@ -70,7 +70,7 @@ def misaligned_axes(matrix: Array, sensor: str, ax: Place | None = None) -> Draw
             va="center",
         )
     axes.set_axis_off()
-    _cube(axes, -0.2, 1.25, zoom=1.2)
+    _cube(axes, -0.2, 1.25, zoom=1.05)
     times = "" if factor == 1.0 else f", drawn {factor:g} times as large"
     off = f"{quantity.number(math.degrees(largest), 2)} deg"
     _headed(axes, f"The axes of the {SENSOR_NAMES[sensor]} are off by up to {off}{times} (dashed: the body)")
@@ -114,7 +114,7 @@ def field_ellipsoid(centre: Array, matrix: Array, points: Array | None, ax: Plac
         shown = ideal + factor * (known - ideal)
         axes.plot(*shown.T, linestyle="none", marker=".", markersize=2.5, color=style.ORANGE)
     axes.plot(*np.stack([np.zeros(3), factor * np.asarray(centre)], axis=1), color=style.VERMILION, linewidth=2.0)
-    _cube(axes, -1.35 * length, 1.35 * length, zoom=1.05)
+    _cube(axes, -1.35 * length, 1.35 * length, zoom=0.85)
     for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y"), (axes.zaxis, "z")):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis.set_label_text(f"mag_{name}, µT", fontsize=8)
