@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.results.noise_part import NoisePart
+from imufit.results.part import Part
 from imufit.results.residual_trace import ResidualTrace
 
 
-@dataclass(frozen=True, eq=False)
-class LogRows:
+@dataclass(frozen=True, eq=False, repr=False)
+class LogRows(Part):
     """Rows of one log.
 
     Attributes
