@@ -270,3 +270,13 @@ def test_figures_have_names_of_their_own_for_files(result):
         names
     )
     assert "residual_gyr_x_1_acc_y" in names
+
+
+def test_hostile_names_of_columns_are_harmless_as_names_of_files():
+    start = comparison()
+    panels = tuple(
+        replace(panel, covariate="../../" + name) for panel, name in zip(start.panels, HOSTILE, strict=False)
+    )
+    names = [picture.name for picture in pictures(replace(start, panels=panels))]
+    assert len(names) == len(set(names))
+    assert all(re.fullmatch(r"[A-Za-z0-9_]+", name) for name in names)

@@ -124,7 +124,7 @@ def field_ellipsoid(centre: Array, matrix: Array, points: Array | None, ax: Plac
     shift = quantity.quantity(float(np.linalg.norm(centre)), "uT")
     size = float(np.linalg.norm(matrix, 2))
     stretch = f" and stretches it by up to {quantity.share(size)}" if size > 0.0 else ""
-    _headed(axes, f"Iron shifts the field by {shift}{stretch}{times}")
+    _headed(axes, f"Iron shifts the field by {shift}{stretch}{times} (dashed: ideal; dots: readings)")
     return drawing
 
 
