@@ -11,7 +11,7 @@ from imufit.figures.style import new_figure
 from imufit.lab.simulate import Grade, ParameterGrade
 from imufit.log import Log, contents
 from imufit.results import Table
-from loop_results import BIAS, addition, card, comparison, diagnosis, ladder
+from loop_results import BIAS, addition, card, comparison, diagnosis, ladder, rows
 
 
 class Fit:
@@ -104,6 +104,9 @@ def install(monkeypatch):
         ("contents", contents(two_rows)),
         ("sensor_model", model),
         ("ladder", ladder_result),
+        ("compared", comparison()),
+        ("rows_of_fit", rows()),
+        ("compare_with_rows", (comparison(), rows())),
         ("explain", card()),
         ("load_effects", None),
         ("replay", Replay()),

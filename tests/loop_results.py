@@ -14,8 +14,11 @@ from imufit.results import (
     Diagnosis,
     EffectCard,
     Ladder,
+    LogRows,
+    NoisePart,
     Panel,
     Parameter,
+    ResidualTrace,
     Rival,
     Spectrum,
     Step,
@@ -166,6 +169,39 @@ def diagnosis(verdict="missing"):
         "Turn the sensor about y at rest, then shake it along x." if verdict == "ambiguous" else None,
         "Gyro x reads 0.02 deg/s per g: acceleration bends the sensing structure." if missing else "",
         (),
+    )
+
+
+def trace(channel, samples=900, effects=("gyr.bias", "gyr.g_sensitivity")):
+    """Trace of one channel with a spike, a gap and effects that go with time."""
+    rng = np.random.default_rng(len(channel) + ord(channel[-1]))
+    t = np.linspace(0.0, 1200.0, samples)
+    floor = 0.05 if channel.startswith("acc") else 0.002
+    parts = {effect: floor * (1 + place) * np.sin(t / (100.0 + 50 * place)) for place, effect in enumerate(effects)}
+    measured = 5.0 * floor * np.cos(t / 60.0)
+    residual = rng.normal(scale=floor, size=samples)
+    residual[samples // 3] = 9.0 * floor
+    before = residual + sum(parts.values(), np.zeros(samples))
+    for line in (measured, residual, before, *parts.values()):
+        line[samples // 2] = np.nan
+    unit = "m/s^2" if channel.startswith("acc") else "rad/s"
+    return ResidualTrace(channel, unit, t, measured, residual, before, parts, floor, " + ".join(effects), "the ideal")
+
+
+def rows(samples=900, effects=("gyr.bias", "gyr.g_sensitivity")):
+    """Rows of the log: six channels, a field on its sphere."""
+    field = np.random.default_rng(4).normal(size=(300, 3))
+    field *= 48.0 / np.linalg.norm(field, axis=1, keepdims=True)
+    names = [f"{sensor}_{axis}" for sensor in ("acc", "gyr") for axis in "xyz"]
+    return LogRows(tuple(trace(name, samples, effects) for name in names), field + np.array([4.0, -3.0, 2.0]))
+
+
+def noise():
+    """Parts of the noise floor of two channels."""
+    return tuple(
+        NoisePart(channel, component, 1e-4, "rad/s", share)
+        for channel in ("gyr_x", "gyr_y")
+        for component, share in (("white", 0.7), ("reference", 0.3), ("random_walk", 0.4))
     )
 
 

@@ -74,6 +74,19 @@ def test_files_that_are_asked_for_are_written(capsys, tmp_path, log):
         figure.unlink()
 
 
+def test_every_figure_is_written_as_png_and_svg(capsys, tmp_path, log):
+    code, out, err = run(capsys, "ladder", log, "--plots", tmp_path / "figures")
+    assert (code, err) == (0, [])
+    written = {path.name for path in (tmp_path / "figures").iterdir()}
+    assert {"error_fall.png", "error_fall.svg", "trace_gyr_x.png", "candidates.svg", "spectrum_acc.png"} <= written
+    assert {name.rpartition(".")[0] for name in written if name.endswith("png")} == {
+        name.rpartition(".")[0] for name in written if name.endswith("svg")
+    }
+    assert (tmp_path / "figures" / "error_fall.png").read_bytes()[1:4] == b"PNG"
+    assert "<svg" in (tmp_path / "figures" / "error_fall.svg").read_text()
+    assert f"wrote {len(written) // 2} figures into" in " ".join(out.split())
+
+
 def test_models_are_written(capsys, tmp_path, log):
     for command in (["ladder", log], ["add", "gyr.bias", log], ["fit", log, "--effects", "gyr.bias"]):
         model = tmp_path / "model.toml"

@@ -15,6 +15,7 @@ from imufit.cli.arguments import (
     model_option,
     model_output,
     plot_option,
+    plots_option,
     title_of,
 )
 from imufit.cli.names import check_effects, complete_effect
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 @json_option
 @html_option
 @plot_option
+@plots_option
 def add(
     effect: str,
     logs: tuple[Path, ...],
@@ -44,6 +46,7 @@ def add(
     json_file: Path | None,
     html_file: Path | None,
     plot_file: Path | None,
+    plots: Path | None,
 ) -> None:
     """Add EFFECT to the model of LOG, refit, and show the held-out error before, as expected and after.
 
@@ -56,6 +59,9 @@ def add(
         opened = engine.open_logs(logs, reading)
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
         addition = fit.add(effect, progress=progress)
+        shown = html_file is not None or plots is not None
+        comparison = engine.compared(fit, progress) if shown else None
+        rows = engine.rows_of_fit(addition.fit, fit, progress=progress) if shown else None
     out.say(addition.sentence, bold=True)
     out.say(addition.warning)
     out.tables(addition.tables())
@@ -65,7 +71,6 @@ def add(
     out.json(addition.to_dict())
     if plot_file is not None:
         out.plot(plot_file, addition.plot())
-    if html_file is not None:
-        from imufit.report import page  # noqa: PLC0415
-
-        out.html(html_file, page(addition=addition, title=f"{title_of(logs)}: {effect} added"))
+    out.report(
+        html_file, plots, f"{title_of(logs)}: {effect} added", comparison=comparison, addition=addition, rows=rows
+    )

@@ -210,6 +210,13 @@ def plot_option(command: Command) -> Command:
     )(command)
 
 
+def plots_option(command: Command) -> Command:
+    """Add --plots."""
+    return click.option(
+        "--plots", "plots", type=OutputDirectory(), metavar="DIR", help="Write every figure as PNG and SVG into DIR."
+    )(command)
+
+
 def verbose_option(command: Command) -> Command:
     """Add -v."""
     return click.option("-v", "--verbose", is_flag=True, help="Show every table, not only those of the answer.")(

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import html_option, json_option, keep_inputs, model_option, plot_option, verbose_option
+from imufit.cli.arguments import (
+    html_option,
+    json_option,
+    keep_inputs,
+    model_option,
+    plot_option,
+    plots_option,
+    verbose_option,
+)
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import log_argument
@@ -23,6 +31,7 @@ if TYPE_CHECKING:
 @json_option
 @html_option
 @plot_option
+@plots_option
 @verbose_option
 def compare(
     log: Path,
@@ -32,6 +41,7 @@ def compare(
     json_file: Path | None,
     html_file: Path | None,
     plot_file: Path | None,
+    plots: Path | None,
     verbose: bool,
 ) -> None:
     """Compare the model with LOG: channel by channel, segment by segment, over every covariate."""
@@ -39,12 +49,14 @@ def compare(
     output = Output(json_file)
     with ProgressBar() as progress:
         opened = engine.open_log(log, reading)
-        comparison = engine.sensor_model(path=model).compare(opened, progress=progress)
+        held = engine.sensor_model(path=model)
+        rows = None
+        if html_file is None and plots is None:
+            comparison = held.compare(opened, progress=progress)
+        else:
+            comparison, rows = engine.compare_with_rows(held, opened, progress)
     output.result(comparison, verbose)
     output.json(comparison.to_dict())
     if plot_file is not None:
         output.plot(plot_file, comparison.plot())
-    if html_file is not None:
-        from imufit.report import page  # noqa: PLC0415
-
-        output.html(html_file, page(comparison=comparison, title=f"{log.name}: where the model fails"))
+    output.report(html_file, plots, f"{log.name}: where the model fails", comparison=comparison, rows=rows)

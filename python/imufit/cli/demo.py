@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from imufit.cli import engine
-from imufit.cli.arguments import OutputDirectory, Whole, json_option
+from imufit.cli.arguments import OutputDirectory, Whole, json_option, plots_option
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reveal import truth_rows
@@ -39,10 +39,10 @@ def choice(diagnosis: Diagnosis) -> str | None:
     "--seed", type=Whole(min=0), default=3, show_default=True, help="Picks the effect, the motion, the noise."
 )
 @json_option
-def demo(*, directory: Path, seed: int, json_file: Path | None) -> None:
+@plots_option
+def demo(*, directory: Path, seed: int, json_file: Path | None, plots: Path | None) -> None:
     """Hide an effect in a simulated log, find it, add it, see the error fall, and only then look at the truth."""
     from imufit.figures import quantity  # noqa: PLC0415
-    from imufit.report import page  # noqa: PLC0415
     from imufit.results import Table  # noqa: PLC0415
     from imufit.results.json_value import json_value  # noqa: PLC0415
 
@@ -78,9 +78,11 @@ def demo(*, directory: Path, seed: int, json_file: Path | None) -> None:
 
         out.say("5. Go on until nothing is missing", bold=True)
         result = engine.ladder(opened, None, progress)
+        rows = engine.rows_of_fit(result.fit, result.start, progress=progress)
     out.table(result.step_table())
     out.say(*(f"   {sentence}" for sentence in result.sentences() if sentence))
-    out.html(directory / "report.html", page(comparison, diagnosis, result, title="Demonstration: a hidden effect"))
+    parts = {"comparison": comparison, "diagnosis": diagnosis, "ladder": result, "rows": rows}
+    out.report(directory / "report.html", plots, "Demonstration: a hidden effect", **parts)
     out.plot(directory / "ladder.png", result.plot())
 
     truth = engine.unseal(log)

@@ -14,6 +14,7 @@ from imufit.cli.arguments import (
     keep_inputs,
     model_option,
     plot_option,
+    plots_option,
     title_of,
     verbose_option,
 )
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 @json_option
 @html_option
 @plot_option
+@plots_option
 @verbose_option
 def diagnose(
     logs: tuple[Path, ...],
@@ -40,6 +42,7 @@ def diagnose(
     json_file: Path | None,
     html_file: Path | None,
     plot_file: Path | None,
+    plots: Path | None,
     verbose: bool,
 ) -> None:
     """Name the effect that is missing in the model of LOG, or state that none is, or that LOG does not determine it.
@@ -56,14 +59,13 @@ def diagnose(
         opened = engine.open_logs(logs, reading)
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
         diagnosis = fit.diagnose(progress=progress)
-        compared = html_file is not None and diagnosis.evidence == "reference"
+        shown = html_file is not None or plots is not None
+        compared = shown and diagnosis.evidence == "reference"
         comparison = fit.compare(progress=progress) if compared else None
+        rows = engine.rows_of_fit(fit, candidate=diagnosis.best, progress=progress) if shown else None
     output.result(diagnosis, verbose)
     output.json(diagnosis.to_dict())
     if plot_file is not None:
         output.plot(plot_file, diagnosis.plot())
-    if html_file is not None:
-        from imufit.report import page  # noqa: PLC0415
-
-        title = f"{title_of(logs)}: which effect is missing"
-        output.html(html_file, page(comparison=comparison, diagnosis=diagnosis, title=title))
+    title = f"{title_of(logs)}: which effect is missing"
+    output.report(html_file, plots, title, comparison=comparison, diagnosis=diagnosis, rows=rows)

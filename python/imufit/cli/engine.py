@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from imufit.lab.simulate import Grade, Simulation, Truth
     from imufit.log import Contents, Log, Reading
     from imufit.log.metadata import Frame
-    from imufit.results import EffectCard, Ladder, LogInfo, Recording
+    from imufit.results import Comparison, EffectCard, Ladder, LogInfo, LogRows, Recording
 
 Progress = Callable[[int, int, str], None]
 
@@ -172,6 +172,25 @@ def studio(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, rea
             remedy="Install it with: pip install 'imufit[studio]'.",
         ) from None
     start(logs, reading, demo, port=port, ready=ready)
+
+
+def compared(fit: Any, progress: Progress) -> Comparison | None:
+    """Return where a fit fails on its own log; None where rests stand in for a reference."""
+    return fit.compare(progress=progress) if fit.analysis.judged_by == "reference" else None
+
+
+def rows_of_fit(fit: Any, first: Any = None, candidate: str | None = None, *, progress: Progress) -> LogRows:
+    """Return the rows of a fit's log that a report shows."""
+    from imufit.comparing import rows_of_fit  # noqa: PLC0415
+
+    return rows_of_fit(fit, first, candidate, progress)
+
+
+def compare_with_rows(model: Any, log: Any, progress: Progress) -> tuple[Comparison, LogRows]:
+    """Compare a model as it is with a log, and return the rows of the log that a report shows."""
+    from imufit.comparing import compare_with_rows  # noqa: PLC0415
+
+    return compare_with_rows(model, log, progress)
 
 
 def catalogue() -> list[EffectCard]:

@@ -15,6 +15,7 @@ from imufit.cli.arguments import (
     model_option,
     model_output,
     plot_option,
+    plots_option,
     title_of,
     verbose_option,
 )
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 @json_option
 @html_option
 @plot_option
+@plots_option
 @verbose_option
 def ladder(
     logs: tuple[Path, ...],
@@ -43,6 +45,7 @@ def ladder(
     json_file: Path | None,
     html_file: Path | None,
     plot_file: Path | None,
+    plots: Path | None,
     verbose: bool,
 ) -> None:
     """Add the missing effects one by one to the model of LOG, and show the held-out error fall.
@@ -55,6 +58,8 @@ def ladder(
         opened = engine.open_logs(logs, reading)
         start = engine.sensor_model(path=model) if model is not None else None
         result = engine.ladder(opened, start, progress)
+        shown = html_file is not None or plots is not None
+        rows = engine.rows_of_fit(result.fit, result.start, progress=progress) if shown else None
     out.result(result, verbose)
     if output is not None:
         result.fit.save(output)
@@ -62,7 +67,4 @@ def ladder(
     out.json(result.to_dict())
     if plot_file is not None:
         out.plot(plot_file, result.plot())
-    if html_file is not None:
-        from imufit.report import page  # noqa: PLC0415
-
-        out.html(html_file, page(ladder=result, title=f"{title_of(logs)}: the error ladder"))
+    out.report(html_file, plots, f"{title_of(logs)}: the error ladder", ladder=result, rows=rows)

@@ -168,6 +168,36 @@ class Output:
             write_text(path, page)
             self.wrote(path)
 
+    def report(self, html_file: Path | None, plots: Path | None, title: str, **results: Any) -> None:
+        """Write the page of results, and the figures of the page as files.
+
+        Parameters
+        ----------
+        html_file : Path or None
+            The page.
+        plots : Path or None
+            Directory of the figures; made if it does not exist.
+        title : str
+            Heading of the page.
+        **results
+            As for `imufit.report.page`.
+        """
+        from imufit.report import page, pictures  # noqa: PLC0415
+        from imufit.report.pictures import WIDE  # noqa: PLC0415
+
+        if html_file is not None:
+            self.html(html_file, page(**results, title=title))
+        if plots is None:
+            return
+        plots.mkdir(parents=True, exist_ok=True)
+        drawn = list(pictures(**results))
+        for picture in drawn:
+            figure = picture.draw(picture.width or WIDE)
+            for ending in ("png", "svg"):
+                with whole_file(plots / f"{picture.name}.{ending}") as file:
+                    figure.savefig(file, format=ending, dpi=150, bbox_inches="tight")
+        self.say(f"wrote {len(drawn)} figures into {plots}")
+
     def plot(self, path: Path | None, figure: Figure) -> None:
         """Write a figure."""
         if path is not None:

@@ -3,6 +3,7 @@
 from imufit.comparing.attitude import attitude_comparison
 from imufit.comparing.compare import compare, compare_model, comparison, panels
 from imufit.comparing.judged import judged
+from imufit.comparing.log_rows import compare_with_rows, rows_of_fit
 from imufit.comparing.noise_budget import noise_budget
 from imufit.comparing.notes import notes
 from imufit.comparing.two_models import compare_two
@@ -13,10 +14,12 @@ __all__ = [
     "compare",
     "compare_model",
     "compare_two",
+    "compare_with_rows",
     "comparison",
     "judged",
     "noise_budget",
     "notes",
     "panels",
+    "rows_of_fit",
     "unexplained",
 ]

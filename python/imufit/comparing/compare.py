@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.comparing.attitude import attitude_comparison
 from imufit.comparing.notes import notes
+from imufit.comparing.traces import Held
 from imufit.errors import InputError
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
@@ -68,10 +69,40 @@ def compare_model(model: EffectStack, log: LogSource, progress: Progress) -> Com
     progress : callable
         Called with (rows done, rows in all, what is being done).
     """
+    return compare_held(held_model(model, log, progress), model, progress)
+
+
+def held_model(model: EffectStack, log: LogSource, progress: Progress) -> Held:
+    """Take the evidence of a log around a model, its parameters as they are.
+
+    Parameters
+    ----------
+    model : EffectStack
+        The model.
+    log : Log or LogStream
+        With reference attitude.
+    progress : callable
+        Called with (rows done, rows in all, what is being done).
+    """
     analysis = Analysis.of(model, (log,), progress, keep_constants=True)
     _refuse_rests(analysis)
-    found = comparison(analysis, analysis.estimate_unnamed().step)
-    return _with_attitude(found, model, analysis.logs[0].surveyed.log, progress)
+    return Held(analysis, analysis.estimate_unnamed().step, analysis.model.effects)
+
+
+def compare_held(held: Held, model: EffectStack, progress: Progress) -> Comparison:
+    """Compare a model with the log that it is held against.
+
+    Parameters
+    ----------
+    held : Held
+        The evidence around the model.
+    model : EffectStack
+        The model.
+    progress : callable
+        Called with (rows done, rows in all, what is being done).
+    """
+    found = comparison(held.analysis, held.step)
+    return _with_attitude(found, model, held.analysis.logs[0].surveyed.log, progress)
 
 
 def _refuse_rests(analysis: Analysis) -> None:

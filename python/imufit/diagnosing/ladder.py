@@ -66,6 +66,7 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
         fit=fit,
         sentence=_sentence(start.ratio, fit.ratio, climb.steps, diagnosis),
         revisions=tuple(revisions),
+        start=start,
     )
 
 

@@ -85,7 +85,8 @@ def candidate_bars(
     low = min(1.0, float((after[drawn] - margin).min()))
     high = max(now, float(before[drawn].max()), float((after[drawn] + margin).max()), 1.02)
     axes.set_xlim(low - 0.04 * (high - low), high + 0.04 * (high - low))
-    axes.set_xlabel("held-out error over noise floor (solid line: noise floor; dashed: now)", fontsize=9)
+    between = "\n" if drawing.narrow else " "
+    axes.set_xlabel(f"held-out error over noise floor{between}(solid line: noise floor; dashed: now)", fontsize=9)
     best = drawn[0]
     style.title(axes, sentence or _promise(effects[best], before[best], after[best], status[best]))
     style.tidy(axes)

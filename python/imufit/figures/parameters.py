@@ -66,7 +66,7 @@ def parameter_sizes(
         axes.set_xlim(-1.6 * reach, 1.6 * reach)
     else:
         axes.set_xlim(-1.1 * max(reach, 1.2), 1.1 * max(reach, 1.2))
-    for at, index in zip(places, drawn, strict=True):
+    for at, index in () if drawing.narrow else zip(places, drawn, strict=True):
         axes.annotate(
             shown[index],
             (1.01, at),
@@ -78,7 +78,8 @@ def parameter_sizes(
         )
     axes.set_yticks(places, [labels[index] for index in drawn])
     axes.set_ylim(len(drawn) - 0.5, -0.5)
-    axes.set_xlabel("value over typical size (shaded: up to the typical size; bars: 95 %)", fontsize=9)
+    between = "\n" if drawing.narrow else " "
+    axes.set_xlabel(f"value over typical size{between}(shaded: up to that size; bars: 95 %)", fontsize=9)
     count = int((~ordinary).sum())
     if count == 0:
         sentence = "Every parameter is of a plausible size"

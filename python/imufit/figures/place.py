@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 Place: TypeAlias = "Axes | Sequence[Axes] | NDArray[Any] | Figure | SubFigure"
 """Where to draw, see the module."""
+
+NARROW: Final = 5.0
+"""Width under which a figure is narrow, inches at 96 pixels: a phone has 3.75 of them, a column of a page 6."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,11 @@ class Drawing:
         if self.own:
             return self.root
         return self.axes[0] if len(self.axes) == 1 else self.axes
+
+    @property
+    def narrow(self) -> bool:
+        """Whether the figure is made for a phone, so that legends stand in one column and words beside panels go."""
+        return self.whole is not None and self.root.get_figwidth() < NARROW
 
     def headline(self, sentence: str, size: float = 11.0) -> None:
         """Put a sentence above all panels; Axes of the user's own have no place for one.

@@ -8,7 +8,7 @@ import re
 _DEGREES = 180.0 / math.pi
 _GRAVITY = 9.80665
 _PARTS = re.compile(r"(?P<head>\([^()]*\)|rad/s\^2|rad/s|m/s\^2|[^/ ()]+)(?:(?:/| per )(?P<tail>.+))?")
-_SPELLING = (("^2", "²"), ("^3", "³"), ("degC", "°C"), ("uT", "µT"), ("sqrt(Hz)", "√Hz"))
+_SPELLING = (("^2", "²"), ("^3", "³"), ("degC", "°C"), ("uT", "µT"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"))
 
 
 def shown_unit(unit: str) -> tuple[float, str]:

@@ -137,7 +137,7 @@ def _panel(axes: Axes, panel: PanelLike) -> None:
         axes.text(
             0.98,
             0.04,
-            f"noise of a sample ±{quantity.number(floor, 2)}",
+            f"noise of a sample ±{quantity.number(floor, 2)} {y_unit}",
             transform=axes.transAxes,
             ha="right",
             va="bottom",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from matplotlib.ticker import LogLocator, NullFormatter
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 _LOGARITHMIC_ABOVE = 8.0
+STEP_WIDTH: Final = 1.42
+"""Width that the longest id of an effect, 27 letters of 9 points, takes beneath a step, inches."""
 
 
 def waterfall(
@@ -104,7 +106,7 @@ def waterfall(
         )
     _values(axes, places, np.concatenate([[start], before]), np.concatenate([[start], after]))
     axes.axhline(1.0, color=style.INK, linewidth=1.4, zorder=3, label="noise floor")
-    slanted = count > 4
+    slanted = count > (4 if drawing.whole is None else drawing.root.get_figwidth() / STEP_WIDTH - 1.0)
     axes.set_xticks(
         places,
         ["start", *(f"+ {effect}" for effect in effects)],
@@ -115,7 +117,7 @@ def waterfall(
     edge = 0.6 if count else 1.6
     axes.set_xlim(-edge, count + edge)
     axes.set_ylabel("held-out error over noise floor", fontsize=9)
-    drawing.legend(loc="outside lower center", ncols=3)
+    drawing.legend(loc="outside lower center", ncols=1 if drawing.narrow else 3)
     if count:
         effect_word = "effect takes" if count == 1 else "effects take"
         sentence = (

@@ -72,6 +72,11 @@ class LogEvidence:
         """Facts of the log as a whole."""
         return self.surveyed.facts
 
+    @property
+    def places(self) -> dict[str, range]:
+        """Places of the parameters of every effect in a step of all parameters, by its id."""
+        return _places(self.surveyed, self.slots)
+
     def slow_gain(self, channel: int) -> float:
         """Return by how much whitening multiplies the square of what changes slowly in a channel."""
         return float((1.0 - sum(self.filters[channel])) ** 2)

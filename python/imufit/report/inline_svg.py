@@ -1,19 +1,65 @@
-"""Figures as SVG elements that stand inside a page."""
+"""Figures as SVG elements inside a page: text stays text, and colours follow the page's light or dark palette."""
 
 from __future__ import annotations
 
 import io
 import re
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from markupsafe import Markup
+
+from imufit.figures import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ID = re.compile(r'(\bid="|href="#|url\(#)')
-_SIZE = re.compile(r'<svg[^>]*?\swidth="[^"]*pt"[^>]*>')
+_OPENING = re.compile(r"<svg\b[^>]*>")
+_STYLE = re.compile(r'style="[^"]*"')
+_COLOUR = re.compile(r"#[0-9a-f]{6}")
+_FONT = re.compile(r" font-family: [^;\"]*;?")
+_GLOBAL = re.compile(r"<style\b.*?</style>", re.DOTALL)
+_DIGITS = re.compile(r' (?:d|x|y|width|height|transform)="[^"]*"')
+_LONG = re.compile(r"(\.\d)\d+")
+_NEXT = re.compile(r"\s*\nL ")
+_BLANK = re.compile(r"\s*\n\s*")
+
+PALETTE: Final = {
+    style.BLUE: "blue",
+    style.SKY: "sky",
+    style.ORANGE: "orange",
+    style.VERMILION: "vermilion",
+    style.GREEN: "green",
+    style.GREY: "grey",
+    style.PALE: "pale",
+    style.INK: "ink",
+    "#000000": "ink",
+    "#555555": "soft",
+    "#cccccc": "line",
+    "#b0b0b0": "line",
+    "#ffffff": "paper",
+}
+"""Colours of the figures and the variables of the page's style sheet that stand for them."""
+_VARIABLES: Final = {colour.lower(): f"var(--{name})" for colour, name in PALETTE.items()}
+
+
+def caption_of(figure: Figure) -> str:
+    """Take the title out of a figure and return it: words of a page wrap where those of a picture do not.
+
+    Parameters
+    ----------
+    figure : Figure
+        Any matplotlib figure; the titles of several panels stay.
+    """
+    title = figure.get_suptitle()
+    figure.suptitle("")
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    if len(shown) == 1:
+        title = " ".join((title or shown[0].get_title(loc="left") or shown[0].get_title()).split())
+        for place in ("left", "center"):
+            shown[0].set_title("", loc=place)
+    return title
 
 
 def inline_svg(figure: Figure, name: str, description: str) -> Markup:
@@ -26,7 +72,7 @@ def inline_svg(figure: Figure, name: str, description: str) -> Markup:
     name : str
         Prefix of all ids, unique in the page.
     description : str
-        What the figure shows, for readers who cannot see it.
+        Contents of the figure, for readers who cannot see it.
 
     Returns
     -------
@@ -37,18 +83,30 @@ def inline_svg(figure: Figure, name: str, description: str) -> Markup:
 
     buffer = io.StringIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": name}):
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", metadata=nothing)
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+    text = _GLOBAL.sub("", text, count=1)
     text = _ID.sub(rf"\g<1>{name}-", text)
+    text = _STYLE.sub(_themed, text)
+    # A digit behind the point is a tenth of a point, and lines go on to the next point by themselves.
+    text = _DIGITS.sub(lambda found: _NEXT.sub(" ", _LONG.sub(r"\1", found.group())), text)
+    text = _BLANK.sub("\n", text)
     box = re.search(r'viewBox="([^"]+)"', text)
-    width = float(box.group(1).split()[2]) * 96.0 / 72.0 if box else 1000.0
+    numbers = box.group(1) if box else "0 0 750 400"
+    width = float(numbers.split()[2]) * 96.0 / 72.0
     opening = (
         f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" role="img" '
-        f'aria-label="{escape(description, quote=True)}" viewBox="{box.group(1) if box else ""}" '
+        f'aria-label="{escape(description, quote=True)}" viewBox="{numbers}" '
         f'style="width:100%;max-width:{width:.0f}px;height:auto">'
     )
-    return Markup(_SIZE.sub(lambda _: opening, text, count=1))
+    return Markup(_OPENING.sub(lambda _: opening, text, count=1))
+
+
+def _themed(found: re.Match[str]) -> str:
+    """Replace the colours of one style by the page's variables, and the font by the page's own."""
+    style_text = _COLOUR.sub(lambda colour: _VARIABLES.get(colour.group(), colour.group()), found.group())
+    return _FONT.sub("", style_text)

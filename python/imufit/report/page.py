@@ -1,31 +1,46 @@
-"""The page: verdict, where, which, the error falling, what to do next."""
+"""The page: the answer, the fall of the error, where the model fails, which effect, the sensor in space, what next."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+import re
+from typing import TYPE_CHECKING, Any, Final
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from imufit.comparing.traces import STRETCHES
 from imufit.figures import quantity
 from imufit.remedy import command
-from imufit.report.inline_svg import inline_svg
-from imufit.report.words import with_words
-from imufit.results.comparison import MOST_PANELS, Panel, drawn_panels
-from imufit.results.diagnosis import VERDICTS
+from imufit.report.inline_svg import caption_of, inline_svg
+from imufit.report.interactive import STILL, interactive
+from imufit.report.pictures import (
+    PHONE,
+    SMALL,
+    WIDE,
+    Picture,
+    fitted_parameters,
+    in_order,
+    noise_of,
+    pictures,
+    worst_first,
+)
+from imufit.report.words import shown, with_words
+from imufit.results.diagnosis import PASSED, VERDICTS
+from imufit.results.noise_part import noise_table
 from imufit.results.parameter import in_lines, parameter_table
+from imufit.results.table import Table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from collections.abc import Sequence
 
-    from imufit.results import Addition, Candidate, Comparison, Diagnosis, Ladder
+    from imufit.results import Addition, Candidate, Comparison, Diagnosis, Ladder, LogRows
 
-_COVARIATES = 6
-_PANELS_AT_FIRST = 8
-_CANDIDATES = 20
-_WORST = {"missing": "warn", "ambiguous": "warn", "unknown": "stop", "adequate": "good"}
+_CANDIDATES: Final = 20
+_MOST_SENTENCES: Final = 3
+"""Sentences of the next step: more is a plan, and the plan stands in the documents."""
+_SENTENCE: Final = re.compile(r"(?<=[.!?])\s+(?=[A-Z])")
+_KINDS: Final = {"missing": "warn", "ambiguous": "warn", "unknown": "stop", "adequate": "good"}
 
 
 def page(
@@ -34,6 +49,7 @@ def page(
     ladder: Ladder | None = None,
     *,
     addition: Addition | None = None,
+    rows: LogRows | None = None,
     title: str = "Sensor model report",
 ) -> str:
     """Write results as one HTML page that needs no network.
@@ -42,6 +58,8 @@ def page(
     ----------
     comparison, diagnosis, ladder, addition : optional
         Whatever there is to show. A ladder brings its own comparison and diagnosis, which those given here replace.
+    rows : LogRows, optional
+        Rows of the log: traces of the channels, the measured field, the noise at rest.
     title : str
         Heading, for instance the log's name.
 
@@ -50,11 +68,10 @@ def page(
     str
         The page; figures are inline SVG.
     """
-    final = None
     if ladder is not None:
         comparison = comparison or ladder.comparison_start
         diagnosis = diagnosis or ladder.first or ladder.diagnosis
-        final = ladder.diagnosis if diagnosis is not ladder.diagnosis else None
+    last = ladder.diagnosis if ladder is not None else diagnosis
     environment = Environment(
         loader=PackageLoader("imufit.report", "templates"),
         autoescape=True,
@@ -62,29 +79,66 @@ def page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals.update(q=quantity, svg=inline_svg, in_lines=in_lines, plot_panels=_panels)
-    by_covariate = _by_covariate(comparison)
-    last = ladder.diagnosis if ladder is not None else diagnosis
+    environment.globals.update(q=quantity, shown=shown, wide=_filling, small=_beside)
+    end = ladder.comparison_end if ladder is not None and ladder.steps else None
+    ends = {item.channel: item.ratio for item in end.channels} if end is not None else {}
+    candidates = diagnosis.candidates[:_CANDIDATES] if diagnosis is not None else ()
+    standing = [item for item in candidates if _stands_out(item, diagnosis)]
+    order = worst_first(comparison)
+    chart = interactive(in_order(rows.traces, order)) if rows is not None and comparison is not None else None
     body = environment.get_template("page.html.j2").render(
         title=title,
+        chart=chart,
+        policy=STILL if chart is None else chart.policy,
+        stretches=STRETCHES,
+        log=rows.log if rows is not None else "",
         verdict=_verdict(comparison, last, ladder, addition),
+        judged=_judged(comparison, last),
+        faults=_faults(comparison, last),
+        pictures=pictures(comparison, diagnosis, ladder, addition=addition, rows=rows),
         comparison=comparison,
-        comparison_end=ladder.comparison_end if ladder is not None else None,
-        channels_end=_ratios(ladder.comparison_end if ladder is not None else None),
-        worst=_worst(comparison),
-        by_covariate=by_covariate[:_COVARIATES],
-        other_covariates=[(name, share) for name, share, _ in by_covariate[_COVARIATES:]],
-        panels_at_first=_PANELS_AT_FIRST,
+        comparison_end=end,
+        channels=_channel_table(comparison, ends),
+        worst=next(iter(order), ""),
+        shares=_shares(comparison),
+        attitude=ladder.attitude if ladder is not None else comparison.attitude if comparison is not None else None,
         diagnosis=diagnosis,
-        candidates=_candidates(diagnosis),
-        final=final,
+        standing=_candidate_table(standing),
+        others=_candidate_table([item for item in candidates if item not in standing]),
+        explanations=_explanations(standing, diagnosis),
+        not_shown=len(diagnosis.candidates) - len(candidates) if diagnosis is not None else 0,
+        final=last if last is not diagnosis else None,
         ladder=ladder,
         addition=addition,
-        fitted=_fitted(ladder, addition),
-        faults=_faults(comparison, last),
-        next_step=_next_step(last, ladder),
+        noise=noise_table(noise_of(ladder, diagnosis, rows)),
+        fitted=parameter_table(fitted_parameters(ladder, addition)),
+        next_steps=_next_steps(last, ladder),
     )
     return with_words(body, environment)
+
+
+def _filling(picture: Picture) -> Markup:
+    """Return a figure that fills the page, drawn twice: for a desk and for a phone, whichever the reader has."""
+    desk, phone = picture.draw(WIDE), picture.draw(PHONE)
+    caption_of(phone)
+    return _figure(
+        caption_of(desk),
+        Markup('<div class="desk">{}</div><div class="phone">{}</div>').format(
+            inline_svg(desk, f"{picture.name}-desk", picture.description),
+            inline_svg(phone, f"{picture.name}-phone", picture.description),
+        ),
+    )
+
+
+def _beside(picture: Picture) -> Markup:
+    """Return a figure with others beside it."""
+    drawn = picture.draw(SMALL)
+    return _figure(caption_of(drawn), inline_svg(drawn, picture.name, picture.description))
+
+
+def _figure(caption: str, contents: Markup) -> Markup:
+    head = Markup("<figcaption>{}</figcaption>").format(caption) if caption else Markup("")
+    return Markup("<figure>{}{}</figure>").format(head, contents)
 
 
 def _verdict(
@@ -97,48 +151,83 @@ def _verdict(
     sentence = diagnosis.sentence or VERDICTS.get(diagnosis.verdict, "")
     if ladder is not None:
         sentence = ladder.sentence or sentence
-    return {"word": diagnosis.verdict, "kind": _WORST.get(diagnosis.verdict, "plain"), "sentence": sentence}
+    return {"word": diagnosis.verdict, "kind": _KINDS.get(diagnosis.verdict, "plain"), "sentence": sentence}
 
 
-def _ratios(comparison: Comparison | None) -> dict[str, float]:
-    """Return each channel's ratio."""
-    return {item.channel: item.ratio for item in comparison.channels} if comparison else {}
+def _judged(comparison: Comparison | None, diagnosis: Diagnosis | None) -> Table | None:
+    """Return which sensors were judged, and why others were not."""
+    if diagnosis is not None and diagnosis.judged:
+        rows = tuple((item.sensor, "yes" if item.judged else "no", item.reason or "") for item in diagnosis.judged)
+    elif comparison is not None and comparison.sensors:
+        rows = tuple((sensor, "yes", "") for sensor in comparison.sensors)
+    else:
+        return None
+    if not any(reason for _, _, reason in rows):
+        return Table("", ("sensor", "judged"), tuple(row[:2] for row in rows))
+    return Table("", ("sensor", "judged", "reason"), rows)
 
 
-def _worst(comparison: Comparison | None) -> str:
-    """Return the channel furthest over its floor."""
-    ratios = {name: value for name, value in _ratios(comparison).items() if math.isfinite(value)}
-    return max(ratios, key=ratios.__getitem__) if ratios else ""
+def _channel_table(comparison: Comparison | None, ends: dict[str, float]) -> Table | None:
+    """Return the residual by channel, with the ratio after the ladder beside that before."""
+    if comparison is None:
+        return None
+    table = comparison.channel_table()
+    if not ends:
+        return table
+    header = (*table.header[:2], ">after the ladder", *table.header[2:])
+    rows = tuple((*row[:2], quantity.ratio(ends.get(row[0])), *row[2:]) for row in table.rows)
+    return Table(table.title, header, rows)
 
 
-def _by_covariate(comparison: Comparison | None) -> list[tuple[str, float, list[Panel]]]:
-    """Return (covariate, largest share, its panels), the worst covariate first."""
-    groups: dict[str, list[Panel]] = {}
-    for panel in comparison.panels if comparison else ():
-        groups.setdefault(panel.covariate, []).append(panel)
-    listed = [
-        (name, max((item.share for item in panels if math.isfinite(item.share)), default=0.0), panels)
-        for name, panels in groups.items()
-    ]
-    return sorted(listed, key=lambda group: -group[1])
+def _shares(comparison: Comparison | None) -> dict[str, str]:
+    """Return in words what each channel's residual depends on."""
+    found: dict[str, str] = {}
+    for panel in comparison.panels if comparison is not None else ():
+        if math.isfinite(panel.share) and panel.channel not in found:
+            found[panel.channel] = f"{panel.covariate} {quantity.share(panel.share)}"
+    return found
 
 
-def _candidates(diagnosis: Diagnosis | None) -> list[tuple[Candidate, Markup]]:
-    """Return the candidates with their typical sizes, as the ranked table shows them."""
-    return [(item, _typical(item)) for item in (diagnosis.candidates if diagnosis else ())[:_CANDIDATES]]
+def _explanations(candidates: Sequence[Candidate], diagnosis: Diagnosis | None) -> list[Candidate]:
+    """Return the best candidate and its rivals, where the answer's own sentence does not explain them."""
+    named = [item for item in candidates if diagnosis is not None and _is_named(item, diagnosis)]
+    return [item for item in named if item.explanation and diagnosis and item.explanation not in diagnosis.sentence]
 
 
-def _typical(candidate: Candidate) -> Markup:
+def _is_named(candidate: Candidate, diagnosis: Diagnosis) -> bool:
+    return candidate.effect == diagnosis.best or candidate.effect in diagnosis.ambiguous_with
+
+
+def _stands_out(candidate: Candidate, diagnosis: Diagnosis | None) -> bool:
+    """Return whether a candidate belongs to the answer: the best, its rivals, and what else is there."""
+    return diagnosis is not None and (_is_named(candidate, diagnosis) or candidate.status == PASSED)
+
+
+def _candidate_table(candidates: Sequence[Candidate]) -> Table:
+    """Return the candidates with their predicted parameters and rivals."""
+    header = ("effect", "status", ">before → expected", ">p", "predicted", "typical size", "smallest detectable")
+    rows = tuple(
+        (
+            item.effect,
+            item.status,
+            f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}",
+            quantity.p_value(item.p_value),
+            ", ".join(in_lines(item.parameters)) if item.status == PASSED else "-",
+            _typical(item),
+            item.smallest_detectable,
+            ", ".join(str(rival) for rival in item.confounded_with) or "-",
+        )
+        for item in candidates
+    )
+    return Table("", (*header, "rivals (correlation)"), rows)
+
+
+def _typical(candidate: Candidate) -> str:
     """Return the typical sizes of the candidate's parameters on one line."""
     sizes = dict.fromkeys(
         quantity.quantity(item.typical, item.unit) for item in candidate.parameters if item.typical is not None
     )
-    return Markup.escape(", ".join(sizes) or "-")
-
-
-def _panels(panels: Sequence[Panel], limit: int = MOST_PANELS) -> Figure:
-    """Return the figure of the worst panels."""
-    return drawn_panels(panels, limit=limit).root
+    return ", ".join(sizes) or "-"
 
 
 def _faults(comparison: Comparison | None, diagnosis: Diagnosis | None) -> dict[str, Any] | None:
@@ -150,23 +239,10 @@ def _faults(comparison: Comparison | None, diagnosis: Diagnosis | None) -> dict[
     return {"table": fault_table(faults), "sentences": [item.sentence for item in faults]} if faults else None
 
 
-def _fitted(ladder: Ladder | None, addition: Addition | None) -> dict[str, Any] | None:
-    """Return table and figure of the final model's parameters."""
-    if addition is not None:
-        parameters = tuple(addition.parameters)
-    else:
-        parameters = tuple(getattr(ladder.fit, "parameters", ()) or ()) if ladder is not None else ()
-    if not parameters:
-        return None
-    from imufit.results.parameter import drawn_parameters  # noqa: PLC0415
-
-    return {"table": parameter_table(parameters), "figure": drawn_parameters(parameters).root}
-
-
-def _next_step(diagnosis: Diagnosis | None, ladder: Ladder | None) -> str:
-    """Return what to do after reading the page."""
+def _next_steps(diagnosis: Diagnosis | None, ladder: Ladder | None) -> list[str]:
+    """Return what to do after reading the page, in at most three sentences."""
     if diagnosis is None:
-        return f"Ask which effect is missing: `{command('diagnose')}`."
+        return [f"Ask which effect is missing: `{command('diagnose')}`."]
     found = "; ".join(str(item) for item in diagnosis.unexplained)
     rivals = " and ".join(diagnosis.ambiguous_with)
     add = command("add", "Fit.add")
@@ -178,4 +254,4 @@ def _next_step(diagnosis: Diagnosis | None, ladder: Ladder | None) -> str:
         if ladder is not None and ladder.steps
         else "The model describes this log down to its noise; a harder motion could show more.",
     }
-    return diagnosis.experiment or steps.get(diagnosis.verdict, "")
+    return _SENTENCE.split(diagnosis.experiment or steps.get(diagnosis.verdict, ""))[:_MOST_SENTENCES]

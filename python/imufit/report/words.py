@@ -30,7 +30,7 @@ def with_words(page: str, environment: Environment) -> str:
     words = used_in([text for text in seen if text])
     section = environment.get_template("words.html.j2").render(
         words=[
-            {"word": term.word, "unit": _shown(term.unit), "means": _shown(term.means), "origin": _shown(term.origin)}
+            {"word": term.word, "unit": shown(term.unit), "means": shown(term.means), "origin": shown(term.origin)}
             for term in words
         ]
     )
@@ -38,6 +38,12 @@ def with_words(page: str, environment: Environment) -> str:
     return f"{before}{section}{end}{after}"
 
 
-def _shown(text: str) -> Markup:
-    """Return a definition as HTML: names from code are set as such, links are plain words."""
+def shown(text: str) -> Markup:
+    """Return text as HTML: names from code are set as such, links are plain words.
+
+    Parameters
+    ----------
+    text : str
+        With names from code in backticks, and links as in Markdown.
+    """
     return Markup(_CODE.sub(r"<code>\1</code>", str(escape(_LINK.sub(r"\1", text)))))

@@ -26,11 +26,13 @@ if TYPE_CHECKING:
         SeriesInfo,
     )
     from imufit.results.log_parameters import LogParameters
+    from imufit.results.log_rows import LogRows
     from imufit.results.model_comparison import ModelComparison
     from imufit.results.noise_part import NoisePart
     from imufit.results.parameter import Parameter
     from imufit.results.params import Params
     from imufit.results.recording import Recording, RecordingClock, RecordingGap
+    from imufit.results.residual_trace import ResidualTrace
     from imufit.results.result import Result
     from imufit.results.table import Table
     from imufit.results.tilt import Mark, TiltComparison, TiltFigures
@@ -83,6 +85,7 @@ else:
             "SeriesInfo",
         ),
         "log_parameters": ("LogParameters",),
+        "log_rows": ("LogRows",),
         "model_comparison": ("ModelComparison",),
         "noise_part": ("NoisePart",),
         "parameter": ("Parameter",),
@@ -92,6 +95,7 @@ else:
             "RecordingClock",
             "RecordingGap",
         ),
+        "residual_trace": ("ResidualTrace",),
         "result": ("Result",),
         "table": ("Table",),
         "tilt": (
@@ -130,6 +134,7 @@ __all__ = [
     "LogGap",
     "LogInfo",
     "LogParameters",
+    "LogRows",
     "Mark",
     "ModelComparison",
     "MotionInfo",
@@ -142,6 +147,7 @@ __all__ = [
     "RecordingClock",
     "RecordingGap",
     "ReferenceInfo",
+    "ResidualTrace",
     "RestInfo",
     "Result",
     "Revision",

@@ -110,6 +110,8 @@ class Ladder(Plotted, Result):
         Before the first step.
     fit : Any
         The final fit.
+    start : Any
+        The fit before the first step.
     sentence : str
         The result in words.
     revisions : tuple of Revision
@@ -129,6 +131,7 @@ class Ladder(Plotted, Result):
     fit: Any = field(default=None, repr=False)
     sentence: str = ""
     revisions: tuple[Revision, ...] = ()
+    start: Any = field(default=None, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of `ladder`; besides: revisions, rivals, what is unexplained, experiment, faults, parameters."""

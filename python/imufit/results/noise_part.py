@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_fields
 from imufit.results.part import Part
 from imufit.results.table import Table
+
+if TYPE_CHECKING:
+    from imufit.figures.place import Drawing, Place
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,3 +59,18 @@ def noise_table(parts: Sequence[NoisePart]) -> Table:
 
     rows = tuple(row(part) for part in parts)
     return Table("Noise", ("channel", "component", ">size", ">share of the floor"), rows)
+
+
+def drawn_noise(parts: Sequence[NoisePart], ax: Place | None = None) -> Drawing:
+    """Draw the components of the noise of every channel.
+
+    Parameters
+    ----------
+    parts : sequence of NoisePart
+        The components.
+    ax : Axes, Figure or SubFigure, optional
+        Where to draw, see :mod:`imufit.figures.place`.
+    """
+    from imufit.figures.noise_parts import noise_parts  # noqa: PLC0415
+
+    return noise_parts(parts, ax)
