@@ -1,5 +1,6 @@
 """Whoever reads the output may stop: the program ends without a word, as other programs do."""
 
+import json
 import os
 import subprocess
 import sys
@@ -44,6 +45,25 @@ def test_a_closed_pipe_ends_a_command_quietly(log: Path, arguments: tuple[str, .
         os.close(writing)
     assert done.stderr == b""
     assert done.returncode == 141
+
+
+def test_the_files_are_written_though_nobody_reads_the_output(log: Path, tmp_path: Path):
+    reading, writing = os.pipe()
+    os.close(reading)
+    answer = tmp_path / "answer.json"
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "imufit.cli.app", "compare", str(log), "--json", str(answer)],
+            stdout=writing,
+            stderr=subprocess.PIPE,
+            timeout=120,
+            check=False,
+        )
+    finally:
+        os.close(writing)
+    assert done.stderr == b""
+    assert done.returncode == 141
+    assert json.loads(answer.read_text())["channels"]
 
 
 def test_a_reader_that_takes_the_first_line_has_it(log: Path):

@@ -6,9 +6,11 @@ import json
 import os
 import sys
 from collections.abc import Iterable, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import click
 
 from imufit.printable import printable
 from imufit.whole_file import whole_file, write_text
@@ -44,6 +46,10 @@ def _harmless(text: str) -> str:
     return printable(text, _LONGEST_TEXT, keep="\n\t")
 
 
+def _raise(error: Exception) -> None:
+    raise error
+
+
 class Output:
     """Standard output for people, and the files that were requested.
 
@@ -55,6 +61,7 @@ class Output:
 
     def __init__(self, json_file: Path | None = None) -> None:
         self._json_file = json_file
+        self._closed = False
 
     @cached_property
     def _console(self) -> Console:
@@ -75,7 +82,7 @@ class Output:
     def say(self, *sentences: str, bold: bool = False) -> None:
         """Print sentences, one paragraph each."""
         for sentence in sentences:
-            if sentence:
+            if sentence and not self._closed:
                 self._console.print(_harmless(sentence), style="bold" if bold else None)
 
     def lines(self, lines: Iterable[str]) -> None:
@@ -84,11 +91,18 @@ class Output:
             self._console.print(_harmless(line), soft_wrap=True)
 
     def result(self, result: Result, verbose: bool) -> None:
-        """Print a result: the answer, its other sentences, then the tables of the answer or, if `verbose`, all."""
+        """Print a result: the answer, its other sentences, then the tables of the answer or, if `verbose`, all.
+
+        A reader that has gone away ends the printing; the requested files are still written.
+        """
         answer, *others = result.sentences()
-        self.say(answer, bold=True)
-        self.say(*others)
-        self.result_tables(result, verbose)
+        try:
+            self.say(answer, bold=True)
+            self.say(*others)
+            self.result_tables(result, verbose)
+        except BrokenPipeError as closed:
+            self._closed = True
+            click.get_current_context().call_on_close(partial(_raise, closed))
 
     def result_tables(self, result: Result, verbose: bool) -> None:
         """Print the tables of the answer and name the others; all of them if `verbose`."""
