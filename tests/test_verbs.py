@@ -94,6 +94,16 @@ def test_two_models_on_one_log(log: Log) -> None:
     found.plot()
 
 
+@pytest.mark.parametrize("effect", ["acc.bias", "gyr.scale", "mag.hard_iron"])
+def test_two_models_are_held_against_each_other_as_they_are(effect: str) -> None:
+    """An effect that is missing in one of them is not lent to it as a candidate."""
+    log = imufit.simulate("handheld", {effect: None}, 5, 60.0).to_log()
+    found = imufit.compare(log, [], [effect])
+    assert found.preferred == "second"
+    assert found.ln_bayes_factor > 5.0
+    assert found.second_ratio < found.first_ratio
+
+
 def test_two_models_that_the_log_leaves_alike(log: Log) -> None:
     found = imufit.compare(log, ["gyr.bias"], ["gyr.bias"])
     assert found.preferred == "neither"

@@ -126,7 +126,8 @@ def tried(fit: FittedStack, model: EffectStack) -> Tried:
     known = fit.analysis.candidates
     lost = [key for key, effect in known.items() if effect.reference_part == "bandwidth" and key not in model.effects]
     analysis, estimate = fit.analysis.solved_for(model, fit.own, only=lost)
-    return Tried(fit.analysis.ln_likelihood(analysis, estimate), estimate.held_out, analysis)
+    evidence = fit.analysis.ln_likelihood(analysis, estimate, analysis.candidate_slots)
+    return Tried(evidence, estimate.held_out, analysis)
 
 
 def _curved(analysis: Analysis, slot: int) -> bool:

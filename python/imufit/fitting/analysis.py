@@ -177,11 +177,10 @@ class Analysis:
             problem=_problem(evidence, model, self.unnamed, columns),
         )
 
-    def ln_likelihood(self, of: Analysis, estimate: Estimate) -> float:
+    def ln_likelihood(self, of: Analysis, estimate: Estimate, open_to: Sequence[int] = ()) -> float:
         """Log of the marginal likelihood of the logs under another stack, with the noise that its own residual has.
 
-        A stack changes the noise, too: what smooths the ideal reading smooths the noise of the reference. Each of the
-        other's candidates may be there or not.
+        A stack changes the noise, too: what smooths the ideal reading smooths the noise of the reference.
 
         Parameters
         ----------
@@ -189,6 +188,8 @@ class Analysis:
             The other stack; its rows are counted as those of this one, since a stack may lack some at the ends.
         estimate : Estimate
             Its best parameters.
+        open_to : sequence of int, optional
+            Slots of the other stack's candidates that may be there besides or not, one as likely as the other.
         """
         logs = [each.with_noise_after(of.own_step(k, estimate.step)) for k, each in enumerate(of.logs)]
         problem = _problem(logs, of.model, of.unnamed, [*of.candidates, *of.probes])
@@ -198,7 +199,7 @@ class Analysis:
         square = 0.5 * sum(sum(each.counts) for each in logs)
         members = len(of.model.effects)
         along = of.fitted_slots[members:]
-        return size + square + problem.ln_evidence(along, of.fitted_slots[:members], of.candidate_slots)
+        return size + square + problem.ln_evidence(along, of.fitted_slots[:members], list(open_to))
 
     def of_logs(self, chosen: Sequence[int]) -> Analysis:
         """Return the same evidence of some of the logs alone; effects that none of them can show are left out."""
