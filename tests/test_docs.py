@@ -63,7 +63,7 @@ def test_index_links_every_page():
         ("rust/inference/src/search.rs", "LARGEST_GAIN", "no gain above {}"),
         ("rust/inference/src/verdict.rs", "NAMED_SHARE", "named effects have at least {:.0%} of the evidence"),
         ("rust/inference/src/verdict.rs", "NOISE", "differ by no more than {} that noise"),
-        ("rust/inference/src/stack.rs", "ATTENUATION", "too small by {} times the noise's part"),
+        ("rust/inference/src/criterion.rs", "ATTENUATION", "too small by {} times the noise's part"),
         ("rust/fit/src/saturated.rs", "COMMON", "as much as {} samples of the whole"),
         ("rust/inference/src/held_out.rs", "FOLDS", "over {} folds"),
         ("rust/inference/src/bins.rs", "CONTRASTS", "up to degree {},"),

@@ -100,7 +100,7 @@ def test_device_is_followed_and_recorded_while_the_stream_runs_on(followed, tmp_
     assert str(log.n) in listening.recorded.message
     assert not list(tmp_path.glob("*.part*"))
     assert log.metadata.to_mapping()["recording"]["gaps"] == []
-    assert listening.state.n > before + log.n
+    until(lambda: listening.state.n > before + log.n)
     # a second one begins where a person says so, and the first one is not overwritten
     listening.record(path)
     until(lambda: not listening.recorded.running)

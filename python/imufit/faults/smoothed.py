@@ -63,15 +63,17 @@ class Gain:
             return None
         length = int(SEGMENT / step)
         segments: list[list[Array]] = []
+        whole = 0
         for begin, end in body.unbroken:
             edges = np.arange(max(begin, sensor.t[0]), min(end, sensor.t[-1]), step)
             if len(edges) <= length:
                 continue
+            whole += len(edges)
             rates = [np.diff(course.angle_at(edges), axis=0) / step for course in (sensor, body)]
             seen = sensor.seen(edges[:-1], edges[1:])
             starts = range(0, len(seen) - length + 1, length // 2)
             segments += [[rate[at : at + length] for rate in rates] for at in starts if seen[at : at + length].all()]
-        if len(segments) < LEAST_SEGMENTS:
+        if whole < LEAST_SEGMENTS * length or len(segments) < LEAST_SEGMENTS:
             return None
         window = np.hanning(length)[:, None]
         own, other, shared = np.zeros(length // 2 + 1), np.zeros(length // 2 + 1), np.zeros(length // 2 + 1, complex)

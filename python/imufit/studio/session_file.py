@@ -133,7 +133,7 @@ def _file(table: Mapping[str, Any], folders: Sequence[Path]) -> LogFile:
 def _found(name: str, folders: Sequence[Path]) -> Path:
     """Return where a log is: as the file states, or under its bare name in one of the folders."""
     for path in (Path(name), *(folder / Path(name).name for folder in folders)):
-        # A device or a pipe is no log: reading one might never end.
+        # A device or a pipe does not hold a log: reading one might never end.
         if path.is_file() or path.is_dir():
             return path
     raise InputError(
