@@ -207,9 +207,10 @@ class Output:
         drawn = list(pictures(**results))
         for picture in drawn:
             figure = picture.draw(picture.width or WIDE)
+            figure.lay_out()
             for ending in ("png", "svg"):
                 with whole_file(plots / f"{picture.name}.{ending}") as file:
-                    figure.savefig(file, format=ending, dpi=150, bbox_inches="tight")
+                    figure.savefig(file, format=ending, dpi=150)
         self.say(f"wrote {len(drawn)} figures into {plots}")
 
     def plot(self, path: Path | None, figure: Figure) -> None:

@@ -52,6 +52,18 @@ class PlainFigure(Figure):
         renderer : RendererBase
             Where to.
         """
+        self._keep_text()
+        super().draw(renderer)
+
+    def lay_out(self) -> None:
+        """Find the layout now and keep it: finding it takes longer than drawing, and each saving would find it anew."""
+        self._keep_text()
+        engine = self.get_layout_engine()
+        if engine is not None:
+            engine.execute(self)
+            self.set_layout_engine(None)
+
+    def _keep_text(self) -> None:
         numbers = set()
         for axes in self.axes:
             for axis in (axes.xaxis, axes.yaxis):
@@ -61,7 +73,6 @@ class PlainFigure(Figure):
         for text in self.findobj(Text):
             if text not in numbers:
                 text.set_parse_math(False)
-        super().draw(renderer)
 
     def _repr_png_(self) -> bytes:
         """Show the figure in a notebook, where only figures of pyplot show themselves."""
@@ -85,7 +96,7 @@ class PlainFigure(Figure):
         return {"image/png": self._repr_png_()}
 
 
-def new_figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> PlainFigure:
     """Empty figure on white whose parts never overlap.
 
     Parameters
@@ -95,7 +106,7 @@ def new_figure(width: float, height: float) -> Figure:
 
     Returns
     -------
-    Figure
+    PlainFigure
         Not registered with pyplot: nothing keeps it alive but its user.
     """
     figure = PlainFigure(figsize=(width, height), dpi=100, layout="constrained")
@@ -117,7 +128,7 @@ def new_grid(rows: int, columns: int, width: float, height: float) -> tuple[Figu
 
     Returns
     -------
-    Figure
+    PlainFigure
         Not registered with pyplot.
     list of Axes
         Row by row.

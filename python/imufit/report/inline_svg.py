@@ -62,13 +62,13 @@ def caption_of(figure: Figure) -> str:
     return title
 
 
-def inline_svg(figure: Figure, name: str, description: str) -> Markup:
+def inline_svg(figure: style.PlainFigure, name: str, description: str) -> Markup:
     """Figure as one ``<svg>`` element that scales with the page.
 
     Parameters
     ----------
-    figure : Figure
-        Any matplotlib figure.
+    figure : PlainFigure
+        The figure, complete.
     name : str
         Prefix of all ids, unique in the page.
     description : str
@@ -83,6 +83,7 @@ def inline_svg(figure: Figure, name: str, description: str) -> Markup:
 
     buffer = io.StringIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    figure.lay_out()
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", metadata=nothing)
     text = buffer.getvalue()

@@ -64,7 +64,7 @@ class Picture:
 
     name: str
     description: str
-    draw: Callable[[float], Figure]
+    draw: Callable[[float], style.PlainFigure]
     width: float | None = None
 
 
@@ -222,7 +222,7 @@ def _sized(
 ) -> Picture:
     """Make a picture of what draws itself on a figure."""
 
-    def drawn(width: float) -> Figure:
+    def drawn(width: float) -> style.PlainFigure:
         figure = style.new_figure(width, height)
         draw(figure)
         return figure
