@@ -123,6 +123,8 @@ def traces(held: Held, first: Held | None = None, log: int = 0) -> tuple[Residua
     out = []
     for index, rows_kept in sorted(kept.items()):
         t, drawn, shares = rows_kept.lines(facts.sensor_dt[index // 3])
+        if not t.size:
+            continue
         moved = {
             key: part for key, part in zip(full, shares, strict=True) if np.nanmax(np.abs(part), initial=0.0) > 0.0
         }

@@ -299,6 +299,9 @@ class TimeScan:
         )
         note = f"{went_on}; {note.partition(': ')[2]}" if went_on else note
         times = stamps + place / counts[of] * steps[of]
+        if np.any(times <= stamps):
+            # Numbers of this size do not resolve the rows of a step.
+            raise self.repeated()
         return TimeRepair(rows, times, note, often=not seldom, anew=anew, periods=periods)
 
     def repeated(self) -> Exception:

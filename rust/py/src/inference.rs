@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::computing::compute;
-use crate::errors::value_error;
+use crate::errors::{input_error, value_error};
 use crate::fit::PyEvidence;
 use crate::verdict::PyVerdict;
 
@@ -26,8 +26,10 @@ type Saturated<'py> = (Bound<'py, PyArray1<f64>>, Vec<f64>, Vec<Vec<f64>>);
 /// over that of its channel (channels, blocks)).
 #[pyfunction]
 fn saturate<'py>(py: Python<'py>, evidence: &PyEvidence) -> PyResult<Saturated<'py>> {
-    let fitted = compute(py, || saturated::fit_all(&evidence.0))?
-        .ok_or_else(|| value_error("the normal equations cannot be solved: the log holds no usable samples"))?;
+    let fitted = compute(py, || saturated::fit_all(&evidence.0))?.ok_or_else(|| {
+        let problem = "the effects cannot be fitted together: no sensor has enough usable readings";
+        input_error(py, problem)
+    })?;
     Ok((
         PyArray1::from_slice(py, fitted.step.as_slice()),
         fitted.variance.to_vec(),
