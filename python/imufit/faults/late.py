@@ -21,7 +21,7 @@ from imufit.faults.samples import Samples, samples
 from imufit.faults.turning import LEAST_SWING, Turning
 from imufit.joining.likeliest import CommonRates, Likeliest, likeliest
 from imufit.joining.refine import Aligned
-from imufit.joining.search import Correlation
+from imufit.joining.search import Correlation, comparable
 from imufit.results import fault_words
 from imufit.results.data_fault import DataFault
 
@@ -57,6 +57,8 @@ def late_faults(turning: Turning, parts: Sequence[Part], facts: _imufit.Facts, p
         None where the rates agree as declared or after a lag that `ref.delay` follows.
     """
     sensor, body = turning.sensor, turning.body
+    if not comparable(sensor, body):
+        return []
     rates = Correlation(sensor, body)
     declared = CommonRates.of(sensor, body, rates, AS_DECLARED)
     left = _left_by_an_effect(declared)

@@ -18,7 +18,7 @@ from imufit.joining.joined import Compared, Joined, RateTrace
 from imufit.joining.likeliest import Likeliest, Placed, likeliest_of_all_widths, placed
 from imufit.joining.mount import SMALL, nearest_square_turn, turned
 from imufit.joining.refine import Aligned, refine
-from imufit.joining.search import FASTER, LEAST_OVERLAP, Candidate, Correlation
+from imufit.joining.search import FASTER, Candidate, Correlation, comparable
 from imufit.log import Log
 from imufit.log.assemble import attitude_of_rig
 from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
@@ -76,7 +76,7 @@ def join(log: Log, reference: Log, lag: float | None = None, skew: float | None 
 def _join_attitude(log: Log, reference: Log, lag: float | None, skew: float | None, by_gravity: bool = True) -> Joined:
     """Join an attitude; the mount is found by gravity too, unless the reference frame need not be level."""
     sensor, body, rows = _courses(log, reference)
-    if min(float(course.t[-1] - course.t[0]) for course in (sensor, body)) < LEAST_OVERLAP:
+    if not comparable(sensor, body):
         raise _apart(reference)
     rates = Correlation(sensor, body)
     if lag is None:

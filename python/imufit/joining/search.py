@@ -117,6 +117,12 @@ def bin_width(sensor: Course, reference: Course) -> float:
     return max(STEP, longest / MOST_BINS, *sampled)
 
 
+def comparable(sensor: Course, reference: Course) -> bool:
+    """Say whether each recording is long enough to be found in the other: some seconds, and some bins."""
+    shorter = min(float(course.t[-1] - course.t[0]) for course in (sensor, reference))
+    return shorter >= max(LEAST_OVERLAP, 2.0 * bin_width(sensor, reference))
+
+
 @dataclass(frozen=True)
 class _Lags:
     """Sums at every lag with one skew: log likelihood ratio (lags,) and products of the rates (9, lags)."""
