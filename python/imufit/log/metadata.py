@@ -128,7 +128,9 @@ def mapping_from_json(text: str | bytes, file: Path) -> dict[str, Any]:
 
 def sidecar_path(path: Path) -> Path:
     """Place of the sidecar of a log: the same name with the suffix ``.toml``."""
-    return path.with_suffix(".toml")
+    # A folder may be given as "." or "/", which are without a name.
+    named = path if path.name else path.resolve()
+    return named.with_suffix(".toml") if named.name else named / "log.toml"
 
 
 def read_sidecar(path: Path) -> dict[str, Any]:
