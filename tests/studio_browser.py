@@ -1,13 +1,11 @@
-"""A studio in a process of its own, and a browser that looks at it."""
+"""A studio in a process of its own, and the parts of its page."""
 
 import os
 import signal
 import subprocess
 import sys
 from contextlib import contextmanager
-from pathlib import Path
 
-CHROMIUM = Path("/usr/bin/chromium")
 SLOW_MS = 60_000
 """Time that a step may take on a busy machine, ms: ten times what the slowest takes on a quiet one."""
 
@@ -28,19 +26,6 @@ def studio(folder, *arguments):
         process.send_signal(signal.SIGINT)
         process.wait(timeout=30)
         process.stdout.close()
-
-
-@contextmanager
-def browser():
-    """Debian's Chromium without a window."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
-        try:
-            yield running
-        finally:
-            running.close()
 
 
 def marked(page, mark):

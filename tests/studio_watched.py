@@ -2,9 +2,6 @@
 
 from urllib.parse import urlsplit
 
-WEBGL = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-"""Arguments of Chromium with WebGL by software: machines that run tests have no graphics card."""
-
 
 def strangers(page):
     """List that fills with the addresses outside this computer that a page asks for."""

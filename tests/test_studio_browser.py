@@ -8,18 +8,15 @@ import urllib.error
 import urllib.request
 from urllib.parse import urlsplit
 
-import pytest
-
-pytest.importorskip("nicegui")
-pytest.importorskip("playwright")
-
 import imufit
+import pytest
+from browser import chromium as started_chromium
+from browser import needs_chromium
 from imufit.figures import quantity
 from imufit.lab.simulate import simulate
-from imufit.lab.simulated_log import log_of
-from studio_browser import CHROMIUM, SLOW_MS, bars, browser, figure, idle, marked, studio, wait_for_bars
+from studio_browser import SLOW_MS, bars, figure, idle, marked, studio, wait_for_bars
 
-pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason="Debian's chromium is not installed")
+pytestmark = needs_chromium
 
 EFFECTS = {"acc.bias": {"x": 0.08, "y": -0.05, "z": 0.03}, "gyr.scale": {"x": 0.03, "y": -0.02, "z": 0.02}}
 HOSTILE = (
@@ -34,7 +31,7 @@ HOSTILE = (
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("browser")
-    log = log_of(simulate("handheld", EFFECTS, duration=40.0, rate=50.0, seed=4))
+    log = simulate("handheld", EFFECTS, duration=40.0, rate=50.0, seed=4).to_log()
     log.write(path / "walk.parquet")
     log.with_fields(ref_q=None, ref_p=None).write(path / "sensor.csv")
     imufit.Log.from_arrays(log.t + 0.5, ref_q=log.ref_q).write(path / "mocap.csv")
@@ -45,7 +42,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def chromium():
-    with browser() as running:
+    with started_chromium() as running:
         yield running
 
 
@@ -290,7 +287,7 @@ def test_the_demonstration_leads_to_a_named_effect_and_a_fallen_error(chromium, 
 
 
 def test_a_button_applies_the_remedy_of_a_fault(page, folder):
-    log_of(simulate("handheld", {}, duration=40.0, rate=50.0, seed=6, frame="ENU")).write(folder / "frame.csv")
+    simulate("handheld", {}, duration=40.0, rate=50.0, seed=6, frame="ENU").to_log().write(folder / "frame.csv")
     sidecar = folder / "frame.toml"
     sidecar.write_text(sidecar.read_text().replace('"ENU"', '"NED"'))
     drop(page, folder / "frame.csv", sidecar)

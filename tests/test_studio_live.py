@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
+from browser import WEBGL, chromium, needs_chromium
 from imufit.log import read
-from studio_browser import CHROMIUM, studio
-from studio_watched import WEBGL, problems, strangers
+from studio_browser import studio
+from studio_watched import problems, strangers
 
-pytest.importorskip("nicegui")
-sync_api = pytest.importorskip("playwright.sync_api")
-pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason="Debian's Chromium is not installed")
+pytestmark = needs_chromium
 PATIENCE = 30_000  # ms
 DRAWN = "[...document.querySelectorAll('.js-plotly-plot')].map(plot => plot.data[0].x.length)"
 """Points of the first trace of every figure."""
@@ -17,10 +16,8 @@ DRAWN = "[...document.querySelectorAll('.js-plotly-plot')].map(plot => plot.data
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
     folder = tmp_path_factory.mktemp("live")
-    with studio(folder) as address, sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=WEBGL)
+    with studio(folder) as address, chromium(WEBGL) as browser:
         yield folder, address, browser
-        browser.close()
 
 
 def number(page, name):

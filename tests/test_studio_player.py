@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from browser import WEBGL, chromium, needs_chromium
 from imufit.lab.simulate import simulate
 from imufit.studio.attitudes import reference_track, scene_rotation
-from studio_browser import CHROMIUM, SLOW_MS, idle, studio
-from studio_watched import WEBGL, problems, strangers
+from studio_browser import SLOW_MS, idle, studio
+from studio_watched import problems, strangers
 
-pytest.importorskip("nicegui")
-sync_api = pytest.importorskip("playwright.sync_api")
-pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason="Debian's Chromium is not installed")
+pytestmark = needs_chromium
 
 TURNED = """() => {
     const scene = document.querySelector('.studio-body');
@@ -25,8 +24,7 @@ TURNED = """() => {
 def test_player_turns_the_bodies_as_the_log_says(tmp_path):
     log = simulate("handheld", {"gyr.bias": {"x": 0.02, "y": -0.01, "z": 0.03}}, 3, 30.0).to_log()
     log.write(tmp_path / "walk.parquet")
-    with studio(tmp_path, "walk.parquet") as address, sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=WEBGL)
+    with studio(tmp_path, "walk.parquet") as address, chromium(WEBGL) as browser:
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         asked, wrong = strangers(page), problems(page)
         page.goto(address)
@@ -59,4 +57,3 @@ def test_player_turns_the_bodies_as_the_log_says(tmp_path):
         assert set(page.evaluate(TURNED)) == {"measured", "reference"}
         assert asked == []
         assert wrong == []
-        browser.close()

@@ -14,7 +14,6 @@ import pytest
 from cli_stand_in import strict_json
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
-from imufit.lab.simulated_log import log_of
 from imufit.log import Reading
 from imufit.studio.log_file import LogFile, Way, arrived, offers, option_words, remedies
 from imufit.studio.recipe import as_python, as_shell
@@ -28,7 +27,7 @@ EFFECTS = {"acc.bias": None, "gyr.scale": None}
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("studio")
-    log_of(simulate("handheld", EFFECTS, duration=40.0, rate=50.0, seed=4)).write(path / "walk.parquet")
+    simulate("handheld", EFFECTS, duration=40.0, rate=50.0, seed=4).to_log().write(path / "walk.parquet")
     return path
 
 
@@ -230,7 +229,7 @@ def test_a_session_comes_back_from_its_file(session, folder):
 
 
 def test_two_files_are_offered_to_be_joined(tmp_path):
-    log = log_of(simulate("handheld", {"gyr.bias": None}, duration=40.0, rate=50.0, seed=5))
+    log = simulate("handheld", {"gyr.bias": None}, duration=40.0, rate=50.0, seed=5).to_log()
     log.with_fields(ref_q=None, ref_p=None).write(tmp_path / "sensor.csv")
     imufit.Log.from_arrays(log.t + 0.5, ref_q=log.ref_q).write(tmp_path / "mocap.csv")
     arrivals = [arrived(LogFile(tmp_path / name, name)) for name in ("mocap.csv", "sensor.csv")]
@@ -246,7 +245,7 @@ def test_two_files_are_offered_to_be_joined(tmp_path):
 
 
 def test_a_fault_is_mended_by_the_options_of_its_remedy(tmp_path):
-    log = log_of(simulate("handheld", {}, duration=60.0, rate=50.0, seed=6, frame="ENU"))
+    log = simulate("handheld", {}, duration=60.0, rate=50.0, seed=6, frame="ENU").to_log()
     log.write(tmp_path / "walk.csv")
     file = LogFile(tmp_path / "walk.csv", "walk.csv", Reading(frame="NED"))
     session = Session([file.open()])

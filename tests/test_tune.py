@@ -8,7 +8,6 @@ import pytest
 from cli_stand_in import run, strict_json
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
-from imufit.lab.simulated_log import log_of
 from imufit.log import Log
 from imufit.replaying import FILTERS, read_settings, replay
 from imufit.tuning import tune
@@ -19,7 +18,7 @@ BIASED = {"gyr.bias": {"x": 0.01, "y": -0.02, "z": 0.01}}
 
 
 def handheld(seed: int = 3, duration: float = 30.0, effects=BIASED) -> Log:
-    return log_of(simulate("handheld", effects, duration=duration, rate=50.0, seed=seed))
+    return simulate("handheld", effects, duration=duration, rate=50.0, seed=seed).to_log()
 
 
 @pytest.fixture(scope="module")

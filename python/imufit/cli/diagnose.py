@@ -60,8 +60,7 @@ def diagnose(
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
         diagnosis = fit.diagnose(progress=progress)
         shown = html_file is not None or plots is not None
-        compared = shown and diagnosis.evidence == "reference"
-        comparison = fit.compare(progress=progress) if compared else None
+        comparison = engine.compared(fit, progress) if shown else None
         rows = engine.rows_of_fit(fit, candidate=diagnosis.best, progress=progress) if shown else None
     output.result(diagnosis, verbose)
     output.json(diagnosis.to_dict())

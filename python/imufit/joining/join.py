@@ -78,12 +78,11 @@ def _join_attitude(log: Log, reference: Log, lag: float | None, skew: float | No
     sensor, body, rows = _courses(log, reference)
     if not comparable(sensor, body):
         raise _apart(reference)
-    rates = Correlation(sensor, body)
+    rates = Correlation(sensor, body, skew)
     if lag is None:
         found, rival = _only_one(likeliest_of_all_widths(sensor, body, skew), (log, reference))
         best = placed(sensor, body, rates, found.aligned)
     else:
-        rates = Correlation(sensor, body, skew)
         refined = refine(sensor, body, replace(rates.at(lag), lag=lag), skew is not None, lag_known=True)
         if refined is None:
             raise _apart(reference)

@@ -1,4 +1,4 @@
-"""A simulation as a log, and as a file with its sealed truth beside it."""
+"""A simulation as a file, with its sealed truth beside it."""
 
 from __future__ import annotations
 
@@ -6,33 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from imufit.lab.simulate import seal
-from imufit.log import Log
 
 if TYPE_CHECKING:
     from imufit.lab.simulate import Simulation
-
-
-def log_of(simulation: Simulation) -> Log:
-    """Return the log of a simulation, without the truth.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        The simulated readings.
-    """
-    return Log.from_arrays(
-        simulation.t,
-        acc=simulation.acc,
-        gyr=simulation.gyr,
-        mag=simulation.mag,
-        temp=simulation.temp,
-        reference=simulation.ref_q,
-        ref_p=simulation.ref_p,
-        ref_angle=simulation.ref_angle,
-        pose=None if simulation.pose is None else simulation.pose.tolist(),
-        covariates=simulation.covariates,
-        **simulation.metadata,
-    )
 
 
 def save_simulation(simulation: Simulation, path: Path) -> Path:
@@ -45,5 +21,5 @@ def save_simulation(simulation: Simulation, path: Path) -> Path:
     path : Path
         The log; its ending chooses the format.
     """
-    log_of(simulation).write(path)
+    simulation.to_log().write(path)
     return seal(simulation.truth, path)

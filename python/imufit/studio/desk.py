@@ -144,9 +144,12 @@ class Desk:
         self.trouble, self.cures, self._troubled = problem, cures if file is not None else [], file
         self._failed = True
 
+    def _no_trouble(self) -> None:
+        self.trouble, self.cures, self._troubled = "", [], None
+
     def forget_trouble(self) -> None:
         """Put the last problem away."""
-        self.trouble, self.cures, self._troubled = "", [], None
+        self._no_trouble()
         self.changed.emit()
 
     async def attempt(self, action: Callable[[], None]) -> None:
@@ -157,7 +160,7 @@ class Desk:
         action : callable
             The change; a quick one.
         """
-        self.trouble, self.cures, self._troubled = "", [], None
+        self._no_trouble()
         try:
             action()
         except InputError as error:
@@ -286,7 +289,7 @@ class Desk:
         self.traces, self.models = None, {}
         self.session, self.files, self.mystery = session, tuple(files), mystery
         self.arrivals, self.channel, self.covariate = [], None, None
-        self.trouble, self.cures, self._troubled = "", [], None
+        self._no_trouble()
         self.changed.emit()
 
     async def mend(self, option: Option, number: int = 0) -> None:

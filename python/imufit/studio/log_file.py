@@ -153,7 +153,7 @@ class Arrival:
     reference : bool
         Whether it has a reference attitude, an angle or labelled poses.
     notes : tuple of str
-        What reading noticed or changed.
+        Notes of reading: faults that it noticed, and columns that it changed.
     """
 
     file: LogFile

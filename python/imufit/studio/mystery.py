@@ -86,7 +86,7 @@ class Verdict:
     sentences : tuple of str
         Truth, answer, evidence, and how sure one could have been.
     lesson : str
-        What the level teaches.
+        The sentence on the method.
     """
 
     right: bool
@@ -153,7 +153,7 @@ class Mystery:
         answer : str
             Id of an effect; empty answers that nothing is missing.
         first : Diagnosis
-            What the evidence says of the ideal sensor on this log.
+            The diagnosis of the ideal sensor on this log.
         """
         truth = unseal(self.log)
         hidden_effects = tuple(truth.effects)

@@ -140,7 +140,7 @@ class Step:
     Attributes
     ----------
     action : Action
-        What was done.
+        The action.
     effect : str
         To which effect; empty at the start.
     stack : Stack
