@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
 
+    from imufit.figures.style import PlainFigure
+    from imufit.report.pictures import Picture
     from imufit.results import Result, Table
 
 _WIDTH_OF_FILES = 150
@@ -197,21 +199,27 @@ class Output:
             As for `imufit.report.page`.
         """
         from imufit.report import page, pictures  # noqa: PLC0415
-        from imufit.report.pictures import WIDE  # noqa: PLC0415
 
+        saved = set[str]()
+
+        def saving(picture: Picture) -> PlainFigure:
+            figure = picture.complete()
+            if plots is not None:
+                for ending in ("png", "svg"):
+                    with whole_file(plots / f"{picture.name}.{ending}") as file:
+                        figure.savefig(file, format=ending, dpi=150)
+                saved.add(picture.name)
+            return figure
+
+        if plots is not None:
+            plots.mkdir(parents=True, exist_ok=True)
         if html_file is not None:
-            self.html(html_file, page(**results, title=title))
-        if plots is None:
-            return
-        plots.mkdir(parents=True, exist_ok=True)
-        drawn = list(pictures(**results))
-        for picture in drawn:
-            figure = picture.draw(picture.width or WIDE)
-            figure.lay_out()
-            for ending in ("png", "svg"):
-                with whole_file(plots / f"{picture.name}.{ending}") as file:
-                    figure.savefig(file, format=ending, dpi=150)
-        self.say(f"wrote {len(drawn)} figures into {plots}")
+            self.html(html_file, page(**results, title=title, complete=saving))
+        if plots is not None:
+            for picture in pictures(**results):
+                if picture.name not in saved:
+                    saving(picture)
+            self.say(f"wrote {len(saved)} figures into {plots}")
 
     def plot(self, path: Path | None, figure: Figure) -> None:
         """Write a figure."""

@@ -44,6 +44,9 @@ class PlainFigure(Figure):
     Only the numbers along an axis, which matplotlib itself writes as powers of ten, stay formulas.
     """
 
+    is_laid_out = False
+    """Whether the layout is found and kept."""
+
     def draw(self, renderer: RendererBase) -> None:
         """Draw it.
 
@@ -52,24 +55,34 @@ class PlainFigure(Figure):
         renderer : RendererBase
             Where to.
         """
-        self._keep_text()
+        if not self.is_laid_out:
+            self._keep_text()
         super().draw(renderer)
 
     def lay_out(self) -> None:
-        """Find the layout now and keep it: finding it takes longer than drawing, and each saving would find it anew."""
+        """Find the layout of a complete figure and keep it.
+
+        Finding it takes longer than drawing, and each saving would find it anew.
+        """
+        if self.is_laid_out:
+            return
         self._keep_text()
+        self.is_laid_out = True
         engine = self.get_layout_engine()
         if engine is not None:
             engine.execute(self)
             self.set_layout_engine(None)
 
     def _keep_text(self) -> None:
-        numbers = set()
+        numbers = set[Text]()
         for axes in self.axes:
             for axis in (axes.xaxis, axes.yaxis):
-                for which, formatter in ((False, axis.get_major_formatter()), (True, axis.get_minor_formatter())):
+                for formatter, ticks in (
+                    (axis.get_major_formatter(), axis.get_major_ticks()),
+                    (axis.get_minor_formatter(), axis.get_minor_ticks()),
+                ):
                     if not isinstance(formatter, FixedFormatter | FuncFormatter | StrCategoryFormatter):
-                        numbers.update(axis.get_ticklabels(minor=which))
+                        numbers.update(label for tick in ticks for label in (tick.label1, tick.label2))
         for text in self.findobj(Text):
             if text not in numbers:
                 text.set_parse_math(False)

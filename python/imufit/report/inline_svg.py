@@ -5,14 +5,12 @@ from __future__ import annotations
 import io
 import re
 from html import escape
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from markupsafe import Markup
+from matplotlib.transforms import Bbox
 
 from imufit.figures import style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _ID = re.compile(r'(\bid="|href="#|url\(#)')
 _OPENING = re.compile(r"<svg\b[^>]*>")
@@ -41,28 +39,40 @@ PALETTE: Final = {
     "#ffffff": "paper",
 }
 """Colours of the figures and the variables of the page's style sheet that stand for them."""
+EDGE: Final = 0.04
+"""Room above what is left of a figure without its title, inches: that of matplotlib's constrained layout."""
 _VARIABLES: Final = {colour.lower(): f"var(--{name})" for colour, name in PALETTE.items()}
 
 
-def caption_of(figure: Figure) -> str:
-    """Take the title out of a figure and return it: words of a page wrap where those of a picture do not.
+def untitled(figure: style.PlainFigure) -> tuple[str, Bbox]:
+    """Take the title out of a figure: words of a page wrap where those of a picture do not.
 
     Parameters
     ----------
-    figure : Figure
-        Any matplotlib figure; the titles of several panels stay.
+    figure : PlainFigure
+        The figure; the titles of several panels stay.
+
+    Returns
+    -------
+    str
+        The title.
+    Bbox
+        The part of the figure below it, inches: all of a figure that is not laid out.
     """
     title = figure.get_suptitle()
     figure.suptitle("")
     shown = [axes for axes in figure.axes if axes.get_visible()]
     if len(shown) == 1:
-        title = " ".join((title or shown[0].get_title(loc="left") or shown[0].get_title()).split())
+        title = title or shown[0].get_title(loc="left") or shown[0].get_title()
         for place in ("left", "center"):
             shown[0].set_title("", loc=place)
-    return title
+    width, height = figure.get_size_inches()
+    if title and figure.is_laid_out:
+        height = min(height, figure.get_tightbbox().y1 + EDGE)
+    return " ".join(title.split()), Bbox.from_bounds(0.0, 0.0, width, height)
 
 
-def inline_svg(figure: style.PlainFigure, name: str, description: str) -> Markup:
+def inline_svg(figure: style.PlainFigure, name: str, description: str, part: Bbox) -> Markup:
     """Figure as one ``<svg>`` element that scales with the page.
 
     Parameters
@@ -73,6 +83,8 @@ def inline_svg(figure: style.PlainFigure, name: str, description: str) -> Markup
         Prefix of all ids, unique in the page.
     description : str
         Contents of the figure, for readers who cannot see it.
+    part : Bbox
+        The part of the figure that is shown, inches.
 
     Returns
     -------
@@ -85,7 +97,7 @@ def inline_svg(figure: style.PlainFigure, name: str, description: str) -> Markup
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     figure.lay_out()
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
-        figure.savefig(buffer, format="svg", metadata=nothing)
+        figure.savefig(buffer, format="svg", metadata=nothing, bbox_inches=part)
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -12,12 +14,10 @@ from markupsafe import Markup
 from imufit.comparing.traces import STRETCHES
 from imufit.figures import quantity
 from imufit.remedy import command
-from imufit.report.inline_svg import caption_of, inline_svg
+from imufit.report.inline_svg import inline_svg, untitled
 from imufit.report.interactive import STILL, interactive
 from imufit.report.pictures import (
     PHONE,
-    SMALL,
-    WIDE,
     Picture,
     fitted_parameters,
     in_order,
@@ -34,7 +34,11 @@ from imufit.results.table import Table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from imufit.figures.style import PlainFigure
     from imufit.results import Addition, Candidate, Comparison, Diagnosis, Ladder, LogRows
+
+Complete: TypeAlias = "Callable[[Picture], PlainFigure]"
+"""Draws a picture at its usual width and finds its layout."""
 
 _CANDIDATES: Final = 20
 _MOST_SENTENCES: Final = 3
@@ -51,6 +55,7 @@ def page(
     addition: Addition | None = None,
     rows: LogRows | None = None,
     title: str = "Sensor model report",
+    complete: Complete = Picture.complete,
 ) -> str:
     """Write results as one HTML page that needs no network.
 
@@ -62,6 +67,8 @@ def page(
         Rows of the log: traces of the channels, the measured field, the noise at rest.
     title : str
         Heading, for instance the log's name.
+    complete : callable
+        Draws a picture at its usual width and finds its layout; may save what it drew.
 
     Returns
     -------
@@ -79,7 +86,9 @@ def page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals.update(q=quantity, shown=shown, wide=_filling, small=_beside)
+    environment.globals.update(
+        q=quantity, shown=shown, wide=partial(_filling, complete=complete), small=partial(_beside, complete=complete)
+    )
     end = ladder.comparison_end if ladder is not None and ladder.steps else None
     ends = {item.channel: item.ratio for item in end.channels} if end is not None else {}
     candidates = diagnosis.candidates[:_CANDIDATES] if diagnosis is not None else ()
@@ -117,23 +126,25 @@ def page(
     return with_words(body, environment)
 
 
-def _filling(picture: Picture) -> Markup:
+def _filling(picture: Picture, complete: Complete) -> Markup:
     """Return a figure that fills the page, drawn twice: for a desk and for a phone, whichever the reader has."""
-    desk, phone = picture.draw(WIDE), picture.draw(PHONE)
-    caption_of(phone)
+    desk, phone = complete(picture), picture.draw(PHONE)
+    caption, part = untitled(desk)
+    _, whole = untitled(phone)
     return _figure(
-        caption_of(desk),
+        caption,
         Markup('<div class="desk">{}</div><div class="phone">{}</div>').format(
-            inline_svg(desk, f"{picture.name}-desk", picture.description),
-            inline_svg(phone, f"{picture.name}-phone", picture.description),
+            inline_svg(desk, f"{picture.name}-desk", picture.description, part),
+            inline_svg(phone, f"{picture.name}-phone", picture.description, whole),
         ),
     )
 
 
-def _beside(picture: Picture) -> Markup:
+def _beside(picture: Picture, complete: Complete) -> Markup:
     """Return a figure with others beside it."""
-    drawn = picture.draw(SMALL)
-    return _figure(caption_of(drawn), inline_svg(drawn, picture.name, picture.description))
+    drawn = complete(picture)
+    caption, part = untitled(drawn)
+    return _figure(caption, inline_svg(drawn, picture.name, picture.description, part))
 
 
 def _figure(caption: str, contents: Markup) -> Markup:

@@ -67,6 +67,12 @@ class Picture:
     draw: Callable[[float], style.PlainFigure]
     width: float | None = None
 
+    def complete(self) -> style.PlainFigure:
+        """Draw it at its usual width, with its layout found."""
+        figure = self.draw(self.width or WIDE)
+        figure.lay_out()
+        return figure
+
 
 @dataclass(frozen=True)
 class Pictures:

@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 
 from imufit.glossary import used_in
 
-_UNSEEN = re.compile(r"<(style|svg|title)\b.*?</\1>", re.DOTALL)
+_UNSEEN = re.compile(r"<(style|script|svg|title)\b.*?</\1>", re.DOTALL)
 _TAG = re.compile(r"<[^>]*>")
 _LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
 _CODE = re.compile(r"`([^`]*)`")
