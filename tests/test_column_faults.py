@@ -16,8 +16,8 @@ from pasted import python_mappings, shell_mappings
 DEG = np.pi / 180.0
 
 
-def sound(seed: int = 5) -> Log:
-    return simulate("handheld", {}, seed=seed, duration=20.0, frame="ENU").to_log()
+def sound(seed: int = 5, scenario: str = "handheld") -> Log:
+    return simulate(scenario, {}, seed=seed, duration=20.0, frame="ENU").to_log()
 
 
 def faults(table: pd.DataFrame, log: Log, **told: object) -> tuple[DataFault, ...]:
@@ -53,9 +53,17 @@ def test_the_mapping_restores_the_columns(change, words) -> None:
         np.testing.assert_allclose(restored[name], right[name], rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.parametrize("told", [{"gravity": 1.0}, {"mag_reference": "flipped"}, {"mag_reference": "gauss"}])
-def test_metadata_that_the_readings_deny_are_named(told) -> None:
-    log = sound()
+@pytest.mark.parametrize(
+    ("told", "scenario"),
+    [
+        ({"gravity": 1.0}, "handheld"),
+        ({"gravity": 1.0}, "turntable"),  # without positions every ideal reading has the length of gravity
+        ({"mag_reference": "flipped"}, "handheld"),
+        ({"mag_reference": "gauss"}, "handheld"),
+    ],
+)
+def test_metadata_that_the_readings_deny_are_named(told, scenario: str) -> None:
+    log = sound(scenario=scenario)
     field = np.array(log.metadata.mag_reference)
     other = {"flipped": field * [1.0, 1.0, -1.0], "gauss": field * 0.01}
     told = {key: other[value].tolist() if isinstance(value, str) else value for key, value in told.items()}
