@@ -38,8 +38,8 @@ QUARTER: Final = 0.25
 TIE: Final = 0.01
 MIN_ROWS: Final = 200
 EXCITED: Final = {"acc": 0.5, "gyr": 0.05}
-"""RMS of the ideal readings, m/s^2 and rad/s, from which on they say something: ten times the noise of a consumer sensor,
-and less than the gravity of a log that states it in g."""
+"""RMS of the ideal readings, m/s^2 and rad/s, from which on they say something: ten times the noise of a consumer
+sensor, and less than the gravity of a log that states it in g."""
 EXCITED_FIELD: Final = 0.06
 """The same of the changes of the field, as a part of the field."""
 UNHEARD: Final = 2.5
