@@ -3,8 +3,7 @@
 Every filter that holds on to a vector replays a motion by hand (`moving` in tests/test_mekf.py) with and without bad
 samples of one sensor: one, two, or those of a second (all the same, noise, zeros), of each size in
 tests/test_bad_samples.py. The measure is the largest angle between both attitudes from 20 s after the last bad sample
-on; of the vertical where nothing shows the heading. Filters with a bound of their own there (`LEFT_OF`) have rows of
-their own.
+on; of the vertical where nothing shows the heading.
 
 Run: ``python benches/bad_samples.py [--seeds N] [--first SEED] [--write]``. With `--write` the table goes between the
 marks of the page, otherwise to standard output. Twenty-two logs take two minutes on one core.
@@ -22,7 +21,7 @@ from marked import markdown, write_between
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from test_bad_samples import AT, FILTERS, KINDS, LEFT, LEFT_OF, SIZES, apart, hand, with_bad  # noqa: E402  lies beside the tests
+from test_bad_samples import AT, FILTERS, KINDS, LEFT, SIZES, apart, hand, with_bad  # noqa: E402  lies beside the tests
 
 PAGE = ROOT / "docs" / "reliability.md"
 BEGIN, END = "<!-- bad samples -->", "<!-- end of bad samples -->"
@@ -61,8 +60,7 @@ def row(what: str, by_filter: dict[str, list[float]]) -> tuple[str, ...]:
 
 def page(found: dict[str, dict[str, list[float]]], command: str) -> str:
     """Write the table, and the command that made it."""
-    rows = [row(NAMES[kind], {n: v for n, v in found[kind].items() if n not in LEFT_OF}) for kind in KINDS]
-    rows += [row(f"`{name}`: {NAMES[kind]}", {name: found[kind][name]}) for name in LEFT_OF for kind in KINDS]
+    rows = [row(NAMES[kind], found[kind]) for kind in KINDS]
     header = ("bad samples of one sensor", ">runs", f">beyond {LEFT:g} deg", ">most, deg", "by")
     table = Table(title="", header=header, rows=tuple(rows))
     return f"{markdown(table)}\n\n`{command}`"

@@ -16,7 +16,7 @@ _CHOSEN: Final[dict[str, dict[str, float]]] = {
     "complementary": {"time_constant": 0.33},
     "kalman": {"acc_noise": 5e-3, "bias_walk": 1e-5},
     "mahony": {"k_p": 0.5, "k_i": 0.005, "k_2": 1.0},
-    "madgwick": {"beta": 0.041},
+    "madgwick": {"beta": 0.16},
     "hybrid": {"k_p": 0.5, "k_i": 0.005, "k_2": 1.0},
     "mekf": {"acc_noise": 5e-3, "mag_noise": 5e-3, "bias_walk": 1e-5},
 }

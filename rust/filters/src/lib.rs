@@ -35,6 +35,7 @@ pub mod madgwick;
 pub mod mahony;
 pub mod mekf;
 mod memory;
+mod met;
 pub mod parameter;
 pub mod quest;
 pub mod replay;

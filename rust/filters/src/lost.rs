@@ -12,7 +12,8 @@
 //!    must be too short for an acceleration: one that turns it by an angle `a` makes it `g / cos a` long, a wrong attitude
 //!    leaves it at `g`, and the middle decides.
 //! 4. The attitude is turned by the least rotation that brings the mean force up, and its heading is that of the field where
-//!    one is measured. What the filter had learned (bias, scale, their certainty) is that of the end of the last window but
+//!    one is measured. A filter that follows the field slowly keeps a heading that the field does not surely deny
+//!    ([`crate::met`](crate)). What the filter had learned (bias, scale, their certainty) is that of the end of the last window but
 //!    one that did not speak against it: the last one may hold the first bad readings.
 //! 5. A turn that bad rates may have made, larger than the limit ([`crate::bridge`](crate)), leaves the attitude where it is and takes back what was learned.
 //! 6. One window shows that attitude coarsely. The next [`WINDOWS`] together show it three times as well: the same turn is
@@ -22,6 +23,7 @@ use imufit_attitude::{Quaternion, Real};
 use nalgebra::{Matrix3, SimdBool, Vector3};
 
 use crate::filter::{Filter, Usage};
+use crate::met::{self, Met};
 use crate::{Environment, Sample};
 
 /// Time over which readings are summed in the body frame, s: a turn of 2000 deg/s is 40 degrees.
@@ -45,6 +47,11 @@ pub(crate) trait Follows<T: Real>: Filter<T> + Clone {
     fn limit(&self, time: f64, sound: &Self) -> T;
     /// The same for the heading of the field; `None` for a filter that does not follow the field.
     fn heading_limit(&self, sound: &Self) -> Option<T>;
+    /// Least turn about up that the field shows and that is carried out, rad; `variance`: that of the heading by what is known of
+    /// this field, rad^2. Nothing is too little for a filter that follows the field at once, or weighs it itself.
+    fn least_heading(&self, variance: T) -> T {
+        variance * T::splat(0.0)
+    }
     /// Goes on at `attitude`, with what `sound` had learned, in the lanes where the condition holds.
     fn find(&mut self, attitude: Quaternion<T>, sound: &Self, lost: T::SimdBool);
 }
@@ -152,6 +159,8 @@ pub struct Watched<F, T = f64> {
     on: bool,
     /// The filter at the end of the last two windows that did not speak against it, the older one first.
     sound: [F; 2],
+    /// The field in windows that did not speak against it.
+    met: Met<T>,
 }
 
 impl<T: Real, F: Follows<T>> Watched<F, T> {
@@ -163,6 +172,7 @@ impl<T: Real, F: Follows<T>> Watched<F, T> {
             environment: *environment,
             per_gravity: 1.0 / environment.gravity(),
             window: Window::first(),
+            met: Met::nothing(),
         }
     }
 
@@ -182,6 +192,7 @@ impl<T: Real, F: Follows<T>> Watched<F, T> {
     fn watch(&mut self) {
         self.window = Window::first();
         self.sound = [self.filter.clone(), self.filter.clone()];
+        self.met = Met::nothing();
     }
 
     /// Goes on with what was learned before rates that may be bad: what they taught is none of the sensor's.
@@ -234,7 +245,10 @@ impl<T: Real, F: Follows<T>> Watched<F, T> {
         let across = field - up * field.dot(&up);
         let shown = across.norm().simd_gt(field.norm() * T::splat(LEAST_SINE));
         let angle = up.dot(&across.cross(&known)).simd_atan2(across.dot(&known));
-        let angle = angle.select(shown, zero);
+        let sure = angle
+            .simd_abs()
+            .simd_gt(self.filter.least_heading(self.met.with(field, &up, WINDOW).1));
+        let angle = angle.select(shown & sure, zero);
         let limit = self.filter.heading_limit(&self.sound[0]);
         (angle, angle.simd_abs().simd_gt(limit.unwrap_or(T::splat(f64::MAX))))
     }
@@ -266,6 +280,9 @@ impl<T: Real, F: Follows<T>> Watched<F, T> {
             let found = (Quaternion::exp(&(up * heading)) * level * self.filter.attitude()).renormalised();
             self.filter.find(found, &self.sound[0], lost | refined);
         }
+        let up = self.environment.up().map(T::splat);
+        let shown = window.north.norm_squared().simd_gt(zero) & !(against | refining);
+        self.met = self.met.with(&window.north, &up, WINDOW).0.select(shown, self.met);
         if !(against | refining).any() {
             self.sound.swap(0, 1);
             self.sound[1] = self.filter.clone();
@@ -327,12 +344,14 @@ impl<T: Real, F: Follows<T>> Filter<T> for Watched<F, T> {
         let mut state = self.filter.state();
         state.extend(self.sound.iter().flat_map(F::state));
         state.extend(self.window.numbers());
+        state.extend(self.met.numbers());
         state
     }
 
     fn set_state(&mut self, state: &[T]) -> bool {
-        let each = state.len().saturating_sub(NUMBERS) / 3;
-        if state.len() != 3 * each + NUMBERS || each == 0 {
+        let all = NUMBERS + met::NUMBERS;
+        let each = state.len().saturating_sub(all) / 3;
+        if state.len() != 3 * each + all || each == 0 {
             return false;
         }
         let (filters, own) = state.split_at(3 * each);
@@ -345,7 +364,9 @@ impl<T: Real, F: Follows<T>> Filter<T> for Watched<F, T> {
                 .zip(filters.chunks(each))
                 .all(|(filter, state)| filter.set_state(state));
         if taken {
-            found.window = Window::from_numbers(own);
+            let (window, met) = own.split_at(NUMBERS);
+            found.window = Window::from_numbers(window);
+            found.met = Met::from_numbers(std::array::from_fn(|k| met[k]));
             *self = found;
         }
         taken

@@ -24,7 +24,7 @@
 //! - A direction that is slower than the log counts for the time since its last reading: gradients are weighed by these times,
 //!   and the step is `beta` times the longest of them. Where all have the same time, that is the paper's step.
 //! - A field within `min_angle` of the vertical is not used.
-//! - The descent has a speed, `2 beta` rad/s, and no time constant: an error of 90 degrees takes 19 s with the default. A lost
+//! - The descent has a speed, `2 beta` rad/s, and no time constant: an error of 90 degrees takes 5 s with the default. A lost
 //!   attitude is found again before that ([`crate::lost`]).
 
 use imufit_attitude::Quaternion;
@@ -41,9 +41,9 @@ use crate::{Environment, Sample};
 pub const PARAMETERS: &[Parameter] = &[
     Parameter {
         name: "beta",
-        default: 0.041,
+        default: 0.16,
         unit: "rad/s",
-        meaning: "speed of the descent, the gyro's error that it makes good (paper: 0.033 without, 0.041 with a magnetometer): larger follows the vectors faster, smaller the gyro",
+        meaning: "speed of the descent, the gyro's error that it makes good (paper: 0.033 without, 0.041 with a magnetometer; default: back 20 s after bad samples): larger follows the vectors faster, smaller the gyro",
     },
     Parameter {
         name: "zeta",
@@ -58,6 +58,9 @@ pub const PARAMETERS: &[Parameter] = &[
         meaning: "where the field is closer to the vertical than this it is not used: smaller accepts noisier headings",
     },
 ];
+
+/// Standard deviations beyond which a heading is not explained by the field.
+const SURE: f64 = 4.0;
 
 /// Largest component of a turn in one step, rad: beyond any, and its square is a number of the machine.
 const LARGEST_TURN: f64 = 1e100;
@@ -224,6 +227,11 @@ impl Follows<f64> for Madgwick {
         Some(LOST_HEADING)
     }
 
+    /// The gyro holds the heading better than a disturbed field: once found there it would be left at `2 beta` rad/s.
+    fn least_heading(&self, variance: f64) -> f64 {
+        SURE * variance.sqrt()
+    }
+
     fn find(&mut self, attitude: Quaternion, sound: &Self, lost: bool) {
         if lost {
             self.put(attitude);
@@ -303,7 +311,7 @@ mod tests {
             let sample = standing(Quaternion::IDENTITY, &environment, field, Vector3::zeros());
             assert_eq!(filter.step(&sample), Usage::NoHeading);
             // Rounding has a direction, too: the descent goes on by a step of its speed.
-            assert!(filter.attitude().angle() <= 2.0 * 0.041 * DT + 1e-12);
+            assert!(filter.attitude().angle() <= 2.0 * PARAMETERS[0].default * DT + 1e-12);
         }
     }
 }
