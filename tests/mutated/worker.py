@@ -158,7 +158,7 @@ def _python(function: str, path: str) -> int:
 
 
 def _forget_peak() -> None:
-    """Begin to measure: memory that earlier inputs used and freed goes back to the system, as at the end of a command."""
+    """Begin to measure: memory that earlier inputs freed goes back to the system, as at the end of a command."""
     gc.collect()
     ctypes.CDLL("libc.so.6").malloc_trim(0)
     Path("/proc/self/clear_refs").write_text("5")
