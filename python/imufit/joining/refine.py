@@ -12,7 +12,7 @@ the rest of the mount) are fitted together (Gauss-Newton).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -202,6 +202,14 @@ class _Turns:
         there = ~body.gap & sensor.seen(t[:-1], t[1:])
         return cls(step, float(np.median(step)), 0.5 * (since[1:] + since[:-1]), there, own, body.rate * step[:, None])
 
+    def by_lag(self, turns: Array) -> Array:
+        """Derivative of turns, (n, 3), by the lag, rad/s; none beside a gap."""
+        rate = turns / self.step[:, None]
+        found = np.zeros_like(turns)
+        inner = self.there[2:] & self.there[:-2]
+        found[1:-1][inner] = 0.5 * (rate[:-2] - rate[2:])[inner]
+        return found
+
     def tame(self, left: Array) -> NDArray[np.bool_]:
         """Say where both were recorded and what is `left`, (n, 3), is not that of a wild pose."""
         size = np.where(self.there, np.linalg.norm(left, axis=1), np.nan)
@@ -303,12 +311,12 @@ def _sums(turns: _Turns, mount: Array, bias: Array, most: int | None) -> _Sums |
     body = turns.body @ mount.T
     left = turns.own - body - turns.step[:, None] * bias
     length = _length(turns.usual)
-    blocks = _Blocks.of(turns.tame(left), length, most)
+    turns = replace(turns, there=turns.tame(left))
+    blocks = _Blocks.of(turns.there, length, most)
     if not len(blocks.rows):
         return None
     spectra = _Spectra.of(blocks, turns.own - turns.step[:, None] * bias, body)
     weight = spectra.weight
-    turning = 2.0j * np.pi * fft.rfftfreq(length, turns.usual)[:, None]
     # Two sides of the spectrum, over the number of samples (Parseval).
     sides = np.full(length // 2 + 1, 2.0 / length)
     sides[0] = 1.0 / length
@@ -316,18 +324,23 @@ def _sums(turns: _Turns, mount: Array, bias: Array, most: int | None) -> _Sums |
         sides[-1] = 1.0 / length
     normals, scores = [], []
     noise = np.zeros((UNKNOWNS, UNKNOWNS))
+    # The noise of one recording is not in the other: the scores weigh the difference by what the sensor saw, and change
+    # with the unknowns as the reference saw it (instrumental variables).
+    by_lag = [(turns.by_lag(each), each) for each in (turns.own - turns.step[:, None] * bias, body)]
     for _, some in blocks.pieces():
-        own, other = some.transform(turns.own), some.transform(body)
+        seen = [(some.transform(moved), some.transform(each)) for moved, each in by_lag]
         rest, flat = some.transform(left), some.transform(turns.step[:, None])
         since = np.sum(turns.since[some.rows] * some.window**2, axis=1) / np.sum(some.window**2, axis=1)
         count = len(some.rows)
         normal, score = np.zeros((count, UNKNOWNS, UNKNOWNS)), np.zeros((count, UNKNOWNS))
         for axis in range(3):
             place = np.array([0, 1, 2 + 3 * axis, 3 + 3 * axis, 4 + 3 * axis, 11 + axis])
-            moved = -turning * other[..., axis : axis + 1]
-            columns = np.concatenate((moved, moved * since[:, None, None], -other, -flat), axis=2)
-            moved = -turning * own[..., axis : axis + 1]
-            known = np.concatenate((moved, moved * since[:, None, None], -other, -flat), axis=2)
+            known, columns = (
+                np.concatenate(
+                    (moved[..., axis, None], moved[..., axis, None] * since[:, None, None], -each, -flat), axis=2
+                )
+                for moved, each in seen
+            )
             scaled = known * (sides[:, None] * weight[:, :, axis].T)
             normal[:, place[:, None], place] += np.einsum("bfi,bfj->bij", scaled.conj(), columns).real
             score[:, place] += np.einsum("bfi,bf->bi", scaled.conj(), rest[..., axis]).real
