@@ -137,6 +137,9 @@ def refine(
     covariance = np.zeros((UNKNOWNS, UNKNOWNS))
     noise = (sums.noise / scatter + np.diag(prior))[np.ix_(free, free)]
     covariance[np.ix_(free, free)] = solved @ noise @ solved.T
+    if not lag_known and sums.noise[0, 0] == 0.0:
+        # No frequency at which both saw the same: nothing shows the lag.
+        covariance[0, 0] = np.inf
     to_start = np.array([1.0, start - middle])
     return Aligned(
         lag=float(at_middle + rate * (start - middle)),
@@ -159,9 +162,7 @@ def _averaged(reference: Course) -> Course:
     if len(rows) < 2:
         return reference
     first = reference.attitude[rows[:, 0]]
-    since = _imufit.quaternion_product(
-        np.repeat(first * CONJUGATE, every, axis=0), reference.attitude[rows.ravel()]
-    )
+    since = _imufit.quaternion_product(np.repeat(first * CONJUGATE, every, axis=0), reference.attitude[rows.ravel()])
     mean = _imufit.rotation_vector_from_quaternion(since).reshape(len(rows), every, 3).mean(axis=1)
     q = _imufit.quaternion_product(first, _imufit.quaternion_from_rotation_vector(mean))
     return reference_course(reference.t[rows].mean(axis=1), q)
@@ -216,8 +217,10 @@ class _Turns:
         length = _length(self.usual)
         number = np.minimum(np.arange(len(size)) // length, max(len(size) // length - 1, 0))
         cuts = np.flatnonzero(np.diff(number)) + 1
-        most = [np.full(len(each), WILD * np.median(each[~np.isnan(each)])) if not np.isnan(each).all() else each
-                for each in np.split(size, cuts)]
+        most = [
+            np.full(len(each), WILD * np.median(each[~np.isnan(each)])) if not np.isnan(each).all() else each
+            for each in np.split(size, cuts)
+        ]
         return np.asarray(self.there & ~(size > np.concatenate(most)))
 
 
@@ -380,7 +383,10 @@ class _Spectra:
                 [
                     np.sum(each, axis=0)
                     for each in (
-                        np.abs(one) ** 2, np.abs(other) ** 2, (one.conj() * other).real, np.abs(one - other) ** 2,
+                        np.abs(one) ** 2,
+                        np.abs(other) ** 2,
+                        (one.conj() * other).real,
+                        np.abs(one - other) ** 2,
                     )
                 ]
             )
@@ -399,7 +405,7 @@ class _Spectra:
 
     @property
     def weight(self) -> Array:
-        """Weights of residuals, by the unknown: (14 or rather 6, frequencies, 3)."""
+        """Weights of the difference in the scores of lag, skew, three of the linear map, bias: (6, frequencies, 3)."""
         share = self.motion / np.maximum(self.motion + self.open, 1e-300) / self.noise
         return np.stack([share] * 5 + [1.0 / self.noise])
 
