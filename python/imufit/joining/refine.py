@@ -5,8 +5,8 @@ Noise of the reference (white in its attitude) and of the gyroscope (a drift, vi
 own, and so has the motion. All three are estimated, axis by axis, from blocks that overlap by half, and each frequency
 counts by what its signal to noise ratio says about the delay (Hannan and Thomson 1973, Estimating group delay,
 Biometrika 60; Knapp and Carter 1976, The generalized correlation method for estimation of time delay, IEEE Trans.
-Acoustics, Speech, and Signal Processing 24). Lag, skew, the gyroscope's bias and a linear map of its rates (scale, axes,
-the rest of the mount) are fitted together (Gauss-Newton).
+Acoustics, Speech, and Signal Processing 24). Lag, skew, the gyroscope's bias and a linear map of its rates (scale,
+axes, the rest of the mount) are fitted together (Gauss-Newton).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from scipy import fft
 
 from imufit import _imufit
 from imufit.joining.course import CONJUGATE, Course, reference_course
-from imufit.joining.search import USUAL_SKEW, Candidate, turn_between
+from imufit.joining.search import USUAL_SKEW, Candidate, bin_width, turn_between
 
 Array = NDArray[np.float64]
 Transform = NDArray[np.complex128]
@@ -38,6 +38,8 @@ BAND: Final = 0.2
 """Half the band over which a spectrum is averaged, as a share of its frequency."""
 ROUNDS: Final = 12
 """Gauss-Newton steps at most."""
+UNHELD: Final = 4
+"""Steps that the prior of the skew does not hold."""
 WILD: Final = 20.0
 """A turn this many times as far off as the usual one (median) of its block is of a wild pose: of normal errors none is
 beyond four."""
@@ -115,13 +117,16 @@ def refine(
     free = np.ones(UNKNOWNS, np.bool_)
     free[:2] = not lag_known, not skew_known
     linear, bias = np.zeros((3, 3)), np.zeros(3)
+    # As far as the clocks may be off; at higher frequencies the phase of the motion does not show yet where they go.
+    off, reach = bin_width(sensor, reference), float(np.max(np.abs(reference.t - middle)))
     for turn in range(ROUNDS):
         turns = _Turns.of(sensor, body, at_middle, rate, middle)
-        sums = _sums(turns, (np.eye(3) + linear) @ near.mount, bias, most)
+        sums = _sums(turns, (np.eye(3) + linear) @ near.mount, bias, off, most)
         if sums is None:
             return None
-        # A Cauchy prior as the normal one of the same pull: a clock of a crystal is held, one that is far off is not.
-        held = 2.0 / (USUAL_SKEW**2 + rate**2)
+        # A Cauchy prior as the normal one of the same pull: a clock of a crystal is held, one that is far off is not. It
+        # has a maximum of its own near no skew, so that the first rounds go to that of the likelihood.
+        held = 0.0 if turn < UNHELD else 2.0 / (USUAL_SKEW**2 + rate**2)
         prior = np.concatenate(([0.0, held], np.full(9, LARGEST_ERROR**-2), np.zeros(3)))
         scatter = sums.scatter(free)
         normal = (sums.normal.sum(axis=0) / scatter + np.diag(prior))[np.ix_(free, free)]
@@ -130,7 +135,8 @@ def refine(
         step[free] = -np.linalg.lstsq(normal, pull[free])[0]
         at_middle, rate = at_middle + step[0], rate + step[1]
         linear, bias = linear + step[2:11].reshape(3, 3), bias + step[11:]
-        if turn > 2 and abs(step[0]) < 1e-6:
+        off = abs(step[0]) + abs(step[1]) * reach
+        if turn > UNHELD and abs(step[0]) < 1e-6:
             break
     assert sums is not None
     solved = np.linalg.pinv(normal)
@@ -204,7 +210,7 @@ class _Turns:
         return cls(step, float(np.median(step)), 0.5 * (since[1:] + since[:-1]), there, own, body.rate * step[:, None])
 
     def by_lag(self, turns: Array) -> Array:
-        """Derivative of turns, (n, 3), by the lag, rad/s; none beside a gap."""
+        """Differentiate turns, (n, 3), by the lag, rad/s; zero beside a gap."""
         rate = turns / self.step[:, None]
         found = np.zeros_like(turns)
         inner = self.there[2:] & self.there[:-2]
@@ -225,7 +231,7 @@ class _Turns:
 
 
 def _length(step: float) -> int:
-    """Samples in a block."""
+    """Count the samples in a block."""
     return max(LEAST_SAMPLES, round(BLOCK / step))
 
 
@@ -310,7 +316,7 @@ class _Sums:
         return max(1.0, float(np.mean(np.sum(left[:, :2] ** 2, axis=0) / usual)))
 
 
-def _sums(turns: _Turns, mount: Array, bias: Array, most: int | None) -> _Sums | None:
+def _sums(turns: _Turns, mount: Array, bias: Array, off: float, most: int | None) -> _Sums | None:
     body = turns.body @ mount.T
     left = turns.own - body - turns.step[:, None] * bias
     length = _length(turns.usual)
@@ -318,7 +324,8 @@ def _sums(turns: _Turns, mount: Array, bias: Array, most: int | None) -> _Sums |
     blocks = _Blocks.of(turns.there, length, most)
     if not len(blocks.rows):
         return None
-    spectra = _Spectra.of(blocks, turns.own - turns.step[:, None] * bias, body)
+    shown = 2.0 * np.pi * off * fft.rfftfreq(length, turns.usual) < 1.0
+    spectra = _Spectra.of(blocks, turns.own - turns.step[:, None] * bias, body, shown)
     weight = spectra.weight
     # Two sides of the spectrum, over the number of samples (Parseval).
     sides = np.full(length // 2 + 1, 2.0 / length)
@@ -374,7 +381,7 @@ class _Spectra:
     open: Array
 
     @classmethod
-    def of(cls, blocks: _Blocks, own: Array, body: Array) -> _Spectra:
+    def of(cls, blocks: _Blocks, own: Array, body: Array, shown: NDArray[np.bool_]) -> _Spectra:
         shape = 4, blocks.rows.shape[1] // 2 + 1, 3
         sums = np.zeros(shape)
         for _, some in blocks.pieces():
@@ -392,7 +399,7 @@ class _Spectra:
             )
         total = float(np.sum(blocks.window**2))
         sensor, reference, shared, noise = (_smooth(each) / total for each in sums)
-        motion = np.maximum(shared, 0.0)
+        motion = np.maximum(shared, 0.0) * shown[:, None]
         noise = np.maximum(noise, 1e-12 * noise.max() + 1e-300)
         # Up to the frequency at which it is likelier that both saw the same (Akaike 1974).
         number = total / blocks.rows.shape[1]
@@ -420,7 +427,7 @@ class _Spectra:
 
 def _half(count: int) -> NDArray[np.intp]:
     """Frequencies on either side over which a spectrum is averaged."""
-    return np.maximum(1, (BAND * np.arange(count)).astype(int))
+    return np.asarray(np.maximum(1, (BAND * np.arange(count)).astype(np.intp)))
 
 
 def _smooth(values: Array) -> Array:
