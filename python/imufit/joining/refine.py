@@ -124,8 +124,8 @@ def refine(
         sums = _sums(turns, (np.eye(3) + linear) @ near.mount, bias, off, most)
         if sums is None:
             return None
-        # A Cauchy prior as the normal one of the same pull: a clock of a crystal is held, one that is far off is not. It
-        # has a maximum of its own near no skew, so that the first rounds go to that of the likelihood.
+        # A Cauchy prior as the normal one of the same pull: a clock of a crystal is held, one that is far off is not.
+        # It has a maximum of its own near no skew, so that the first rounds go to that of the likelihood.
         held = 0.0 if turn < UNHELD else 2.0 / (USUAL_SKEW**2 + rate**2)
         prior = np.concatenate(([0.0, held], np.full(9, LARGEST_ERROR**-2), np.zeros(3)))
         scatter = sums.scatter(free)
@@ -401,7 +401,8 @@ class _Spectra:
         sensor, reference, shared, noise = (_smooth(each) / total for each in sums)
         motion = np.maximum(shared, 0.0) * shown[:, None]
         noise = np.maximum(noise, 1e-12 * noise.max() + 1e-300)
-        # Up to the frequency at which it is likelier that both saw the same (Akaike 1974).
+        # Up to the frequency at which it is likelier that both saw the same (Akaike 1974, A new look at the statistical
+        # model identification, IEEE Trans. Automatic Control 19).
         number = total / blocks.rows.shape[1]
         coherence = np.minimum(motion**2 / np.maximum(sensor * reference, 1e-300), 1.0 - 1e-9)
         width = 1.0 + 2.0 * _half(len(motion))
