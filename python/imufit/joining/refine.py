@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Transform = NDArray[np.complex128]
 
 BLOCK: Final = 8.0
-"""Length of a block, s: its spectra tell a motion of some tenths of a hertz from the drift of a gyroscope."""
+"""Length of a block, s: its spectra separate a motion of some tenths of a hertz from the drift of a gyroscope."""
 RAMP: Final = 0.1
 """Share of a block over which the ends of a stretch fade in and out."""
 LEAST_SAMPLES: Final = 12
