@@ -31,8 +31,8 @@ Part = Mapping[str, Any]
 AS_DECLARED: Final = Aligned(0.0, 0.0, 0.0, 0.0, np.eye(3), 0.0, 0)
 """Reference and sensor on one clock, with parallel axes."""
 BLOCKS: Final = 60
-"""Blocks of the attitude, of 1.5 s each, by which the lag is refined. Of a log of 25 minutes all blocks take minutes;
-these take seconds, and still give the lag to some milliseconds."""
+"""Blocks of 8 s, which overlap by half, by which the lag is refined: four minutes of motion give it to a
+millisecond."""
 ONE_MOTION: Final = 0.6
 """Correlation of the rates from which on two recordings show one motion, whatever else is wrong."""
 

@@ -40,9 +40,9 @@ def join(log: Log, reference: Log, lag: float | None = None, skew: float | None 
     """Put the reference of one recording beside the sensor of another.
 
     The lag between the clocks is found by correlating the angular rates over all of both recordings, in whatever way
-    the sensor is mounted; then lag, skew and mount are refined on the attitude. The joined log has every row of the
-    sensor, with the reference filled in between its samples (``ref_exact`` 0), and a row for every sample of the
-    reference (``ref_exact`` 1). Gaps of the reference stay open.
+    the sensor is mounted; then lag, skew and mount are refined by the turns between samples. The joined log has every
+    row of the sensor, with the reference filled in between its samples (``ref_exact`` 0), and a row for every sample of
+    the reference (``ref_exact`` 1). Gaps of the reference stay open.
 
     Parameters
     ----------

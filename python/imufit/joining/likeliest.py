@@ -33,7 +33,7 @@ period apart are in different bins then."""
 SAME: Final = 0.5
 """Two alignments that put one sample of the reference at the same time, to this many bins, are one."""
 FEW: Final = 100
-"""Blocks of the attitude, of 1.5 s each, by which several lags are refined before the likeliest one is by all."""
+"""Blocks of 8 s, which overlap by half, by which several lags are refined before the likeliest one is by all."""
 SURE: Final = 7.0
 """Log odds from which on an alignment is accepted: one in a thousand is wrong. They count against all alignments that
 were tried, of unrelated recordings, and against the second one."""
@@ -120,7 +120,7 @@ def likeliest(
     skew : float, optional
         Rate of the reference's clock over the sensor's, less one, where it is known.
     most : int, optional
-        Blocks of the attitude to refine by, as in `refine`.
+        Blocks to refine by, as in `refine`.
     peaks : sequence of Candidate, optional
         The peaks of `rates`, where they are known.
 
