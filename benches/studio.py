@@ -4,7 +4,7 @@ A log is made chunk by chunk in a temporary directory (2.5 GB), drawn whole, and
 a random middle and a random width between 20 ms and the whole log, and three columns of 1200 pixels. Then the live page
 of a running studio follows an emulated device, which sends several times faster than real, in Debian's Chromium.
 
-Run: ``python benches/studio.py [--rows N] [--zooms N] [--seconds S] [--speed X] [--only rows|live] [--write]``.
+Run: ``python benches/studio.py [--rows N] [--zooms N] [--seconds S] [--speed X] [--only rows|page|live] [--write]``.
 ``--write`` puts the figures into docs/studio.md.
 """
 
@@ -13,8 +13,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from imufit.log import LogStream, Metadata
@@ -33,6 +35,26 @@ STEP = 1e-3
 """Time between two rows, s: 20 million rows are five and a half hours at 1 kHz."""
 PIXELS = 1200
 NAMES = ("acc_x", "acc_y", "acc_z"), ("gyr_x", "gyr_y", "gyr_z"), ("temp",), ("ref_qw",)
+IMUFIT = [sys.executable, "-m", "imufit"]
+LONGEST = 1800.0
+"""Time after which the page is taken to hang, s."""
+HAS_POINTS = """() => {
+    const drawn = document.querySelector("[data-mark=trace].js-plotly-plot, [data-mark=trace] .js-plotly-plot");
+    return drawn && drawn.data && drawn.data.length > 0 && drawn.data[0].x && drawn.data[0].x.length > 100;
+}"""
+"""Whether the trace has points."""
+ZOOM = """([low, high]) => new Promise((done) => {
+    const drawn = document.querySelector("[data-mark=trace].js-plotly-plot, [data-mark=trace] .js-plotly-plot");
+    const old = drawn.data[0].x, begin = performance.now();
+    const listen = () => {
+        if (drawn.data[0].x === old) { return; }
+        drawn.removeListener("plotly_afterplot", listen);
+        done(performance.now() - begin);
+    };
+    drawn.on("plotly_afterplot", listen);
+    Plotly.relayout(drawn, {"xaxis.range[0]": low, "xaxis.range[1]": high});
+})"""
+"""Zoom as a person does; the answer is the time until other points are drawn, ms."""
 SHORTEST = 0.02
 """Narrowest window, s."""
 
@@ -69,11 +91,17 @@ def rows_of_a_long_log(rows: int) -> Iterator[dict[str, np.ndarray]]:
         yield {"t": t, **table, "temp": 25.0 + 3.0 * np.sin(t / 500.0), **attitude}
 
 
+def long_log(folder: str, rows: int) -> Path:
+    """Write a long log, a row group at a time."""
+    path = Path(folder) / "long.parquet"
+    write_rows(path, Metadata(), rows_of_a_long_log(rows))
+    return path
+
+
 def drawn(rows: int, zooms: int) -> list[tuple[str, str]]:
     """Draw a long log and zoom into it; return figures with their words."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "long.parquet"
-        write_rows(path, Metadata(), rows_of_a_long_log(rows))
+        path = long_log(folder, rows)
         begin = time.perf_counter()
         log = LogStream(path)
         opened = time.perf_counter() - begin
@@ -129,19 +157,63 @@ def zoomed(traces: Traces, zooms: int) -> tuple[list[float], list[float], list[f
     return times, worked, held, reads
 
 
+def paged(rows: int, zooms: int) -> list[tuple[str, str]]:
+    """Open a long log in the studio's page and zoom into its trace; return figures with their words."""
+    with tempfile.TemporaryDirectory() as folder, studio(folder, [long_log(folder, rows)]) as (server, page, address):
+        begin = time.perf_counter()
+        page.goto(address)
+        page.wait_for_function(HAS_POINTS, timeout=1000 * LONGEST)
+        first = time.perf_counter() - begin
+        tools = page.context.new_cdp_session(page)
+        rng = np.random.default_rng(3)
+        last = rows * STEP
+        times, held, heaps = [], [], []
+        for _ in range(zooms):
+            width = np.exp(rng.uniform(np.log(SHORTEST), np.log(last)))
+            middle = rng.uniform(width / 2, last - width / 2)
+            times.append(page.evaluate(ZOOM, [middle - width / 2, middle + width / 2]))
+            tools.send("HeapProfiler.collectGarbage")
+            heaps.append(tools.send("Runtime.getHeapUsage")["usedSize"] / 1e6)
+            held.append(resident(server.pid))
+    tenth = len(held) // 10
+    return [
+        (f"page on {rows:,} rows: the trace is drawn, the evidence counted in, after", f"{first:.0f} s"),
+        (f"{zooms} zooms of the page, until the new points are drawn: median", f"{np.median(times):.0f} ms"),
+        ("99 of 100 zooms of the page within", f"{np.percentile(times, 99):.0f} ms"),
+        ("memory of the server after a tenth of the zooms", f"{held[tenth]:.0f} MB"),
+        ("after all of them", f"{held[-1]:.0f} MB"),
+        ("memory of the page's script after a tenth of the zooms", f"{heaps[tenth]:.1f} MB"),
+        ("after all of them", f"{heaps[-1]:.1f} MB"),
+    ]
+
+
+@contextmanager
+def studio(folder: str, logs: Sequence[Path] = ()) -> Iterator[tuple[subprocess.Popen[str], Any, str]]:
+    """Run a studio and Debian's Chromium; give the server, an empty page, and the address of the studio."""
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415 - only the parts with a page need it
+
+    command = [*IMUFIT, "studio", "--no-browser", *map(str, logs)]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder)
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=WEBGL)
+            try:
+                page = browser.new_page(viewport={"width": 1280, "height": 900})
+                yield server, page, server.stdout.readline().strip()
+            finally:
+                browser.close()
+    finally:
+        server.terminate()
+        server.wait(timeout=30)
+
+
 def live(seconds: float, speed: float) -> list[tuple[str, str]]:
     """Follow an emulated device on the live page; return figures with their words."""
-    from playwright.sync_api import sync_playwright  # noqa: PLC0415 - only this part needs it
-
-    imufit = [sys.executable, "-m", "imufit"]
-    device = [*imufit, "emulate", "handheld", "--loop", "--speed", str(speed), "--on", "socket://127.0.0.1:0"]
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        emulator = subprocess.Popen(device, stdout=subprocess.PIPE, text=True)
-        server = subprocess.Popen([*imufit, "studio", "--no-browser"], stdout=subprocess.PIPE, text=True, cwd=folder)
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=WEBGL)
-        try:
-            page = browser.new_page(viewport={"width": 1280, "height": 900})
-            page.goto(f"{server.stdout.readline().strip()}live")
+    device = [*IMUFIT, "emulate", "handheld", "--loop", "--speed", str(speed), "--on", "socket://127.0.0.1:0"]
+    emulator = subprocess.Popen(device, stdout=subprocess.PIPE, text=True)
+    try:
+        with tempfile.TemporaryDirectory() as folder, studio(folder) as (server, page, address):
+            page.goto(f"{address}live")
             field = page.get_by_label("device")
             field.click()
             field.fill(emulator.stdout.readline().strip())
@@ -156,11 +228,9 @@ def live(seconds: float, speed: float) -> list[tuple[str, str]]:
                 heaps.append(tools.send("Runtime.getHeapUsage")["usedSize"] / 1e6)
                 held.append(resident(server.pid))
             counts = {name: page.get_by_test_id(name).inner_text() for name in ("rows", "lost", "rate")}
-        finally:
-            browser.close()
-            for process in (server, emulator):
-                process.terminate()
-                process.wait(timeout=30)
+    finally:
+        emulator.terminate()
+        emulator.wait(timeout=30)
     tenth = len(held) // 10
     return [
         (f"live page for {seconds:g} s at {counts['rate']}: rows shown", counts["rows"]),
@@ -180,13 +250,15 @@ def main() -> None:
     parser.add_argument("--zooms", type=int, default=500)
     parser.add_argument("--seconds", type=float, default=180.0)
     parser.add_argument("--speed", type=float, default=10.0)
-    parser.add_argument("--only", choices=("rows", "live"))
+    parser.add_argument("--only", choices=("rows", "page", "live"))
     parser.add_argument("--write", action="store_true")
     given = parser.parse_args()
     found: list[tuple[str, str]] = []
-    if given.only != "live":
+    if given.only in (None, "rows"):
         found += drawn(given.rows, given.zooms)
-    if given.only != "rows":
+    if given.only in (None, "page"):
+        found += paged(given.rows, given.zooms)
+    if given.only in (None, "live"):
         found += live(given.seconds, given.speed)
     text = markdown(Table("", ("", ">measured"), tuple(found)))
     if given.write:
