@@ -27,6 +27,8 @@ HEIGHT: Final = 240
 """Height of a figure, px: two of them and the sentence fit on a laptop's screen."""
 SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
+DECADES: Final = 6
+"""Numbers that the logarithmic axis of the fall has room for."""
 LINE: Final = 1.6
 """Width of a line, px."""
 LOGARITHMIC_ABOVE: Final = 8.0
@@ -154,9 +156,10 @@ def spectrum(found: Spectrum, other: Spectrum | None = None) -> Figure:
         lines += _line(other.frequency, factor * np.sqrt(other.density), GREEN, "second model", dash="dashdot")
     ends = found.frequency[[0, -1]]
     lines += _line(ends, np.full(2, factor * math.sqrt(found.floor)), GREY, "noise floor", dash="dash")
-    log = {"type": "log"}
+    # Numbers are written out where they stand inside a decade, and few enough not to touch.
+    log = {"type": "log", "tickformat": "~g", "nticks": 6}
     # Decades alone carry numbers: the others would lie upon one another on a phone.
-    ticks = {**log, "dtick": 1}
+    ticks = {"type": "log", "dtick": 1}
     title = f"residual of {words(found.channel)}, {unit}/√Hz"
     return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=log)
 
@@ -239,6 +242,7 @@ def fall(
     # The number stands over the bar and over its diamond.
     above = {"x": places[: len(ratios)], "y": tops, "text": texts, "textposition": "top center", "showlegend": False}
     unseen = {"size": 13, "opacity": 0.0}
+    above["cliponaxis"] = False
     bars.append({"type": "scatter", "mode": "markers+text", **above, "marker": unseen, "hoverinfo": "skip"})
     heights = [value for value in [*ratios, *(value for _, value in known)] if math.isfinite(value) and value > 0.0]
     top, low = max([*heights, 1.0]), min([*heights, 1.0])
@@ -251,7 +255,7 @@ def fall(
     # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
     edge = [-0.6, max(len(places), SLOTS) - 0.4]
     floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
-    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": 20}
+    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": 35}
     figure = _figure([*bars, *floor], "", "error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
@@ -259,9 +263,11 @@ def fall(
 
 
 def _decades(low: float, top: float) -> list[float]:
-    """Return 1 and 10 and so on, with 3 between them, over the range of a logarithmic axis."""
-    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(top)) + 1)
-    return [value for power in powers for value in (10.0**power, 3.0 * 10.0**power)]
+    """Return 1 and 10 and so on, with 3 between them where there is room, over the range of a logarithmic axis."""
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(top))
+    if last - first <= DECADES // 2:
+        return [value for power in range(first, last + 1) for value in (10.0**power, 3.0 * 10.0**power)]
+    return [10.0**power for power in range(first, last + 1, -(-(last - first) // DECADES))]
 
 
 def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:

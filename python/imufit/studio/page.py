@@ -42,13 +42,13 @@ def page_of(desk: Desk) -> Callable[[], None]:
                 body = BodyView(desk)
             with _region("right") as right:
                 candidates = CandidateView(desk, panels)
-            with _region("bottom") as bottom:
+            with _region("fall") as steps:
                 fall = FallView(desk)
             with _region("left") as left:
                 model = ModelView(desk)
 
         def numbers() -> None:
-            for region in (middle, right, bottom, left):
+            for region in (middle, right, steps, left):
                 region.visible = desk.session is not None
             for view in (head, model, fall):
                 view.refresh()
