@@ -18,7 +18,7 @@ from imufit.log import Reading
 from imufit.studio.log_file import LogFile, Way, arrived, offers, option_words, remedies
 from imufit.studio.recipe import as_python, as_shell
 from imufit.studio.session import Session, worst_channel
-from imufit.studio.session_file import Kept, LogsWanted, as_toml, read_session
+from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
 from imufit.studio.stack import Action, Stack
 
 EFFECTS = {"acc.bias": None, "gyr.scale": None}
@@ -222,7 +222,7 @@ def test_a_session_comes_back_from_its_file(session, folder):
         with pytest.raises(InputError):
             read_session(path)
     path.write_text(text.replace("walk.parquet", "gone.parquet"))
-    with pytest.raises(LogsWanted, match="not there") as wanted:
+    with pytest.raises(LogsWantedError, match="not there") as wanted:
         read_session(path)
     assert wanted.value.names == ("gone.parquet",)
     path.write_text(text.replace('"acc.bias"', '"acc.nothing"'))

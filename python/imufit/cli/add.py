@@ -85,6 +85,5 @@ def add(
     out.json(addition.to_dict())
     if plot_file is not None:
         out.plot(plot_file, addition.plot())
-    out.report(
-        html_file, plots, f"{title_of(logs)}: {' and '.join([effect, *others])} added", comparison=comparison, addition=addition, rows=rows
-    )
+    title = f"{title_of(logs)}: {' and '.join([effect, *others])} added"
+    out.report(html_file, plots, title, comparison=comparison, addition=addition, rows=rows)

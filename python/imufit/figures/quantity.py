@@ -109,7 +109,7 @@ def probability(value: float | None) -> str:
 
 
 def counted(count: int, singular: str) -> str:
-    """Number and noun, e.g. ``1 note`` or ``3 notes``."""
+    """Give a number with its noun, e.g. ``1 note`` or ``3 notes``."""
     return f"{count} {singular}" if count == 1 else f"{count} {singular}s"
 
 

@@ -169,7 +169,8 @@ class Candidate(Part):
     def __str__(self) -> str:
         return (
             f"{self.effect}: held-out error {quantity.ratio(self.held_out_before)} -> "
-            f"{quantity.ratio(self.held_out_after)}, probability {quantity.probability(self.probability)}. {self.explanation}"
+            f"{quantity.ratio(self.held_out_after)}, probability {quantity.probability(self.probability)}. "
+            f"{self.explanation}"
         )
 
 

@@ -9,16 +9,19 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imufit.figures import quantity
-from imufit.figures.style import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
+from imufit.figures.style import AXES, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
 from imufit.printable import NAME, printable
 from imufit.results import Spectrum
 from imufit.results.comparison import Panel
+
+if TYPE_CHECKING:
+    from imufit.figures.allan import ChannelLike
 
 Figure = dict[str, Any]
 Array = NDArray[np.float64]
@@ -27,6 +30,8 @@ HEIGHT: Final = 240
 """Height of a figure, px: two of them and the sentence fit on a laptop's screen."""
 SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
+WRITTEN_OUT: Final = {"type": "log", "tickformat": "~g", "nticks": 6}
+"""Logarithmic axis: numbers inside a decade are written out, and few enough not to touch."""
 DECADES: Final = 6
 """Numbers that the logarithmic axis of the fall has room for."""
 LINE: Final = 1.6
@@ -156,12 +161,42 @@ def spectrum(found: Spectrum, other: Spectrum | None = None) -> Figure:
         lines += _line(other.frequency, factor * np.sqrt(other.density), GREEN, "second model", dash="dashdot")
     ends = found.frequency[[0, -1]]
     lines += _line(ends, np.full(2, factor * math.sqrt(found.floor)), GREY, "noise floor", dash="dash")
-    # Numbers are written out where they stand inside a decade, and few enough not to touch.
-    log = {"type": "log", "tickformat": "~g", "nticks": 6}
     # Decades alone carry numbers: the others would lie upon one another on a phone.
     ticks = {"type": "log", "dtick": 1}
     title = f"residual of {words(found.channel)}, {unit}/√Hz"
-    return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=log)
+    return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=WRITTEN_OUT)
+
+
+def allan(sensor: str, channels: Sequence[ChannelLike]) -> Figure:
+    """Draw the Allan deviation of one sensor's channels with their confidence bands and fits.
+
+    Parameters
+    ----------
+    sensor : str
+        Its name.
+    channels : sequence of ChannelLike
+        One per curve.
+    """
+    drawn: list[Figure] = []
+    shown = ""
+    for channel in channels:
+        axis = channel.name.rpartition("_")[2]
+        factor, shown = quantity.shown_unit(channel.unit)
+        colour = AXES.get(axis, GREY)
+        band = _area(channel.tau, factor * channel.low, factor * channel.high, colour, 0.15, f"68 % band of {axis}")
+        drawn += [trace | {"showlegend": False} for trace in band]
+        drawn += _line(channel.tau, factor * channel.deviation, colour, axis)
+        fitted = channel.fitted(channel.tau)
+        if fitted is not None:
+            fit = _line(channel.tau, factor * fitted, GREY, f"fit of {axis}", dash="dot")
+            drawn += [trace | {"showlegend": False} for trace in fit]
+    return _figure(
+        drawn,
+        "averaging time, s",
+        f"{words(sensor)}, {shown}",
+        xaxis={"type": "log", "dtick": 1},
+        yaxis=WRITTEN_OUT,
+    )
 
 
 def fall(

@@ -16,7 +16,7 @@ from imufit.remedy import Option
 from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, offers, remedies
 from imufit.studio.mystery import DEMONSTRATION, Mystery
 from imufit.studio.session import Session
-from imufit.studio.session_file import Kept, LogsWanted, as_toml, read_session
+from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
 from imufit.studio.stack import Stack
 from imufit.studio.traces import ModelTraces, Traces
 
@@ -37,7 +37,7 @@ class Desk:
         Its logs.
     arrivals : list of Arrival
         Files that were brought and await a choice.
-    wanted : LogsWanted or None
+    wanted : LogsWantedError or None
         The session that waits for its logs.
     mystery : Mystery or None
         The game, while one is played.
@@ -65,7 +65,7 @@ class Desk:
         self.session: Session | None = None
         self.files: tuple[LogFile, ...] = ()
         self.arrivals: list[Arrival] = []
-        self.wanted: LogsWanted | None = None
+        self.wanted: LogsWantedError | None = None
         self.mystery: Mystery | None = None
         self.joined: tuple[str, ...] = ()
         self.channel: str | None = None
@@ -336,15 +336,15 @@ class Desk:
             The file of the session.
         """
 
-        def work() -> Kept | LogsWanted:
+        def work() -> Kept | LogsWantedError:
             try:
                 return read_session(path, self._folders())
-            except LogsWanted as wanted:
+            except LogsWantedError as wanted:
                 return wanted
 
         kept = await self._in_thread(f"opening {path.name}", work)
-        self.wanted = kept if isinstance(kept, LogsWanted) else None
-        if kept is None or isinstance(kept, LogsWanted):
+        self.wanted = kept if isinstance(kept, LogsWantedError) else None
+        if kept is None or isinstance(kept, LogsWantedError):
             self.changed.emit()
             return
         session = await self._opened(kept.files)

@@ -14,6 +14,7 @@ from imufit.studio.view_body import BodyView
 from imufit.studio.view_candidates import CandidateView
 from imufit.studio.view_fall import FallView
 from imufit.studio.view_model import ModelView
+from imufit.studio.view_noise import NoiseView
 from imufit.studio.view_panels import PanelView
 from imufit.studio.view_top import Head, Top
 
@@ -39,6 +40,7 @@ def page_of(desk: Desk) -> Callable[[], None]:
                 top = Top(desk)
             with _region("middle") as middle:
                 panels = PanelView(desk)
+                noise = NoiseView(desk)
                 body = BodyView(desk)
             with _region("right") as right:
                 candidates = CandidateView(desk, panels)
@@ -56,6 +58,7 @@ def page_of(desk: Desk) -> Callable[[], None]:
         def pictures() -> None:
             for view in (top, candidates, panels):
                 view.refresh()
+            noise.renew()
             body.renew()
 
         async def pictures_after() -> None:

@@ -19,7 +19,7 @@ FORMAT: Final = 1
 AGAIN: Final = "Save the session again."
 
 
-class LogsWanted(InputError):
+class LogsWantedError(InputError):
     """A session whose logs are not there: their names, so that they can be brought.
 
     Parameters
@@ -112,7 +112,7 @@ def read_session(path: str | Path, beside: Sequence[Path] = ()) -> Kept:
 
     Raises
     ------
-    LogsWanted
+    LogsWantedError
         Its logs are not there.
     InputError
         The file is damaged, or of a later format.
@@ -127,7 +127,7 @@ def read_session(path: str | Path, beside: Sequence[Path] = ()) -> Kept:
     try:
         wanted = [name for table in document["logs"] for name in _names(table) if _found(name, folders) is None]
         if wanted:
-            raise LogsWanted(file, list(dict.fromkeys(wanted)))
+            raise LogsWantedError(file, list(dict.fromkeys(wanted)))
         files = tuple(_file(table, folders) for table in document["logs"])
         steps = tuple(
             Step(Action(table["action"]), str(table["effect"]), _stack(table["stack"]), table.get("expected"))

@@ -39,6 +39,7 @@ def start(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, read
     """
     desk = Desk()
     server.add_page("/", page_of(desk))
+
     async def look_at(path: Path) -> None:
         await desk.bring([LogFile(path, str(path))])
 

@@ -56,7 +56,8 @@ class CandidateView:
                 return
             shown = [item for item in diagnosis.candidates if item.status != NOT_TESTABLE]
             if self._desk.guessing:
-                ui.label("Point at an effect, or tap its name, to see what the effect would explain.").classes("studio-muted")
+                words = "Point at an effect, or tap its name, to see what the effect would explain."
+                ui.label(words).classes("studio-muted")
                 for item in sorted(shown, key=lambda item: item.effect):
                     self._candidate(item, None)
                 return
@@ -65,7 +66,8 @@ class CandidateView:
             for item in shown[:FIRST]:
                 self._candidate(item, diagnosis)
             if shown[FIRST:]:
-                with ui.expansion(quantity.counted(len(shown) - FIRST, "more candidate")).classes("w-full").props("dense"):
+                words = quantity.counted(len(shown) - FIRST, "more candidate")
+                with ui.expansion(words).classes("w-full").props("dense"):
                     for item in shown[FIRST:]:
                         self._candidate(item, diagnosis)
 

@@ -36,7 +36,7 @@ class FallView:
         self._desk = desk
         self._shown: tuple[object, ...] = ()
         with ui.element("div").classes("studio-row flex-wrap"):
-            ui.html("Fall of the error", tag="h2", sanitize=False).style("flex: 1")
+            ui.html("Fall of the error", tag="h2", sanitize=False).style("flex: 1 0 auto; white-space: nowrap")
             self._undo = _button("undo", "Undo", lambda: desk.attempt(lambda: _session(desk).undo())).props(
                 "data-mark=undo"
             )

@@ -21,7 +21,7 @@ from imufit.studio.desk import Desk
 from imufit.studio.log_file import LogFile, option_words, remedies
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING
 from imufit.studio.recipe import as_python, as_shell
-from imufit.studio.session_file import LogsWanted
+from imufit.studio.session_file import LogsWantedError
 
 SEEDS: Final = 1_000_000
 """Logs of the game: none is met twice."""
@@ -173,12 +173,12 @@ class Top:
         with ui.row().classes("gap-2"):
             for number, level in LEVELS.items():
                 words = level.title if number == DEMONSTRATION else f"Level {number}: {level.title}"
-                action = _player(desk, number) if number != DEMONSTRATION else lambda: desk.play(DEMONSTRATION, DEMO_SEED)
+                action = _player(desk, number, DEMO_SEED if number == DEMONSTRATION else None)
                 ui.button(words, on_click=action).props("no-caps outline size=sm").props(
                     attribute("data-mark", f"play-{number}")
                 )
 
-    def _wanted(self, wanted: LogsWanted) -> None:
+    def _wanted(self, wanted: LogsWantedError) -> None:
         """Ask for the logs of a session."""
         names = " and ".join(printable(Path(name).name, NAME) for name in wanted.names)
         ui.label(f"The session {printable(wanted.session.name, NAME)} wants {names}: drop the log here.").classes(
@@ -205,7 +205,8 @@ class Top:
         for words in self._desk.joined:
             ui.label(printable(words)).classes("studio-muted").props("data-mark=joined")
         if diagnosis.notes:
-            with ui.expansion(f"{quantity.counted(len(diagnosis.notes), 'note')} on these data").classes("w-full").props("dense"):
+            words = f"{quantity.counted(len(diagnosis.notes), 'note')} on these data"
+            with ui.expansion(words).classes("w-full").props("dense"):
                 for note in diagnosis.notes:
                     ui.label(printable(note)).classes("studio-muted")
 
@@ -301,8 +302,8 @@ def _number_of(desk: Desk, name: str | None) -> int:
     return names.index(name) if name in names else 0
 
 
-def _player(desk: Desk, level: int) -> Callable[[], object]:
-    return lambda: desk.play(level, secrets.randbelow(SEEDS))
+def _player(desk: Desk, level: int, seed: int | None = None) -> Callable[[], object]:
+    return lambda: desk.play(level, secrets.randbelow(SEEDS) if seed is None else seed)
 
 
 def _upload(desk: Desk) -> None:
