@@ -245,7 +245,7 @@ def _panel(item: Mapping[str, Any], floors: list[float], facts: _imufit.Facts) -
 def _spectra(evidence: LogEvidence, step: Array) -> tuple[Spectrum, ...]:
     """Density of the residual of each channel, averaged over stretches without a gap (Welch's method).
 
-    A channel is sampled at its own rate: rows of other channels between its samples are no gap.
+    A channel is sampled at its own rate: rows of other channels may stand between its samples.
     """
     from scipy.signal import welch  # noqa: PLC0415  only needed here
 
