@@ -30,8 +30,6 @@ HEIGHT: Final = 240
 """Height of a figure, px: two of them and the sentence fit on a laptop's screen."""
 SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
-WRITTEN_OUT: Final = {"type": "log", "tickformat": "~g", "nticks": 6}
-"""Logarithmic axis: numbers inside a decade are written out, and few enough not to touch."""
 DECADES: Final = 6
 """Numbers that the logarithmic axis of the fall has room for."""
 LINE: Final = 1.6
@@ -164,7 +162,16 @@ def spectrum(found: Spectrum, other: Spectrum | None = None) -> Figure:
     # Decades alone carry numbers: the others would lie upon one another on a phone.
     ticks = {"type": "log", "dtick": 1}
     title = f"residual of {words(found.channel)}, {unit}/√Hz"
-    return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=WRITTEN_OUT)
+    return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=_logarithmic(lines))
+
+
+def _logarithmic(lines: Sequence[Figure]) -> Figure:
+    """Return a logarithmic axis whose numbers are written out and do not touch: at 1, 2 and 5, or at decades."""
+    seen = [value for line in lines for value in line["y"] if value is not None and value > 0.0]
+    decades = math.log10(max(seen) / min(seen)) if seen else 0.0
+    # Within a third of a decade Plotly's even steps name more than one number.
+    steps = {} if decades < 1 / 3 else {"dtick": "D2" if decades < DECADES / 2 else 1}
+    return {"type": "log", "tickformat": "~g", **steps}
 
 
 def allan(sensor: str, channels: Sequence[ChannelLike]) -> Figure:
@@ -195,7 +202,7 @@ def allan(sensor: str, channels: Sequence[ChannelLike]) -> Figure:
         "averaging time, s",
         f"{words(sensor)}, {shown}",
         xaxis={"type": "log", "dtick": 1},
-        yaxis=WRITTEN_OUT,
+        yaxis=_logarithmic(drawn),
     )
 
 
