@@ -151,6 +151,39 @@ def test_a_finger_on_the_chart_scrolls_the_page(browser: Browser, report: Path) 
     shown.close()
 
 
+def test_a_figure_in_space_turns(browser: Browser, report: Path) -> None:
+    shown = opened(browser, report)
+    _, errors = watched(shown)
+    figures = shown.locator(".space.turns")
+    assert figures.count() == 2
+    ends = """(held) => [...held.querySelectorAll('polyline')].map((each) => each.getAttribute('points'))"""
+    for k in range(2):
+        figure = figures.nth(k)
+        figure.scroll_into_view_if_needed()
+        still = set(figure.locator("svg text").all_text_contents())
+        figure.press("ArrowRight")
+        before = figure.evaluate(ends)
+        assert before
+        words = figure.locator("svg text").all_text_contents()
+        named = {word for word in words if word.startswith(("acc", "mag"))}
+        assert len(named) == 3
+        assert named <= still
+        box = figure.bounding_box()
+        assert box is not None
+        x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+        shown.mouse.move(x, y)
+        shown.mouse.down()
+        shown.mouse.move(x + 60, y + 10, steps=4)
+        shown.mouse.up()
+        after = figure.evaluate(ends)
+        assert len(after) == len(before)
+        assert after != before
+        shown.mouse.move(x - 60, y)
+        assert figure.evaluate(ends) == after
+    assert errors == []
+    shown.close()
+
+
 def test_without_scripts_the_still_figures_stay(browser: Browser, report: Path) -> None:
     shown = opened(browser, report, java_script_enabled=False)
     assert shown.locator("#chart").is_hidden()

@@ -119,6 +119,7 @@ def test_the_loop_gives_the_numbers_of_the_command_line(page, folder):
 
     step_back_and_compare(page, ladder)
     copy_and_save(page, folder)
+    open_the_noise(page, folder)
 
 
 def step_back_and_compare(page, ladder):
@@ -133,13 +134,18 @@ def step_back_and_compare(page, ladder):
     marked(page, f"switch-{first}").click()
     wait_for_bars(page, len(ladder["steps"]) + 2)
     assert "The second model stands lower" in marked(page, "two-sentence").inner_text()
+    assert "The log prefers the second model (ln Bayes factor -" in marked(page, "two-evidence").inner_text()
     marked(page, "second").click()
     marked(page, f"switch-{first}").click()
     heights = wait_for_bars(page, len(ladder["steps"]) + 3)
     assert heights[-1] == ladder["ratio_end"]
     marked(page, f"edit-{first}.x").click()
-    marked(page, "edit-value").locator("input").or_(page.locator("input[data-mark=edit-value]")).first.fill("0.25")
+    value = marked(page, "edit-value").locator("input").or_(page.locator("input[data-mark=edit-value]")).first
+    value.fill("")
     marked(page, "edit-take").click()
+    page.get_by_text("Give a number.").wait_for()
+    value.fill("0.25")
+    value.press("Enter")
     heights = wait_for_bars(page, len(ladder["steps"]) + 4)
     assert heights[-1] > heights[-2]
     assert "fixed" in marked(page, f"value-{first}.x").inner_text()
@@ -162,6 +168,45 @@ def copy_and_save(page, folder):
     assert wait_for_bars(page, len(before)) == before
 
 
+def open_the_noise(page, folder):
+    """Allan deviation of the longest rest, as `imufit allan` finds it."""
+    page.get_by_text("Noise at rest").click()
+    found = imufit.allan(imufit.read(folder / "walk.parquet"))
+    marked(page, "allan-gyr").wait_for()
+    drawn = next(trace for trace in figure(page, "allan-gyr")["data"] if trace["name"] == "x")
+    channel = found.channels["gyr_x"]
+    assert drawn["x"] == pytest.approx(channel.tau)
+    assert drawn["y"] == pytest.approx(quantity.shown_unit(channel.unit)[0] * channel.deviation)
+
+
+def test_the_fall_stands_in_sight_beside_the_candidates(page, folder):
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    for mark in ("fall", "panel"):
+        box = marked(page, mark).bounding_box()
+        assert box["y"] + box["height"] < 900
+    add = page.get_by_role("button", name="Add", exact=True).first.bounding_box()
+    assert add["y"] < 900
+
+
+def test_a_session_asks_for_its_log(page, folder, tmp_path):
+    session = tmp_path / "lost-session.toml"
+    session.write_text(
+        'kind = "imufit session"\nformat = 1\nposition = 1\nlogs = [{ file = "lost.parquet" }]\n'
+        '[[steps]]\naction = "start"\neffect = ""\nstack = []\n'
+        '[[steps]]\naction = "add"\neffect = "acc.bias"\nstack = [{ effect = "acc.bias", on = true, held = {} }]\n'
+    )
+    drop(page, session)
+    marked(page, "wanted").wait_for()
+    assert "lost-session.toml wants lost.parquet" in marked(page, "wanted").inner_text()
+    page.locator(".q-dialog").wait_for(state="detached")
+    (tmp_path / "lost.parquet").write_bytes((folder / "walk.parquet").read_bytes())
+    drop(page, tmp_path / "lost.parquet")
+    assert len(wait_for_bars(page, 2)) == 2
+    assert "lost.parquet" in marked(page, "logs").inner_text()
+    assert marked(page, "wanted").count() == 0
+
+
 def test_two_files_are_joined_and_a_broken_one_is_refused(page, folder):
     drop(page, folder / "broken.csv")
     marked(page, "trouble").wait_for()
@@ -172,6 +217,9 @@ def test_two_files_are_joined_and_a_broken_one_is_refused(page, folder):
     marked(page, "verdict").wait_for()
     idle(page)
     assert "sensor.csv" in marked(page, "logs").inner_text()
+    assert "s late (correlation 1.000" in marked(page, "joined").inner_text()
+    # Rows of the reference between the sensor's own are no gap.
+    assert any(trace["name"] == "residual now" for trace in figure(page, "spectrum")["data"])
 
 
 def test_names_from_a_file_are_text(page, folder):
@@ -199,14 +247,16 @@ def test_a_game_is_played_and_revealed(page):
     marked(page, "reveal").wait_for()
     idle(page)
     assert page.get_by_text("probable").count() == 0
-    marked(page, "answer").click()
-    page.get_by_role("option").nth(1).click()
+    marked(page, "add-acc.bias").click()
+    wait_for_bars(page, 2)
+    # Who added an effect has answered with it.
     marked(page, "reveal").click()
     marked(page, "truth").wait_for()
     text = page.locator('[data-mark="truth"]').all_inner_texts()
-    assert len(text) == 3
-    assert "was hidden" in text[0]
-    assert "%" in text[1]
+    assert len(text) == 4
+    assert "was hidden, and you named acc.bias" in text[0]
+    assert " = " in text[1]
+    assert "%" in text[2]
     assert marked(page, "lesson").inner_text()
     assert page.get_by_text("probable").count() > 0
 
@@ -283,7 +333,20 @@ def test_the_demonstration_leads_to_a_named_effect_and_a_fallen_error(chromium, 
         marked(page, "reveal").click()
         marked(page, "truth").wait_for()
         assert marked(page, "truth").inner_text().startswith("Right")
+        run_what_is_copied(page, folder, after)
         page.close()
+
+
+def run_what_is_copied(page, folder, ratio):
+    """Save the log of a demonstration and run the copied program beside it."""
+    page.get_by_role("button", name="Copy the model").click()
+    marked(page, "copy-python").click()
+    program = marked(page, "copied").inner_text()
+    with page.expect_download() as download:
+        marked(page, "save-log").click()
+    download.value.save_as(folder / download.value.suggested_filename)
+    done = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, check=True)
+    assert float(done.stdout.splitlines()[0]) == ratio
 
 
 def test_a_button_applies_the_remedy_of_a_fault(page, folder):

@@ -89,6 +89,8 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     page.get_by_test_id("file").fill("walk.parquet")
     page.get_by_test_id("record").click()
     wait_until(page, lambda: "recording walk.parquet" in page.get_by_test_id("recorded").inner_text())
+    # The guide records, too: it waits for the end of this recording.
+    wait_until(page, lambda: page.get_by_role("button", name="Calibrate").is_disabled())
     page.wait_for_timeout(1500)
     page.reload()
     wait_until(page, lambda: "recording walk.parquet" in page.get_by_test_id("recorded").inner_text())
@@ -99,6 +101,10 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     assert np.linalg.norm(log.acc, axis=1).mean() == pytest.approx(9.8, abs=0.2)
     assert f"{log.n} rows" in page.get_by_test_id("recorded").inner_text()
 
+    # the times of the four panels stand over one another
+    edges = page.evaluate("[...document.querySelectorAll('.js-plotly-plot')].map(plot => plot._fullLayout._size.l)")
+    assert len(set(edges)) == 1
+
     # the guide names a side and draws it; stopping keeps the rows
     page.get_by_role("button", name="Calibrate").click()
     page.get_by_text("Lay it like this:").wait_for(timeout=PATIENCE)
@@ -107,6 +113,10 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     wait_until(page, lambda: page.locator(".studio-body canvas").count() == 1)
     wait_until(page, (folder / "calibration-1.parquet").exists)
 
+    # the recording opens in the studio, and the device stays connected
+    page.get_by_test_id("look").click()
+    page.wait_for_function("() => document.querySelector('[data-mark=logs]')?.textContent.includes('calibration-1')")
+    page.goto(f"{address}live")
     page.get_by_role("button", name="Disconnect").click()
     page.get_by_text("Not connected").wait_for(timeout=PATIENCE)
     assert asked == []

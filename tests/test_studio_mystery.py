@@ -2,7 +2,9 @@
 
 import pytest
 from imufit.errors import InputError
+from imufit.figures import quantity
 from imufit.lab.simulate import unseal
+from imufit.model.catalogue import find_effect
 from imufit.studio.log_file import LogFile
 from imufit.studio.mystery import LEVELS, NOTHING, Mystery
 from imufit.studio.session import Session
@@ -24,8 +26,11 @@ def test_a_large_effect_is_named_by_the_evidence(tmp_path):
     assert right.right
     assert right.truth == (truth,)
     assert right.sentences[0] == f"Right: {truth} was hidden, and you named {truth}."
-    assert "100 %" in right.sentences[1]
-    assert "You could have been sure" in right.sentences[2]
+    name, value = next(iter(unseal(game.log).effects[truth].items()))
+    unit = next(unit for key, unit, _ in find_effect(truth).parameters if key == name)
+    assert f"{name} = {quantity.quantity(value, unit)}" in right.sentences[1]
+    assert "> 99.9 %" in right.sentences[2]
+    assert "You could have been sure" in right.sentences[-1]
     assert right.lesson == LEVELS[1].lesson
     wrong = game.reveal(NOTHING, first)
     assert not wrong.right
@@ -38,7 +43,7 @@ def test_nothing_may_be_hidden(tmp_path):
     assert game.reveal(NOTHING, first).right
     false_alarm = game.reveal("acc.bias", first)
     assert not false_alarm.right
-    assert "You could not have named an effect" in false_alarm.sentences[2]
+    assert "You could not have named an effect" in false_alarm.sentences[-1]
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -52,7 +57,7 @@ def test_a_rival_is_allowed_where_the_log_does_not_separate_it(tmp_path, seed):
     answer = game.reveal(rival, first)
     assert not answer.right
     assert answer.sentences[0].startswith("Allowed")
-    assert "You could not have been sure" in answer.sentences[2]
+    assert "You could not have been sure" in answer.sentences[-1]
 
 
 def test_the_same_number_is_the_same_game(tmp_path):

@@ -30,6 +30,14 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("effect", metavar="EFFECT", shell_complete=complete_effect)
 @logs_argument
+@click.option(
+    "--then",
+    "others",
+    multiple=True,
+    metavar="EFFECT",
+    shell_complete=complete_effect,
+    help="A further effect, added after the one before. Repeatable.",
+)
 @model_option
 @model_output
 @json_option
@@ -41,6 +49,7 @@ def add(
     logs: tuple[Path, ...],
     *,
     reading: Reading,
+    others: tuple[str, ...],
     model: Path | None,
     output: Path | None,
     json_file: Path | None,
@@ -53,17 +62,22 @@ def add(
     Several LOGs of one sensor are fitted together.
     """
     keep_inputs(logs, [output, json_file, html_file, plot_file])
-    check_effects([effect])
+    check_effects([effect, *others])
     out = Output(json_file)
     with ProgressBar() as progress:
         opened = engine.open_logs(logs, reading)
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
-        addition = fit.add(effect, progress=progress)
+        additions = [fit.add(effect, progress=progress)]
+        for other in others:
+            additions.append(additions[-1].fit.add(other, progress=progress))
+        addition = additions[-1]
+        fit = additions[-2].fit if others else fit
         shown = html_file is not None or plots is not None
         comparison = engine.compared(fit, progress) if shown else None
         rows = engine.rows_of_fit(addition.fit, fit, progress=progress) if shown else None
-    out.say(addition.sentence, bold=True)
-    out.say(addition.warning)
+    for made in additions:
+        out.say(made.sentence, bold=True)
+        out.say(made.warning)
     out.tables(addition.tables())
     if output is not None:
         addition.fit.save(output)
@@ -71,6 +85,5 @@ def add(
     out.json(addition.to_dict())
     if plot_file is not None:
         out.plot(plot_file, addition.plot())
-    out.report(
-        html_file, plots, f"{title_of(logs)}: {effect} added", comparison=comparison, addition=addition, rows=rows
-    )
+    title = f"{title_of(logs)}: {' and '.join([effect, *others])} added"
+    out.report(html_file, plots, title, comparison=comparison, addition=addition, rows=rows)

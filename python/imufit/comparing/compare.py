@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS, UNITS
 from imufit.fitting.rest_passes import RestPasses
 from imufit.fitting.row_residuals import residual_chunks
+from imufit.log.segments import is_gap
 from imufit.progress import Progress
 from imufit.remedy import command
 from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
@@ -35,6 +37,8 @@ SCATTER = 4.0
 WORST_SEGMENTS = 8
 SPECTRUM_ROWS = 512
 SPECTRUM_CHUNKS = 32
+MISSED = 1.75
+"""Time between two samples, in usual steps, from which on one is missing between them: even sampling ends there."""
 
 
 def compare(fit: FittedStack, log: LogSource | None, progress: Progress) -> Comparison:
@@ -239,36 +243,34 @@ def _panel(item: Mapping[str, Any], floors: list[float], facts: _imufit.Facts) -
 
 
 def _spectra(evidence: LogEvidence, step: Array) -> tuple[Spectrum, ...]:
-    """Density of the residual of each channel, averaged over stretches without a gap (Welch's method)."""
+    """Density of the residual of each channel, averaged over stretches without a gap (Welch's method).
+
+    A channel is sampled at its own rate: rows of other channels may stand between its samples.
+    """
     from scipy.signal import welch  # noqa: PLC0415  only needed here
 
     sums: dict[int, list[Array]] = {}
-    frequency = np.empty(0)
-    facts = evidence.facts
-    rate = 1.0 / facts.dt
-    chunks = 0
-    for arrays, residuals in residual_chunks(evidence, step, "spectrum"):
+    rates: dict[int, float] = {}
+    for arrays, residuals in islice(residual_chunks(evidence, step, "spectrum"), SPECTRUM_CHUNKS):
         t = arrays["t"][arrays["begin"] : arrays["end"]]
-        steady = np.diff(t, prepend=t[0]) < 1.75 * facts.dt
         for index, residual in enumerate(residuals):
-            if residual is None:
+            known = np.empty(0, int) if residual is None else np.flatnonzero(np.isfinite(residual))
+            if residual is None or known.size < SPECTRUM_ROWS:
                 continue
-            good = np.isfinite(residual) & steady
-            for start in range(0, len(residual) - SPECTRUM_ROWS + 1, SPECTRUM_ROWS):
-                if good[start : start + SPECTRUM_ROWS].all():
-                    piece = residual[start : start + SPECTRUM_ROWS]
-                    frequency, density = welch(piece, rate, nperseg=SPECTRUM_ROWS, detrend="constant")
+            steps = np.diff(t[known])
+            rate = rates.setdefault(index, 1.0 / float(np.median(steps)))
+            for stretch in np.split(residual[known], np.flatnonzero(is_gap(steps, 1.0 / rate, MISSED)) + 1):
+                for start in range(0, len(stretch) - SPECTRUM_ROWS + 1, SPECTRUM_ROWS):
+                    piece = stretch[start : start + SPECTRUM_ROWS]
+                    _, density = welch(piece, rate, nperseg=SPECTRUM_ROWS, detrend="constant")
                     sums.setdefault(index, []).append(density)
-        chunks += 1
-        if chunks >= SPECTRUM_CHUNKS:
-            break
     return tuple(
         Spectrum(
             CHANNELS[index],
             f"({UNITS[CHANNELS[index][:3]]})^2/Hz",
-            frequency[1:],
+            rates[index] / SPECTRUM_ROWS * np.arange(1.0, SPECTRUM_ROWS // 2 + 1),
             np.mean(densities, axis=0)[1:],
-            2.0 * evidence.floors[index] ** 2 / rate,
+            2.0 * evidence.floors[index] ** 2 / rates[index],
         )
         for index, densities in sorted(sums.items())
     )

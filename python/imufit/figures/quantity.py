@@ -85,6 +85,8 @@ def ratio(value: float | None) -> str:
     """Residual over noise floor, e.g. ``1.04``, ``23.1`` or ``1240``."""
     if value is None or not math.isfinite(value):
         return "-"
+    if abs(value) >= 1e5:
+        return f"{value:.2e}"
     return f"{value:.2f}" if abs(value) < 10.0 else f"{value:.1f}" if abs(value) < 100.0 else f"{value:.0f}"
 
 
@@ -93,6 +95,22 @@ def share(value: float | None) -> str:
     if value is None or not math.isfinite(value):
         return "-"
     return f"{100.0 * value:.1f} %" if 0.0005 <= abs(value) < 0.0995 else f"{100.0 * value:.0f} %"
+
+
+def probability(value: float | None) -> str:
+    """Probability as per cent; near 0 and 1 as a bound, e.g. ``> 99.9 %``, since no evidence is certain."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if value < 0.001:
+        return "< 0.1 %"
+    if value > 0.999:
+        return "> 99.9 %"
+    return f"{100.0 * value:.1f} %" if value < 0.0995 or value > 0.9945 else f"{100.0 * value:.0f} %"
+
+
+def counted(count: int, singular: str) -> str:
+    """Give a number with its noun, e.g. ``1 note`` or ``3 notes``."""
+    return f"{count} {singular}" if count == 1 else f"{count} {singular}s"
 
 
 def p_value(value: float | None) -> str:

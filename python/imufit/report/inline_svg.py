@@ -119,7 +119,18 @@ def inline_svg(figure: style.PlainFigure, name: str, description: str, part: Bbo
     return Markup(_OPENING.sub(lambda _: opening, text, count=1))
 
 
+def themed(colour: str) -> str:
+    """Return the page's variable that stands for a colour, or the colour itself.
+
+    Parameters
+    ----------
+    colour : str
+        Such as ``#0072b2``.
+    """
+    return _VARIABLES.get(colour, colour)
+
+
 def _themed(found: re.Match[str]) -> str:
     """Replace the colours of one style by the page's variables, and the font by the page's own."""
-    style_text = _COLOUR.sub(lambda colour: _VARIABLES.get(colour.group(), colour.group()), found.group())
+    style_text = _COLOUR.sub(lambda colour: themed(colour.group()), found.group())
     return _FONT.sub("", style_text)

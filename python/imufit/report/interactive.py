@@ -47,8 +47,8 @@ class Interactive:
     ----------
     library, view, data : str
         Bokeh's code and the data, packed; the page's own script.
-    policy : str
-        Content security policy: these two scripts and nothing else may run, and nothing is fetched.
+    scripts : tuple of str
+        These two scripts, as the page's policy names them.
     channels, effects : tuple of str
         Choices of the reader: channels, the worst first, and effects of the model.
     """
@@ -56,13 +56,25 @@ class Interactive:
     library: str
     view: str
     data: str
-    policy: str
+    scripts: tuple[str, ...]
     channels: tuple[str, ...]
     effects: tuple[str, ...]
 
 
 STILL: Final = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 """Content security policy of a page without a script."""
+
+
+def policy(scripts: Sequence[str]) -> str:
+    """Return the content security policy: these scripts and nothing else may run, and nothing is fetched.
+
+    Parameters
+    ----------
+    scripts : sequence of str
+        Hashes of the scripts.
+    """
+    allowed = " ".join(f"'sha256-{each}'" for each in scripts)
+    return f"{STILL}; script-src {allowed}; img-src data:" if scripts else STILL
 
 
 def interactive(traces: Sequence[ResidualTrace]) -> Interactive | None:
@@ -77,7 +89,6 @@ def interactive(traces: Sequence[ResidualTrace]) -> Interactive | None:
         return None
     packed, library_hash = _library()
     view = files("imufit.report").joinpath("templates/view.js").read_text(encoding="utf-8")
-    scripts = " ".join(f"'sha256-{each}'" for each in (_hash(view), library_hash))
     effects = tuple(dict.fromkeys(effect for trace in traces for effect in trace.parts))
     data = {
         "palette": {colour: f"--{name}" for colour, name in {**PALETTE, _PAPER: "paper"}.items()},
@@ -88,7 +99,7 @@ def interactive(traces: Sequence[ResidualTrace]) -> Interactive | None:
         library=packed,
         view=view,
         data=_packed(json.dumps(data, allow_nan=False).encode()),
-        policy=f"{STILL}; script-src {scripts}; img-src data:",
+        scripts=(hash_of(view), library_hash),
         channels=tuple(trace.channel for trace in traces),
         effects=effects,
     )
@@ -98,14 +109,21 @@ def interactive(traces: Sequence[ResidualTrace]) -> Interactive | None:
 def _library() -> tuple[str, str]:
     """Return Bokeh's code, packed, and its hash."""
     code = files("bokeh").joinpath("server/static/js/bokeh.min.js").read_text(encoding="utf-8")
-    return _packed(code.encode()), _hash(code)
+    return _packed(code.encode()), hash_of(code)
 
 
 def _packed(data: bytes) -> str:
     return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
 
 
-def _hash(script: str) -> str:
+def hash_of(script: str) -> str:
+    """Return the hash by which a policy allows a script.
+
+    Parameters
+    ----------
+    script : str
+        Its code.
+    """
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 

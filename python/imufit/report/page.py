@@ -15,7 +15,7 @@ from imufit.comparing.traces import STRETCHES
 from imufit.figures import quantity
 from imufit.remedy import command
 from imufit.report.inline_svg import inline_svg, untitled
-from imufit.report.interactive import STILL, interactive
+from imufit.report.interactive import hash_of, interactive, policy
 from imufit.report.pictures import (
     PHONE,
     Picture,
@@ -25,6 +25,7 @@ from imufit.report.pictures import (
     pictures,
     worst_first,
 )
+from imufit.report.turned import script, turned
 from imufit.report.words import shown, with_words
 from imufit.results.diagnosis import PASSED, VERDICTS
 from imufit.results.noise_part import noise_table
@@ -86,25 +87,30 @@ def page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals.update(
-        q=quantity, shown=shown, wide=partial(_filling, complete=complete), small=partial(_beside, complete=complete)
-    )
+    drawing = {
+        name: partial(drawn, complete=complete)
+        for name, drawn in (("wide", _filling), ("small", _beside), ("turned", _in_space))
+    }
+    environment.globals.update(q=quantity, shown=shown, **drawing)
     end = ladder.comparison_end if ladder is not None and ladder.steps else None
     ends = {item.channel: item.ratio for item in end.channels} if end is not None else {}
     candidates = diagnosis.candidates[:_CANDIDATES] if diagnosis is not None else ()
     standing = [item for item in candidates if _stands_out(item, diagnosis)]
     order = worst_first(comparison)
     chart = interactive(in_order(rows.traces, order)) if rows is not None and comparison is not None else None
+    figures = pictures(comparison, diagnosis, ladder, addition=addition, rows=rows)
+    space = script() if figures.space else ""
     body = environment.get_template("page.html.j2").render(
         title=title,
         chart=chart,
-        policy=STILL if chart is None else chart.policy,
+        policy=policy([*(() if chart is None else chart.scripts), *([hash_of(space)] if space else ())]),
+        space=space,
         stretches=STRETCHES,
         log=rows.log if rows is not None else "",
         verdict=_verdict(comparison, last, ladder, addition),
         judged=_judged(comparison, last),
         faults=_faults(comparison, last),
-        pictures=pictures(comparison, diagnosis, ladder, addition=addition, rows=rows),
+        pictures=figures,
         comparison=comparison,
         comparison_end=end,
         channels=_channel_table(comparison, ends),
@@ -145,6 +151,13 @@ def _beside(picture: Picture, complete: Complete) -> Markup:
     drawn = complete(picture)
     caption, part = untitled(drawn)
     return _figure(caption, inline_svg(drawn, picture.name, picture.description, part))
+
+
+def _in_space(picture: Picture, complete: Complete) -> Markup:
+    """Return a figure in space that the reader turns, with others beside it."""
+    drawn = complete(picture)
+    caption, part = untitled(drawn)
+    return _figure(caption, turned(drawn, inline_svg(drawn, picture.name, picture.description, part)))
 
 
 def _figure(caption: str, contents: Markup) -> Markup:

@@ -152,7 +152,7 @@ def pictures(
         if diagnosis is not None and diagnosis.candidates
         else None,
         proposed=_parameters("predicted_parameters", "Predicted parameters over their typical sizes", best.parameters)
-        if best is not None
+        if best is not None and any(item.typical is not None for item in best.parameters)
         else None,
         parameters=_parameters("fitted_parameters", "Fitted parameters over their typical sizes", fitted),
         traces=_traces(rows, order),

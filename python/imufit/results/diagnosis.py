@@ -169,7 +169,8 @@ class Candidate(Part):
     def __str__(self) -> str:
         return (
             f"{self.effect}: held-out error {quantity.ratio(self.held_out_before)} -> "
-            f"{quantity.ratio(self.held_out_after)}, probability {quantity.share(self.probability)}. {self.explanation}"
+            f"{quantity.ratio(self.held_out_after)}, probability {quantity.probability(self.probability)}. "
+            f"{self.explanation}"
         )
 
 
@@ -415,7 +416,7 @@ def _candidate_row(item: Candidate) -> tuple[str, ...]:
         item.effect,
         item.status,
         f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}",
-        quantity.share(item.probability),
+        quantity.probability(item.probability),
         in_words(item.parameters) if item.status == PASSED else "-",
         item.smallest_detectable,
         ", ".join(str(rival) for rival in item.confounded_with[:2]) or "-",

@@ -22,6 +22,19 @@ DECISIVE: Final = 5.0
 Kass and A. Raftery, "Bayes Factors", J. Am. Stat. Assoc. 90 (1995), p. 777."""
 
 
+def preferred(ln_bayes_factor: float) -> str:
+    """Return which of two models the evidence prefers: ``first``, ``second``, or ``neither`` where it does not decide.
+
+    Parameters
+    ----------
+    ln_bayes_factor : float
+        Natural logarithm of the evidence for the second over that for the first.
+    """
+    if abs(ln_bayes_factor) < DECISIVE:
+        return "neither"
+    return "second" if ln_bayes_factor > 0.0 else "first"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ModelComparison(Plotted, Result):
     """Two models fitted to the same log.
@@ -45,9 +58,7 @@ class ModelComparison(Plotted, Result):
     @property
     def preferred(self) -> str:
         """``first``, ``second``, or ``neither`` where the evidence does not decide."""
-        if abs(self.ln_bayes_factor) < DECISIVE:
-            return "neither"
-        return "second" if self.ln_bayes_factor > 0.0 else "first"
+        return preferred(self.ln_bayes_factor)
 
     @property
     def sentence(self) -> str:

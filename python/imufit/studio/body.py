@@ -96,7 +96,7 @@ class Body:
                     scene.text(word, "font-weight: 600; opacity: 0.7").move(place[0], place[1], 0.0)
             for name in names:
                 self._bodies[name] = self._body(name)
-        scene.move_camera(x=-2.6, y=-4.4, z=4.2, look_at_x=0.0, look_at_y=0.0, look_at_z=1.1, duration=0.0)
+        scene.move_camera(x=-3.0, y=-5.1, z=4.6, look_at_x=0.0, look_at_y=0.0, look_at_z=0.7, duration=0.0)
 
     def _body(self, name: str) -> Object3D:
         """Make the body of one attitude: a plate with a nose to its x axis, and the three axes with their names."""

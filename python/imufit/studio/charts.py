@@ -9,16 +9,19 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imufit.figures import quantity
-from imufit.figures.style import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
+from imufit.figures.style import AXES, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
 from imufit.printable import NAME, printable
 from imufit.results import Spectrum
 from imufit.results.comparison import Panel
+
+if TYPE_CHECKING:
+    from imufit.figures.allan import ChannelLike
 
 Figure = dict[str, Any]
 Array = NDArray[np.float64]
@@ -27,6 +30,8 @@ HEIGHT: Final = 240
 """Height of a figure, px: two of them and the sentence fit on a laptop's screen."""
 SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
+DECADES: Final = 6
+"""Numbers that the logarithmic axis of the fall has room for."""
 LINE: Final = 1.6
 """Width of a line, px."""
 LOGARITHMIC_ABOVE: Final = 8.0
@@ -154,11 +159,51 @@ def spectrum(found: Spectrum, other: Spectrum | None = None) -> Figure:
         lines += _line(other.frequency, factor * np.sqrt(other.density), GREEN, "second model", dash="dashdot")
     ends = found.frequency[[0, -1]]
     lines += _line(ends, np.full(2, factor * math.sqrt(found.floor)), GREY, "noise floor", dash="dash")
-    log = {"type": "log"}
     # Decades alone carry numbers: the others would lie upon one another on a phone.
-    ticks = {**log, "dtick": 1}
+    ticks = {"type": "log", "dtick": 1}
     title = f"residual of {words(found.channel)}, {unit}/√Hz"
-    return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=log)
+    return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=_logarithmic(lines))
+
+
+def _logarithmic(lines: Sequence[Figure]) -> Figure:
+    """Return a logarithmic axis whose numbers are written out and do not touch: at 1, 2 and 5, or at decades."""
+    seen = [value for line in lines for value in line["y"] if value is not None and value > 0.0]
+    decades = math.log10(max(seen) / min(seen)) if seen else 0.0
+    # Within a third of a decade Plotly's even steps name more than one number.
+    steps = {} if decades < 1 / 3 else {"dtick": "D2" if decades < DECADES / 2 else 1}
+    return {"type": "log", "tickformat": "~g", **steps}
+
+
+def allan(sensor: str, channels: Sequence[ChannelLike]) -> Figure:
+    """Draw the Allan deviation of one sensor's channels with their confidence bands and fits.
+
+    Parameters
+    ----------
+    sensor : str
+        Its name.
+    channels : sequence of ChannelLike
+        One per curve.
+    """
+    drawn: list[Figure] = []
+    shown = ""
+    for channel in channels:
+        axis = channel.name.rpartition("_")[2]
+        factor, shown = quantity.shown_unit(channel.unit)
+        colour = AXES.get(axis, GREY)
+        band = _area(channel.tau, factor * channel.low, factor * channel.high, colour, 0.15, f"68 % band of {axis}")
+        drawn += [trace | {"showlegend": False} for trace in band]
+        drawn += _line(channel.tau, factor * channel.deviation, colour, axis)
+        fitted = channel.fitted(channel.tau)
+        if fitted is not None:
+            fit = _line(channel.tau, factor * fitted, GREY, f"fit of {axis}", dash="dot")
+            drawn += [trace | {"showlegend": False} for trace in fit]
+    return _figure(
+        drawn,
+        "averaging time, s",
+        f"{words(sensor)}, {shown}",
+        xaxis={"type": "log", "dtick": 1},
+        yaxis=_logarithmic(drawn),
+    )
 
 
 def fall(
@@ -239,6 +284,7 @@ def fall(
     # The number stands over the bar and over its diamond.
     above = {"x": places[: len(ratios)], "y": tops, "text": texts, "textposition": "top center", "showlegend": False}
     unseen = {"size": 13, "opacity": 0.0}
+    above["cliponaxis"] = False
     bars.append({"type": "scatter", "mode": "markers+text", **above, "marker": unseen, "hoverinfo": "skip"})
     heights = [value for value in [*ratios, *(value for _, value in known)] if math.isfinite(value) and value > 0.0]
     top, low = max([*heights, 1.0]), min([*heights, 1.0])
@@ -251,7 +297,7 @@ def fall(
     # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
     edge = [-0.6, max(len(places), SLOTS) - 0.4]
     floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
-    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": 20}
+    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": 35}
     figure = _figure([*bars, *floor], "", "error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
@@ -259,9 +305,11 @@ def fall(
 
 
 def _decades(low: float, top: float) -> list[float]:
-    """Return 1 and 10 and so on, with 3 between them, over the range of a logarithmic axis."""
-    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(top)) + 1)
-    return [value for power in powers for value in (10.0**power, 3.0 * 10.0**power)]
+    """Return 1 and 10 and so on, with 3 between them where there is room, over the range of a logarithmic axis."""
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(top))
+    if last - first <= DECADES // 2:
+        return [value for power in range(first, last + 1) for value in (10.0**power, 3.0 * 10.0**power)]
+    return [10.0**power for power in range(first, last + 1, -(-(last - first) // DECADES))]
 
 
 def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:

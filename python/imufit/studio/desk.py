@@ -16,7 +16,7 @@ from imufit.remedy import Option
 from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, offers, remedies
 from imufit.studio.mystery import DEMONSTRATION, Mystery
 from imufit.studio.session import Session
-from imufit.studio.session_file import Kept, as_toml, read_session
+from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
 from imufit.studio.stack import Stack
 from imufit.studio.traces import ModelTraces, Traces
 
@@ -37,8 +37,12 @@ class Desk:
         Its logs.
     arrivals : list of Arrival
         Files that were brought and await a choice.
+    wanted : LogsWantedError or None
+        The session that waits for its logs.
     mystery : Mystery or None
         The game, while one is played.
+    joined : tuple of str
+        How the references of the logs were joined to them.
     channel, covariate : str or None
         The panel that the person chose; None is the worst one.
     traces : Traces or None
@@ -61,7 +65,9 @@ class Desk:
         self.session: Session | None = None
         self.files: tuple[LogFile, ...] = ()
         self.arrivals: list[Arrival] = []
+        self.wanted: LogsWantedError | None = None
         self.mystery: Mystery | None = None
+        self.joined: tuple[str, ...] = ()
         self.channel: str | None = None
         self.covariate: str | None = None
         self.traces: Traces | None = None
@@ -213,6 +219,8 @@ class Desk:
             second = session.made(session.second)
             if second is None or (second.comparison is None and session.has_reference):
                 yield "comparing the second model", lambda: session.compare(session.second, self.progress)
+            if session.second.model != stack.model and session.weighed() is None:
+                yield "weighing the two models", lambda: session.weigh(self.progress)
 
     def _drawn_rows(self) -> Traces:
         """Make the pass over the rows of the log that is drawn."""
@@ -242,6 +250,9 @@ class Desk:
             The files.
         """
         self.forget_trouble()
+        if self.wanted is not None and {file.path.name for file in files} & {Path(n).name for n in self.wanted.names}:
+            await self.reopen(self.wanted.session)
+            return
         for file in files:
             if file.path.suffix.lower() == SESSION_ENDING and not any(
                 other.path != file.path and other.path.stem == file.path.stem for other in files
@@ -276,8 +287,10 @@ class Desk:
 
     async def _opened(self, files: Sequence[LogFile]) -> Session | None:
         def work() -> Session:
-            session = Session([file.open() for file in files])
+            opened = [file.opened() for file in files]
+            session = Session([log for log, _ in opened])
             session.begin(self.progress)
+            self.joined = tuple(words for _, joined in opened for words in joined)
             return session
 
         names = " and ".join(file.name for file in files)
@@ -289,6 +302,7 @@ class Desk:
         self.traces, self.models = None, {}
         self.session, self.files, self.mystery = session, tuple(files), mystery
         self.arrivals, self.channel, self.covariate = [], None, None
+        self.wanted = None
         self._no_trouble()
         self.changed.emit()
 
@@ -321,8 +335,17 @@ class Desk:
         path : Path
             The file of the session.
         """
-        kept = await self._in_thread(f"opening {path.name}", lambda: read_session(path, self._folders()))
-        if kept is None:
+
+        def work() -> Kept | LogsWantedError:
+            try:
+                return read_session(path, self._folders())
+            except LogsWantedError as wanted:
+                return wanted
+
+        kept = await self._in_thread(f"opening {path.name}", work)
+        self.wanted = kept if isinstance(kept, LogsWantedError) else None
+        if kept is None or isinstance(kept, LogsWantedError):
+            self.changed.emit()
             return
         session = await self._opened(kept.files)
         if session is not None:
@@ -345,6 +368,10 @@ class Desk:
         return as_toml(Kept(self.files, tuple(session.steps), session.position, session.second))
 
     # --- the game
+
+    def game_log(self) -> Path | None:
+        """Return the log of the game, which no folder of the person holds."""
+        return None if self.mystery is None else self.mystery.log
 
     async def play(self, level: int, seed: int) -> None:
         """Begin a game: a simulated log with a hidden effect.

@@ -45,7 +45,11 @@ class LogFile:
     skew: float | None = None
 
     def open(self) -> LogSource:
-        """Open the log; one with a reference that is joined to it is read into memory.
+        """Open the log; see :meth:`opened`."""
+        return self.opened()[0]
+
+    def opened(self) -> tuple[LogSource, list[str]]:
+        """Open the log, and say how its reference was joined; a log with a joined reference is read into memory.
 
         Raises
         ------
@@ -54,13 +58,14 @@ class LogFile:
         """
         if self.reference is None:
             way = self.reading
-            return open_log(self.path, way.mapping, frame=way.frame, noise=way.noise, drop=way.drop)
+            return open_log(self.path, way.mapping, frame=way.frame, noise=way.noise, drop=way.drop), []
         from imufit.verbs import join  # noqa: PLC0415  the joining is only loaded where it is needed
 
         other = self.reference
         log = _stream(self, bare=False).read()
         reference = log if other.path == self.path else _stream(other, bare=True).read()
-        return join(log, reference, lag=self.lag, skew=self.skew).log
+        found = join(log, reference, lag=self.lag, skew=self.skew)
+        return found.log, found.sentences()
 
     def joined(self, reference: LogFile) -> LogFile:
         """Return the same log with another one's reference.
@@ -241,15 +246,15 @@ def offers(arrivals: Sequence[Arrival]) -> list[Offer]:
         # A log that has a reference of its own hardly needs another one.
         pairs.sort(key=lambda pair: (pair[0].reference, bool(pair[1].sensors)))
         found += [
-            Offer(Way.JOIN, (a.file.joined(b.file),), f"Join the reference of {b.file.name} to {a.file.name}.")
+            Offer(Way.JOIN, (a.file.joined(b.file),), f"Join the reference of {b.file.name} to {a.file.name}")
             for a, b in pairs
         ]
     if len(with_sensors) > 1:
         together = Offer(
-            Way.TOGETHER, tuple(item.file for item in with_sensors), "Open all of them as logs of one sensor."
+            Way.TOGETHER, tuple(item.file for item in with_sensors), "Open all of them as logs of one sensor"
         )
         found.insert(0 if all(item.reference for item in with_sensors) else len(found), together)
-    found += [Offer(Way.OPEN, (item.file,), f"Open {item.file.name} alone.") for item in with_sensors]
+    found += [Offer(Way.OPEN, (item.file,), f"Open {item.file.name} alone") for item in with_sensors]
     return found
 
 

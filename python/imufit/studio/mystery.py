@@ -12,6 +12,7 @@ from imufit.errors import InputError
 from imufit.figures import quantity
 from imufit.lab.simulate import hidden, simulate, unseal
 from imufit.lab.simulated_log import save_simulation
+from imufit.model.catalogue import find_effect
 from imufit.results import Diagnosis
 
 if TYPE_CHECKING:
@@ -60,6 +61,8 @@ LEVELS: Final[dict[int, Level]] = {
         "A log cannot separate effects that its motion does not separate: the remedy is another motion, not more rows.",
     ),
 }
+DEMO_SEED: Final = 3
+"""The log of the demonstration: the seed of `imufit demo`, whose effect lies far above the noise."""
 NOTHING: Final = ""
 """The answer that nothing is missing."""
 DURATION: Final = 60.0
@@ -84,7 +87,7 @@ class Verdict:
     truth : tuple of str
         The hidden effects; empty where nothing was hidden.
     sentences : tuple of str
-        Truth, answer, evidence, and how sure one could have been.
+        Truth, answer, hidden values, evidence, and how sure one could have been.
     lesson : str
         The sentence on the method.
     """
@@ -105,6 +108,8 @@ class Mystery:
         Level, `DEMONSTRATION` included, and the number that picked the log.
     log : Path
         The log; its sealed truth lies beside it.
+    answer : str or None
+        Id of the effect that the person chose, or `NOTHING`; None before a choice.
     verdict : Verdict or None
         After the reveal.
     """
@@ -112,6 +117,7 @@ class Mystery:
     level: int
     seed: int
     log: Path
+    answer: str | None = None
     verdict: Verdict | None = None
 
     @classmethod
@@ -163,7 +169,12 @@ class Mystery:
         self.verdict = Verdict(
             right,
             hidden_effects,
-            (_said(hidden_effects, answer, right, rival), _evidence(truth, first), _sureness(first)),
+            (
+                _said(hidden_effects, answer, right, rival),
+                *_values(truth),
+                _evidence(truth, first),
+                _sureness(first),
+            ),
             LEVELS[self.level].lesson,
         )
         return self.verdict
@@ -176,18 +187,29 @@ def _said(truth: Sequence[str], answer: str, right: bool, rival: bool) -> str:
     return f"{mark}: {hid}, and {named}."
 
 
+def _values(truth: Truth) -> list[str]:
+    """Give the values of each hidden effect, to be held beside the fitted ones."""
+    sentences = []
+    for effect, hidden_values in truth.effects.items():
+        units = {name: unit for name, unit, _ in find_effect(effect).parameters}
+        shown = (f"{name} = {quantity.quantity(value, units[name])}" for name, value in hidden_values.items())
+        sentences.append(f"Hidden in {effect}: {', '.join(shown)}.")
+    return sentences
+
+
 def _evidence(truth: Truth, first: Diagnosis) -> str:
     """Say which probability the evidence gives to the truth."""
     if not truth.effects:
         largest = max((item.probability for item in first.candidates), default=0.0)
-        return f"The evidence gives its likeliest candidate a probability of {quantity.share(largest)}."
+        return f"The evidence gives its likeliest candidate a probability of {quantity.probability(largest)}."
     effect = next(iter(truth.effects))
     found = next((item for item in first.candidates if item.effect == effect), None)
     if found is None:
         return f"The log cannot show {effect}: the evidence holds no such candidate."
     rivals = [name for name in (first.best, *first.ambiguous_with) if name not in (None, effect)]
-    beside = f", its rivals are {', '.join(map(str, rivals))}" if rivals else ""
-    return f"The evidence gives {effect} a probability of {quantity.share(found.probability)}{beside}."
+    verb = "rival is" if len(rivals) == 1 else "rivals are"
+    beside = f", its {verb} {', '.join(map(str, rivals))}" if rivals else ""
+    return f"The evidence gives {effect} a probability of {quantity.probability(found.probability)}{beside}."
 
 
 def _sureness(first: Diagnosis) -> str:
@@ -196,7 +218,7 @@ def _sureness(first: Diagnosis) -> str:
     if first.verdict == "adequate":
         return "You could not have named an effect: no effect stands out of the noise of this log."
     if first.verdict == "missing" and best >= SURE:
-        return f"You could have been sure: one effect stands out, with {quantity.share(best)}."
+        return "You could have been sure: one effect stands out."
     if first.verdict == "ambiguous":
         alike = ", ".join(str(name) for name in (first.best, *first.ambiguous_with) if name)
         return f"You could not have been sure: {alike} explain this log equally well."

@@ -14,6 +14,7 @@ from imufit.studio.view_body import BodyView
 from imufit.studio.view_candidates import CandidateView
 from imufit.studio.view_fall import FallView
 from imufit.studio.view_model import ModelView
+from imufit.studio.view_noise import NoiseView
 from imufit.studio.view_panels import PanelView
 from imufit.studio.view_top import Head, Top
 
@@ -39,16 +40,17 @@ def page_of(desk: Desk) -> Callable[[], None]:
                 top = Top(desk)
             with _region("middle") as middle:
                 panels = PanelView(desk)
+                noise = NoiseView(desk)
                 body = BodyView(desk)
             with _region("right") as right:
                 candidates = CandidateView(desk, panels)
-            with _region("bottom") as bottom:
+            with _region("fall") as steps:
                 fall = FallView(desk)
             with _region("left") as left:
                 model = ModelView(desk)
 
         def numbers() -> None:
-            for region in (middle, right, bottom, left):
+            for region in (middle, right, steps, left):
                 region.visible = desk.session is not None
             for view in (head, model, fall):
                 view.refresh()
@@ -56,6 +58,7 @@ def page_of(desk: Desk) -> Callable[[], None]:
         def pictures() -> None:
             for view in (top, candidates, panels):
                 view.refresh()
+            noise.renew()
             body.renew()
 
         async def pictures_after() -> None:

@@ -54,11 +54,17 @@ def _call(name: str, options: dict[str, Any]) -> str:
     return ", ".join([repr(name), *(f"{key}={value!r}" for key, value in options.items())])
 
 
+def _added(before: Stack, after: Stack) -> bool:
+    """Return whether a step adds one effect as `imufit add` does: nothing else changes, and nothing is held."""
+    new = [effect for effect in after.effects if effect not in before.effects]
+    return len(new) == 1 and set(before.effects) < set(after.effects) and not after.holds and not before.holds
+
+
 def _python_step(before: Stack, after: Stack) -> list[str]:
     """Return the calls of `imufit.studio.session.moved`."""
     new = [effect for effect in after.effects if effect not in before.effects]
     gone = [effect for effect in before.effects if effect not in after.effects]
-    if len(new) == 1 and not gone and not after.holds and not before.holds:
+    if _added(before, after):
         return [f"fit = fit.add({new[0]!r}).fit"]
     lines = ["model = fit.model.copy()"]
     lines += [f"model = model.without_effect({effect!r})" for effect in gone]
@@ -72,19 +78,20 @@ def _python_step(before: Stack, after: Stack) -> list[str]:
     return [*lines, "fit = fit.moved(model)"]
 
 
-def as_shell(files: Sequence[LogFile], model: Stack) -> str:
-    """Return the commands that fit the present model and write it to ``model.toml``, equal in every shown digit.
+def as_shell(files: Sequence[LogFile], way: Sequence[Stack]) -> str:
+    """Return the commands that fit the present model and write it to ``model.toml``.
 
-    The commands fit all effects at once, the session one after the other. Where effects are not linear together, both
-    stop within a hundredth of a standard error.
+    A way that adds effects alone goes the same way in the shell, to the last digit. Any other model is fitted at once:
+    where effects are not linear together, both stop within a hundredth of a standard error.
 
     Parameters
     ----------
     files : sequence of LogFile
         The logs.
-    model : Stack
-        The effects that are switched on.
+    way : sequence of Stack
+        Models from the ideal sensor to the present one, each fitted from the one before.
     """
+    model = way[-1]
     lines: list[str] = []
     logs: list[str] = []
     for k, file in enumerate(files):
@@ -99,13 +106,13 @@ def as_shell(files: Sequence[LogFile], model: Stack) -> str:
     if not model.effects:
         lines.append(" ".join(["imufit compare", *logs, *options]))
         return "\n".join([*lines, ""])
-    plain = not model.holds and not any("," in effect for effect in model.effects)
-    if plain:
-        effects = ["--effects", shlex.quote(",".join(model.effects))]
+    if all(_added(before, after) for before, after in pairwise(way)):
+        first, *others = (shlex.quote(effect) for effect in model.effects)
+        then = [f"--then {effect}" for effect in others]
+        lines.append(" ".join(["imufit add", first, *logs, *options, *then, "-o model.toml"]))
     else:
         lines += ["cat > start.toml <<'END_OF_MODEL'", *_start(model).splitlines(), "END_OF_MODEL"]
-        effects = ["--model", "start.toml"]
-    lines.append(" ".join(["imufit fit", *logs, *options, *effects, "-o model.toml"]))
+        lines.append(" ".join(["imufit fit", *logs, *options, "--model start.toml", "-o model.toml"]))
     return "\n".join([*lines, ""])
 
 

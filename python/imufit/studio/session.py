@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.comparing import comparison, panels
+from imufit.comparing.two_models import ln_bayes_factor
 from imufit.errors import InputError
 from imufit.fitting.analysis import pooled
 from imufit.log import LogSource
@@ -105,6 +106,7 @@ class Session:
         self.second: Stack | None = None
         self._made: dict[Stack, Made] = {}
         self._full: OrderedDict[Stack, None] = OrderedDict()
+        self._weighed: dict[tuple[Stack, Stack], float] = {}
         self._quick: dict[Stack, tuple[Numbers, Array]] = {}
         self._work = threading.RLock()
         self._start: Fit | None = None
@@ -410,6 +412,27 @@ class Session:
                 fit = self._with_evidence(made)
                 made.comparison = comparison(fit.analysis, fit.estimate.step, self.shown)
             return made.comparison
+
+    def weighed(self) -> float | None:
+        """Return the ln Bayes factor for the present model over the second one; None before it is worked out."""
+        return None if self.second is None else self._weighed.get((self.second.model, self.stack.model))
+
+    def weigh(self, progress: Progress = silent) -> float | None:
+        """Work out the ln Bayes factor for the present model over the second one; None without a second one.
+
+        Parameters
+        ----------
+        progress : callable
+            Called with (rows done, rows in all, what is being done).
+        """
+        with self._work:
+            if self.second is None:
+                return None
+            first, second = (self.fit(stack, progress) for stack in (self.second, self.stack))
+            key = (first.way[-1], second.way[-1])
+            # The second one's evidence first: the present model's is needed again, and stays.
+            self._weighed[key] = ln_bayes_factor(self._with_evidence(first), self._with_evidence(second))
+            return self._weighed[key]
 
     @cached_property
     def has_reference(self) -> bool:

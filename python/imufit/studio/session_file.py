@@ -19,6 +19,26 @@ FORMAT: Final = 1
 AGAIN: Final = "Save the session again."
 
 
+class LogsWantedError(InputError):
+    """A session whose logs are not there: their names, so that they can be brought.
+
+    Parameters
+    ----------
+    session : Path
+        The file of the session.
+    names : sequence of str
+        Of the files that are not there.
+    """
+
+    def __init__(self, session: Path, names: Sequence[str]) -> None:
+        self.session, self.names = session, tuple(names)
+        super().__init__(
+            "the log of the session is not there",
+            file=names[0],
+            remedy="Lay the log beside the session, or drop the log on the studio.",
+        )
+
+
 @dataclass(frozen=True)
 class Kept:
     """A session as its file keeps it; fits are made again from the logs.
@@ -92,8 +112,10 @@ def read_session(path: str | Path, beside: Sequence[Path] = ()) -> Kept:
 
     Raises
     ------
+    LogsWantedError
+        Its logs are not there.
     InputError
-        The file is damaged, of a later format, or one of its logs is not there.
+        The file is damaged, or of a later format.
     """
     file = Path(path)
     document, _ = read_toml(file, "the session")
@@ -103,6 +125,9 @@ def read_session(path: str | Path, beside: Sequence[Path] = ()) -> Kept:
         raise InputError(f"format {document.get('format')!r} is not known", file=file, remedy="Update imufit.")
     folders = (file.parent, *beside)
     try:
+        wanted = [name for table in document["logs"] for name in _names(table) if _found(name, folders) is None]
+        if wanted:
+            raise LogsWantedError(file, list(dict.fromkeys(wanted)))
         files = tuple(_file(table, folders) for table in document["logs"])
         steps = tuple(
             Step(Action(table["action"]), str(table["effect"]), _stack(table["stack"]), table.get("expected"))
@@ -127,18 +152,23 @@ def _file(table: Mapping[str, Any], folders: Sequence[Path]) -> LogFile:
     given = {key: table[key] for key in ("mapping", "frame", "noise") if key in table}
     reading = Reading(**given, drop=tuple(table.get("drop", ())))
     reference = _file(table["reference"], folders) if "reference" in table else None
-    return LogFile(_found(str(name), folders), str(name), reading, reference, table.get("lag"), table.get("skew"))
+    path = _found(str(name), folders)
+    assert path is not None, "logs that are not there were asked for"
+    return LogFile(path, str(name), reading, reference, table.get("lag"), table.get("skew"))
 
 
-def _found(name: str, folders: Sequence[Path]) -> Path:
+def _names(table: Mapping[str, Any]) -> list[str]:
+    """List the files of one log: its own and that of its reference."""
+    return [str(table["file"]), *(_names(table["reference"]) if "reference" in table else ())]
+
+
+def _found(name: str, folders: Sequence[Path]) -> Path | None:
     """Return where a log is: as the file states, or under its bare name in one of the folders."""
     for path in (Path(name), *(folder / Path(name).name for folder in folders)):
         # A device or a pipe does not hold a log: reading one might never end.
         if path.is_file() or path.is_dir():
             return path
-    raise InputError(
-        "the log of the session is not there", file=name, remedy="Lay the log beside the session, or drop both files."
-    )
+    return None
 
 
 def _stack(entries: Sequence[Mapping[str, Any]]) -> Stack:

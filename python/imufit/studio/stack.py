@@ -163,7 +163,14 @@ class Step:
             Action.REMOVE: f"− {self.effect}",
             Action.ON: f"{self.effect} on",
             Action.OFF: f"{self.effect} off",
-            Action.HOLD: f"{self.effect} fixed",
+            Action.HOLD: f"{self._held} fixed",
             Action.FREE: f"{self.effect} fitted",
         }
         return words[self.action]
+
+    @property
+    def _held(self) -> str:
+        """The effect, with the parameters of it that stay at a value."""
+        if self.effect not in self.stack.effects:
+            return self.effect
+        return f"{self.effect}.{','.join(name for name, _ in self.stack.entry(self.effect).held)}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Final
 
 from nicegui import app, background_tasks
 
@@ -13,11 +12,8 @@ from imufit.studio import server
 from imufit.studio.desk import SESSION_ENDING, Desk
 from imufit.studio.live import page as live
 from imufit.studio.log_file import LogFile
-from imufit.studio.mystery import DEMONSTRATION
+from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION
 from imufit.studio.page import page_of
-
-DEMO_SEED: Final = 3
-"""The log of the demonstration: the seed of `imufit demo`, whose effect lies far above the noise."""
 
 
 def start(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, ready: Callable[[str], None]) -> None:
@@ -43,7 +39,11 @@ def start(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, read
     """
     desk = Desk()
     server.add_page("/", page_of(desk))
-    server.add_page("/live", live.build, "imufit live")
+
+    async def look_at(path: Path) -> None:
+        await desk.bring([LogFile(path, str(path))])
+
+    server.add_page("/live", live.page_with(look_at), "imufit live")
 
     async def first() -> None:
         if demo:

@@ -34,7 +34,7 @@ class CandidateView:
         self._desk, self._panels = desk, panels
         self._looked_at = ""
         self._drawn: tuple[object, bool] | None = None
-        ui.html("Missing effects", tag="h2", sanitize=False)
+        ui.html("Candidates", tag="h2", sanitize=False)
         self._list = ui.column().classes("w-full gap-0")
         self._card = ui.column().classes("w-full gap-1 studio-item").props("data-mark=card")
         self._card.visible = False
@@ -56,7 +56,8 @@ class CandidateView:
                 return
             shown = [item for item in diagnosis.candidates if item.status != NOT_TESTABLE]
             if self._desk.guessing:
-                ui.label("Rest on an effect to see what the effect would explain.").classes("studio-muted")
+                words = "Point at an effect, or tap its name, to see what the effect would explain."
+                ui.label(words).classes("studio-muted")
                 for item in sorted(shown, key=lambda item: item.effect):
                     self._candidate(item, None)
                 return
@@ -65,7 +66,8 @@ class CandidateView:
             for item in shown[:FIRST]:
                 self._candidate(item, diagnosis)
             if shown[FIRST:]:
-                with ui.expansion(f"{len(shown) - FIRST} more candidates").classes("w-full").props("dense"):
+                words = quantity.counted(len(shown) - FIRST, "more candidate")
+                with ui.expansion(words).classes("w-full").props("dense"):
                     for item in shown[FIRST:]:
                         self._candidate(item, diagnosis)
 
@@ -99,11 +101,11 @@ class CandidateView:
             if diagnosis is None:
                 return
             drop = f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}"
-            words = f"{quantity.share(item.probability)} probable, error {drop}"
+            words = f"{quantity.probability(item.probability)} probable, error {drop}"
             ui.label(words if item.status == PASSED else f"{words}, {item.status}").classes("studio-muted")
             if named and item.confounded_with:
                 rivals = ", ".join(str(rival) for rival in item.confounded_with[:2])
-                ui.label(f"Rivals: {printable(rivals)}").classes("studio-muted")
+                ui.label(f"Rivals, with correlation: {printable(rivals)}").classes("studio-muted")
 
     def look_at(self, effect: str) -> None:
         """Show the card of an effect, and what it would explain; empty puts both away.

@@ -1,4 +1,4 @@
-"""Bottom region: the fall of the error step by step, undo, redo, and two models side by side."""
+"""Region over the model: the fall of the error step by step, undo, redo, and two models side by side."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from nicegui import ui
 
 from imufit.figures import quantity
 from imufit.printable import NAME, printable
-from imufit.results.noise_part import NoisePart
+from imufit.results.model_comparison import preferred
+from imufit.results.noise_part import BEYOND, NoisePart
 from imufit.studio import charts
 from imufit.studio.desk import Desk
 from imufit.studio.session import Made, Session, worst_channel
@@ -35,7 +36,7 @@ class FallView:
         self._desk = desk
         self._shown: tuple[object, ...] = ()
         with ui.element("div").classes("studio-row flex-wrap"):
-            ui.html("Fall of the error", tag="h2", sanitize=False).style("flex: 1")
+            ui.html("Fall of the error", tag="h2", sanitize=False).style("flex: 1 0 auto; white-space: nowrap")
             self._undo = _button("undo", "Undo", lambda: desk.attempt(lambda: _session(desk).undo())).props(
                 "data-mark=undo"
             )
@@ -92,7 +93,8 @@ class FallView:
         second = None if session.second is None else session.made(session.second)
         present = session.made()
         levels = tuple(made is not None and made.comparison is not None for made in (second, present))
-        state = (session.second, session.stack, second, present, levels)
+        factor = session.weighed()
+        state = (session.second, session.stack, second, present, levels, factor)
         if state == self._shown:
             return
         self._shown = state
@@ -107,16 +109,21 @@ class FallView:
             elif second is None or present is None:
                 ui.label("The two models are being compared.").classes("studio-muted")
             else:
-                _two_models(second, present)
+                _two_models(second, present, factor)
 
 
-def _two_models(second: Made, present: Made) -> None:
-    """Lay out two models: held-out error, residual of each channel that changes, parameters."""
+def _two_models(second: Made, present: Made, factor: float | None) -> None:
+    """Lay out two models: held-out error, evidence, residual of each channel that changes, parameters."""
     lower = "second" if second.numbers.ratio < present.numbers.ratio else "present"
     ui.label(
         f"Held-out error: {quantity.ratio(second.numbers.ratio)} times the noise floor with the second model, "
         f"{quantity.ratio(present.numbers.ratio)} with the present one. The {lower} model stands lower."
     ).classes("studio-sentence").props("data-mark=two-sentence")
+    if factor is not None:
+        choice = {"first": "the second model", "second": "the present model", "neither": "neither model"}
+        ui.label(
+            f"The log prefers {choice[preferred(factor)]} (ln Bayes factor {factor:+.1f} for the present one)."
+        ).classes("studio-sentence").props("data-mark=two-evidence")
     rows: list[tuple[str, ...]] = [
         ("held-out error", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))
     ]
@@ -146,9 +153,11 @@ def _floor_words(session: Session, noise: tuple[NoisePart, ...]) -> str:
     parts.sort(key=lambda part: -part.share)
     if not parts:
         return ""
-    names = [f"{part.component.replace('_', ' ')} {quantity.share(part.share)}" for part in parts[:4]]
-    white, *slow = names or ["not known"]
-    return f"Noise floor of {channel}: {white}{'; beside it ' if slow else ''}{', '.join(slow)} of its variance."
+    names = [(part.component, f"{part.component.replace('_', ' ')} {quantity.share(part.share)}") for part in parts[:4]]
+    floor = ", ".join(words for component, words in names if component not in BEYOND)
+    slow = ", ".join(words for component, words in names if component in BEYOND)
+    beside = f" Beside it, over the same variance: {slow}." if slow else ""
+    return f"Noise floor of {channel}: {floor or 'not known'} of its variance.{beside}"
 
 
 def _session(desk: Desk) -> Session:

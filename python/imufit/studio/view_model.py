@@ -97,16 +97,19 @@ class ModelView:
         with ui.dialog() as dialog, ui.card():
             ui.label(f"{printable(parameter.key, NAME)}, {unit}").classes("studio-id")
             given = ui.number(label=f"value, {unit}", value=float(f"{factor * parameter.value:.6g}")).props(
-                "data-mark=edit-value"
+                "data-mark=edit-value autofocus"
             )
             ui.label("The value stays fixed until you open the lock.").classes("studio-muted")
 
             async def take() -> None:
+                if given.value is None:
+                    given.error = "Give a number."
+                    return
                 dialog.close()
-                if given.value is not None:
-                    value = float(given.value) / factor
-                    await desk.attempt(lambda: _session(desk).hold(parameter.effect, parameter.name, value))
+                value = float(given.value) / factor
+                await desk.attempt(lambda: _session(desk).hold(parameter.effect, parameter.name, value))
 
+            given.on("keydown.enter", take)
             with ui.row():
                 ui.button("Fix at this value", on_click=take).props("data-mark=edit-take")
                 ui.button("Cancel", on_click=dialog.close).props("flat")

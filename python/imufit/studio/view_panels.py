@@ -8,6 +8,7 @@ import numpy as np
 from nicegui import events, run, ui
 
 from imufit.comparing.compare import MIN_SHARE
+from imufit.figures import quantity
 from imufit.fitting.passes import UNITS
 from imufit.printable import NAME, printable
 from imufit.results import Comparison, Spectrum
@@ -49,16 +50,18 @@ class PanelView:
             self._channel.classes("min-w-28").props("data-mark=channel")
             self._covariate = ui.select([], label="against", on_change=self._chosen).props("dense outlined")
             self._covariate.classes("min-w-36").props("data-mark=covariate")
-            self._trace_kind = ui.toggle(
-                {RESIDUAL: "residual", READING: "reading"}, value=RESIDUAL, on_change=self._other_kind
-            ).props("dense no-caps")
         self._note = ui.label("").classes("studio-muted")
         with ui.element("div").classes("studio-charts"):
             self._panel = (
                 ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart").props("data-mark=panel")
             )
             self._spectrum = ui.plotly(charts.empty("")).classes("studio-chart").props("data-mark=spectrum")
-            self._trace = ui.plotly(charts.empty("")).classes("studio-chart studio-wide").props("data-mark=trace")
+            with ui.element("div").classes("studio-chart studio-wide"):
+                # The choice stands over the one figure that it changes.
+                self._trace_kind = ui.toggle(
+                    {RESIDUAL: "residual", READING: "reading"}, value=RESIDUAL, on_change=self._other_kind
+                ).props('dense no-caps padding="2px 10px"')
+                self._trace = ui.plotly(charts.empty("")).classes("studio-chart").props("data-mark=trace")
         self._trace.on("plotly_relayout", self._zoomed, throttle=0.1)
         self._trace.on("plotly_doubleclick", lambda: self._zoom(None))
 
@@ -138,7 +141,7 @@ class PanelView:
         covariate = self._present_covariate(found, channel)
         self._setting = True
         self._channel.set_options(
-            {item.channel: f"{item.channel} ({item.ratio:.2f})" for item in ratios}, value=channel
+            {item.channel: f"{item.channel} ({quantity.ratio(item.ratio)})" for item in ratios}, value=channel
         )
         self._covariate.set_options(
             {panel.covariate: printable(panel.covariate, NAME) for panel in panels}, value=covariate
@@ -207,7 +210,7 @@ class PanelView:
             else charts.spectrum(spectrum, both)
         )
         level = next(item for item in found.channels if item.channel == channel)
-        self._note.set_text(f"{channel} stands at {level.ratio:.2f} times its noise floor.")
+        self._note.set_text(f"{channel} stands at {quantity.ratio(level.ratio)} times its noise floor.")
         ui.timer(0, lambda: self._draw_trace(channel), once=True)
 
     async def _draw_trace(self, channel: str) -> None:

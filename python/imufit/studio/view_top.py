@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Final
 from nicegui import events, ui
 
 from imufit.errors import InputError
+from imufit.figures import quantity
 from imufit.printable import NAME, printable
 from imufit.remedy import Option
 from imufit.results import Diagnosis
@@ -17,13 +19,16 @@ from imufit.studio import server
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.log_file import LogFile, option_words, remedies
-from imufit.studio.mystery import DEMONSTRATION, LEVELS, NOTHING
+from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING
 from imufit.studio.recipe import as_python, as_shell
+from imufit.studio.session_file import LogsWantedError
 
 SEEDS: Final = 1_000_000
 """Logs of the game: none is met twice."""
 MOST_BYTES: Final = 4 * 2**30
 """Largest file that the browser may send: 20 million rows of 14 columns take 2.2 GB."""
+_APART: Final = re.compile(r"(?<=\d) (?=±|%|°|deg|m/s|µT|s\b|Hz)|(?<=±) ")
+"""Blanks between a number and its error or unit."""
 ICONS: Final = {"adequate": "check_circle", "missing": "help", "ambiguous": "call_split", "unknown": "error"}
 
 
@@ -73,6 +78,13 @@ class Head:
             ui.notify(str(error))
             return
         ui.download.content(text.encode(), f"{Path(self._desk.files[0].name).stem}-session.toml")
+        self._download_game()
+
+    def _download_game(self) -> None:
+        """Give the log of a game to the person: session and copied text name it."""
+        log = self._desk.game_log()
+        if log is not None:
+            ui.download.content(log.read_bytes(), log.name)
 
     def _show(self, form: str) -> None:
         """Show the text that makes the present model, and lay a copy in the clipboard."""
@@ -82,12 +94,17 @@ class Head:
         if session is None or made is None:
             ui.notify("The model is being fitted: copy it once that is done.")
             return
-        text = as_python(desk.files, made.way) if form == "Python" else as_shell(desk.files, session.stack.model)
+        text = as_python(desk.files, made.way) if form == "Python" else as_shell(desk.files, made.way)
         with ui.dialog() as dialog, ui.card().style("max-width: 92vw"):
             ui.label(f"The present model as {form}").classes("studio-id")
-            ui.label("Run the text in the folder of the log.").classes("studio-muted")
+            ui.label("The text lies in the clipboard. Run it in the folder of the log.").classes("studio-muted")
             ui.label(text).classes("studio-copy").props("data-mark=copied")
-            ui.button("Close", on_click=dialog.close).props("flat")
+            with ui.row():
+                if desk.game_log() is not None:
+                    ui.button("Save the log", on_click=self._download_game).props("no-caps outline").props(
+                        "data-mark=save-log"
+                    )
+                ui.button("Close", on_click=dialog.close).props("flat")
         dialog.on("hide", dialog.delete)
         dialog.open()
         ui.clipboard.write(text)
@@ -125,7 +142,9 @@ class Top:
         made = None if session is None or not session.begun else session.made()
         diagnosis = None if made is None else made.diagnosis
         verdict = None if desk.mystery is None else desk.mystery.verdict
-        state = (diagnosis, desk.trouble, tuple(item.file for item in desk.arrivals), desk.mystery, verdict)
+        brought = tuple(item.file for item in desk.arrivals)
+        answer = _named(desk) if desk.guessing else ""
+        state = (diagnosis, desk.trouble, brought, desk.wanted, desk.joined, desk.mystery, verdict, answer)
         if state == self._state and self._state:
             return
         self._state = state
@@ -133,27 +152,44 @@ class Top:
         with self._column:
             if desk.trouble:
                 self._problem()
+            if desk.wanted is not None:
+                self._wanted(desk.wanted)
             if desk.arrivals:
                 self._choice()
             if desk.mystery is not None:
                 self._game(made is not None and diagnosis is not None)
             if diagnosis is not None and not desk.guessing:
                 self._verdict(diagnosis)
-            if session is None and not desk.arrivals:
+            if session is None and not desk.arrivals and desk.wanted is None:
                 self._welcome()
 
     def _welcome(self) -> None:
         desk = self._desk
         ui.label("Drop a log here, or two files that belong together.").classes("studio-sentence")
         _uploader(desk)
-        ui.label("No log at hand? The mystery log hides an effect in a simulated one: choose a level above.").classes(
+        ui.label("No log at hand? See the loop on a simulated log, or find the effect that one hides.").classes(
             "studio-muted"
         )
+        with ui.row().classes("gap-2"):
+            for number, level in LEVELS.items():
+                words = level.title if number == DEMONSTRATION else f"Level {number}: {level.title}"
+                action = _player(desk, number, DEMO_SEED if number == DEMONSTRATION else None)
+                ui.button(words, on_click=action).props("no-caps outline size=sm").props(
+                    attribute("data-mark", f"play-{number}")
+                )
+
+    def _wanted(self, wanted: LogsWantedError) -> None:
+        """Ask for the logs of a session."""
+        names = " and ".join(printable(Path(name).name, NAME) for name in wanted.names)
+        ui.label(f"The session {printable(wanted.session.name, NAME)} wants {names}: drop the log here.").classes(
+            "studio-sentence"
+        ).props("data-mark=wanted")
+        _uploader(self._desk)
 
     def _verdict(self, diagnosis: Diagnosis) -> None:
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
             ui.icon(ICONS[diagnosis.verdict], size="sm").props(f'aria-label="{diagnosis.verdict}"')
-            ui.label(printable(diagnosis.sentence or diagnosis.verdict)).classes("studio-sentence").props(
+            ui.label(unbroken(printable(diagnosis.sentence or diagnosis.verdict))).classes("studio-sentence").props(
                 "data-mark=verdict"
             )
         if diagnosis.experiment:
@@ -166,8 +202,11 @@ class Top:
                 ui.label(printable(words)).classes("studio-muted").props("data-mark=fault")
                 for option in remedies(fault.advice):
                     self._cure(option, number, "mend")
+        for words in self._desk.joined:
+            ui.label(printable(words)).classes("studio-muted").props("data-mark=joined")
         if diagnosis.notes:
-            with ui.expansion(f"{len(diagnosis.notes)} notes on these data").classes("w-full").props("dense"):
+            words = f"{quantity.counted(len(diagnosis.notes), 'note')} on these data"
+            with ui.expansion(words).classes("w-full").props("dense"):
                 for note in diagnosis.notes:
                     ui.label(printable(note)).classes("studio-muted")
 
@@ -225,8 +264,11 @@ class Top:
             names = sorted(desk.session.start.analysis.candidates)
             choices = {NOTHING: "nothing is missing"} | {name: printable(name, NAME) for name in names}
             with ui.row().classes("items-center"):
-                answer = ui.select(choices, value=NOTHING, label="Your answer", with_input=True).props("dense outlined")
+                # Who added an effect has named it; another choice stays until the reveal.
+                present = _named(desk) if game.answer is None else game.answer
+                answer = ui.select(choices, value=present, label="Your answer", with_input=True).props("dense outlined")
                 answer.classes("min-w-56").props("data-mark=answer")
+                answer.on_value_change(lambda event: setattr(game, "answer", event.value or NOTHING))
                 ui.button("Reveal", on_click=lambda: desk.reveal(answer.value or NOTHING)).props("no-caps").props(
                     "data-mark=reveal"
                 )
@@ -235,6 +277,17 @@ class Top:
             ui.label(printable(sentence)).classes("studio-sentence").props("data-mark=truth")
         ui.label(game.verdict.lesson).classes("studio-muted").props("data-mark=lesson")
         ui.button("Play again", on_click=_player(desk, game.level)).props("no-caps outline").props("data-mark=again")
+
+
+def unbroken(sentence: str) -> str:
+    """Return a sentence whose numbers stay on one line with their errors and units.
+
+    Parameters
+    ----------
+    sentence : str
+        Any text.
+    """
+    return _APART.sub("\N{NO-BREAK SPACE}", sentence)
 
 
 def _named(desk: Desk) -> str:
@@ -249,8 +302,8 @@ def _number_of(desk: Desk, name: str | None) -> int:
     return names.index(name) if name in names else 0
 
 
-def _player(desk: Desk, level: int) -> Callable[[], object]:
-    return lambda: desk.play(level, secrets.randbelow(SEEDS))
+def _player(desk: Desk, level: int, seed: int | None = None) -> Callable[[], object]:
+    return lambda: desk.play(level, secrets.randbelow(SEEDS) if seed is None else seed)
 
 
 def _upload(desk: Desk) -> None:

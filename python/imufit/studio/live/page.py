@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final, cast
@@ -59,9 +60,23 @@ _device = _Device()
 app.on_shutdown(_device.disconnect)
 
 
-def build() -> None:
-    """Make the page."""
-    _LivePage()
+Opener = Callable[[Path], Awaitable[None]]
+"""Opens a log in the studio."""
+
+
+def page_with(opener: Opener) -> Callable[[], None]:
+    """Return what builds the page for one browser.
+
+    Parameters
+    ----------
+    opener : callable
+        Opens a recording in the studio.
+    """
+
+    def build() -> None:
+        _LivePage(opener)
+
+    return build
 
 
 def devices() -> list[str]:
@@ -74,7 +89,8 @@ def devices() -> list[str]:
 class _LivePage:
     """The elements of one browser's page."""
 
-    def __init__(self) -> None:
+    def __init__(self, opener: Opener) -> None:
+        self._opener = opener
         for sheet in ("studio.css", "live/live.css"):
             ui.add_css(files("imufit.studio").joinpath(sheet).read_text(encoding="utf-8"))
         self._columns: tuple[str, ...] = ()
@@ -150,6 +166,8 @@ class _LivePage:
                 self._file.classes("grow").props('data-testid="file"')
             self._recorded = ui.label("The red button records what comes from now on.").classes("text-sm")
             self._recorded.props('data-testid="recorded"')
+            self._look = ui.button("Open in the studio", on_click=self._look_at).props("no-caps outline size=sm")
+            self._look.props('data-testid="look"').visible = False
 
     def _guide(self) -> None:
         with ui.column().classes("studio-region gap-2"):
@@ -219,6 +237,14 @@ class _LivePage:
         else:
             listening.record(self._path("recording"))
 
+    async def _look_at(self) -> None:
+        """Go to the studio with the log that was recorded last."""
+        listening = _device.listening
+        if listening is None or (path := listening.recorded.path) is None:
+            return
+        ui.navigate.to("./")
+        await self._opener(path)
+
     def _path(self, stem: str) -> Path:
         """Return the log to record: the one named, in the folder that the studio was started in, or a free name."""
         named = str(self._file.value or "").strip()
@@ -230,7 +256,7 @@ class _LivePage:
             self._message.text = "Connect a device first."
         elif listening.stage is not None:
             listening.stop()
-        elif not listening.recorded.running:
+        else:
             listening.guide(free_name(Path.cwd(), "calibration"))
 
     def _longer(self, event: Any) -> None:
@@ -300,6 +326,7 @@ class _LivePage:
         if recorded.path is None:
             return
         name = printable(recorded.path.name)
+        self._look.visible = not recorded.running
         if recorded.running:
             said = recorded.message or "recording"
             self._recorded.text = f"{said} {name}: {recorded.rows} rows, {recorded.seconds:.0f} s"
@@ -310,6 +337,8 @@ class _LivePage:
     def _show_guide(self, listening: Listening | None) -> None:
         stage = None if listening is None else listening.stage
         self._start.text = "Calibrate" if stage is None else "Stop"
+        # The guide records, too: one recording at a time.
+        self._start.set_enabled(stage is not None or listening is None or not listening.recorded.running)
         self._progress.visible = self._sides.visible = stage is not None
         if stage is None:
             self._draw_side(None)

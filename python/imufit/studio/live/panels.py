@@ -97,10 +97,11 @@ def panel(rolling: Rolling, title: str, names: Sequence[str], seconds: float, re
         for rest in rests
         if rest.end > edge[0]
     ]
-    axis_look = {"zeroline": False, "automargin": True, "fixedrange": True}
+    # One margin for all panels: their times stand over one another.
+    axis_look = {"zeroline": False, "fixedrange": True}
     layout = {
         "height": HEIGHT,
-        "margin": {"l": 52, "r": 10, "t": 26, "b": 34},
+        "margin": {"l": 60, "r": 10, "t": 26, "b": 34},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
         "xaxis": {**axis_look, "range": edge, "title": {"text": "time, s", "standoff": 4}, "nticks": 6},
