@@ -8,6 +8,7 @@ from html import escape
 from typing import Final
 
 from markupsafe import Markup
+from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from imufit.figures import style
@@ -39,8 +40,6 @@ PALETTE: Final = {
     "#ffffff": "paper",
 }
 """Colours of the figures and the variables of the page's style sheet that stand for them."""
-EDGE: Final = 0.04
-"""Room above what is left of a figure without its title, inches: that of matplotlib's constrained layout."""
 _VARIABLES: Final = {colour.lower(): f"var(--{name})" for colour, name in PALETTE.items()}
 
 
@@ -59,16 +58,17 @@ def untitled(figure: style.PlainFigure) -> tuple[str, Bbox]:
     Bbox
         The part of the figure below it, inches: all of a figure that is not laid out.
     """
-    title = figure.get_suptitle()
-    figure.suptitle("")
     shown = [axes for axes in figure.axes if axes.get_visible()]
+    title = figure.get_suptitle()
     if len(shown) == 1:
         title = title or shown[0].get_title(loc="left") or shown[0].get_title()
-        for place in ("left", "center"):
-            shown[0].set_title("", loc=place)
     width, height = figure.get_size_inches()
-    if title and figure.is_laid_out:
-        height = min(height, figure.get_tightbbox().y1 + EDGE)
+    holders = (figure, *shown) if len(shown) == 1 else (figure,)
+    for text in (child for holder in holders for child in holder.get_children() if isinstance(child, Text)):
+        if title and text.get_text() == title:
+            if figure.is_laid_out:
+                height = min(height, text.get_window_extent().y0 / figure.dpi)
+            text.set_text("")
     return " ".join(title.split()), Bbox.from_bounds(0.0, 0.0, width, height)
 
 
