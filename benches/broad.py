@@ -47,7 +47,7 @@ FOLDER = Path(__file__).resolve().parents[1] / ".." / "shared" / "data" / "broad
 NORTH = (0.0, 20.0, -44.0)  # ENU: the horizontal part to the north, as all filters take it
 ALMOST_INERTIAL = (0.05, 0.2, 0.5, 1.0, 3.0)
 """Time constants of the low pass of the specific force, s; the last is the default of vqf (tauAcc)."""
-OURS = ("mekf", "smoother", "mahony")
+OURS = ("mekf", "smoother", "madgwick", "mahony")
 TUNED = ("mekf", "smoother")
 WITH_MODEL = ("mekf", "smoother", "vqf, online", "vqf, offline")
 LEFT_OUT = ("ahrs, Mahony",)  # slower than its Madgwick and no better
