@@ -71,14 +71,14 @@ def table(rows: list[Mistake], found: list[Judgement]) -> Table:
         kinds = Counter(each.kind for each in own)
         right = sum(each.right for each in own)
         asked = "not named" if row.harmless else row.remedy.split(":")[0].split(" that")[0]
-        other = len(own) - right - kinds[Kind.BELIEVED] - kinds[Kind.WRONG_MISSING]
+        other = len(own) - right - kinds[Kind.UNNOTICED] - kinds[Kind.WRONG_MISSING]
         lines.append(
             (
                 row.line,
                 row.group.value,
                 asked,
                 f"{right} of {len(own)}",
-                f"{kinds[Kind.BELIEVED] or ''}",
+                f"{kinds[Kind.UNNOTICED] or ''}",
                 f"{kinds[Kind.WRONG_MISSING] or ''}",
                 f"{other or ''}",
             )
@@ -97,7 +97,7 @@ def summary(found: list[Judgement], sounds: list[Sound], answers: list[Answer]) 
         named = sum(bool(answer.faults) or answer.code != 0 for answer in clean)
         lines.append(
             f"In {words}: right in {sum(each.right for each in own)} of {len(own)}, unnoticed "
-            f"{kinds[Kind.BELIEVED]}, wrong MISSING {kinds[Kind.WRONG_MISSING]}. Before they were spoilt, faults were "
+            f"{kinds[Kind.UNNOTICED]}, wrong MISSING {kinds[Kind.WRONG_MISSING]}. Before they were spoilt, faults were "
             f"named in {named} of {len(clean)}."
         )
     return "\n".join(lines)

@@ -50,7 +50,7 @@ def test_an_answer_without_a_name_is_not_taken_for_one(sound, baseline, tmp_path
     }
     for change, kind in (
         ({}, Kind.WRONG_MISSING),
-        ({"verdict": "adequate", "best": None}, Kind.BELIEVED),
+        ({"verdict": "adequate", "best": None}, Kind.UNNOTICED),
         ({"verdict": "unknown", "best": None}, Kind.UNKNOWN_ONLY),
     ):
         answer = Answer(0, "", {**said, **change})

@@ -30,7 +30,7 @@ class Kind(StrEnum):
     """What came of a spoilt log, the most harmful first."""
 
     WRONG_MISSING = "wrong missing"
-    BELIEVED = "believed"
+    UNNOTICED = "unnoticed"
     MISLED = "another mistake named"
     CRASHED = "crashed"
     INVENTED = "named though harmless"
@@ -180,7 +180,7 @@ def unnamed(mistake: Mistake, sound: Sound, spoilt: Log, baseline: Answer, answe
     rewritten = spoilt.text is not None or set(spoilt.table) != set(sound.log.table)
     if rewritten and mistake.remedy is Remedy.MAPPING and restores(path, None, sound.log, mistake.step):
         return Kind.READ_RIGHT
-    return Kind.UNKNOWN_ONLY if answer.verdict == "unknown" else Kind.BELIEVED
+    return Kind.UNKNOWN_ONLY if answer.verdict == "unknown" else Kind.UNNOTICED
 
 
 def names(told: str, mistake: Mistake) -> bool:

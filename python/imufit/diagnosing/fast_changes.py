@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.diagnosing.hops import hops
+from imufit.diagnosing.telegraph_noise import telegraph_noise
 from imufit.diagnosing.tones import moving, strongest
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
@@ -57,7 +57,7 @@ def _changes(evidence: LogEvidence, step: Array) -> list[tuple[int, float, str]]
     for index, residual in channels.items():
         square, p_value, shape, least = 0.0, 1.0, "", LEAST
         step_of_sensor = evidence.facts.sensor_dt[index // 3]
-        tone, sweep, hopping = strongest(t, residual), moving(t, residual), hops(t, residual)
+        tone, sweep, jumping = strongest(t, residual), moving(t, residual), telegraph_noise(t, residual)
         if tone is not None:
             frequency, square, p_value = tone
             shape = f"a line at {frequency:.3g} Hz"
@@ -67,14 +67,14 @@ def _changes(evidence: LogEvidence, step: Array) -> list[tuple[int, float, str]]
             (first, last), square, p_value = sweep
             shape = f"a line that moves from {first:.3g} to {last:.3g} Hz"
             least = LEAST if max(first, last) * step_of_sensor < FASTEST else MOST_OF_IT
-        if hopping is not None:
-            square, p_value, least = hopping.size**2 * hopping.upper * (1.0 - hopping.upper), 2.0**-hopping.count, LEAST
+        if jumping is not None:
+            square, p_value, least = jumping.size**2 * jumping.upper * (1.0 - jumping.upper), 2.0**-jumping.count, LEAST
             shape = (
-                f"random telegraph noise: {hopping.count} jumps between two levels, the first at {hopping.first:.1f} s"
+                f"random telegraph noise: {jumping.count} jumps between two levels, the first at {jumping.first:.1f} s"
             )
         # The drop is one of the whitened residual, as that of other causes is; half of it is a log likelihood ratio.
         whitened = square * evidence.slow_gain(index) / evidence.variance[index]
-        certain = hopping is not None or p_value * len(channels) <= CHANCE
+        certain = jumping is not None or p_value * len(channels) <= CHANCE
         if certain and square >= least**2 * float(np.nanvar(residual)):
             found.append((index, 0.5 * whitened * int(np.sum(np.isfinite(residual))), shape))
     return found

@@ -8,8 +8,8 @@ from typing import Final
 from imufit.faults.backlog import backlogs
 from imufit.faults.duplicate import duplicates
 from imufit.faults.jump import jumps
+from imufit.faults.outliers import outliers
 from imufit.faults.row_fault import RowFault, joined
-from imufit.faults.strangers import strangers
 from imufit.faults.stuck import stuck
 from imufit.log import LogSource
 from imufit.results import column_words, fault_words
@@ -41,7 +41,7 @@ def row_faults(log: LogSource) -> tuple[list[DataFault], list[LeftOut]]:
     """
     found: list[RowFault] = []
     for chunk in log.chunks(CHUNK_ROWS, MARGIN):
-        for look in (strangers, stuck, duplicates, backlogs, jumps):
+        for look in (outliers, stuck, duplicates, backlogs, jumps):
             found += look(chunk)
     found = joined(found)
     faults, left_out = [], []
@@ -67,10 +67,10 @@ def _named(item: RowFault, *, left_out: bool, spoils: bool) -> DataFault:
     rows, span, figures = item.rows, (item.t_start, item.t_end), item.figures
     if item.fault == "stuck":
         words = fault_words.stuck(item.sensors[0], item.axes, rows, span, figures["moved"])
-    elif item.fault == "stranger":
+    elif item.fault == "outlier":
         assert channel is not None
         values = -figures["low"], figures["high"]
-        words = column_words.strangers(channel, rows, span, values, figures["usual"])
+        words = column_words.outliers(channel, rows, span, values, figures["usual"])
     elif item.fault == "duplicate":
         words = fault_words.duplicate(item.sensors, rows, span, figures["lag"])
     elif item.fault == "jump":

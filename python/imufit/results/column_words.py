@@ -130,7 +130,7 @@ def copied(copy: str, original: str, *, sure: bool) -> Words:
     )
 
 
-def strangers(channel: str, rows: int, span: tuple[float, float], values: tuple[float, float], usual: float) -> Words:
+def outliers(channel: str, rows: int, span: tuple[float, float], values: tuple[float, float], usual: float) -> Words:
     """Say that single samples are none that the sensor can have read."""
     low, high = values
     shown = f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"

@@ -354,7 +354,7 @@ OUTSIDE: Mapping[str, Outside] = {
         _outside("gyr.other_level", "another level for a while", 5e-3, _while, ["t"], inner=_some_time("length")),
         _outside("gyr.tone", "oscillation of one frequency", 5e-3, _tone, ["t"], inner=_pitch),
         _outside("acc.tone", "oscillation of one frequency", 0.05, _tone, ["t"], inner=_pitch),
-        _outside("gyr.loose_contact", "hops between two levels", 5e-3, _loose, ["t"], inner=_pattern),
+        _outside("gyr.loose_contact", "jumps between two levels", 5e-3, _loose, ["t"], inner=_pattern),
         _outside(
             "acc.creep", "creeps after every change", 0.01, _creep, own="f", inner=_somewhere(2.0, 8.0, "forgotten")
         ),

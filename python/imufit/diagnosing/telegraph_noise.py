@@ -28,7 +28,7 @@ SURE = 8.0
 
 
 @dataclass(frozen=True)
-class Hops:
+class TelegraphNoise:
     """Jumps of a residual between two levels.
 
     Attributes
@@ -49,7 +49,7 @@ class Hops:
     upper: float
 
 
-def hops(t: Array, residual: Array) -> Hops | None:
+def telegraph_noise(t: Array, residual: Array) -> TelegraphNoise | None:
     """Find whether a residual jumps between two levels.
 
     Noise of any colour has differences of all sizes, a burst of noise has jumps of all sizes, and a bias random walk
@@ -65,7 +65,7 @@ def hops(t: Array, residual: Array) -> Hops | None:
     if len(t) < 2:
         return None
     dt = float(np.median(np.diff(t)))
-    tried = (_hops(t, residual, max(WINDOW_ROWS, round(window / dt))) for window in WINDOWS)
+    tried = (_jumps(t, residual, max(WINDOW_ROWS, round(window / dt))) for window in WINDOWS)
     return next((found for found in tried if found is not None), None)
 
 
@@ -83,7 +83,7 @@ def _stay(means: Array, peaks: list[int], size: float) -> bool:
     return apart >= max(STAYING * size, SURE * error)
 
 
-def _hops(t: Array, residual: Array, rows: int) -> Hops | None:
+def _jumps(t: Array, residual: Array, rows: int) -> TelegraphNoise | None:
     """Find jumps between means of so many rows."""
     windows = len(t) // rows
     if windows < FEWEST_WINDOWS:
@@ -108,4 +108,4 @@ def _hops(t: Array, residual: Array, rows: int) -> Hops | None:
     at = t[[(k + 1) * rows for k in peaks]]
     stays = np.diff(np.concatenate([[t[0]], at, [t[-1]]]))
     share = float(np.sum(stays[1::2]) / np.sum(stays))
-    return Hops(middle, float(at[0]), len(peaks), min(share, 1.0 - share))
+    return TelegraphNoise(middle, float(at[0]), len(peaks), min(share, 1.0 - share))
