@@ -58,6 +58,10 @@ class FallView:
         self._redo.set_enabled(session is not None and begun and session.can_redo)
         self._keep.set_enabled(begun)
         if session is None or not begun:
+            self._chart.update_figure(charts.empty("The error stands here once the evidence is there."))
+            self._floor.set_text("")
+            self._two.clear()
+            self._shown = ()
             return
         numbers = [session.numbers(step.stack) for step in session.steps]
         ratios = [math.nan if item is None else item.ratio for item in numbers]

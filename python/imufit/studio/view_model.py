@@ -34,14 +34,15 @@ class ModelView:
         begun = session is not None and session.begun
         numbers = session.numbers() if session is not None and begun else None
         # A list that stays as it is keeps its elements: a click never falls on one that is being replaced.
-        state = (begun, None if session is None else session.stack, numbers)
+        state = (session, begun, None if session is None else session.stack, numbers)
         if state == self._state:
             return
         self._state = state
         self._list.clear()
         with self._list:
             if session is None or not begun:
-                ui.label("Open a log to begin.").classes("studio-muted")
+                words = "Open a log to begin." if session is None else "The evidence is being taken."
+                ui.label(words).classes("studio-muted")
                 return
             ui.label(_state(session, numbers)).classes("studio-muted").props("data-mark=model-state")
             for entry in session.stack.entries:
