@@ -175,7 +175,9 @@ class Player:
         self.tracks = {track.name: track for track in tracks}
         self.begin = min(float(track.t[0]) for track in tracks)
         self.end = max(float(track.t[-1]) for track in tracks)
-        self.time, self.playing, self.speed = self.begin, False, 1.0
+        # A filter needs some rows before its first attitude: the player starts where every body has one.
+        known = max((track.known for track in tracks), default=self.begin)
+        self.time, self.playing, self.speed = known, False, 1.0
         with ui.column().classes("w-full gap-1 studio-player"):
             self.body = Body(tuple(self.tracks))
             self._words: dict[str, ui.label] = {}
@@ -184,7 +186,7 @@ class Player:
             with ui.row().classes("w-full items-center no-wrap gap-2"):
                 self._button = ui.button(icon="play_arrow", on_click=self.toggle).props('flat dense aria-label="play"')
                 self._slider = ui.slider(
-                    min=self.begin, max=self.end, step=max((self.end - self.begin) / 2000.0, 1e-3), value=self.begin
+                    min=self.begin, max=self.end, step=max((self.end - self.begin) / 2000.0, 1e-3), value=self.time
                 ).props('aria-label="time of the attitude"')
                 self._slider.on_value_change(lambda event: self.go(float(event.value)))
             with ui.row().classes("w-full items-center gap-2"):
@@ -194,7 +196,7 @@ class Player:
                     {speed: f"{speed:g} ×" for speed in SPEEDS}, value=1.0, on_change=self._faster, label="speed"
                 ).props("dense options-dense").classes("w-20")
         self._timer = ui.timer(1.0 / PICTURES, self._tick, active=False)
-        self.go(self.begin)
+        self.go(self.time)
 
     def _legend(self, name: str) -> None:
         colour, _, edges = LOOKS[name]

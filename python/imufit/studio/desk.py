@@ -13,7 +13,8 @@ from typing import Final, TypeVar
 from nicegui import Event, run
 
 from imufit.errors import InputError
-from imufit.remedy import Option
+from imufit.log import Reading
+from imufit.remedy import Option, Remedy
 from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, offers, remedies
 from imufit.studio.mystery import DEMONSTRATION, Mystery
 from imufit.studio.session import Session
@@ -22,6 +23,8 @@ from imufit.studio.stack import Stack
 from imufit.studio.traces import ModelTraces, Traces
 
 Answer = TypeVar("Answer")
+Piece = tuple[str, Callable[[], object], LogFile | None]
+"""Work in words, the work, and the file that a problem of it concerns."""
 
 SESSION_ENDING: Final = ".toml"
 """Ending of the file of a session."""
@@ -84,6 +87,10 @@ class Desk:
         Share of the work that is done, where this is known.
     trouble : str
         The last problem; empty where there is none.
+    in_shell : str
+        The last problem's remedy in the words of the command line, where it names an option.
+    troubled : LogFile or None
+        The file that gave the last problem.
     cures : list of Option
         Options of reading that the problem's remedy names.
     changed : Event
@@ -104,11 +111,12 @@ class Desk:
         self.busy = ""
         self.share: float | None = None
         self.trouble = ""
+        self.in_shell = ""
         self.cures: list[Option] = []
         self.changed: Event[[]] = Event()
         self._folder = tempfile.TemporaryDirectory(prefix="imufit-")
         self._working = self._failed = False
-        self._troubled: LogFile | None = None
+        self.troubled: LogFile | None = None
         self._before: Shown | None = None
 
     def new_folder(self) -> Path:
@@ -164,7 +172,13 @@ class Desk:
         try:
             return await run.io_bound(work)
         except InputError as error:
-            self._note(str(error), remedies(error.advice), file)
+            advice = error.advice
+            if file is not None and isinstance(advice, Remedy) and advice.python != advice.shell:
+                # Options of a shell: the page has buttons and a field in their place.
+                self._note(error.statement, remedies(advice), file)
+                self.in_shell = advice.shell
+            else:
+                self._note(str(error), remedies(advice), file)
         except (OSError, MemoryError) as error:
             self._note(f"{type(error).__name__}: {error}", [], file)
         except Exception as error:
@@ -177,11 +191,12 @@ class Desk:
         return None
 
     def _note(self, problem: str, cures: list[Option], file: LogFile | None) -> None:
-        self.trouble, self.cures, self._troubled = problem, cures if file is not None else [], file
+        self._no_trouble()
+        self.trouble, self.cures, self.troubled = problem, cures if file is not None else [], file
         self._failed = True
 
     def _no_trouble(self) -> None:
-        self.trouble, self.cures, self._troubled = "", [], None
+        self.trouble, self.in_shell, self.cures, self.troubled = "", "", [], None
 
     def forget_trouble(self) -> None:
         """Put the last problem away."""
@@ -231,44 +246,48 @@ class Desk:
             self._before = None
         self.changed.emit()
 
-    def _pending(self) -> Iterator[tuple[str, Callable[[], object]] | tuple[str, Callable[[], object], LogFile]]:
-        """List the pieces of work that are to be done for the present model, in order."""
-        session = self.session
-        if session is None:
-            return
+    def _pending_first(self, session: Session) -> Iterator[Piece]:
+        """List the pieces of work before anything can be fitted: a person sees the rows while the evidence is taken."""
         if self.traces is None or not self.traces.built or self.traces.log is not session.logs[session.shown]:
-            # The rows come first: a person sees them while the evidence is taken.
             yield "reading the rows", self._drawn_rows, self.files[0]
         if not session.begun:
             names = " and ".join(file.name for file in self.files)
             yield f"taking the evidence of {names}", partial(session.begin, self.progress), self.files[0]
-            return
-        if self._before is not None:
+        elif self._before is not None:
             before, self._before = self._before, None
             self._close(before.traces)
+
+    def _pending(self) -> Iterator[Piece]:
+        """List the pieces of work that are to be done for the present model, in order."""
+        session = self.session
+        if session is None:
+            return
+        yield from self._pending_first(session)
+        if not session.begun:
+            return
         stack = session.stack
         made = session.made(stack)
         words = " + ".join(stack.model.effects) or "the ideal sensor"
         for step in session.steps[: session.position + 1]:
             # Earlier ones first: a session that was reopened goes the same way again.
             if session.made(step.stack) is None:
-                yield f"fitting {words}", partial(session.fit, step.stack, self.progress)
+                yield f"fitting {words}", partial(session.fit, step.stack, self.progress), None
                 return
         assert made is not None
         if made.comparison is None and session.has_reference:
-            yield f"comparing {words}", lambda: session.compare(stack, self.progress)
+            yield f"comparing {words}", lambda: session.compare(stack, self.progress), None
         if made.diagnosis is None:
-            yield f"effects missing in {words}", lambda: session.diagnose(stack, self.progress)
+            yield f"effects missing in {words}", lambda: session.diagnose(stack, self.progress), None
         if session.has_reference:
             for model in dict.fromkeys((stack.model, Stack())):
                 if model not in self.models:
-                    yield "residuals over time", partial(self._drawn_model, model)
+                    yield "residuals over time", partial(self._drawn_model, model), None
         if session.second is not None:
             second = session.made(session.second)
             if second is None or (second.comparison is None and session.has_reference):
-                yield "comparing the second model", lambda: session.compare(session.second, self.progress)
+                yield "comparing the second model", lambda: session.compare(session.second, self.progress), None
             if session.second.model != stack.model and session.weighed() is None:
-                yield "weighing the two models", lambda: session.weigh(self.progress)
+                yield "weighing the two models", lambda: session.weigh(self.progress), None
 
     def _drawn_rows(self) -> Traces:
         """Make the pass over the rows of the log that is drawn; those read so far are shown meanwhile."""
@@ -342,7 +361,9 @@ class Desk:
         names = " and ".join(file.name for file in files)
         return await self._in_thread(f"opening {names}", work, files[0])
 
-    def _take(self, session: Session, files: Sequence[LogFile], joined: tuple[str, ...], mystery: Mystery | None) -> None:
+    def _take(
+        self, session: Session, files: Sequence[LogFile], joined: tuple[str, ...], mystery: Mystery | None
+    ) -> None:
         """Show a session; the one before is kept until the evidence of this one is there."""
         if self.session is not None and self.session.begun:
             self._before = Shown(self.session, self.files, self.mystery, self.joined, self.traces, self.models)
@@ -373,8 +394,8 @@ class Desk:
             Number of the log of the session.
         """
         try:
-            if self._troubled is not None and option in self.cures:
-                await self.bring([self._troubled.mended(option)])
+            if self.troubled is not None and option in self.cures:
+                await self.bring([self.troubled.mended(option)])
                 return
             files = [file.mended(option) if k == number else file for k, file in enumerate(self.files)]
         except InputError as error:
@@ -382,6 +403,25 @@ class Desk:
             self.changed.emit()
             return
         await self.open(files)
+
+    async def remap(self, text: str) -> None:
+        """Read the file that gave trouble anew, with a mapping of its columns.
+
+        Parameters
+        ----------
+        text : str
+            Such as ``acc_x=AccX[g],acc_y=AccY[g]``.
+        """
+        file = self.troubled
+        if file is None:
+            return
+        try:
+            mapping = Reading.of_texts([text], None, [], []).mapping or {}
+        except InputError as error:
+            self._note(error.statement, [], file)
+            self.changed.emit()
+            return
+        await self.bring([file.mended(("mapping", mapping))])
 
     async def reopen(self, path: Path) -> None:
         """Take up a session that was saved: its logs, its way, its models.
