@@ -41,8 +41,6 @@ class BodyView:
 
     def renew(self) -> None:
         """Show the attitudes of the present model, in the background."""
-        session = self._desk.session
-        self._opened.visible = session is not None and session.begun
         if self._opened.value:
             background_tasks.create(self.refresh(), name="attitudes")
 

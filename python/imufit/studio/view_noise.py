@@ -33,8 +33,6 @@ class NoiseView:
 
     def renew(self) -> None:
         """Show the noise of the present log, in the background."""
-        session = self._desk.session
-        self._opened.visible = session is not None and session.begun
         if self._opened.value:
             background_tasks.create(self.refresh(), name="noise at rest")
 

@@ -76,11 +76,14 @@ class PanelView:
         if session is not self._session:
             self._session, self._window, self._state = session, None, ()
             self._trace.update_figure(charts.empty("The rows are being read."))
+            for chart in (self._panel, self._spectrum):
+                chart.update_figure(charts.empty("This stands here once the evidence is there."))
         made = session.made()
         found = None if made is None else made.comparison
         judged = session.begun and session.has_reference
-        for element in (self._panel, self._spectrum, self._covariate, self._trace_kind):
-            element.visible = judged
+        self._covariate.visible = self._trace_kind.visible = judged
+        # A chart is hidden where it stays empty: Plotly cannot resize one that comes and goes.
+        self._panel.visible = self._spectrum.visible = judged or not session.begun
         if not judged:
             self._note.set_text(
                 "The log has no reference: the rests are judged, and the readings are drawn."
