@@ -76,16 +76,21 @@ class InputError(ValueError):
                 where.append(f"column {column}")
         return ", ".join(where)
 
+    @property
+    def statement(self) -> str:
+        """The message without the remedy."""
+        return self._message(with_remedy=False)
+
     def __str__(self) -> str:
         return self._message()
 
-    def _message(self) -> str:
+    def _message(self, *, with_remedy: bool = True) -> str:
         parts = [printable(Path(self.file).name, NAME)] if self.file else []
         parts += [self.where] if self.where else []
         text = ": ".join([*parts, self.problem])
         if not text.endswith((".", "?", "!")):
             text += "."
-        if self.remedy:
+        if with_remedy and self.remedy:
             text += f" {self.remedy}"
         return " ".join(text.split())
 

@@ -8,16 +8,20 @@ import re
 _DEGREES = 180.0 / math.pi
 _GRAVITY = 9.80665
 _PARTS = re.compile(r"(?P<head>\([^()]*\)|rad/s\^2|rad/s|m/s\^2|[^/ ()]+)(?:(?:/| per )(?P<tail>.+))?")
+_SHORT = ((1e-4, 1e6, "µs"), (0.1, 1e3, "ms"))
+"""Times below so many seconds are shown in a smaller unit: no zero stands between the point and the first digit."""
 _SPELLING = (("^2", "²"), ("^3", "³"), ("degC", "°C"), ("uT", "µT"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"))
 
 
-def shown_unit(unit: str) -> tuple[float, str]:
+def shown_unit(unit: str, size: float | None = None) -> tuple[float, str]:
     """Find the unit in which a quantity is shown, and the factor that leads there.
 
     Parameters
     ----------
     unit : str
         SI unit as the library keeps it, e.g. ``rad/s`` or ``1``.
+    size : float, optional
+        Largest size of the values, in `unit`: a short time is then shown in ms or µs.
 
     Returns
     -------
@@ -32,6 +36,8 @@ def shown_unit(unit: str) -> tuple[float, str]:
     (1.0, 'm/s²')
     """
     text = unit.strip()
+    if text == "s" and size is not None and math.isfinite(size) and size != 0.0:
+        return next(((factor, short) for below, factor, short in _SHORT if abs(size) < below), (1.0, text))
     if text in ("", "1", "-"):
         return 100.0, "%"
     parts = _PARTS.fullmatch(text)
@@ -143,9 +149,10 @@ def with_error(value: float, standard_error: float, unit: str) -> str:
     str
         For instance ``0.0200 ± 0.0004 deg/s per g``.
     """
-    factor, shown = shown_unit(unit)
+    known = math.isfinite(standard_error) and standard_error > 0.0
+    factor, shown = shown_unit(unit, max(abs(value), standard_error) if known else value)
     value, standard_error = factor * value, factor * standard_error
-    if not (math.isfinite(standard_error) and standard_error > 0.0):
+    if not known:
         return f"{number(value)} {shown}"
     if standard_error >= 1e5 or standard_error < 1e-6:
         return f"{number(value)} ± {number(standard_error, 2)} {shown}"
@@ -157,7 +164,7 @@ def quantity(value: float | None, unit: str) -> str:
     """Value in the shown unit, e.g. ``0.573 deg/s``; a dash without a value."""
     if value is None or not math.isfinite(value):
         return "-"
-    factor, shown = shown_unit(unit)
+    factor, shown = shown_unit(unit, value)
     return f"{number(factor * value)} {shown}"
 
 

@@ -21,6 +21,8 @@ LINE: Final = 20.0
 once in 100 spectra at most (counted by a test), a mean of several rarer."""
 NEIGHBOURS: Final = 16
 """Bins on each side that a line is compared with."""
+LEGEND: Final = 0.25
+"""Height of the legend's strip over that of the lines: a line of text over a panel of 25 mm."""
 
 
 class SpectrumLike(Protocol):
@@ -124,7 +126,10 @@ def _sensor(axes: Axes, sensor: str, spectra: Sequence[SpectrumLike]) -> None:
         for scale in (axes.xaxis, axes.yaxis):
             scale.set_major_formatter(lambda value, _: quantity.number(float(value), 1))
             scale.set_minor_formatter(NullFormatter())
-        axes.legend(frameon=False, fontsize=8, ncols=3, loc="best")
+        # A strip over the lines is the legend's.
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high * (high / low) ** LEGEND)
+        axes.legend(frameon=False, fontsize=8, ncols=3, loc="upper right", borderaxespad=0.0)
     name = SENSOR_NAMES.get(sensor, sensor)
     style.title(
         axes,

@@ -335,12 +335,12 @@ class Diagnosis(Plotted, Result):
         limit : int
             Rows at most.
         """
-        rows = tuple(_candidate_row(item) for item in self.candidates[:limit])
+        rows = tuple(self._candidate_row(item) for item in self.candidates[:limit])
         return Table("Candidates, best first", _CANDIDATE, rows, blocks=True)
 
     def answer_table(self) -> Table:
         """Return the candidates that the answer names, or that passed the test; without rows where none did."""
-        rows = tuple(_candidate_row(item) for item in self.candidates if self._stands_out(item))
+        rows = tuple(self._candidate_row(item) for item in self.candidates if self._stands_out(item))
         return Table("Candidates that stand out", _CANDIDATE, rows, blocks=True)
 
     def next_table(self, limit: int = NEXT) -> Table:
@@ -352,8 +352,32 @@ class Diagnosis(Plotted, Result):
             Rows at most.
         """
         others = [item for item in self.candidates if not self._stands_out(item)][:limit]
-        rows = tuple(row[:4] for row in map(_candidate_row, others))
+        rows = tuple(row[:4] for row in map(self._candidate_row, others))
         return Table("Next candidates", _CANDIDATE[:4], rows)
+
+    def _candidate_row(self, item: Candidate) -> tuple[str, ...]:
+        """One candidate in shown units."""
+        return (
+            item.effect,
+            item.status,
+            f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}",
+            f"{quantity.probability(item.probability)}{self.shared(item)}",
+            in_words(item.parameters) if item.status == PASSED else "-",
+            item.smallest_detectable,
+            ", ".join(str(rival) for rival in item.confounded_with[:2]) or "-",
+        )
+
+    def shared(self, item: Candidate) -> str:
+        """Name the rivals that share the probability of a candidate, e.g. ``, shared with gyr.delay``; often empty.
+
+        Parameters
+        ----------
+        item : Candidate
+            One of the candidates.
+        """
+        alike = (self.best, *self.ambiguous_with) if self.verdict == "ambiguous" else ()
+        rivals = [str(name) for name in alike if name not in (None, item.effect)]
+        return f", shared with {' and '.join(rivals)}" if item.effect in alike and rivals else ""
 
     def _stands_out(self, item: Candidate) -> bool:
         return item.status == PASSED or item.effect in (self.best, *self.ambiguous_with)
@@ -408,16 +432,3 @@ class Diagnosis(Plotted, Result):
 
 
 _CANDIDATE = ("effect", "status", "held-out error", ">probability", "predicted", "smallest detectable", "rivals")
-
-
-def _candidate_row(item: Candidate) -> tuple[str, ...]:
-    """One candidate in shown units."""
-    return (
-        item.effect,
-        item.status,
-        f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}",
-        quantity.probability(item.probability),
-        in_words(item.parameters) if item.status == PASSED else "-",
-        item.smallest_detectable,
-        ", ".join(str(rival) for rival in item.confounded_with[:2]) or "-",
-    )

@@ -142,7 +142,7 @@ def sizes(values: Sequence[tuple[float, str]]) -> str:
     parts = []
     for unit, of_unit in by_unit.items():
         low, high = min(of_unit), max(of_unit)
-        factor, shown = quantity.shown_unit(unit)
+        factor, shown = quantity.shown_unit(unit, high)
         start = "" if high <= NEARLY * low else f"{quantity.number(factor * low, 2)} to "
         parts.append(f"{start}{quantity.number(factor * high, 2)} {shown}")
     return ", ".join(parts) or "-"

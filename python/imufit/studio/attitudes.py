@@ -54,6 +54,11 @@ class Track:
     q: Array
     frame: str
 
+    @property
+    def known(self) -> float:
+        """Time of the first attitude that is known, s of the log; the first time where none is."""
+        return float(self.t[np.argmax(np.isfinite(self.q).all(axis=1))])
+
     def at(self, time: float) -> Array | None:
         """Return the attitude at a time: that of the last row before it; None where it is unknown.
 

@@ -33,7 +33,7 @@ LOOKS: Final[Mapping[str, tuple[str, float, bool]]] = {
 """Colour, opacity, and whether only the edges are drawn, by name of an attitude."""
 GROWN: Final = {"measured": 1.0, "predicted": 1.02, "reference": 1.04, "wanted": 1.0}
 """Sizes by name: surfaces of equal attitudes would flicker through one another."""
-GROUND: Final = 3
+GROUND: Final = 2
 """Half the width of the ground, in its squares."""
 PICTURES: Final = 15.0
 """Pictures a second of the player."""
@@ -96,7 +96,7 @@ class Body:
                     scene.text(word, "font-weight: 600; opacity: 0.7").move(place[0], place[1], 0.0)
             for name in names:
                 self._bodies[name] = self._body(name)
-        scene.move_camera(x=-3.0, y=-5.1, z=4.6, look_at_x=0.0, look_at_y=0.0, look_at_z=0.7, duration=0.0)
+        scene.move_camera(x=-3.3, y=-5.6, z=5.05, look_at_x=0.0, look_at_y=0.0, look_at_z=0.6, duration=0.0)
 
     def _body(self, name: str) -> Object3D:
         """Make the body of one attitude: a plate with a nose to its x axis, and the three axes with their names."""
@@ -175,7 +175,9 @@ class Player:
         self.tracks = {track.name: track for track in tracks}
         self.begin = min(float(track.t[0]) for track in tracks)
         self.end = max(float(track.t[-1]) for track in tracks)
-        self.time, self.playing, self.speed = self.begin, False, 1.0
+        # A filter needs some rows before its first attitude: the player starts where every body has one.
+        known = max((track.known for track in tracks), default=self.begin)
+        self.time, self.playing, self.speed = known, False, 1.0
         with ui.column().classes("w-full gap-1 studio-player"):
             self.body = Body(tuple(self.tracks))
             self._words: dict[str, ui.label] = {}
@@ -184,7 +186,7 @@ class Player:
             with ui.row().classes("w-full items-center no-wrap gap-2"):
                 self._button = ui.button(icon="play_arrow", on_click=self.toggle).props('flat dense aria-label="play"')
                 self._slider = ui.slider(
-                    min=self.begin, max=self.end, step=max((self.end - self.begin) / 2000.0, 1e-3), value=self.begin
+                    min=self.begin, max=self.end, step=max((self.end - self.begin) / 2000.0, 1e-3), value=self.time
                 ).props('aria-label="time of the attitude"')
                 self._slider.on_value_change(lambda event: self.go(float(event.value)))
             with ui.row().classes("w-full items-center gap-2"):
@@ -194,7 +196,7 @@ class Player:
                     {speed: f"{speed:g} ×" for speed in SPEEDS}, value=1.0, on_change=self._faster, label="speed"
                 ).props("dense options-dense").classes("w-20")
         self._timer = ui.timer(1.0 / PICTURES, self._tick, active=False)
-        self.go(self.begin)
+        self.go(self.time)
 
     def _legend(self, name: str) -> None:
         colour, _, edges = LOOKS[name]

@@ -290,7 +290,7 @@ def fall(
     top, low = max([*heights, 1.0]), min([*heights, 1.0])
     logarithmic = top / low > LOGARITHMIC_ABOVE
     scale: dict[str, Any] = (
-        {"type": "log", "range": [math.log10(0.6 * low), math.log10(3.0 * top)], "tickvals": _decades(low, top)}
+        {"type": "log", "range": [math.log10(0.6 * low), math.log10(5.0 * top)], "tickvals": _decades(low, top)}
         if logarithmic
         else {"range": [0.0, 1.22 * top]}
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar
@@ -12,7 +13,8 @@ from typing import Final, TypeVar
 from nicegui import Event, run
 
 from imufit.errors import InputError
-from imufit.remedy import Option
+from imufit.log import Reading
+from imufit.remedy import Option, Remedy
 from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, offers, remedies
 from imufit.studio.mystery import DEMONSTRATION, Mystery
 from imufit.studio.session import Session
@@ -21,9 +23,39 @@ from imufit.studio.stack import Stack
 from imufit.studio.traces import ModelTraces, Traces
 
 Answer = TypeVar("Answer")
+Piece = tuple[str, Callable[[], object], LogFile | None]
+"""Work in words, the work, and the file that a problem of it concerns."""
 
 SESSION_ENDING: Final = ".toml"
 """Ending of the file of a session."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A session, and what is shown of it.
+
+    Attributes
+    ----------
+    session : Session or None
+        The session.
+    files : tuple of LogFile
+        Its logs.
+    mystery : Mystery or None
+        The game that is played on them.
+    joined : tuple of str
+        How the references were joined to them.
+    traces : Traces or None
+        Columns of the log over time.
+    models : dict of Stack to ModelTraces
+        Residuals over time.
+    """
+
+    session: Session | None
+    files: tuple[LogFile, ...]
+    mystery: Mystery | None = None
+    joined: tuple[str, ...] = ()
+    traces: Traces | None = None
+    models: dict[Stack, ModelTraces] = field(default_factory=dict)
 
 
 class Desk:
@@ -55,6 +87,10 @@ class Desk:
         Share of the work that is done, where this is known.
     trouble : str
         The last problem; empty where there is none.
+    in_shell : str
+        The last problem's remedy in the words of the command line, where it names an option.
+    troubled : LogFile or None
+        The file that gave the last problem.
     cures : list of Option
         Options of reading that the problem's remedy names.
     changed : Event
@@ -75,11 +111,13 @@ class Desk:
         self.busy = ""
         self.share: float | None = None
         self.trouble = ""
+        self.in_shell = ""
         self.cures: list[Option] = []
         self.changed: Event[[]] = Event()
         self._folder = tempfile.TemporaryDirectory(prefix="imufit-")
         self._working = self._failed = False
-        self._troubled: LogFile | None = None
+        self.troubled: LogFile | None = None
+        self._before: Shown | None = None
 
     def new_folder(self) -> Path:
         """Make a folder for files that come together; it goes with the server.
@@ -134,7 +172,13 @@ class Desk:
         try:
             return await run.io_bound(work)
         except InputError as error:
-            self._note(str(error), remedies(error.advice), file)
+            advice = error.advice
+            if file is not None and isinstance(advice, Remedy) and advice.python != advice.shell:
+                # Options of a shell: the page has buttons and a field in their place.
+                self._note(error.statement, remedies(advice), file)
+                self.in_shell = advice.shell
+            else:
+                self._note(str(error), remedies(advice), file)
         except (OSError, MemoryError) as error:
             self._note(f"{type(error).__name__}: {error}", [], file)
         except Exception as error:
@@ -147,11 +191,12 @@ class Desk:
         return None
 
     def _note(self, problem: str, cures: list[Option], file: LogFile | None) -> None:
-        self.trouble, self.cures, self._troubled = problem, cures if file is not None else [], file
+        self._no_trouble()
+        self.trouble, self.cures, self.troubled = problem, cures if file is not None else [], file
         self._failed = True
 
     def _no_trouble(self) -> None:
-        self.trouble, self.cures, self._troubled = "", [], None
+        self.trouble, self.in_shell, self.cures, self.troubled = "", "", [], None
 
     def forget_trouble(self) -> None:
         """Put the last problem away."""
@@ -181,20 +226,44 @@ class Desk:
         self._working = True
         try:
             while (step := next(self._pending(), None)) is not None:
-                self._failed = False
+                self._failed, session = False, self.session
                 await self._in_thread(*step)
-                if self._failed:
-                    if self.session is not None and self.session.made() is None:
-                        self.session.give_up()
-                        self.changed.emit()
+                if self._failed and session is self.session:
+                    self._give_up()
                     return
         finally:
             self._working = False
 
-    def _pending(self) -> Iterator[tuple[str, Callable[[], object]]]:
+    def _give_up(self) -> None:
+        """Return to the step before one whose model cannot be fitted, or to the session before one without evidence."""
+        session = self.session
+        if session is None or session.made() is not None:
+            return
+        if session.begun:
+            session.give_up()
+        else:
+            self._show(self._before or Shown(None, ()))
+            self._before = None
+        self.changed.emit()
+
+    def _pending_first(self, session: Session) -> Iterator[Piece]:
+        """List the pieces of work before anything can be fitted: a person sees the rows while the evidence is taken."""
+        if self.traces is None or not self.traces.built or self.traces.log is not session.logs[session.shown]:
+            yield "reading the rows", self._drawn_rows, self.files[0]
+        if not session.begun:
+            names = " and ".join(file.name for file in self.files)
+            yield f"taking the evidence of {names}", partial(session.begin, self.progress), self.files[0]
+        elif self._before is not None:
+            before, self._before = self._before, None
+            self._close(before.traces)
+
+    def _pending(self) -> Iterator[Piece]:
         """List the pieces of work that are to be done for the present model, in order."""
         session = self.session
-        if session is None or not session.begun:
+        if session is None:
+            return
+        yield from self._pending_first(session)
+        if not session.begun:
             return
         stack = session.stack
         made = session.made(stack)
@@ -202,33 +271,31 @@ class Desk:
         for step in session.steps[: session.position + 1]:
             # Earlier ones first: a session that was reopened goes the same way again.
             if session.made(step.stack) is None:
-                yield f"fitting {words}", partial(session.fit, step.stack, self.progress)
+                yield f"fitting {words}", partial(session.fit, step.stack, self.progress), None
                 return
         assert made is not None
         if made.comparison is None and session.has_reference:
-            yield f"comparing {words}", lambda: session.compare(stack, self.progress)
+            yield f"comparing {words}", lambda: session.compare(stack, self.progress), None
         if made.diagnosis is None:
-            yield f"effects missing in {words}", lambda: session.diagnose(stack, self.progress)
-        if self.traces is None:
-            yield "reading the rows", self._drawn_rows
-        elif session.has_reference:
+            yield f"effects missing in {words}", lambda: session.diagnose(stack, self.progress), None
+        if session.has_reference:
             for model in dict.fromkeys((stack.model, Stack())):
                 if model not in self.models:
-                    yield "residuals over time", partial(self._drawn_model, model)
+                    yield "residuals over time", partial(self._drawn_model, model), None
         if session.second is not None:
             second = session.made(session.second)
             if second is None or (second.comparison is None and session.has_reference):
-                yield "comparing the second model", lambda: session.compare(session.second, self.progress)
+                yield "comparing the second model", lambda: session.compare(session.second, self.progress), None
             if session.second.model != stack.model and session.weighed() is None:
-                yield "weighing the two models", lambda: session.weigh(self.progress)
+                yield "weighing the two models", lambda: session.weigh(self.progress), None
 
     def _drawn_rows(self) -> Traces:
-        """Make the pass over the rows of the log that is drawn."""
+        """Make the pass over the rows of the log that is drawn; those read so far are shown meanwhile."""
         assert self.session is not None
-        traces = Traces(self.session.logs[self.session.shown])
-        traces.build(self.progress)
-        self.traces = traces
-        return traces
+        self._close(self.traces)
+        self.traces = Traces(self.session.logs[self.session.shown])
+        self.traces.build(self.progress)
+        return self.traces
 
     def _drawn_model(self, model: Stack) -> ModelTraces:
         """Compute the residuals of a model over time, and forget those of models that are not shown."""
@@ -280,31 +347,41 @@ class Desk:
         mystery : Mystery, optional
             The game that is played on them.
         """
-        session = await self._opened(files)
-        if session is not None:
-            self._take(session, files, mystery)
+        opened = await self._opened(files)
+        if opened is not None:
+            session, joined = opened
+            self._take(session, files, joined, mystery)
             await self.update()
 
-    async def _opened(self, files: Sequence[LogFile]) -> Session | None:
-        def work() -> Session:
+    async def _opened(self, files: Sequence[LogFile]) -> tuple[Session, tuple[str, ...]] | None:
+        def work() -> tuple[Session, tuple[str, ...]]:
             opened = [file.opened() for file in files]
-            session = Session([log for log, _ in opened])
-            session.begin(self.progress)
-            self.joined = tuple(words for _, joined in opened for words in joined)
-            return session
+            return Session([log for log, _ in opened]), tuple(words for _, joined in opened for words in joined)
 
         names = " and ".join(file.name for file in files)
-        return await self._in_thread(f"taking the evidence of {names}", work, files[0])
+        return await self._in_thread(f"opening {names}", work, files[0])
 
-    def _take(self, session: Session, files: Sequence[LogFile], mystery: Mystery | None = None) -> None:
-        if self.traces is not None:
-            self.traces.close()
-        self.traces, self.models = None, {}
-        self.session, self.files, self.mystery = session, tuple(files), mystery
-        self.arrivals, self.channel, self.covariate = [], None, None
-        self.wanted = None
+    def _take(
+        self, session: Session, files: Sequence[LogFile], joined: tuple[str, ...], mystery: Mystery | None
+    ) -> None:
+        """Show a session; the one before is kept until the evidence of this one is there."""
+        if self.session is not None and self.session.begun:
+            self._before = Shown(self.session, self.files, self.mystery, self.joined, self.traces, self.models)
+        self._show(Shown(session, tuple(files), mystery, joined))
+        self.arrivals, self.wanted = [], None
         self._no_trouble()
         self.changed.emit()
+
+    def _show(self, shown: Shown) -> None:
+        self._close(self.traces)
+        self.session, self.files, self.mystery, self.joined = shown.session, shown.files, shown.mystery, shown.joined
+        self.traces, self.models = shown.traces, shown.models
+        self.channel = self.covariate = None
+
+    def _close(self, traces: Traces | None) -> None:
+        """Close traces that are not those of the session before."""
+        if traces is not None and (self._before is None or traces is not self._before.traces):
+            traces.close()
 
     async def mend(self, option: Option, number: int = 0) -> None:
         """Read a log of the session anew with one option of a fault's remedy, or the file that gave trouble.
@@ -317,8 +394,8 @@ class Desk:
             Number of the log of the session.
         """
         try:
-            if self._troubled is not None and option in self.cures:
-                await self.bring([self._troubled.mended(option)])
+            if self.troubled is not None and option in self.cures:
+                await self.bring([self.troubled.mended(option)])
                 return
             files = [file.mended(option) if k == number else file for k, file in enumerate(self.files)]
         except InputError as error:
@@ -326,6 +403,25 @@ class Desk:
             self.changed.emit()
             return
         await self.open(files)
+
+    async def remap(self, text: str) -> None:
+        """Read the file that gave trouble anew, with a mapping of its columns.
+
+        Parameters
+        ----------
+        text : str
+            Such as ``acc_x=AccX[g],acc_y=AccY[g]``.
+        """
+        file = self.troubled
+        if file is None:
+            return
+        try:
+            mapping = Reading.of_texts([text], None, [], []).mapping or {}
+        except InputError as error:
+            self._note(error.statement, [], file)
+            self.changed.emit()
+            return
+        await self.bring([file.mended(("mapping", mapping))])
 
     async def reopen(self, path: Path) -> None:
         """Take up a session that was saved: its logs, its way, its models.
@@ -347,11 +443,12 @@ class Desk:
         if kept is None or isinstance(kept, LogsWantedError):
             self.changed.emit()
             return
-        session = await self._opened(kept.files)
-        if session is not None:
+        opened = await self._opened(kept.files)
+        if opened is not None:
+            session, joined = opened
             session.go(kept.steps, kept.position)
             session.second = kept.second
-            self._take(session, kept.files)
+            self._take(session, kept.files, joined, None)
             await self.update()
 
     def saved(self) -> str:

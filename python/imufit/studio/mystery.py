@@ -206,10 +206,8 @@ def _evidence(truth: Truth, first: Diagnosis) -> str:
     found = next((item for item in first.candidates if item.effect == effect), None)
     if found is None:
         return f"The log cannot show {effect}: the evidence holds no such candidate."
-    rivals = [name for name in (first.best, *first.ambiguous_with) if name not in (None, effect)]
-    verb = "rival is" if len(rivals) == 1 else "rivals are"
-    beside = f", its {verb} {', '.join(map(str, rivals))}" if rivals else ""
-    return f"The evidence gives {effect} a probability of {quantity.probability(found.probability)}{beside}."
+    likely = quantity.probability(found.probability)
+    return f"The evidence gives {effect} a probability of {likely}{first.shared(found)}."
 
 
 def _sureness(first: Diagnosis) -> str:

@@ -17,6 +17,7 @@ from imufit.studio.view_model import ModelView
 from imufit.studio.view_noise import NoiseView
 from imufit.studio.view_panels import PanelView
 from imufit.studio.view_top import Head, Top
+from imufit.studio.view_two import TwoView
 
 AHEAD_S: Final = 0.02
 """Time that the server has for sending the numbers of a change, s."""
@@ -48,12 +49,15 @@ def page_of(desk: Desk) -> Callable[[], None]:
                 fall = FallView(desk)
             with _region("left") as left:
                 model = ModelView(desk)
+            with _region("two") as beside:
+                two = TwoView(desk)
 
         def numbers() -> None:
             for region in (middle, right, steps, left):
                 region.visible = desk.session is not None
-            for view in (head, model, fall):
+            for view in (head, model, fall, two):
                 view.refresh()
+            beside.visible = two.kept
 
         def pictures() -> None:
             for view in (top, candidates, panels):

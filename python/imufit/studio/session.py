@@ -441,8 +441,8 @@ class Session:
 
     @property
     def shown(self) -> int:
-        """Number of the log whose residuals are drawn: of several the one that stands highest at the start."""
-        return self.start.worst
+        """Number of the log that is drawn: the one that stands highest at the start; the first before the evidence."""
+        return self.start.worst if self.begun else 0
 
     def model_traces(self, traces: Traces, stack: Stack) -> ModelTraces:
         """Return residual and predicted readings of a stack over time, after a pass over the rows.

@@ -101,7 +101,7 @@ class CandidateView:
             if diagnosis is None:
                 return
             drop = f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}"
-            words = f"{quantity.probability(item.probability)} probable, error {drop}"
+            words = f"{quantity.probability(item.probability)} probable{diagnosis.shared(item)}, error {drop}"
             ui.label(words if item.status == PASSED else f"{words}, {item.status}").classes("studio-muted")
             if named and item.confounded_with:
                 rivals = ", ".join(str(rival) for rival in item.confounded_with[:2])

@@ -1,4 +1,4 @@
-"""Region over the model: the fall of the error step by step, undo, redo, and two models side by side."""
+"""Region over the model: the fall of the error step by step, undo and redo."""
 
 from __future__ import annotations
 
@@ -8,19 +8,13 @@ from typing import Final
 from nicegui import ui
 
 from imufit.figures import quantity
-from imufit.printable import NAME, printable
-from imufit.results.model_comparison import preferred
 from imufit.results.noise_part import BEYOND, NoisePart
 from imufit.studio import charts
 from imufit.studio.desk import Desk
-from imufit.studio.session import Made, Session, worst_channel
+from imufit.studio.session import Session, worst_channel
 
 SMALL: Final = 0.005
 """Share of the noise floor's variance below which a part is not listed."""
-
-
-CHANGED: Final = 0.005
-"""Change of a channel's residual over its noise floor from which on the channel is listed: the last digit shown."""
 
 
 class FallView:
@@ -34,7 +28,6 @@ class FallView:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._shown: tuple[object, ...] = ()
         with ui.element("div").classes("studio-row flex-wrap"):
             ui.html("Fall of the error", tag="h2", sanitize=False).style("flex: 1 0 auto; white-space: nowrap")
             self._undo = _button("undo", "Undo", lambda: desk.attempt(lambda: _session(desk).undo())).props(
@@ -48,7 +41,6 @@ class FallView:
         self._chart = ui.plotly(charts.empty("The error stands here once a log is open.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
         self._floor = ui.label("").classes("studio-muted").props("data-mark=floor")
-        self._two = ui.column().classes("w-full gap-1").props("data-mark=two")
 
     def refresh(self) -> None:
         """Show the steps up to the present one, those that were undone paler."""
@@ -58,6 +50,8 @@ class FallView:
         self._redo.set_enabled(session is not None and begun and session.can_redo)
         self._keep.set_enabled(begun)
         if session is None or not begun:
+            self._chart.update_figure(charts.empty("The error stands here once the evidence is there."))
+            self._floor.set_text("")
             return
         numbers = [session.numbers(step.stack) for step in session.steps]
         ratios = [math.nan if item is None else item.ratio for item in numbers]
@@ -79,7 +73,6 @@ class FallView:
             "" if made is None or made.diagnosis is None else _floor_words(session, made.diagnosis.noise)
         )
         self._keep.set_text("Put the second model away" if session.second is not None else "Keep as second model")
-        self._show_two(session)
 
     async def _keep_second(self) -> None:
         """Keep the present model beside later ones, or put the kept one away."""
@@ -87,61 +80,6 @@ class FallView:
         session.second = None if session.second is not None else session.stack
         self._desk.changed.emit()
         await self._desk.update()
-
-    def _show_two(self, session: Session) -> None:
-        """Lay out the second model and the present one beside each other."""
-        second = None if session.second is None else session.made(session.second)
-        present = session.made()
-        levels = tuple(made is not None and made.comparison is not None for made in (second, present))
-        factor = session.weighed()
-        state = (session.second, session.stack, second, present, levels, factor)
-        if state == self._shown:
-            return
-        self._shown = state
-        self._two.clear()
-        if session.second is None:
-            return
-        with self._two:
-            if session.second.model == session.stack.model:
-                ui.label("The second model is the present one. Change the present one to compare.").classes(
-                    "studio-muted"
-                )
-            elif second is None or present is None:
-                ui.label("The two models are being compared.").classes("studio-muted")
-            else:
-                _two_models(second, present, factor)
-
-
-def _two_models(second: Made, present: Made, factor: float | None) -> None:
-    """Lay out two models: held-out error, evidence, residual of each channel that changes, parameters."""
-    lower = "second" if second.numbers.ratio < present.numbers.ratio else "present"
-    ui.label(
-        f"Held-out error: {quantity.ratio(second.numbers.ratio)} times the noise floor with the second model, "
-        f"{quantity.ratio(present.numbers.ratio)} with the present one. The {lower} model stands lower."
-    ).classes("studio-sentence").props("data-mark=two-sentence")
-    if factor is not None:
-        choice = {"first": "the second model", "second": "the present model", "neither": "neither model"}
-        ui.label(
-            f"The log prefers {choice[preferred(factor)]} (ln Bayes factor {factor:+.1f} for the present one)."
-        ).classes("studio-sentence").props("data-mark=two-evidence")
-    rows: list[tuple[str, ...]] = [
-        ("held-out error", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))
-    ]
-    levels = [
-        {item.channel: item.ratio for item in (made.comparison.channels if made.comparison is not None else ())}
-        for made in (second, present)
-    ]
-    changed = [name for name in levels[0] if abs(levels[0][name] - levels[1].get(name, math.nan)) >= CHANGED]
-    rows += [(f"{name} over its floor", *(quantity.ratio(level[name]) for level in levels)) for name in changed]
-    values = [{item.key: item.shown for item in made.numbers.parameters} for made in (second, present)]
-    keys = dict.fromkeys([*values[0], *values[1]])
-    rows += [(printable(key, NAME), values[0].get(key, "–"), values[1].get(key, "–")) for key in keys]
-    with ui.element("table").classes("studio-table"):
-        for k, row in enumerate([("", "second model", "present model"), *rows]):
-            with ui.element("tr"):
-                for cell in row:
-                    with ui.element("th" if k == 0 else "td"):
-                        ui.label(cell)
 
 
 def _floor_words(session: Session, noise: tuple[NoisePart, ...]) -> str:

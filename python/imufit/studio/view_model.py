@@ -34,14 +34,15 @@ class ModelView:
         begun = session is not None and session.begun
         numbers = session.numbers() if session is not None and begun else None
         # A list that stays as it is keeps its elements: a click never falls on one that is being replaced.
-        state = (begun, None if session is None else session.stack, numbers)
+        state = (session, begun, None if session is None else session.stack, numbers)
         if state == self._state:
             return
         self._state = state
         self._list.clear()
         with self._list:
             if session is None or not begun:
-                ui.label("Open a log to begin.").classes("studio-muted")
+                words = "Open a log to begin." if session is None else "The evidence is being taken."
+                ui.label(words).classes("studio-muted")
                 return
             ui.label(_state(session, numbers)).classes("studio-muted").props("data-mark=model-state")
             for entry in session.stack.entries:
@@ -82,18 +83,18 @@ class ModelView:
             elif parameter.typical is not None:
                 value.tooltip(f"typical size {quantity.quantity(parameter.typical, parameter.unit)}")
             ui.button(icon="edit", on_click=lambda: self._edit(parameter)).props(
-                "flat dense round size=xs " + attribute("aria-label", f"Edit {parameter.key}")
+                "flat dense round size=sm " + attribute("aria-label", f"Edit {parameter.key}")
             ).tooltip("Edit the value").props(attribute("data-mark", f"edit-{parameter.key}"))
             pin = "lock" if parameter.fixed else "lock_open"
             words = "Fit this parameter again" if parameter.fixed else "Fix at this value"
             ui.button(icon=pin, on_click=lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
-                "flat dense round size=xs " + attribute("aria-label", f"{words}: {parameter.key}")
+                "flat dense round size=sm " + attribute("aria-label", f"{words}: {parameter.key}")
             ).tooltip(words).props(attribute("data-mark", f"pin-{parameter.key}"))
 
     def _edit(self, parameter: Parameter) -> None:
         """Ask for a value in the shown unit."""
         desk = self._desk
-        factor, unit = quantity.shown_unit(parameter.unit)
+        factor, unit = quantity.shown_unit(parameter.unit, parameter.value)
         with ui.dialog() as dialog, ui.card():
             ui.label(f"{printable(parameter.key, NAME)}, {unit}").classes("studio-id")
             given = ui.number(label=f"value, {unit}", value=float(f"{factor * parameter.value:.6g}")).props(

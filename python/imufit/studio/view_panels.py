@@ -62,6 +62,7 @@ class PanelView:
                     {RESIDUAL: "residual", READING: "reading"}, value=RESIDUAL, on_change=self._other_kind
                 ).props('dense no-caps padding="2px 10px"')
                 self._trace = ui.plotly(charts.empty("")).classes("studio-chart").props("data-mark=trace")
+        ui.timer(1.0, self._grow)
         self._trace.on("plotly_relayout", self._zoomed, throttle=0.1)
         self._trace.on("plotly_doubleclick", lambda: self._zoom(None))
 
@@ -70,16 +71,25 @@ class PanelView:
     def refresh(self) -> None:
         """Show the panels of the present model."""
         session = self._desk.session
-        if session is None or not session.begun:
+        if session is None:
             return
         if session is not self._session:
-            self._session, self._window = session, None
+            self._session, self._window, self._state = session, None, ()
+            self._trace.update_figure(charts.empty("The rows are being read."))
+            for chart in (self._panel, self._spectrum):
+                chart.update_figure(charts.empty("This stands here once the evidence is there."))
         made = session.made()
         found = None if made is None else made.comparison
-        for element in (self._panel, self._spectrum, self._covariate, self._trace_kind):
-            element.visible = session.has_reference
-        if not session.has_reference:
-            self._note.set_text("The log has no reference: the rests are judged, and the readings are drawn.")
+        judged = session.begun and session.has_reference
+        self._covariate.visible = self._trace_kind.visible = judged
+        # A chart is hidden where it stays empty: Plotly cannot resize one that comes and goes.
+        self._panel.visible = self._spectrum.visible = judged or not session.begun
+        if not judged:
+            self._note.set_text(
+                "The log has no reference: the rests are judged, and the readings are drawn."
+                if session.begun
+                else "The readings are drawn while the evidence is taken."
+            )
             self._refresh_readings()
             return
         if found is None:
@@ -120,7 +130,7 @@ class PanelView:
             self._panel.update_figure(charts.residual_panel(panel))
 
     def _refresh_readings(self) -> None:
-        """Show the readings of a log without a reference over time."""
+        """Show the readings over time: of a log without a reference, or before the evidence is there."""
         desk = self._desk
         channels = [] if desk.traces is None else [item.name for item in desk.traces.channels if item.name[:3] in UNITS]
         state = (desk.traces, desk.channel)
@@ -129,10 +139,16 @@ class PanelView:
         self._state = state
         channel = desk.channel if desk.channel in channels else channels[0]
         self._setting = True
-        self._kind = self._trace_kind.value = READING
         self._channel.set_options(channels, value=channel)
         self._setting = False
         ui.timer(0, lambda: self._draw_trace(channel), once=True)
+
+    def _grow(self) -> None:
+        """Draw the rows read so far, while a long log is being read."""
+        traces = self._desk.traces
+        if traces is not None and not traces.built:
+            self._state = ()
+            self.refresh()
 
     def _offer(self, found: Comparison, channel: str) -> None:
         """Fill the two lists, the worst first."""
@@ -222,7 +238,8 @@ class PanelView:
             return
         begin, end = self._window or span
         start, now = desk.models.get(Stack()), desk.models.get(session.stack.model)
-        kind = self._kind
+        # Before the residuals are there, and on a log that has none, the readings stand in their place.
+        kind = READING if start is None and now is None else self._kind
 
         def work() -> list[tuple[str, Any, Any]]:
             lines = []

@@ -144,7 +144,17 @@ class Top:
         verdict = None if desk.mystery is None else desk.mystery.verdict
         brought = tuple(item.file for item in desk.arrivals)
         answer = _named(desk) if desk.guessing else ""
-        state = (diagnosis, desk.trouble, brought, desk.wanted, desk.joined, desk.mystery, verdict, answer)
+        state = (
+            diagnosis,
+            desk.trouble,
+            desk.in_shell,
+            brought,
+            desk.wanted,
+            desk.joined,
+            desk.mystery,
+            verdict,
+            answer,
+        )
         if state == self._state and self._state:
             return
         self._state = state
@@ -224,6 +234,13 @@ class Top:
         desk = self._desk
         with ui.element("div").classes("studio-error").props('role="alert"'):
             ui.label(printable(desk.trouble)).props("data-mark=trouble")
+            if desk.in_shell and desk.troubled is not None:
+                with ui.row().classes("w-full items-center"):
+                    given = ui.input("columns, such as acc_x=AccX[g],acc_y=AccY[g]").props("dense outlined")
+                    given.classes("grow").props("data-mark=mapping")
+                    given.on("keydown.enter", lambda: desk.remap(given.value))
+                    ui.button("Read", on_click=lambda: desk.remap(given.value)).props("dense outline no-caps")
+                ui.label(f"In a shell: {printable(desk.in_shell)}").classes("studio-muted").props("data-mark=in-shell")
             with ui.row():
                 for option in desk.cures:
                     self._cure(option, 0, "cure")
@@ -251,7 +268,9 @@ class Top:
         assert game is not None
         level = LEVELS[game.level]
         title = level.title if game.level == DEMONSTRATION else f"Mystery log, level {game.level}"
-        ui.label(f"{title}: {level.words}").classes("studio-sentence").props("data-mark=game")
+        # After the reveal nothing is left to be done here.
+        words = title if game.verdict is not None else f"{title}: {level.words}"
+        ui.label(words).classes("studio-sentence").props("data-mark=game")
         if game.verdict is None:
             if not judged:
                 ui.label("The evidence is being taken.").classes("studio-muted")

@@ -1,0 +1,99 @@
+"""Region of two models side by side: held-out error, evidence, channels and parameters."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from nicegui import ui
+
+from imufit.figures import quantity
+from imufit.printable import NAME, printable
+from imufit.results.model_comparison import preferred
+from imufit.studio.desk import Desk
+from imufit.studio.session import Made
+
+CHANGED: Final = 0.005
+"""Change of a channel's residual over its noise floor from which on the channel is listed: the last digit shown."""
+
+
+class TwoView:
+    """The second model and the present one on one page.
+
+    Parameters
+    ----------
+    desk : Desk
+        The state that it shows.
+
+    Attributes
+    ----------
+    kept : bool
+        Whether a second model is kept.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self.kept = False
+        self._shown: tuple[object, ...] = ()
+        ui.html("Two models", tag="h2", sanitize=False)
+        self._two = ui.column().classes("w-full gap-1").props("data-mark=two")
+
+    def refresh(self) -> None:
+        """Lay out the second model and the present one beside each other, where a second one is kept."""
+        session = self._desk.session
+        self.kept = session is not None and session.begun and session.second is not None
+        if session is None or not self.kept:
+            self._shown = ()
+            self._two.clear()
+            return
+        assert session.second is not None
+        second = None if session.second is None else session.made(session.second)
+        present = session.made()
+        levels = tuple(made is not None and made.comparison is not None for made in (second, present))
+        factor = session.weighed()
+        state = (session.second, session.stack, second, present, levels, factor)
+        if state == self._shown:
+            return
+        self._shown = state
+        self._two.clear()
+        with self._two:
+            if session.second.model == session.stack.model:
+                ui.label("The second model is the present one. Change the present one to compare.").classes(
+                    "studio-muted"
+                )
+            elif second is None or present is None:
+                ui.label("The two models are being compared.").classes("studio-muted")
+            else:
+                _two_models(second, present, factor)
+
+
+def _two_models(second: Made, present: Made, factor: float | None) -> None:
+    """Lay out two models: held-out error, evidence, residual of each channel that changes, parameters."""
+    lower = "second" if second.numbers.ratio < present.numbers.ratio else "present"
+    ui.label(
+        f"Held-out error: {quantity.ratio(second.numbers.ratio)} times the noise floor with the second model, "
+        f"{quantity.ratio(present.numbers.ratio)} with the present one. The {lower} model stands lower."
+    ).classes("studio-sentence").props("data-mark=two-sentence")
+    if factor is not None:
+        choice = {"first": "the second model", "second": "the present model", "neither": "neither model"}
+        ui.label(
+            f"The log prefers {choice[preferred(factor)]} (ln Bayes factor {factor:+.1f} for the present one)."
+        ).classes("studio-sentence").props("data-mark=two-evidence")
+    rows: list[tuple[str, ...]] = [
+        ("held-out error", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))
+    ]
+    levels = [
+        {item.channel: item.ratio for item in (made.comparison.channels if made.comparison is not None else ())}
+        for made in (second, present)
+    ]
+    changed = [name for name in levels[0] if abs(levels[0][name] - levels[1].get(name, math.nan)) >= CHANGED]
+    rows += [(f"{name} over its floor", *(quantity.ratio(level[name]) for level in levels)) for name in changed]
+    values = [{item.key: item.shown for item in made.numbers.parameters} for made in (second, present)]
+    keys = dict.fromkeys([*values[0], *values[1]])
+    rows += [(printable(key, NAME), values[0].get(key, "–"), values[1].get(key, "–")) for key in keys]
+    with ui.element("table").classes("studio-table"):
+        for k, row in enumerate([("", "second model", "present model"), *rows]):
+            with ui.element("tr"):
+                for cell in row:
+                    with ui.element("th" if k == 0 else "td"):
+                        ui.label(cell)

@@ -1,0 +1,56 @@
+"""The state of the studio: rows are shown before the evidence, and a bad log leaves what was there."""
+
+import asyncio
+
+import pytest
+from imufit.lab.simulate import simulate
+from imufit.lab.simulated_log import save_simulation
+from imufit.studio.desk import Desk
+from imufit.studio.log_file import LogFile
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("desk") / "walk.csv"
+    save_simulation(simulate("handheld", {}, 1, duration=20.0, rate=50.0), path)
+    return LogFile(path, path.name)
+
+
+@pytest.fixture
+def spoilt(tmp_path):
+    """A log that moves all the time, with neither a reference nor a rest."""
+    path = tmp_path / "bare.csv"
+    rows = [f"{0.01 * k:.2f},{5 + k % 7},{k % 5},{9 - k % 3},{k % 4},{2 - k % 9},{k % 11}" for k in range(3000)]
+    path.write_text("t,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return LogFile(path, path.name)
+
+
+def test_rows_can_be_drawn_before_the_evidence_is_taken(log):
+    desk, seen = Desk(), []
+    desk.changed.subscribe(
+        lambda: seen.append((desk.traces is not None and desk.traces.built, desk.session and desk.session.begun))
+    )
+    asyncio.run(desk.open([log]))
+    assert (True, False) in seen
+    assert seen[-1] == (True, True)
+
+
+def test_a_log_without_evidence_leaves_the_session_before_it(log, spoilt):
+    async def both() -> None:
+        await desk.open([log])
+        before.append((desk.session, desk.files, desk.traces, desk.models))
+        await desk.open([spoilt])
+
+    desk, before = Desk(), []
+    asyncio.run(both())
+    assert spoilt.name in desk.trouble
+    assert [(desk.session, desk.files, desk.traces, desk.models)] == before
+    t, values = desk.traces.window(["acc_x"], *desk.traces.span, 100)["acc_x"].line()
+    assert t.size == values.size > 100
+
+
+def test_a_first_log_without_evidence_leaves_nothing(spoilt):
+    desk = Desk()
+    asyncio.run(desk.open([spoilt]))
+    assert spoilt.name in desk.trouble
+    assert (desk.session, desk.files, desk.traces) == (None, (), None)
