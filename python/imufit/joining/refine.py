@@ -89,7 +89,6 @@ def refine(
     near: Candidate,
     skew_known: bool = False,
     lag_known: bool = False,
-    most: int | None = None,
 ) -> Aligned | None:
     """Refine lag, skew and mount from what is nearly right.
 
@@ -101,8 +100,6 @@ def refine(
         Lag, skew and mount to a bin of the search.
     skew_known, lag_known : bool
         True for what is not to be refined: the skew, the lag at the first sample.
-    most : int, optional
-        Blocks to look at, evenly over the recording; all of them if None.
 
     Returns
     -------
@@ -121,7 +118,7 @@ def refine(
     off, reach = bin_width(sensor, reference), float(np.max(np.abs(reference.t - middle)))
     for turn in range(ROUNDS):
         turns = _Turns.of(sensor, body, at_middle, rate, middle)
-        sums = _sums(turns, (np.eye(3) + linear) @ near.mount, bias, off, most)
+        sums = _sums(turns, (np.eye(3) + linear) @ near.mount, bias, off)
         if sums is None:
             return None
         # A Cauchy prior as the normal one of the same pull: a clock of a crystal is held, one that is far off is not.
@@ -243,8 +240,8 @@ class _Blocks:
     window: Array
 
     @classmethod
-    def of(cls, there: NDArray[np.bool_], length: int, most: int | None) -> _Blocks:
-        """Cut where samples are missing; `most` blocks at most, evenly over the recording."""
+    def of(cls, there: NDArray[np.bool_], length: int) -> _Blocks:
+        """Cut where samples are missing."""
         edges = np.flatnonzero(np.diff(np.concatenate(([False], there, [False]))))
         rows, windows = [np.zeros((0, length), np.intp)], [np.zeros((0, length))]
         for begin, end in edges.reshape(-1, 2):
@@ -260,11 +257,7 @@ class _Blocks:
             window = (np.sin(0.5 * np.pi * ramp) / np.sqrt(weight))[place] * sine
             rows.append(np.pad(begin + place, ((0, 0), (0, length - size)), mode="edge"))
             windows.append(np.pad(window, ((0, 0), (0, length - size))))
-        found = cls(np.concatenate(rows), np.concatenate(windows))
-        if most is None or len(found.rows) <= most:
-            return found
-        some = np.linspace(0, len(found.rows) - 1, most).astype(int)
-        return cls(found.rows[some], found.window[some])
+        return cls(np.concatenate(rows), np.concatenate(windows))
 
     def pieces(self) -> Iterator[tuple[slice, _Blocks]]:
         """Yield some blocks at a time."""
@@ -316,12 +309,12 @@ class _Sums:
         return max(1.0, float(np.mean(np.sum(left[:, :2] ** 2, axis=0) / usual)))
 
 
-def _sums(turns: _Turns, mount: Array, bias: Array, off: float, most: int | None) -> _Sums | None:
+def _sums(turns: _Turns, mount: Array, bias: Array, off: float) -> _Sums | None:
     body = turns.body @ mount.T
     left = turns.own - body - turns.step[:, None] * bias
     length = _length(turns.usual)
     turns = replace(turns, there=turns.tame(left))
-    blocks = _Blocks.of(turns.there, length, most)
+    blocks = _Blocks.of(turns.there, length)
     if not len(blocks.rows):
         return None
     shown = 2.0 * np.pi * off * fft.rfftfreq(length, turns.usual) < 1.0
