@@ -21,7 +21,7 @@ from scipy import fft
 
 from imufit import _imufit
 from imufit.joining.course import CONJUGATE, Course, reference_course
-from imufit.joining.search import USUAL_SKEW, Candidate, bin_width, turn_between
+from imufit.joining.search import LARGEST_SKEW, USUAL_SKEW, Candidate, bin_width, turn_between
 
 Array = NDArray[np.float64]
 Transform = NDArray[np.complex128]
@@ -39,7 +39,7 @@ BAND: Final = 0.2
 ROUNDS: Final = 12
 """Gauss-Newton steps at most."""
 UNHELD: Final = 4
-"""Steps that the prior of the skew does not hold."""
+"""Steps in which all skews that are looked for are as likely."""
 WILD: Final = 20.0
 """A turn this many times as far off as the usual one (median) of its block is of a wild pose: of normal errors none is
 beyond four."""
@@ -110,24 +110,28 @@ def refine(
     start = float(reference.t[0])
     middle = start if lag_known else float(0.5 * (reference.t[0] + reference.t[-1]))
     # The lag is that of the middle: there the skew hardly moves it.
-    at_middle, rate = near.lag + near.skew * (middle - start), near.skew
+    searched = near.lag + near.skew * (middle - start)
+    at_middle, rate = searched, near.skew
     free = np.ones(UNKNOWNS, np.bool_)
     free[:2] = not lag_known, not skew_known
     linear, bias = np.zeros((3, 3)), np.zeros(3)
     # As far as the clocks may be off; at higher frequencies the phase of the motion does not show yet where they go.
-    off, reach = bin_width(sensor, reference), float(np.max(np.abs(reference.t - middle)))
+    width = off = bin_width(sensor, reference)
+    reach = float(np.max(np.abs(reference.t - middle)))
     for turn in range(ROUNDS):
         turns = _Turns.of(sensor, body, at_middle, rate, middle)
         sums = _sums(turns, (np.eye(3) + linear) @ near.mount, bias, off)
         if sums is None:
             return None
         # A Cauchy prior as the normal one of the same pull: a clock of a crystal is held, one that is far off is not.
-        # It has a maximum of its own near no skew, so that the first rounds go to that of the likelihood.
-        held = 0.0 if turn < UNHELD else 2.0 / (USUAL_SKEW**2 + rate**2)
-        prior = np.concatenate(([0.0, held], np.full(9, LARGEST_ERROR**-2), np.zeros(3)))
+        # It has a maximum of its own near no skew, so that the first rounds go to that of the likelihood, among the
+        # skews that are looked for. The lag is known to a bin.
+        held = LARGEST_SKEW**-2 if turn < UNHELD else 2.0 / (USUAL_SKEW**2 + rate**2)
+        prior = np.concatenate(([width**-2, held], np.full(9, LARGEST_ERROR**-2), np.zeros(3)))
         scatter = sums.scatter(free)
         normal = (sums.normal.sum(axis=0) / scatter + np.diag(prior))[np.ix_(free, free)]
-        pull = sums.scores.sum(axis=0) / scatter + prior * np.concatenate(([0.0, rate], linear.ravel(), np.zeros(3)))
+        away = np.concatenate(([at_middle - searched, rate], linear.ravel(), np.zeros(3)))
+        pull = sums.scores.sum(axis=0) / scatter + prior * away
         step = np.zeros(UNKNOWNS)
         step[free] = -np.linalg.lstsq(normal, pull[free])[0]
         at_middle, rate = at_middle + step[0], rate + step[1]
