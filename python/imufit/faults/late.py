@@ -30,9 +30,6 @@ Part = Mapping[str, Any]
 
 AS_DECLARED: Final = Aligned(0.0, 0.0, 0.0, 0.0, np.eye(3), 0.0, 0)
 """Reference and sensor on one clock, with parallel axes."""
-BLOCKS: Final = 60
-"""Blocks of 8 s, which overlap by half, by which the lag is refined: four minutes of motion give it to a
-millisecond."""
 ONE_MOTION: Final = 0.6
 """Correlation of the rates from which on two recordings show one motion, whatever else is wrong."""
 
@@ -65,7 +62,7 @@ def late_faults(turning: Turning, parts: Sequence[Part], facts: _imufit.Facts, p
     if left <= MISSED:
         return []
     correlation = declared.correlation(np.eye(3))
-    found = likeliest(sensor, body, rates, most=BLOCKS)
+    found = likeliest(sensor, body, rates)
 
     def named(fault: str, words: fault_words.Words) -> list[DataFault]:
         return [DataFault(fault, "ref", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
@@ -74,7 +71,7 @@ def late_faults(turning: Turning, parts: Sequence[Part], facts: _imufit.Facts, p
     if found is not None and fits and not found.ambiguous:
         best = found.best
         return named("late", fault_words.late(best.aligned.lag, best.traces.correlation, correlation, path))
-    drift = None if fits else likeliest(sensor, body, Correlation(sensor, body, None), most=BLOCKS)
+    drift = None if fits else likeliest(sensor, body, Correlation(sensor, body, None))
     if drift is not None and explains(drift.best.traces.left, left) and not drift.ambiguous:
         clocks = drift.best.aligned
         words = fault_words.skew(clocks.lag, clocks.skew, drift.best.traces.correlation, correlation, path)

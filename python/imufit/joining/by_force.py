@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from imufit.joining.forces import REACH, Forces
 from imufit.joining.joined import Compared, RateTrace
-from imufit.joining.likeliest import RIVAL, SAME, Likeliest, Placed, of_these
+from imufit.joining.likeliest import Likeliest, Placed, left_error, likeliest_of
 from imufit.joining.refine import Aligned
 from imufit.joining.search import LEAST_BINS, USUAL_SKEW, Candidate, LagSearch, likeliest_width, widths
 
@@ -56,15 +56,12 @@ def likeliest_by_force(
     if best is None:
         return None
     search, peaks = best
-    found: list[Placed] = []
-    for peak in peaks:
-        if peak.gain < RIVAL * peaks[0].gain:
-            continue
+
+    def refined(peak: Candidate) -> Placed | None:
         start = replace(peak, lag=near.lag) if near is not None else peak
-        placed = _refined(sensor, reference, search, start, near is not None, skew is not None)
-        if placed is not None and not any(search.meet(placed.aligned, other.aligned, SAME) for other in found):
-            found.append(placed)
-    return of_these(found, search) if found else None
+        return _refined(sensor, reference, search, start, near is not None, skew is not None)
+
+    return likeliest_of(peaks, search, refined)
 
 
 def _widths(sensor: Forces, reference: Forces) -> list[float]:
@@ -123,7 +120,8 @@ def _refined(
     lag = float(at_middle + rate * (start - middle))
     aligned = Aligned(lag, lag_error, float(rate), float(np.sqrt(covariance[1, 1])), np.eye(3), float("nan"), 0)
     correlation = float(np.corrcoef(length[used], expected[used])[0, 1])
-    return Placed(aligned, None, _trace(search, aligned, start, correlation, float(used.sum()) * width / OVERSAMPLED))
+    traces = _trace(search, aligned, start, correlation, float(used.sum()) * width / OVERSAMPLED)
+    return Placed(aligned, None, traces, left_error(left[:, None]))
 
 
 def _equations(columns: Array, left: Array, t: Array, block: float) -> tuple[Array, Array]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 from imufit.joining.course import Course
 from imufit.joining.joined import RateTrace
@@ -18,6 +19,7 @@ from imufit.joining.search import (
     Correlation,
     LagSearch,
     bin_width,
+    independent,
     likeliest_width,
     turn_between,
     widths,
@@ -32,11 +34,9 @@ RESOLVED: Final = 0.5
 period apart are in different bins then."""
 SAME: Final = 0.5
 """Two alignments that put one sample of the reference at the same time, to this many bins, are one."""
-FEW: Final = 100
-"""Blocks of 8 s, which overlap by half, by which several lags are refined before the likeliest one is by all."""
 SURE: Final = 7.0
 """Log odds from which on an alignment is accepted: one in a thousand is wrong. They count against all alignments that
-were tried, of unrelated recordings, and against the second one."""
+were tried, of unrelated recordings, and against each other one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +51,29 @@ class Placed:
         The rates of both at the same times; None where something else was compared.
     traces : RateTrace
         The rates and how well they agree.
+    left_error : float
+        Standard error of the share of the rates (square) that is left, over this share.
     """
 
     aligned: Aligned
     common: CommonRates | None
     traces: RateTrace
+    left_error: float
+
+    def odds(self, other: Placed) -> float:
+        """Return the log odds that another alignment leaves more of the rates than this one by more than chance.
+
+        Of a motion that repeats itself both leave the noise alone, and the difference is as much as the noise varies.
+        The odds are less than zero if the other one leaves less.
+
+        Q. H. Vuong 1989, Likelihood ratio tests for model selection and non-nested hypotheses, Econometrica 57.
+        """
+        least = 1e-12
+        difference = float(np.log(max(other.traces.left, least) / max(self.traces.left, least)))
+        # The other overlap is another sample of the noise.
+        samples = 1.0 + self.traces.overlap / max(other.traces.overlap, least)
+        variance = max(self.left_error**2 * samples, least)
+        return 0.5 * difference * abs(difference) / variance
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,20 +85,17 @@ class Likeliest:
     best : Placed
         The likeliest one.
     second : Placed or None
-        Of the others the one that leaves least of the rates; None if no other comes near.
+        Of the others the one against which the odds are least; None if no other comes near.
     independent : float
         Time after which the rates say something new, s.
     tried : float
         Number of different alignments that were looked at.
-    next_gain : float
-        Largest gain of the others, as that of the traces; 0 without any.
     """
 
     best: Placed
     second: Placed | None
     independent: float
     tried: float
-    next_gain: float
 
     @property
     def rival(self) -> float:
@@ -90,15 +105,12 @@ class Likeliest:
     @property
     def ambiguous(self) -> bool:
         """True if two lags make the rates agree equally well, or nearly so for as little as there is."""
-        return self._odds(self.best.traces.gain - self.next_gain) < SURE
+        return self.second is not None and self.best.odds(self.second) < SURE
 
     @property
     def unrelated(self) -> bool:
         """True if one of as many unrelated alignments agrees as well."""
-        return self._odds(self.best.traces.gain) < SURE + float(np.log(self.tried))
-
-    def _odds(self, gain: float) -> float:
-        return 0.5 * gain / self.independent
+        return 0.5 * self.best.traces.gain / self.independent < SURE + float(np.log(self.tried))
 
 
 def likeliest(
@@ -106,7 +118,6 @@ def likeliest(
     body: Course,
     rates: Correlation,
     skew: float | None = None,
-    most: int | None = None,
     peaks: Sequence[Candidate] | None = None,
 ) -> Likeliest | None:
     """Find the likeliest alignment.
@@ -119,8 +130,6 @@ def likeliest(
         Of the two.
     skew : float, optional
         Rate of the reference's clock over the sensor's, less one, where it is known.
-    most : int, optional
-        Blocks to refine by, as in `refine`.
     peaks : sequence of Candidate, optional
         The peaks of `rates`, where they are known.
 
@@ -129,25 +138,12 @@ def likeliest(
     Likeliest or None
         None where no few seconds are common to both.
     """
-    peaks = peaks or rates.peaks()
-    near = [peak for peak in peaks if peak.gain >= RIVAL * peaks[0].gain]
-    some = most if len(near) == 1 else min(most or FEW, FEW)
-    found: list[Placed] = []
-    for peak in near:
-        aligned = refine(sensor, body, peak, skew is not None, most=some)
-        if aligned is None or any(rates.meet(aligned, other.aligned, SAME) for other in found):
-            continue
-        found.append(placed(sensor, body, rates, aligned))
-    if not found:
-        return None
-    answer = of_these(found, rates)
-    if some != most:
-        rough = answer.best.aligned
-        near_best = Candidate(rough.lag, rough.skew, 0.0, rough.mount)
-        aligned = refine(sensor, body, near_best, skew is not None, most=most)
-        if aligned is not None:
-            return replace(answer, best=placed(sensor, body, rates, aligned))
-    return answer
+
+    def refined(peak: Candidate) -> Placed | None:
+        aligned = refine(sensor, body, peak, skew is not None)
+        return None if aligned is None else placed(sensor, body, rates, aligned)
+
+    return likeliest_of(peaks or rates.peaks(), rates, refined)
 
 
 def likeliest_of_all_widths(sensor: Course, body: Course, skew: float | None) -> Likeliest | None:
@@ -170,12 +166,35 @@ def likeliest_of_all_widths(sensor: Course, body: Course, skew: float | None) ->
     return likeliest(sensor, body, chosen, skew, peaks=peaks)
 
 
-def of_these(found: Sequence[Placed], search: LagSearch) -> Likeliest:
-    """Return the likeliest of some alignments, one at least, and the evidence against it."""
+def likeliest_of(
+    peaks: Sequence[Candidate], search: LagSearch, refined: Callable[[Candidate], Placed | None]
+) -> Likeliest | None:
+    """Refine the peaks of a search, the likeliest first, and return the likeliest alignment."""
+    found: list[Placed] = []
+    for peak in peaks:
+        each = refined(peak) if peak.gain >= RIVAL * peaks[0].gain else None
+        if each is not None and not any(search.meet(each.aligned, other.aligned, SAME) for other in found):
+            found.append(each)
+    if not found:
+        return None
     best, *others = sorted(found, key=lambda each: -each.traces.gain)
-    second = min(others, key=lambda each: each.traces.left, default=None)
-    next_gain = max((each.traces.gain for each in others), default=0.0)
-    return Likeliest(best, second, search.independent, search.tried, next_gain)
+    return Likeliest(best, min(others, key=best.odds, default=None), search.independent, search.tried)
+
+
+def left_error(left: Array) -> float:
+    """Return the standard error of the mean square of what is left, (k, c), over it; infinite without any.
+
+    The squares of a normal process are correlated by the square of its own correlation (Isserlis 1918, On a formula for
+    the product-moment coefficient of any order of a normal frequency distribution in any number of variables,
+    Biometrika 12).
+    """
+    squares = np.sum(left**2, axis=1)
+    if not squares.any():
+        return float("inf")
+    size = 2 * fft.next_fast_len(len(left), real=True)
+    spectrum = fft.rfft(left.T, size)
+    spread = float(np.var(squares) / np.mean(squares) ** 2)
+    return float(np.sqrt(spread * independent(spectrum, spectrum, size, len(left)) / len(left)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,6 +241,12 @@ class CommonRates:
         """Turn from the reference body's axes to the sensor's that makes the rates agree best, (3, 3)."""
         return turn_between(self.measured.T @ self.expected)
 
+    def left(self, mount: Array) -> Array:
+        """Return what a mount and the scale that fits best leave of the rates, (k, 3), rad/s."""
+        expected = self.expected @ mount.T
+        scale = np.sum(self.measured * expected) / max(float(np.sum(expected**2)), 1e-300)
+        return np.asarray(self.measured - scale * expected)
+
     def correlation(self, mount: Array) -> float:
         """Correlation of the rates, axis by axis, with a mount; 0 where nothing moves."""
         size = np.sqrt(np.sum(self.measured**2) * np.sum(self.expected**2))
@@ -243,4 +268,4 @@ def placed(sensor: Course, body: Course, rates: Correlation, aligned: Aligned) -
         correlation=common.correlation(mount),
         overlap=common.overlap,
     )
-    return Placed(replace(aligned, mount=mount), common, traces)
+    return Placed(replace(aligned, mount=mount), common, traces, left_error(common.left(mount)))

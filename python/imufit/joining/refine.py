@@ -21,7 +21,7 @@ from scipy import fft
 
 from imufit import _imufit
 from imufit.joining.course import CONJUGATE, Course, reference_course
-from imufit.joining.search import USUAL_SKEW, Candidate, bin_width, turn_between
+from imufit.joining.search import LARGEST_SKEW, USUAL_SKEW, Candidate, bin_width, turn_between
 
 Array = NDArray[np.float64]
 Transform = NDArray[np.complex128]
@@ -39,7 +39,7 @@ BAND: Final = 0.2
 ROUNDS: Final = 12
 """Gauss-Newton steps at most."""
 UNHELD: Final = 4
-"""Steps that the prior of the skew does not hold."""
+"""Steps in which all skews that are looked for are as likely."""
 WILD: Final = 20.0
 """A turn this many times as far off as the usual one (median) of its block is of a wild pose: of normal errors none is
 beyond four."""
@@ -89,7 +89,6 @@ def refine(
     near: Candidate,
     skew_known: bool = False,
     lag_known: bool = False,
-    most: int | None = None,
 ) -> Aligned | None:
     """Refine lag, skew and mount from what is nearly right.
 
@@ -101,8 +100,6 @@ def refine(
         Lag, skew and mount to a bin of the search.
     skew_known, lag_known : bool
         True for what is not to be refined: the skew, the lag at the first sample.
-    most : int, optional
-        Blocks to look at, evenly over the recording; all of them if None.
 
     Returns
     -------
@@ -113,24 +110,28 @@ def refine(
     start = float(reference.t[0])
     middle = start if lag_known else float(0.5 * (reference.t[0] + reference.t[-1]))
     # The lag is that of the middle: there the skew hardly moves it.
-    at_middle, rate = near.lag + near.skew * (middle - start), near.skew
+    searched = near.lag + near.skew * (middle - start)
+    at_middle, rate = searched, near.skew
     free = np.ones(UNKNOWNS, np.bool_)
     free[:2] = not lag_known, not skew_known
     linear, bias = np.zeros((3, 3)), np.zeros(3)
     # As far as the clocks may be off; at higher frequencies the phase of the motion does not show yet where they go.
-    off, reach = bin_width(sensor, reference), float(np.max(np.abs(reference.t - middle)))
+    width = off = bin_width(sensor, reference)
+    reach = float(np.max(np.abs(reference.t - middle)))
     for turn in range(ROUNDS):
         turns = _Turns.of(sensor, body, at_middle, rate, middle)
-        sums = _sums(turns, (np.eye(3) + linear) @ near.mount, bias, off, most)
+        sums = _sums(turns, (np.eye(3) + linear) @ near.mount, bias, off)
         if sums is None:
             return None
         # A Cauchy prior as the normal one of the same pull: a clock of a crystal is held, one that is far off is not.
-        # It has a maximum of its own near no skew, so that the first rounds go to that of the likelihood.
-        held = 0.0 if turn < UNHELD else 2.0 / (USUAL_SKEW**2 + rate**2)
-        prior = np.concatenate(([0.0, held], np.full(9, LARGEST_ERROR**-2), np.zeros(3)))
+        # It has a maximum of its own near no skew, so that the first rounds go to that of the likelihood, among the
+        # skews that are looked for. The lag is known to a bin.
+        held = LARGEST_SKEW**-2 if turn < UNHELD else 2.0 / (USUAL_SKEW**2 + rate**2)
+        prior = np.concatenate(([width**-2, held], np.full(9, LARGEST_ERROR**-2), np.zeros(3)))
         scatter = sums.scatter(free)
         normal = (sums.normal.sum(axis=0) / scatter + np.diag(prior))[np.ix_(free, free)]
-        pull = sums.scores.sum(axis=0) / scatter + prior * np.concatenate(([0.0, rate], linear.ravel(), np.zeros(3)))
+        away = np.concatenate(([at_middle - searched, rate], linear.ravel(), np.zeros(3)))
+        pull = sums.scores.sum(axis=0) / scatter + prior * away
         step = np.zeros(UNKNOWNS)
         step[free] = -np.linalg.lstsq(normal, pull[free])[0]
         at_middle, rate = at_middle + step[0], rate + step[1]
@@ -243,8 +244,8 @@ class _Blocks:
     window: Array
 
     @classmethod
-    def of(cls, there: NDArray[np.bool_], length: int, most: int | None) -> _Blocks:
-        """Cut where samples are missing; `most` blocks at most, evenly over the recording."""
+    def of(cls, there: NDArray[np.bool_], length: int) -> _Blocks:
+        """Cut where samples are missing."""
         edges = np.flatnonzero(np.diff(np.concatenate(([False], there, [False]))))
         rows, windows = [np.zeros((0, length), np.intp)], [np.zeros((0, length))]
         for begin, end in edges.reshape(-1, 2):
@@ -260,11 +261,7 @@ class _Blocks:
             window = (np.sin(0.5 * np.pi * ramp) / np.sqrt(weight))[place] * sine
             rows.append(np.pad(begin + place, ((0, 0), (0, length - size)), mode="edge"))
             windows.append(np.pad(window, ((0, 0), (0, length - size))))
-        found = cls(np.concatenate(rows), np.concatenate(windows))
-        if most is None or len(found.rows) <= most:
-            return found
-        some = np.linspace(0, len(found.rows) - 1, most).astype(int)
-        return cls(found.rows[some], found.window[some])
+        return cls(np.concatenate(rows), np.concatenate(windows))
 
     def pieces(self) -> Iterator[tuple[slice, _Blocks]]:
         """Yield some blocks at a time."""
@@ -316,12 +313,12 @@ class _Sums:
         return max(1.0, float(np.mean(np.sum(left[:, :2] ** 2, axis=0) / usual)))
 
 
-def _sums(turns: _Turns, mount: Array, bias: Array, off: float, most: int | None) -> _Sums | None:
+def _sums(turns: _Turns, mount: Array, bias: Array, off: float) -> _Sums | None:
     body = turns.body @ mount.T
     left = turns.own - body - turns.step[:, None] * bias
     length = _length(turns.usual)
     turns = replace(turns, there=turns.tame(left))
-    blocks = _Blocks.of(turns.there, length, most)
+    blocks = _Blocks.of(turns.there, length)
     if not len(blocks.rows):
         return None
     shown = 2.0 * np.pi * off * fft.rfftfreq(length, turns.usual) < 1.0

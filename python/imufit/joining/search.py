@@ -169,7 +169,7 @@ class LagSearch:
         self._known = fft.rfft(known, self._size)
         self._sums = float(np.sum(values**2)), float(known.sum())
         other = fft.rfft(self.other.values.T, self._size)
-        self.independent = self.step * _independent(self._rate, other, min(n, m))
+        self.independent = self.step * independent(self._rate, other, self._size, min(n, m))
         self.spacing = 2.0 / max(1, min(n, m))
         number = min(int(LARGEST_SKEW / self.spacing), int(MOST_STRETCHED / (2 * (n + m))))
         steps = np.arange(-number, number + 1)
@@ -278,13 +278,13 @@ class LagSearch:
         )
 
 
-def _independent(own: Transform, other: Transform, shorter: int) -> float:
+def independent(own: Transform, other: Transform, size: int, shorter: int) -> float:
     """Bins after which the products of two unrelated recordings are independent (Bartlett 1935), by their transforms.
 
     M. S. Bartlett, Some aspects of the time-correlation problem in regard to tests of significance, Journal of the
     Royal Statistical Society 98.
     """
-    shapes = [fft.irfft(np.sum(np.abs(each) ** 2, axis=0))[:shorter] for each in (own, other)]
+    shapes = [fft.irfft(np.sum(np.abs(each) ** 2, axis=0), size)[:shorter] for each in (own, other)]
     if min(float(shape[0]) for shape in shapes) <= 0.0:
         return 1.0
     products = shapes[0] * shapes[1] / (shapes[0][0] * shapes[1][0])
