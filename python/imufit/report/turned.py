@@ -14,6 +14,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.colors import to_hex
 
+from imufit.figures.style import GREY, INK
 from imufit.report.inline_svg import themed
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def scene(axes: Any) -> dict[str, Any]:
         for k, axis in enumerate((axes.xaxis, axes.yaxis, axes.zaxis)):
             end = corner + 2.0 * np.eye(3)[k]
             edge = [corner.tolist(), end.tolist()]
-            lines.append({"at": edge, "colour": "var(--grey)", "width": 0.8, "dashed": False})
-            words.append({"at": end.tolist(), "text": axis.get_label_text(), "colour": "var(--ink)"})
+            lines.append({"at": edge, "colour": themed(to_hex(GREY)), "width": 0.8, "dashed": False})
+            words.append({"at": end.tolist(), "text": axis.get_label_text(), "colour": themed(to_hex(INK))})
     view = [math.radians(axes.elev), math.radians(axes.azim)]
     return {"view": view, "lines": lines, "words": words}
