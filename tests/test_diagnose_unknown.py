@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from imufit import Log, SensorModel, ladder
-from imufit.diagnosing.hops import hops
+from imufit.diagnosing.telegraph_noise import telegraph_noise
 from imufit.diagnosing.tones import strongest
 from imufit.lab import simulate
 from scipy.signal import lfilter
@@ -81,20 +81,20 @@ KINDS = ["white", "coloured", "slowly coloured", "walk", "bursts", "short bursts
 
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("kind", KINDS)
-def test_noise_holds_no_tone_and_no_hops(kind, seed):
+def test_noise_holds_no_tone_and_no_telegraph_noise(kind, seed):
     t, noise = noise_of(kind, seed)
-    assert hops(t, noise) is None
+    assert telegraph_noise(t, noise) is None
     _, _, p_value = strongest(t, noise)
     assert p_value > 1e-4
 
 
 @pytest.mark.parametrize("kind", ["white", "coloured"])
-def test_hops_are_counted_and_measured(kind):
+def test_jumps_are_counted_and_measured(kind):
     t, noise = noise_of(kind, 1)
     noise /= np.nanstd(noise)
     changes = np.array([20.0, 23.0, 60.0, 61.5, 90.0, 95.0, 140.0, 142.0])
     size = 1.5 if kind == "white" else 9.0
-    found = hops(t, noise + size * (np.searchsorted(changes, t) % 2))
+    found = telegraph_noise(t, noise + size * (np.searchsorted(changes, t) % 2))
     assert found is not None
     assert (found.count, found.size) == (8, pytest.approx(size, rel=0.2))
     assert found.first == pytest.approx(20.0, abs=0.4)
