@@ -238,7 +238,10 @@ def _length(step: float) -> int:
 
 @dataclass(frozen=True)
 class _Blocks:
-    """Stretches cut into blocks: rows (b, k) and their weights (b, k), of which the squares add up to one."""
+    """Blocks cut from stretches: the rows (b, k) of each, and their weights (b, k).
+
+    Blocks overlap. The squares of the weights of one row add up to one over all blocks.
+    """
 
     rows: NDArray[np.intp]
     window: Array
@@ -286,7 +289,8 @@ class _Sums:
     noise : (14, 14) array
         Covariance of the sum of the scores, if blocks are alike.
     alike : float
-        What the squares of the scores of blocks add up to over the square of their sum: less than one as they overlap.
+        Sum of the variances of the blocks' scores over the variance of the sum of all scores, if blocks are alike.
+        Blocks overlap, so it is less than one.
     attitude_error : float
         RMS over axes of the attitude error within a block, rad.
     """

@@ -54,18 +54,19 @@ def _call(name: str, options: dict[str, Any]) -> str:
     return ", ".join([repr(name), *(f"{key}={value!r}" for key, value in options.items())])
 
 
-def _added(before: Stack, after: Stack) -> bool:
-    """Return whether a step adds one effect as `imufit add` does: nothing else changes, and nothing is held."""
+def _added(before: Stack, after: Stack) -> str | None:
+    """Return the effect that a step adds as `imufit add` does; None if more changes, or anything is held."""
     new = [effect for effect in after.effects if effect not in before.effects]
-    return len(new) == 1 and set(before.effects) < set(after.effects) and not after.holds and not before.holds
+    alone = len(new) == 1 and set(before.effects) < set(after.effects) and not after.holds and not before.holds
+    return new[0] if alone else None
 
 
 def _python_step(before: Stack, after: Stack) -> list[str]:
     """Return the calls of `imufit.studio.session.moved`."""
+    if (added := _added(before, after)) is not None:
+        return [f"fit = fit.add({added!r}).fit"]
     new = [effect for effect in after.effects if effect not in before.effects]
     gone = [effect for effect in before.effects if effect not in after.effects]
-    if _added(before, after):
-        return [f"fit = fit.add({new[0]!r}).fit"]
     lines = ["model = fit.model.copy()"]
     lines += [f"model = model.without_effect({effect!r})" for effect in gone]
     lines += [f"model = model.with_effect({effect!r})" for effect in new]
@@ -106,8 +107,9 @@ def as_shell(files: Sequence[LogFile], way: Sequence[Stack]) -> str:
     if not model.effects:
         lines.append(" ".join(["imufit compare", *logs, *options]))
         return "\n".join([*lines, ""])
-    if all(_added(before, after) for before, after in pairwise(way)):
-        first, *others = (shlex.quote(effect) for effect in model.effects)
+    added = [_added(before, after) for before, after in pairwise(way)]
+    if None not in added:
+        first, *others = (shlex.quote(str(effect)) for effect in added)
         then = [f"--then {effect}" for effect in others]
         lines.append(" ".join(["imufit add", first, *logs, *options, *then, "-o model.toml"]))
     else:

@@ -41,13 +41,12 @@ class TwoView:
     def refresh(self) -> None:
         """Lay out the second model and the present one beside each other, where a second one is kept."""
         session = self._desk.session
-        self.kept = session is not None and session.begun and session.second is not None
-        if session is None or not self.kept:
-            self._shown = ()
+        if session is None or not session.begun or session.second is None:
+            self.kept, self._shown = False, ()
             self._two.clear()
             return
-        assert session.second is not None
-        second = None if session.second is None else session.made(session.second)
+        self.kept = True
+        second = session.made(session.second)
         present = session.made()
         levels = tuple(made is not None and made.comparison is not None for made in (second, present))
         factor = session.weighed()

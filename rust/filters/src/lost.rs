@@ -13,8 +13,8 @@
 //!    leaves it at `g`, and the middle decides.
 //! 4. The attitude is turned by the least rotation that brings the mean force up, and its heading is that of the field where
 //!    one is measured. A filter that follows the field slowly keeps a heading that the field does not surely deny
-//!    ([`crate::met`](crate)). What the filter had learned (bias, scale, their certainty) is that of the end of the last window but
-//!    one that did not speak against it: the last one may hold the first bad readings.
+//!    ([`crate::met`](crate)). The filter goes back to what it had learned (bias, scale, their certainty) by the end of the last
+//!    window but one that did not speak against it: the last one may hold the first bad readings.
 //! 5. A turn that bad rates may have made, larger than the limit ([`crate::bridge`](crate)), leaves the attitude where it is and takes back what was learned.
 //! 6. One window shows that attitude coarsely. The next [`WINDOWS`] together show it three times as well: the same turn is
 //!    done by their mean, with what the filter had learned before it was lost.
