@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from imufit.figures import place, quantity, style
-from imufit.results.noise_part import BEYOND
 
 COLOURS: Final = {
     "white": style.BLUE,
@@ -17,6 +16,9 @@ COLOURS: Final = {
     "block_scatter": style.SKY,
 }
 """Colours of the components (Okabe and Ito), those beyond the floor last."""
+
+BEYOND: Final = ("random_walk", "block_scatter")
+"""Components that stand beside the floor: they move the zero from one part of the log to the next."""
 
 LEAST_SHARE: Final = 0.002
 """Share that is a pixel of a bar of 500; smaller parts stand in the table alone."""

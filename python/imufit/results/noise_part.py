@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_fields
@@ -13,9 +13,6 @@ from imufit.results.table import Table
 
 if TYPE_CHECKING:
     from imufit.figures.place import Drawing, Place
-
-BEYOND: Final = ("random_walk", "block_scatter")
-"""Components that stand beside the floor: they move the zero from one part of the log to the next."""
 
 
 @dataclass(frozen=True, repr=False)

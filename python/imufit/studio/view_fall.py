@@ -8,7 +8,8 @@ from typing import Final
 from nicegui import ui
 
 from imufit.figures import quantity
-from imufit.results.noise_part import BEYOND, NoisePart
+from imufit.figures.noise_parts import BEYOND
+from imufit.results.noise_part import NoisePart
 from imufit.studio import charts
 from imufit.studio.desk import Desk
 from imufit.studio.session import Session, worst_channel
