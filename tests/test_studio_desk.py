@@ -2,11 +2,13 @@
 
 import asyncio
 
+import numpy as np
 import pytest
 from imufit.lab.simulate import simulate
 from imufit.lab.simulated_log import save_simulation
+from imufit.log import read
 from imufit.studio.desk import Desk
-from imufit.studio.log_file import LogFile
+from imufit.studio.log_file import LogFile, Way
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +51,20 @@ def test_a_log_without_evidence_leaves_the_session_before_it(log, spoilt):
     assert t.size == values.size > 100
 
 
-def test_a_first_log_without_evidence_leaves_nothing(spoilt):
+def test_rows_of_a_first_log_without_evidence_are_drawn_and_a_reference_can_be_joined_to_it(log, spoilt, tmp_path):
+    async def both() -> None:
+        await desk.bring([spoilt])
+        await desk.bring([LogFile(reference, reference.name)])
+
+    rows = read(log.path)
+    reference = tmp_path / "poses.csv"
+    table = np.column_stack([rows.t, rows.ref_q])
+    np.savetxt(reference, table, delimiter=",", header="t,ref_qw,ref_qx,ref_qy,ref_qz", comments="")
     desk = Desk()
-    asyncio.run(desk.open([spoilt]))
-    assert spoilt.name in desk.trouble
-    assert (desk.session, desk.files, desk.traces) == (None, (), None)
+    asyncio.run(both())
+    assert desk.session is not None
+    assert desk.session.refused
+    assert desk.files == (spoilt,)
+    t, values = desk.traces.window(["acc_x"], *desk.traces.span, 100)["acc_x"].line()
+    assert t.size == values.size > 100
+    assert [(offer.way, offer.files) for offer in desk.offers] == [(Way.JOIN, (spoilt.joined(desk.arrivals[0].file),))]

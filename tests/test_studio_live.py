@@ -9,7 +9,7 @@ from studio_watched import problems, strangers
 
 pytestmark = needs_chromium
 PATIENCE = 30_000  # ms
-DRAWN = "[...document.querySelectorAll('.js-plotly-plot')].map(plot => plot.data[0].x.length)"
+DRAWN = "[...document.querySelectorAll('.js-plotly-plot')].map(plot => plot.data?.[0]?.x?.length ?? 0)"
 """Points of the first trace of every figure."""
 
 
@@ -115,7 +115,8 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
 
     # the recording opens in the studio, and the device stays connected
     page.get_by_test_id("look").click()
-    page.wait_for_function("() => document.querySelector('[data-mark=logs]')?.textContent.includes('calibration-1')")
+    page.wait_for_function("() => document.querySelector('[data-mark=logs]')?.textContent === 'calibration-1.parquet'")
+    wait_until(page, lambda: max(page.evaluate(DRAWN), default=0) > 50)
     page.goto(f"{address}live")
     page.get_by_role("button", name="Disconnect").click()
     page.get_by_text("Not connected").wait_for(timeout=PATIENCE)

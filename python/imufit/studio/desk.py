@@ -69,6 +69,8 @@ class Desk:
         Its logs.
     arrivals : list of Arrival
         Files that were brought and await a choice.
+    opened : list of Arrival
+        Files of the session: a reference that is brought alone can be joined to one of them.
     wanted : LogsWantedError or None
         The session that waits for its logs.
     mystery : Mystery or None
@@ -101,6 +103,7 @@ class Desk:
         self.session: Session | None = None
         self.files: tuple[LogFile, ...] = ()
         self.arrivals: list[Arrival] = []
+        self.opened: list[Arrival] = []
         self.wanted: LogsWantedError | None = None
         self.mystery: Mystery | None = None
         self.joined: tuple[str, ...] = ()
@@ -154,7 +157,9 @@ class Desk:
     @property
     def offers(self) -> list[Offer]:
         """Uses of the files that were brought."""
-        return offers(self.arrivals)
+        if any(item.sensors for item in self.arrivals):
+            return offers(self.arrivals)
+        return [offer for offer in offers([*self.opened, *self.arrivals]) if offer.way is Way.JOIN]
 
     # --- work
 
@@ -235,12 +240,17 @@ class Desk:
             self._working = False
 
     def _give_up(self) -> None:
-        """Return to the step before one whose model cannot be fitted, or to the session before one without evidence."""
+        """Return to the step before one whose model cannot be fitted, or to the session before one without evidence.
+
+        The rows of a first log without evidence stay, to be looked at.
+        """
         session = self.session
         if session is None or session.made() is not None:
             return
         if session.begun:
             session.give_up()
+        elif self._before is None and self.traces is not None and self.traces.built:
+            session.refused = True
         else:
             self._show(self._before or Shown(None, ()))
             self._before = None
@@ -250,7 +260,7 @@ class Desk:
         """List the pieces of work before anything can be fitted: a person sees the rows while the evidence is taken."""
         if self.traces is None or not self.traces.built or self.traces.log is not session.logs[session.shown]:
             yield "reading the rows", self._drawn_rows, self.files[0]
-        if not session.begun:
+        if not session.begun and not session.refused:
             names = " and ".join(file.name for file in self.files)
             yield f"taking the evidence of {names}", partial(session.begin, self.progress), self.files[0]
         elif self._before is not None:
@@ -368,6 +378,7 @@ class Desk:
         if self.session is not None and self.session.begun:
             self._before = Shown(self.session, self.files, self.mystery, self.joined, self.traces, self.models)
         self._show(Shown(session, tuple(files), mystery, joined))
+        self.opened = [item for item in self.arrivals if item.file in files]
         self.arrivals, self.wanted = [], None
         self._no_trouble()
         self.changed.emit()

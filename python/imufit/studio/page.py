@@ -36,7 +36,7 @@ def page_of(desk: Desk) -> Callable[[], None]:
     def build() -> None:
         ui.add_css(style)
         head = Head(desk)
-        with ui.element("main").classes("studio"):
+        with ui.element("main").classes("studio") as main:
             with _region("top"):
                 top = Top(desk)
             with _region("middle") as middle:
@@ -53,8 +53,11 @@ def page_of(desk: Desk) -> Callable[[], None]:
                 two = TwoView(desk)
 
         def numbers() -> None:
-            for region in (middle, right, steps, left):
-                region.visible = desk.session is not None
+            middle.visible = desk.session is not None
+            judged = desk.session is not None and not desk.session.refused
+            for region in (right, steps, left):
+                region.visible = judged
+            main.classes(**({"remove": "studio-rows"} if judged else {"add": "studio-rows"}))
             for view in (head, model, fall, two):
                 view.refresh()
             beside.visible = two.kept

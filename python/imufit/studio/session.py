@@ -11,7 +11,6 @@ import threading
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -97,6 +96,8 @@ class Session:
         Number of the present step.
     second : Stack or None
         The other of two models side by side.
+    refused : bool
+        Whether the logs cannot be judged: their rows are drawn, and nothing can be fitted.
     """
 
     def __init__(self, logs: Sequence[LogSource]) -> None:
@@ -104,6 +105,7 @@ class Session:
         self.steps = [Step(Action.START, "", Stack())]
         self.position = 0
         self.second: Stack | None = None
+        self.refused = False
         self._made: dict[Stack, Made] = {}
         self._full: OrderedDict[Stack, None] = OrderedDict()
         self._weighed: dict[tuple[Stack, Stack], float] = {}
@@ -434,9 +436,11 @@ class Session:
             self._weighed[key] = ln_bayes_factor(self._with_evidence(first), self._with_evidence(second))
             return self._weighed[key]
 
-    @cached_property
+    @property
     def has_reference(self) -> bool:
-        """Whether every row is judged by a reference, so that residuals can be drawn."""
+        """Whether every row is judged by a reference, so that residuals can be drawn; by the columns before the fit."""
+        if self._start is None:
+            return all("ref_qw" in log.columns or "ref_angle" in log.columns for log in self.logs)
         return self.start.analysis.judged_by == "reference"
 
     @property

@@ -41,7 +41,9 @@ def start(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, read
     server.add_page("/", page_of(desk))
 
     async def look_at(path: Path) -> None:
-        await desk.bring([LogFile(path, str(path))])
+        here = Path.cwd()
+        name = path.relative_to(here) if path.is_relative_to(here) else path
+        await desk.bring([LogFile(path, str(name))])
 
     server.add_page("/live", live.page_with(look_at), "imufit live")
 

@@ -39,7 +39,7 @@ class NoiseView:
     async def refresh(self) -> None:
         """Show the noise of the log that is drawn, if the region is open and it is not there yet."""
         session = self._desk.session
-        if not self._opened.value or session is None or not session.begun:
+        if not self._opened.value or session is None or not (session.begun or session.refused):
             return
         log = session.logs[session.shown]
         if log is self._log:

@@ -52,10 +52,11 @@ class PanelView:
             self._covariate.classes("min-w-36").props("data-mark=covariate")
         self._note = ui.label("").classes("studio-muted")
         with ui.element("div").classes("studio-charts"):
-            self._panel = (
-                ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart").props("data-mark=panel")
-            )
-            self._spectrum = ui.plotly(charts.empty("")).classes("studio-chart").props("data-mark=spectrum")
+            # They are hidden with what is around them: Plotly cannot resize a figure that is hidden itself.
+            with ui.element("div").classes("studio-pair") as self._pair:
+                self._panel = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
+                self._panel.props("data-mark=panel")
+                self._spectrum = ui.plotly(charts.empty("")).classes("studio-chart").props("data-mark=spectrum")
             with ui.element("div").classes("studio-chart studio-wide"):
                 # The choice stands over the one figure that it changes.
                 self._trace_kind = ui.toggle(
@@ -82,14 +83,15 @@ class PanelView:
         found = None if made is None else made.comparison
         judged = session.begun and session.has_reference
         self._covariate.visible = self._trace_kind.visible = judged
-        # A chart is hidden where it stays empty: Plotly cannot resize one that comes and goes.
-        self._panel.visible = self._spectrum.visible = judged or not session.begun
+        self._pair.visible = session.has_reference and not session.refused
         if not judged:
-            self._note.set_text(
-                "The log has no reference: the rests are judged, and the readings are drawn."
-                if session.begun
-                else "The readings are drawn while the evidence is taken."
-            )
+            if session.begun:
+                words = "The log has no reference: the rests are judged, and the readings are drawn."
+            elif session.refused:
+                words = "The log cannot be judged: the readings alone are drawn."
+            else:
+                words = "The readings are drawn while the evidence is taken."
+            self._note.set_text(words)
             self._refresh_readings()
             return
         if found is None:

@@ -145,6 +145,7 @@ class Top:
         brought = tuple(item.file for item in desk.arrivals)
         answer = _named(desk) if desk.guessing else ""
         state = (
+            session is not None and session.refused,
             diagnosis,
             desk.trouble,
             desk.in_shell,
@@ -170,7 +171,7 @@ class Top:
                 self._game(made is not None and diagnosis is not None)
             if diagnosis is not None and not desk.guessing:
                 self._verdict(diagnosis)
-            if session is None and not desk.arrivals and desk.wanted is None:
+            if (session is None or session.refused) and not desk.arrivals and desk.wanted is None:
                 self._welcome()
 
     def _welcome(self) -> None:
