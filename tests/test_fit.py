@@ -220,7 +220,10 @@ def test_comparing_with_another_log_keeps_the_parameters():
         (lambda log: log.rows(0, 150), "150 rows are too few for a fit.*at least 200"),
         (lambda log: replace(log, ref_q=None, ref_p=None), "gyr.bias.* no reference attitude"),
         (lambda log: replace(log, ref_q=np.full_like(log.ref_q, np.nan)), "gyr.bias.* no reference attitude"),
-        (lambda log: replace(log, acc=None, gyr=None, mag=None), "no sensor of the log has a sample"),
+        (
+            lambda log: replace(log, acc=None, gyr=None, mag=None, covariates={"AccX": log.acc[:, 0]}),
+            "no sensor of the log has a sample. Name the columns .*mapping=.*The columns are AccX",
+        ),
         (
             lambda log: replace(log, acc=np.full_like(log.acc, np.nan), gyr=None, mag=None),
             "no sensor of the log has a sample",

@@ -9,6 +9,7 @@ import urllib.request
 from urllib.parse import urlsplit
 
 import imufit
+import numpy as np
 import pytest
 from browser import chromium as started_chromium
 from browser import needs_chromium
@@ -35,6 +36,8 @@ def folder(tmp_path_factory):
     log.write(path / "walk.parquet")
     log.with_fields(ref_q=None, ref_p=None).write(path / "sensor.csv")
     imufit.Log.from_arrays(log.t + 0.5, ref_q=log.ref_q).write(path / "mocap.csv")
+    table = np.column_stack([log.t, log.acc / 9.80665, np.degrees(log.gyr), log.ref_q])
+    np.savetxt(path / "odd.csv", table, delimiter=",", header="t,U,V,W,P,Q,R,ref_qw,ref_qx,ref_qy,ref_qz", comments="")
     (path / "broken.csv").write_text("t,acc_x,acc_y,acc_z\n0,1,2,9\n1,1,no,9\n")
     log.with_fields(covariates=dict.fromkeys(HOSTILE, log.t % 1.0)).write(path / "hostile.parquet")
     return path
@@ -358,3 +361,19 @@ def test_a_button_applies_the_remedy_of_a_fault(page, folder):
     page.wait_for_function("() => !document.querySelector('[data-mark=fault]')")
     idle(page)
     assert bars(page)[0] < 1.1
+
+
+def test_columns_that_cannot_be_guessed_are_named_in_a_field(page, folder):
+    drop(page, folder / "odd.csv")
+    marked(page, "mapping").wait_for()
+    assert "odd.csv" in marked(page, "arrival").inner_text()
+    marked(page, "mapping").fill("acc_x=U[furlong]")
+    page.keyboard.press("Enter")
+    page.wait_for_function("() => document.querySelector('[data-mark=trouble]')?.textContent.includes('furlong')")
+    names = {f"acc_{axis}": f"{column}[g]" for axis, column in zip("xyz", "UVW", strict=True)}
+    names |= {f"gyr_{axis}": f"{column}[deg/s]" for axis, column in zip("xyz", "PQR", strict=True)}
+    marked(page, "mapping").fill(",".join(f"{name}={column}" for name, column in names.items()))
+    page.get_by_role("button", name="Read", exact=True).click()
+    (start,) = wait_for_bars(page, 1)
+    mapping = [word for name, column in names.items() for word in ("--map", f"{name}={column}")]
+    assert start == pytest.approx(answer(folder, "ladder", "odd.csv", *mapping)["ratio_start"], rel=1e-12)

@@ -20,7 +20,9 @@ from imufit.fitting.range_end import RangeEnd
 from imufit.fitting.readings_seen import ReadingsSeen
 from imufit.log import Chunk, LogSource
 from imufit.log.columns import SENSOR_NAMES
+from imufit.log.foreign import naming
 from imufit.model.effect import registered
+from imufit.printable import NAME, printable
 from imufit.progress import Progress
 
 CHUNK_ROWS = 16384
@@ -193,7 +195,11 @@ class Passes:
             return self.survey()
         facts = survey.finish()
         if not facts.sensors:
-            raise InputError("no sensor of the log has a sample", file=log.path)
+            raise InputError(
+                "no sensor of the log has a sample",
+                file=log.path,
+                remedy=naming(log.path, [printable(name, NAME) for name in self.covariates]),
+            )
         if self._leave_out_flat(readings, facts):
             return self.survey()
         for sensor, dead in readings.dead():

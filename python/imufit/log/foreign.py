@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -319,8 +320,21 @@ def _check_complete(targets: Sequence[str], unused: Sequence[str], place: Place,
     if not complete and "ref_angle" not in targets and not bare:
         raise place.error(
             "the file has no sensor: neither acc_x acc_y acc_z nor gyr_* nor mag_* nor a reference ref_q*",
-            remedy="Name the columns with " + reading(place.file, template("acc")) + "." + _listing(free),
+            remedy=naming(place.file, free),
         )
+
+
+def naming(file: str | Path | None, free: Sequence[str]) -> Remedy:
+    """Return the remedy for a file without a sensor: a mapping of its columns.
+
+    Parameters
+    ----------
+    file : str, Path or None
+        Of the log; None for a table in memory.
+    free : sequence of str
+        Columns without a meaning, as printed.
+    """
+    return "Name the columns with " + reading(file, template("acc")) + "." + _listing(free)
 
 
 def _missing(missing: dict[str, str], targets: Sequence[str], place: Place) -> InputError:

@@ -415,17 +415,16 @@ class Desk:
             return
         await self.open(files)
 
-    async def remap(self, text: str) -> None:
-        """Read the file that gave trouble anew, with a mapping of its columns.
+    async def remap(self, file: LogFile, text: str) -> None:
+        """Read a file that was brought anew, with a mapping of its columns.
 
         Parameters
         ----------
+        file : LogFile
+            The file.
         text : str
             Such as ``acc_x=AccX[g],acc_y=AccY[g]``.
         """
-        file = self.troubled
-        if file is None:
-            return
         try:
             mapping = Reading.of_texts([text], None, [], []).mapping or {}
         except InputError as error:

@@ -236,16 +236,23 @@ class Top:
         with ui.element("div").classes("studio-error").props('role="alert"'):
             ui.label(printable(desk.trouble)).props("data-mark=trouble")
             if desk.in_shell and desk.troubled is not None:
-                with ui.row().classes("w-full items-center"):
-                    given = ui.input("columns, such as acc_x=AccX[g],acc_y=AccY[g]").props("dense outlined")
-                    given.classes("grow").props("data-mark=mapping")
-                    given.on("keydown.enter", lambda: desk.remap(given.value))
-                    ui.button("Read", on_click=lambda: desk.remap(given.value)).props("dense outline no-caps")
+                self._mapping(desk.troubled)
                 ui.label(f"In a shell: {printable(desk.in_shell)}").classes("studio-muted").props("data-mark=in-shell")
             with ui.row():
                 for option in desk.cures:
                     self._cure(option, 0, "cure")
                 ui.button("Dismiss", on_click=desk.forget_trouble).props("dense flat no-caps size=sm")
+
+    def _mapping(self, file: LogFile) -> None:
+        """Take names for the columns of a file."""
+
+        async def read() -> None:
+            await self._desk.remap(file, given.value)
+
+        with ui.row().classes("w-full items-center"):
+            given = ui.input("columns, such as acc_x=AccX[g],acc_y=AccY[g]").props("dense outlined")
+            given.classes("grow").props("data-mark=mapping").on("keydown.enter", read)
+            ui.button("Read", on_click=read).props("dense outline no-caps")
 
     def _choice(self) -> None:
         desk = self._desk
@@ -257,7 +264,10 @@ class Top:
                 ui.label(printable(note)).classes("studio-muted")
         offers = desk.offers
         if not offers:
-            ui.label("This file holds a reference alone: drop the sensor's file as well.").classes("studio-sentence")
+            ui.label(
+                "This file holds a reference alone: drop the sensor's file as well, or name the columns of a sensor."
+            ).classes("studio-sentence")
+            self._mapping(desk.arrivals[-1].file)
         for offer in offers:
             ui.button(printable(offer.words, 2 * NAME), on_click=lambda offer=offer: desk.open(offer.files)).props(
                 "no-caps outline"
