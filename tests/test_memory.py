@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from imufit.devices.record.arrived import Announced, Arrived
+from imufit.devices.record.circumstances import Circumstances
 from imufit.devices.record.part import PartFile, part_path
 from imufit.log.excerpt import MOST_ROWS, Excerpt, judged_rows
 from imufit.log.size import HELD
@@ -208,7 +209,7 @@ def test_the_log_of_a_recording_is_made_block_by_block(tmp_path: Path) -> None:
     names = ("acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z", "mag_x", "mag_y", "mag_z", "temp")
     announced = Announced("binary", "device", 1e-6, names)
     part = PartFile(part_path(tmp_path / "a.parquet"))
-    part.begin(announced, {"port": "p", "utc": "2026-01-01T00:00:00+00:00", "monotonic": 0.0, "mapping": None})
+    part.begin(announced, Circumstances("p", "2026-01-01T00:00:00+00:00", 0.0))
     for first in range(0, n, rows):
         k = np.arange(first, first + rows)
         values = np.tile([0.0, 0.0, 9.81, 0.0, 0.0, 0.0, 20.0, 0.0, 44.0, 25.0], (rows, 1))

@@ -6,20 +6,14 @@ import pytest
 from imufit.devices.record import recover
 from imufit.devices.record.arrived import Chunk
 from imufit.devices.record.beginning import BeginningFile, beginning_path, read_beginning
+from imufit.devices.record.circumstances import Circumstances
 from imufit.devices.record.part import part_path
+from imufit.devices.record.reception import Listening
 from imufit.errors import InputError
 from recording_device import Sender, values_of
 
-ABOUT = {
-    "about": {
-        "port": "/dev/x",
-        "utc": "2026-01-01T00:00:00+00:00",
-        "monotonic": 99.0,
-        "mapping": None,
-        "frame": "ENU",
-    },
-    "how": {"form": "auto", "header": None, "baud": 115200},
-}
+ABOUT = Circumstances("/dev/x", "2026-01-01T00:00:00+00:00", 99.0, None, "ENU")
+HOW = Listening("auto", None, 115200)
 
 
 def chunks():
@@ -33,7 +27,7 @@ def chunks():
 
 def written(log, pieces):
     part_path(log).touch()
-    file = BeginningFile(beginning_path(log), ABOUT)
+    file = BeginningFile(beginning_path(log), ABOUT, HOW)
     for piece in pieces:
         file.keep(piece)
     file.close()
@@ -44,7 +38,7 @@ def test_what_came_is_read_as_it_was_written_and_a_cut_costs_the_last_chunk(tmp_
     path = written(tmp_path / "a.parquet", chunks())
     whole = path.read_bytes()
     begun = read_beginning(path)
-    assert (begun.about, list(begun.chunks)) == (ABOUT, chunks())
+    assert (begun.about, begun.how, list(begun.chunks)) == (ABOUT, HOW, chunks())
     for cut in range(0, len(whole), 37):
         path.write_bytes(whole[:cut])
         begun = read_beginning(path)
@@ -87,3 +81,26 @@ def test_a_file_of_another_kind_is_refused_and_stays(tmp_path):
     with pytest.raises(InputError, match="does not hold the first bytes of a recording"):
         recover(path)
     assert path.read_bytes() == b"PAR1 and so on"
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ('"port": "/dev/x"', '"Port": "/dev/x"'),
+        ('"port": "/dev/x"', '"port": 7'),
+        ('"monotonic": 99.0', '"monotonic": NaN'),
+        ('"mapping": null', '"mapping": [1]'),
+        ('"frame": "ENU"', '"frame": "ENX"'),
+        ('"baud": 115200', '"baud": "x"'),
+        ('"how": {', '"who": {'),
+        ("2026-01", "2026-31"),
+    ],
+)
+def test_a_damaged_beginning_is_refused_and_stays(tmp_path, before, after):
+    path = written(tmp_path / "a.parquet", chunks())
+    damaged = path.read_bytes().replace(before.encode(), after.encode())
+    assert damaged != path.read_bytes()
+    path.write_bytes(damaged)
+    with pytest.raises(InputError, match="is damaged"):
+        recover(path)
+    assert path.read_bytes() == damaged

@@ -18,12 +18,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from imufit.devices.record import recover
 from imufit.devices.record.arrived import Announced, Arrived
+from imufit.devices.record.circumstances import Circumstances
 from imufit.devices.record.part import PartFile, part_path, parts_of, read_part
 from imufit.errors import InputError
 
 COLUMNS = ("acc_x", "acc_y", "acc_z", "temp")
 DEVICE = Announced("binary", "d", 1e-6, COLUMNS, (20.0, 20.0, 20.0, 0.0), (100.0,) * 4)
-ABOUT = {"port": "/dev/x", "utc": "2026-01-02T03:04:05+00:00", "monotonic": 100.0, "mapping": None}
+ABOUT = Circumstances("/dev/x", "2026-01-02T03:04:05+00:00", 100.0)
 
 
 def rows(first, n, announced=DEVICE, start=1):
@@ -300,11 +301,12 @@ from pathlib import Path
 import numpy as np
 from imufit.devices.record import record
 from imufit.devices.record.arrived import Announced, Arrived
+from imufit.devices.record.circumstances import Circumstances
 from imufit.devices.record.part import PartFile
 before = set(sys.modules)
 file = PartFile(Path(sys.argv[1]))
 device = Announced("binary", "d", 1e-6, ("acc_x",))
-file.begin(device, {})
+file.begin(device, Circumstances("p", "2026-01-01T00:00:00+00:00", 0.0))
 whole = (np.zeros(1, kind) for kind in (np.uint32, np.uint8, np.uint32, np.uint16, np.uint32))
 file.write(Arrived(device, np.zeros(1), *whole, np.zeros((1, 1))), {})
 file.close()

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from imufit.devices.record.arrived import Announced, Arrived
+from imufit.devices.record.circumstances import Circumstances
 from imufit.devices.record.part import PartFile
 
 from mutated.column_mutations import Columns
@@ -74,7 +75,7 @@ def write_part(path: Path) -> None:
     columns = ("acc_x", "acc_y", "acc_z", "gyr_x", "gyr_y", "gyr_z")
     device = Announced("binary", "d", 1e-6, columns, (20.0,) * 6, (100.0,) * 6)
     file = PartFile(path)
-    file.begin(device, {"port": "/dev/x", "utc": "2026-01-02T03:04:05+00:00", "monotonic": 100.0, "mapping": None})
+    file.begin(device, Circumstances("/dev/x", "2026-01-02T03:04:05+00:00", 100.0))
     noise = np.random.default_rng(1)
     for first in range(0, 300, 50):
         k = np.arange(first, first + 50)

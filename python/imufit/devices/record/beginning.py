@@ -6,14 +6,15 @@ import json
 import os
 import struct
 import zlib
-from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from imufit.devices.record.arrived import Chunk
+from imufit.devices.record.circumstances import Circumstances
 from imufit.devices.record.part import STALL
+from imufit.devices.record.reception import Listening
 from imufit.errors import InputError
 
 MOST: Final = 1 << 24
@@ -41,8 +42,10 @@ class BeginningFile:
     ----------
     path : Path
         File to make.
-    about : mapping
-        What has to be known to decode them and to make a log of the rows: plain values.
+    about : Circumstances
+        What has to be known to make a log of the rows.
+    how : Listening
+        What has to be known to decode them.
 
     Raises
     ------
@@ -50,7 +53,7 @@ class BeginningFile:
         It cannot be made, or is there already.
     """
 
-    def __init__(self, path: Path, about: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, about: Circumstances, how: Listening) -> None:
         self.path = path
         self._file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0), 0o666)
         self._room = MOST
@@ -58,7 +61,8 @@ class BeginningFile:
         self._writer = ThreadPoolExecutor(1)
         self._over = False
         self._last: Future[None] | None = None
-        self._append(_MARK + json.dumps({**about, "version": _VERSION}).encode() + b"\n")
+        told = {"about": about.to_json(), "how": asdict(how), "version": _VERSION}
+        self._append(_MARK + json.dumps(told).encode() + b"\n")
 
     def keep(self, chunk: Chunk) -> None:
         """Append a chunk, as long as there is room.
@@ -104,13 +108,16 @@ class Beginning:
 
     Attributes
     ----------
-    about : dict
+    about : Circumstances
+        As it was given.
+    how : Listening
         As it was given.
     chunks : tuple of Chunk
         All whole ones, in order.
     """
 
-    about: dict[str, Any]
+    about: Circumstances
+    how: Listening
     chunks: tuple[Chunk, ...]
 
 
@@ -130,7 +137,7 @@ def read_beginning(path: Path) -> Beginning | None:
     Raises
     ------
     InputError
-        Another version wrote it, or something else.
+        Another version wrote it, or something else, or it is damaged.
     """
     data = path.read_bytes()
     if not data.startswith(_MARK[: len(data)]):
@@ -138,13 +145,19 @@ def read_beginning(path: Path) -> Beginning | None:
     end = data.find(b"\n", len(_MARK))
     if end < 0:
         return None
-    about = json.loads(data[len(_MARK) : end])
-    if (version := about.pop("version")) != _VERSION:
-        raise InputError(
-            f"this was written by another version (form {version}, known is {_VERSION})",
-            file=path,
-            remedy="Use the imufit that recorded it.",
-        )
+    try:
+        told = json.loads(data[len(_MARK) : end])
+        if (version := told["version"]) != _VERSION:
+            raise InputError(
+                f"this was written by another version (form {version}, known is {_VERSION})",
+                file=path,
+                remedy="Use the imufit that recorded it.",
+            )
+        about, how = Circumstances.from_json(told["about"]), Listening(**told["how"])
+    except InputError:
+        raise
+    except (ValueError, KeyError, TypeError):
+        raise InputError("the beginning of this file is damaged", file=path, remedy="Record again.") from None
     chunks: list[Chunk] = []
     at = end + 1
     while at + _HEAD.size <= len(data):
@@ -154,4 +167,4 @@ def read_beginning(path: Path) -> Beginning | None:
             break
         chunks.append(Chunk(arrival, opening, piece))
         at += _HEAD.size + n
-    return Beginning(about, tuple(chunks))
+    return Beginning(about, how, tuple(chunks))

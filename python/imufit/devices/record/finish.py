@@ -77,12 +77,12 @@ class _Commanded:
 
     @classmethod
     def of(cls, parts: Sequence[Part]) -> _Commanded | None:
-        rig = parts[0].about.get("rig")
-        if rig is None:
+        about = parts[0].about
+        if about.rig_axis is None:
             return None
         later = [tuple(each) for part in parts for note in part.told for each in note.get("angles", ())]
-        since, angle = np.array([(-np.inf, rig["angle"]), *later], dtype=np.float64).T
-        return cls(rig["axis"], since, angle)
+        since, angle = np.array([(-np.inf, about.rig_angle), *later], dtype=np.float64).T
+        return cls(about.rig_axis, since, angle)
 
     def at(self, t: Array) -> Array:
         """Angle at some times, s on the host's clock, (n,)."""
@@ -155,7 +155,7 @@ def make_log(parts: Sequence[Part], file: Path, ended: str | None = None, cpu_sh
     """
     timed = _Timed.of(parts)
     held = timed.parts
-    columns = [Columns(part.announced, part.about.get("mapping")) for part in held]
+    columns = [Columns(part.announced, part.about.mapping) for part in held]
     commanded = _Commanded.of(held)
     names = tuple(dict.fromkeys(name for each in columns for name in each.names))
     if commanded is not None:
@@ -167,7 +167,7 @@ def make_log(parts: Sequence[Part], file: Path, ended: str | None = None, cpu_sh
             told |= note
     about = held[0].about
     counts = told.get("counts", {})
-    began = datetime.fromisoformat(about["utc"]) + timedelta(seconds=seen.first - about["monotonic"])
+    began = about.began + timedelta(seconds=seen.first - about.monotonic)
     fit = timed.clocks[0].fit
     clock = RecordingClock("arrival")
     if fit is not None:
@@ -178,7 +178,7 @@ def make_log(parts: Sequence[Part], file: Path, ended: str | None = None, cpu_sh
     duration = seen.last - seen.first
     recording = Recording(
         file=str(file),
-        port=about["port"],
+        port=about.port,
         form=device.form,
         device=device.name,
         began=began.isoformat(timespec="microseconds"),
@@ -275,8 +275,7 @@ def _metadata(recording: Recording, parts: Sequence[Part], messages: list[dict[s
     if messages:
         described["messages"] = messages
     sensor = {"sensor": recording.device} if recording.device else {}
-    frame = {"frame": parts[0].about["frame"]} if "frame" in parts[0].about else {}
-    return Metadata.from_mapping({**sensor, **frame, KEY: described})
+    return Metadata.from_mapping({**sensor, "frame": parts[0].about.frame, KEY: described})
 
 
 def check_target(log: Path, force: bool) -> None:

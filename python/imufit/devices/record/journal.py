@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from imufit.devices.record.arrived import Arrived
 from imufit.devices.record.beginning import BeginningFile, beginning_path
+from imufit.devices.record.circumstances import Circumstances
 from imufit.devices.record.columns import Columns
 from imufit.devices.record.finish import utc_now
 from imufit.devices.record.part import PartFile, part_path
@@ -62,18 +63,18 @@ class Journal:
         self._log = log
         self._reception = reception
         self._mapping = mapping
-        self._about: dict[str, Any] = {
-            "port": reception.line.port,
-            "utc": utc_now(),
-            "monotonic": time.monotonic(),
-            "mapping": None if mapping is None else dict(mapping),
-            "frame": frame,
-        }
+        self._about = Circumstances(
+            port=reception.line.port,
+            utc=utc_now(),
+            monotonic=time.monotonic(),
+            mapping=None if mapping is None else dict(mapping),
+            frame=frame,
+            rig_axis=None if rig is None else rig.axis,
+            rig_angle=None if rig is None else _plain(rig.angle),
+        )
         # A recording may begin while the device has been listened to for long.
         self._counts_before = reception.counts
         self._rig = rig
-        if rig is not None:
-            self._about["rig"] = {"axis": rig.axis, "angle": _plain(rig.angle)}
         self._angles: list[tuple[float, float | None]] = []
         self._held: list[Arrived] = []
         self._texts: list[tuple[float, str]] = []
@@ -170,8 +171,7 @@ class Journal:
         path = beginning_path(self._log)
         try:
             if self._beginning is None:
-                how = {**self._reception.told, "baud": self._reception.line.baud}
-                self._beginning = BeginningFile(path, {"about": self._about, "how": how})
+                self._beginning = BeginningFile(path, self._about, self._reception.listening)
             self._beginning.keep(chunk)
         except OSError as error:
             raise DiskError(f"{path} cannot be written ({error.strerror or error})") from None

@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
-from datetime import datetime
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -20,6 +19,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from imufit.devices.record.arrived import Announced, Arrived
+from imufit.devices.record.circumstances import Circumstances
 from imufit.errors import InputError
 from imufit.remedy import command
 
@@ -127,18 +127,18 @@ class PartFile:
         self._schema: Any = None
         self.announced: Announced | None = None
 
-    def begin(self, announced: Announced, about: Mapping[str, Any]) -> None:
+    def begin(self, announced: Announced, about: Circumstances) -> None:
         """Write what the rows will hold.
 
         Parameters
         ----------
         announced : Announced
             The device's announcement.
-        about : mapping
-            What else has to be known to make a log of them: plain values.
+        about : Circumstances
+            What else has to be known to make a log of them.
         """
         self.announced = announced
-        told = json.dumps({**about, "version": VERSION, "announced": asdict(announced)})
+        told = json.dumps({**about.to_json(), "version": VERSION, "announced": asdict(announced)})
         self._schema = _schema(announced).with_metadata({_KEY: told.encode()})
         self._stream = pa.ipc.new_stream(pa.PythonFile(self._sink, "w"), self._schema)
         self._append(0)
@@ -239,7 +239,7 @@ class Part:
         The file.
     announced : Announced
         The device's announcement.
-    about : dict
+    about : Circumstances
         What else was written at its beginning.
     n : int
         Rows of whole batches.
@@ -251,7 +251,7 @@ class Part:
 
     path: Path
     announced: Announced
-    about: dict[str, Any]
+    about: Circumstances
     n: int
     told: list[dict[str, Any]]
     dropped: int
@@ -321,20 +321,17 @@ def _read(path: Path, data: Any, size: int) -> Part | None:
             remedy=command("record", "imufit.devices.record.record") + " writes LOG.part while it runs.",
         )
     try:
-        about = json.loads(metadata[_KEY])
-        version = about.pop("version")
+        plain = json.loads(metadata[_KEY])
+        version = plain.pop("version")
         if version != VERSION:
             raise InputError(
                 f"this part was written by another version (form {version}, known is {VERSION})",
                 file=path,
                 remedy="Use the imufit that recorded it.",
             )
-        # The input of the end of a recording; it fails here, where the file is named.
-        datetime.fromisoformat(about["utc"])
-        float(about["monotonic"])
-        said = about.pop("announced")
-        plain: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in said.items()}
-        announced = Announced(**plain)
+        said: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in plain.pop("announced").items()}
+        announced = Announced(**said)
+        about = Circumstances.from_json(plain)
         as_written = stream.schema.equals(_schema(announced))
     except InputError:
         raise

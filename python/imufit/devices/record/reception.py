@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -25,6 +26,39 @@ ASK_FOR: Final = 1.0
 _DOUBTFUL: Final = 50
 
 
+@dataclass(frozen=True)
+class Listening:
+    """How the line was listened to.
+
+    Attributes
+    ----------
+    form : {"auto", "binary", "text"}
+        Form of the wire protocol, as it was asked for.
+    header : str or None
+        Names of the columns in text form, for a device that prints none.
+    baud : int
+        Speed of the line, 1/s.
+
+    Raises
+    ------
+    ValueError
+        A value is not such a one.
+    """
+
+    form: str
+    header: str | None
+    baud: int
+
+    def __post_init__(self) -> None:
+        if (
+            self.form not in ("auto", *FORMS)
+            or not isinstance(self.header, str | None)
+            or type(self.baud) is not int
+            or self.baud <= 0
+        ):
+            raise ValueError("this is not how a line is listened to")
+
+
 class Reception:
     """Reads a line and decodes what comes.
 
@@ -41,8 +75,8 @@ class Reception:
     ----------
     form : str or None
         The form, once it is known.
-    told : dict
-        ``form`` and ``header`` as they were given.
+    listening : Listening
+        Form and header as they were given, and the speed of the line.
     chunk : Chunk or None
         What the last read brought; None if it was nothing.
     """
@@ -56,7 +90,7 @@ class Reception:
                 "a header names the columns of text, not of binary frames", remedy="Leave one of them out."
             )
         self.form: str | None = "text" if header is not None else None if form == "auto" else form
-        self.told = {"form": form, "header": header}
+        self.listening = Listening(form, header, line.baud)
         self.chunk: Chunk | None = None
         self._decoded = line.opening
         self._opening = -1  # of the line as it was read last: not at all

@@ -88,9 +88,9 @@ def _explain(begun: Beginning, wanted: Path, port: str | None) -> None:
     """Decode the bytes that a recording began with, and write the rows as parts of it."""
     if not begun.chunks:
         return
-    how, last = begun.about["how"], begun.chunks[-1]
-    line = Line(port or begun.about["about"]["port"], how["baud"])
-    reception = Reception(line, how["form"], how["header"])
+    how, last = begun.how, begun.chunks[-1]
+    line = Line(port or begun.about.port, how.baud)
+    reception = Reception(line, how.form, how.header)
     rows = [part for chunk in begun.chunks for part in reception.take_in(chunk)]
     counts, texts = reception.counts, reception.take_texts()
     if not rows and port is not None:
@@ -107,7 +107,7 @@ def _explain(begun: Beginning, wanted: Path, port: str | None) -> None:
     for announced, group in groupby((part for part in kept if part.n), lambda part: part.announced):
         written = PartFile(part_path(wanted, len(parts_of(wanted)) + 1))
         try:
-            written.begin(announced, begun.about["about"])
+            written.begin(announced, begun.about)
             written.write(Arrived.joined(list(group)), told)
             written.settle()
         finally:

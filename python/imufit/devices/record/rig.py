@@ -14,6 +14,8 @@ from typing import Final, Literal
 from imufit.errors import InputError
 from imufit.log.units import conversion
 
+AXES: Final = ("x", "y", "z")
+"""Body axes about which a rig may turn."""
 MOVING: Final = math.nan
 """Commanded angle while the rig moves: not known."""
 MOST: Final = 1e4
@@ -44,7 +46,7 @@ class Rig:
     typed: Callable[[bool], Sequence[float]] = lambda _rows_came: ()
 
     def __post_init__(self) -> None:
-        if self.axis not in ("x", "y", "z"):
+        if self.axis not in AXES:
             raise InputError(f"{self.axis!r} is not a body axis of a rig", remedy="Use x, y or z.")
         if not (math.isnan(self.angle) or abs(self.angle) <= MOST):
             raise InputError(f"{self.angle!r} rad is not an angle of a rig", remedy=f"It is at most {MOST:g} rad.")
