@@ -89,6 +89,14 @@ def zip_flags(offset: int, value: int) -> Callable[[SeedFiles], Files]:
     return files
 
 
+def required_column(seeds: SeedFiles) -> Files:
+    """Make a Parquet file whose schema says of t that no value may miss; its statistics count those that may."""
+    data = parquet(b"{}")(seeds)["log.parquet"]
+    optional, required = (bytes.fromhex(f"150a25{kind}180174") for kind in ("02", "00"))
+    assert optional in data
+    return {"log.parquet": data.replace(optional, required)}
+
+
 def parquet(metadata: bytes, name: str = "acc_x") -> Callable[[SeedFiles], Files]:
     table: Columns = {"t": np.arange(3.0), name: np.zeros(3)}
     return lambda _: {"log.parquet": formats.parquet(table, metadata, Random(1))}
@@ -101,6 +109,11 @@ KEPT: dict[str, Kept] = {
         "numpy takes the header of an array apart as Python, and the end does not come",
         ("convert", "log.npz", "-o", "out.csv"),
         lambda _: {"log.npz": formats.npz({"t": np.arange(9000.0)}).replace(b"(9000,), }", b"(9000,(, }")},
+    ),
+    "parquet_statistics": Kept(
+        "pyarrow ends the process where a column's statistics do not fit its kind",
+        ("convert", "log.parquet", "-o", "out.csv"),
+        required_column,
     ),
     "parquet_deep_metadata": Kept(
         "the JSON parser's depth", ("convert", "log.parquet", "-o", "out.csv"), parquet(b"[" * DEEP)

@@ -41,7 +41,7 @@ class ParquetSource:
             with pq.ParquetFile(path) as file:
                 self._schema = file.schema_arrow
                 self.n: int = file.metadata.num_rows
-                self._check_text(file.metadata)
+                self._check_text(file)
                 sizes = [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)]
                 self._groups = [0, *accumulate(sizes)][: len(sizes)]
                 self._largest_group = max(sizes, default=0)
@@ -62,16 +62,22 @@ class ParquetSource:
         text = (self._schema.metadata or {}).get(_KEY)
         self.embedded: Mapping[str, Any] = mapping_from_json(text, path) if text else {}
 
-    def _check_text(self, metadata: Any) -> None:
-        """Refuse a column of text that cannot be labels, before anything of it is unpacked."""
-        for group in range(metadata.num_row_groups):
-            for place in range(metadata.num_columns):
-                column = metadata.row_group(group).column(place)
-                if column.physical_type == "BYTE_ARRAY" and column.total_uncompressed_size > TEXT_GROUP:
+    def _check_text(self, file: pq.ParquetFile) -> None:
+        """Refuse a column of text that cannot be labels, before anything of it is unpacked.
+
+        A column is looked at only where its row group is large enough: pyarrow 26 ends the process, and raises
+        nothing, where the description of a column is damaged.
+        """
+        texts = [k for k in range(len(file.schema.names)) if file.schema.column(k).physical_type == "BYTE_ARRAY"]
+        groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)] if texts else []
+        for group in groups:
+            if group.total_byte_size <= TEXT_GROUP:
+                continue
+            for column in map(group.column, texts):
+                if column.total_uncompressed_size > TEXT_GROUP:
                     size = size_in_words(column.total_uncompressed_size)
                     raise InputError(
-                        f"the column holds {size} of text in {metadata.row_group(group).num_rows} rows: too much to "
-                        "be labels",
+                        f"the column holds {size} of text in {group.num_rows} rows: too much to be labels",
                         file=self._path,
                         column=column.path_in_schema,
                         remedy="Write the log without this column.",
