@@ -85,7 +85,7 @@ class InputError(ValueError):
         return self._message()
 
     def _message(self, *, with_remedy: bool = True) -> str:
-        parts = [printable(Path(self.file).name, NAME)] if self.file else []
+        parts = [printable(Path(self.file).name or self.file, NAME)] if self.file else []
         parts += [self.where] if self.where else []
         text = ": ".join([*parts, self.problem])
         if not text.endswith((".", "?", "!")):

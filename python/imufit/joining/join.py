@@ -225,15 +225,7 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
     best, second = found.best, found.second
     if found.unrelated and best.traces.left > 0.5:
         raise _unrelated(best.traces, *logs)
-    if second is None and found.unrelated:
-        raise InputError(
-            f"the motion that both recordings saw is too short or too uniform to determine the lag: correlation "
-            f"{best.traces.correlation:.3f} over {best.traces.overlap:.1f} s",
-            file=logs[0].path or "log",
-            remedy="Move the sensor for longer, once as at no other time, or give the lag, in s, such as "
-            + _with_lag(best),
-        )
-    if second is not None and (found.ambiguous or found.unrelated):
+    if second is not None and found.ambiguous:
         raise InputError(
             f"the lag is ambiguous: {best.aligned.lag:.3f} s and {second.aligned.lag:.3f} s make "
             f"{best.traces.compared.value} agree equally well "
@@ -243,6 +235,14 @@ def _only_one(found: Likeliest | None, logs: tuple[Log, Log]) -> tuple[Placed, f
             + _with_lag(best)
             + " or "
             + _with_lag(second),
+        )
+    if found.unrelated:
+        raise InputError(
+            f"the motion that both recordings saw is too short or too uniform to determine the lag: correlation "
+            f"{best.traces.correlation:.3f} over {best.traces.overlap:.1f} s",
+            file=logs[0].path or "log",
+            remedy="Move the sensor for longer, once as at no other time, or give the lag, in s, such as "
+            + _with_lag(best),
         )
     return best, found.rival
 

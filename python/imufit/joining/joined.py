@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from imufit.figures import quantity
 from imufit.joining.mount import OPEN, SMALL, axis_words, words
 from imufit.log import Log
 from imufit.results.part import Part
@@ -178,7 +179,7 @@ class Joined(Plotted, Result):
     def tables(self) -> tuple[Table, ...]:
         """Lag, skew, mount and overlap."""
         rows = (
-            ("lag", f"{self.lag:.4f} ± {self.lag_error:.4f} s"),
+            ("lag", quantity.with_error(self.lag, self.lag_error, "s")),
             ("skew", f"{1e6 * self.skew:.1f} ± {1e6 * self.skew_error:.1f} ppm"),
             *self._how_mounted(),
             ("common stretch", f"{self.overlap:.1f} s"),
