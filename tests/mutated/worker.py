@@ -84,7 +84,14 @@ def _case(seeds: SeedFiles, request: dict[str, Any]) -> draw.Case:
 
 def _import_all() -> None:
     """Import what the commands import when they are first used, so that no input pays for it."""
-    for name in ("matplotlib.pyplot", "pandas", "pyarrow.parquet", "scipy.optimize"):
+    for name in (
+        "matplotlib.pyplot",
+        "pandas",
+        "pyarrow.parquet",
+        "scipy.optimize",
+        "scipy.signal",
+        "imufit.report.page",
+    ):
         importlib.import_module(name)
     for name in dir(imufit):
         getattr(imufit, name)

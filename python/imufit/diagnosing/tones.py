@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtrc
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,6 @@ def moving(t: Array, residual: Array) -> tuple[tuple[float, float], float, float
         there are too few samples, or a line stands in less than half of the stretches.
     """
     from scipy.ndimage import median_filter  # noqa: PLC0415  only needed here
-    from scipy.stats import binom  # noqa: PLC0415  only needed here
 
     known = np.isfinite(residual)
     t, residual = t[known], residual[known]
@@ -62,7 +62,7 @@ def moving(t: Array, residual: Array) -> tuple[tuple[float, float], float, float
     above = np.take_along_axis(power - floor, lobe, axis=1).sum(axis=1)
     square = 2.0 * float(np.mean(above * seen)) / (STRETCH * float(np.sum(taper**2)))
     frequency = line[seen] / (STRETCH * float(np.median(np.diff(t))))
-    return (frequency[0], frequency[-1]), square, float(binom.sf(np.count_nonzero(seen) - 1, stretches, RARE))
+    return (frequency[0], frequency[-1]), square, float(bdtrc(np.count_nonzero(seen) - 1, stretches, RARE))
 
 
 def strongest(t: Array, residual: Array) -> tuple[float, float, float] | None:

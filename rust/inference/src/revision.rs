@@ -72,7 +72,8 @@ fn competition<T>(
     let criterion = Criterion::new(&without);
     let offered: Vec<usize> = candidates.iter().copied().chain([slot]).collect();
     let search = Search::new(&criterion, &search::without(model, slot), &offered);
-    let weighed = search.weigh_all(&search.stack(&[])?, &[]);
+    let alone = search.stack(&[])?;
+    let weighed = search.weigh_all(&alone, &[]);
     let own = weighed.iter().find(|w| w.slot == slot)?.ln_bayes;
     decide(&search, &weighed, own)
 }

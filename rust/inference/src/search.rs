@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::f64::consts::LN_2;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use imufit_fit::part::Part;
 use imufit_model::card::Stage;
@@ -46,6 +47,8 @@ pub struct Search<'a> {
     /// Slots of candidates whose columns promise more than a fit keeps: they are not there.
     pub refuted: Vec<usize>,
     asked: HashMap<usize, Asked>,
+    /// Stacks by their members: a search comes back to most of them.
+    stacks: Mutex<HashMap<Vec<usize>, Option<Arc<Stack<'a>>>>>,
     /// Log Bayes factor from which on a candidate is there: the odds against one of so many.
     pub threshold: f64,
 }
@@ -98,6 +101,7 @@ impl<'a> Search<'a> {
             candidates: candidates.to_vec(),
             refuted: Vec::new(),
             asked,
+            stacks: Mutex::default(),
             threshold: threshold(candidates.len()),
         }
     }
@@ -122,8 +126,14 @@ impl<'a> Search<'a> {
     }
 
     /// The stack of the model and some members.
-    pub fn stack(&self, members: &[usize]) -> Option<Stack<'a>> {
-        Stack::new(self.criterion, &self.parameters(members))
+    pub fn stack(&self, members: &[usize]) -> Option<Arc<Stack<'a>>> {
+        let known = || self.stacks.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(stack) = known().get(members) {
+            return stack.clone();
+        }
+        let stack = Stack::new(self.criterion, &self.parameters(members)).map(Arc::new);
+        known().insert(members.to_vec(), stack.clone());
+        stack
     }
 
     /// The stack of the model and some members without one slot, be it in the model or a member.
@@ -310,7 +320,7 @@ impl<'a> Search<'a> {
     }
 
     /// The effects that are there beside one another, in the order in which they were found, and their stack.
-    pub fn find(&self) -> Option<(Vec<usize>, Stack<'a>)> {
+    pub fn find(&self) -> Option<(Vec<usize>, Arc<Stack<'a>>)> {
         let mut members: Vec<usize> = Vec::new();
         let mut dropped: Vec<usize> = Vec::new();
         let mut stack = self.stack(&members)?;
@@ -413,7 +423,8 @@ impl<'a> Search<'a> {
                 .copied()
                 .filter(|m| m != member && !found.contains(m))
                 .collect();
-            let weighed = self.weigh(&self.stack(&others)?, *member)?;
+            let beside = self.stack(&others)?;
+            let weighed = self.weigh(&beside, *member)?;
             if !self.there(&weighed) {
                 found.push(*member);
             }
@@ -426,7 +437,8 @@ impl<'a> Search<'a> {
         let mut any = false;
         for place in 0..members.len() {
             let others = without(members, members[place]);
-            let best = self.likeliest(&self.stack(&others)?, &others);
+            let beside = self.stack(&others)?;
+            let best = self.likeliest(&beside, &others);
             if let Some(best) = best.filter(|w| w.slot != members[place]) {
                 members[place] = best.slot;
                 any = true;

@@ -63,8 +63,8 @@ pub struct Stack<'a> {
     columns: Vec<usize>,
     /// Prior deviations, those of the heading for a unit one.
     deviation: DVector<f64>,
-    /// For every channel the columns that act on it, and their sums along its modes.
-    sums: Vec<(Vec<usize>, DMatrix<f64>)>,
+    /// For every channel the columns that act on it.
+    sums: Vec<Acting>,
     /// The likeliest strength for each sensor, and for the heading of the reference.
     best: [usize; SENSORS + 1],
     points: [Vec<Point>; SENSORS + 1],
@@ -72,24 +72,34 @@ pub struct Stack<'a> {
     pub ln_z: f64,
 }
 
-/// Takes what the noise of one channel's zero makes out of equations of a stack; `sums` are those of the columns that act on the channel.
+/// Columns of a stack that act on one channel.
+struct Acting {
+    /// Their places in the stack.
+    columns: Vec<usize>,
+    /// Their sums along the channel's modes (modes x columns).
+    sums: DMatrix<f64>,
+    /// The same transposed: a product of plain matrices is worked out in blocks, a transposed one is not.
+    across: DMatrix<f64>,
+}
+
+/// Takes what the noise of one channel's zero makes out of equations of a stack.
 fn take(
     modes: &Modes,
-    (active, sums): &(Vec<usize>, DMatrix<f64>),
+    acting: &Acting,
     strength: Strength,
     gram: &mut DMatrix<f64>,
     right: &mut DVector<f64>,
     square: &mut f64,
 ) {
     let noise = modes.noise(strength);
-    let mut weighted = sums.clone();
+    let mut weighted = acting.sums.clone();
     for mut column in weighted.column_iter_mut() {
         column.component_mul_assign(&noise);
     }
-    let own = sums.tr_mul(&weighted);
+    let own = &acting.across * &weighted;
     let score = weighted.tr_mul(&modes.right);
-    for (j, q) in active.iter().enumerate() {
-        for (i, p) in active.iter().enumerate() {
+    for (j, q) in acting.columns.iter().enumerate() {
+        for (i, p) in acting.columns.iter().enumerate() {
             gram[(*p, *q)] -= own[(i, j)];
         }
         right[*q] -= score[j];
@@ -130,7 +140,13 @@ impl<'a> Stack<'a> {
             let acts = |k: &usize| modes.sums.column(columns[*k]).iter().any(|v| *v != 0.0);
             let active: Vec<usize> = (0..columns.len()).filter(acts).collect();
             let places: Vec<usize> = active.iter().map(|k| columns[*k]).collect();
-            (active, modes.sums.select_columns(&places))
+            let sums = modes.sums.select_columns(&places);
+            let across = sums.transpose();
+            Acting {
+                columns: active,
+                sums,
+                across,
+            }
         };
         let sums = criterion.modes.iter().map(of_channel).collect();
         let mut stack = Self {
@@ -327,9 +343,9 @@ impl<'a> Stack<'a> {
         for mut column in weighted.column_iter_mut() {
             column.component_mul_assign(&noise);
         }
-        let (active, sums) = &self.sums[c];
-        let taken = sums.tr_mul(&weighted);
-        for (i, k) in active.iter().enumerate() {
+        let acting = &self.sums[c];
+        let taken = &acting.across * &weighted;
+        for (i, k) in acting.columns.iter().enumerate() {
             for j in 0..taken.ncols() {
                 cross[(*k, j)] -= taken[(i, j)];
             }
