@@ -39,8 +39,11 @@ Reader = Callable[[int, int, Sequence[str]], tuple[Array, Table]]
 BLOCK: Final = 64
 """Rows of a block of the pyramid: a window of so many rows a pixel is read again, 77,000 rows for 1200 pixels, which
 takes a tenth of a second. The pyramid of 20 million rows of 14 columns then takes 150 MB."""
-EVALUATED: Final = 16_384
-"""Rows of which the model's readings are computed anew for a window: at 5 us a row a tenth of a second."""
+EVALUATED: Final = 8_192
+"""Rows of which the model's readings are computed anew for a window: at 5 us a row a twentieth of a second."""
+EVALUATED_BLOCK: Final = 16
+"""Rows of a block of the pyramid of a model's readings: 512 blocks in the narrowest window that is drawn from them. The
+pyramid of 2 million judged rows then takes 36 MB."""
 
 
 class Kind(Enum):
@@ -102,12 +105,14 @@ class _Columns:
     ----------
     gaps : mapping of str to float
         For each column the time between two samples from which on its line is interrupted, s.
+    block : int
+        Rows of a block.
     """
 
-    def __init__(self, gaps: Mapping[str, float]) -> None:
+    def __init__(self, gaps: Mapping[str, float], block: int) -> None:
         self.gaps = dict(gaps)
         self._number = {name: k for k, name in enumerate(self.gaps)}
-        self.pyramid = _imufit.Pyramid(list(self.gaps.values()), BLOCK)
+        self.pyramid = _imufit.Pyramid(list(self.gaps.values()), block)
 
     def feed(self, t: Array, table: Table) -> None:
         """Take the next rows."""
@@ -175,7 +180,7 @@ class Traces:
         samples = list(_samples(log))
         self.channels = _channels(samples[0])
         names = [channel.name for channel in self.channels]
-        self._columns = _Columns(gaps_of(samples, names))
+        self._columns = _Columns(gaps_of(samples, names), BLOCK)
         self._read_again = _RowsRead(self._read)
         self.built = False
 
@@ -336,7 +341,7 @@ class ModelTraces:
         gaps = gaps_of(list(_samples(evidence.passes.log)), judged)
         self.channels = tuple(Channel(name, Kind.MEASURED, UNITS[name[:3]]) for name in judged)
         both = {f"{kind}:{name}": gap for kind in ("residual", "predicted") for name, gap in gaps.items()}
-        self._columns = _Columns(both)
+        self._columns = _Columns(both, EVALUATED_BLOCK)
         self._read_again = _RowsRead(self._read)
         self.built = False
 
