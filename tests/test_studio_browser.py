@@ -377,3 +377,32 @@ def test_columns_that_cannot_be_guessed_are_named_in_a_field(page, folder):
     (start,) = wait_for_bars(page, 1)
     mapping = [word for name, column in names.items() for word in ("--map", f"{name}={column}")]
     assert start == pytest.approx(answer(folder, "ladder", "odd.csv", *mapping)["ratio_start"], rel=1e-12)
+
+
+TARGETS = """() => [...document.querySelectorAll(
+        'button, a, [role=button], [role=switch], .q-expansion-item .q-item, .q-field__control')]
+    .filter((item) => item.offsetParent)
+    .map((item) => [item.getAttribute('aria-label') || item.textContent.trim(), item.getBoundingClientRect()])
+    .filter(([, box]) => Math.min(box.width, box.height) < 44).map(([words]) => words)"""
+"""Whatever is tapped and is smaller than the 44 px of the accessibility guidelines."""
+
+
+def test_a_finger_finds_everything_that_is_tapped(chromium, address, folder):
+    context = chromium.new_context(viewport={"width": 380, "height": 800}, has_touch=True, is_mobile=True)
+    page = context.new_page()
+    page.set_default_timeout(SLOW_MS)
+    page.goto(address)
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    page.locator('[data-mark^="add-"]').first.tap()
+    wait_for_bars(page, 2)
+    idle(page)
+    assert page.evaluate(TARGETS) == []
+    # The icons of the head stand in one row.
+    places = page.locator(".studio-head button").evaluate_all("(all) => all.map((item) => item.offsetTop)")
+    assert len(places) > 3
+    assert len(set(places)) == 1
+    page.goto(f"{address}live")
+    page.get_by_role("button", name="Calibrate").wait_for()
+    assert page.evaluate(TARGETS) == []
+    context.close()

@@ -95,7 +95,7 @@ class CandidateView:
                         self.look_at("")
                         await desk.attempt(lambda: session.add(effect))
 
-                ui.button("Add", on_click=add).props("dense no-caps size=sm" + ("" if named else " outline")).props(
+                ui.button("Add", on_click=add).props("dense size=sm" + ("" if named else " outline")).props(
                     attribute("data-mark", f"add-{effect}")
                 )
             if diagnosis is None:

@@ -38,7 +38,7 @@ class FallView:
                 "data-mark=redo"
             )
             self._keep = ui.button("Keep as second model", icon="splitscreen", on_click=self._keep_second)
-            self._keep.props("flat dense no-caps size=sm").props("data-mark=second")
+            self._keep.props("flat dense size=sm").props("data-mark=second")
         self._chart = ui.plotly(charts.empty("The error stands here once a log is open.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
         self._floor = ui.label("").classes("studio-muted").props("data-mark=floor")

@@ -61,7 +61,7 @@ class PanelView:
                 # The choice stands over the one figure that it changes.
                 self._trace_kind = ui.toggle(
                     {RESIDUAL: "residual", READING: "reading"}, value=RESIDUAL, on_change=self._other_kind
-                ).props('dense no-caps padding="2px 10px"')
+                ).props('dense padding="2px 10px"')
                 self._trace = ui.plotly(charts.empty("")).classes("studio-chart").props("data-mark=trace")
         ui.timer(1.0, self._grow)
         self._trace.on("plotly_relayout", self._zoomed, throttle=0.1)

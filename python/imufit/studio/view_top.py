@@ -101,9 +101,7 @@ class Head:
             ui.label(text).classes("studio-copy").props("data-mark=copied")
             with ui.row():
                 if desk.game_log() is not None:
-                    ui.button("Save the log", on_click=self._download_game).props("no-caps outline").props(
-                        "data-mark=save-log"
-                    )
+                    ui.button("Save the log", on_click=self._download_game).props("outline").props("data-mark=save-log")
                 ui.button("Close", on_click=dialog.close).props("flat")
         dialog.on("hide", dialog.delete)
         dialog.open()
@@ -185,7 +183,7 @@ class Top:
             for number, level in LEVELS.items():
                 words = level.title if number == DEMONSTRATION else f"Level {number}: {level.title}"
                 action = _player(desk, number, DEMO_SEED if number == DEMONSTRATION else None)
-                ui.button(words, on_click=action).props("no-caps outline size=sm").props(
+                ui.button(words, on_click=action).props("outline size=sm").props(
                     attribute("data-mark", f"play-{number}")
                 )
 
@@ -227,7 +225,7 @@ class Top:
         async def apply() -> None:
             await self._desk.mend(option, number)
 
-        ui.button(printable(option_words(option)), on_click=apply).props("dense outline no-caps size=sm").props(
+        ui.button(printable(option_words(option)), on_click=apply).props("dense outline size=sm").props(
             attribute("data-mark", mark)
         )
 
@@ -241,7 +239,7 @@ class Top:
             with ui.row():
                 for option in desk.cures:
                     self._cure(option, 0, "cure")
-                ui.button("Dismiss", on_click=desk.forget_trouble).props("dense flat no-caps size=sm")
+                ui.button("Dismiss", on_click=desk.forget_trouble).props("dense flat size=sm")
 
     def _mapping(self, file: LogFile) -> None:
         """Take names for the columns of a file."""
@@ -252,7 +250,7 @@ class Top:
         with ui.row().classes("w-full items-center"):
             given = ui.input("columns, such as acc_x=AccX[g],acc_y=AccY[g]").props("dense outlined")
             given.classes("grow").props("data-mark=mapping").on("keydown.enter", read)
-            ui.button("Read", on_click=read).props("dense outline no-caps")
+            ui.button("Read", on_click=read).props("dense outline")
 
     def _choice(self) -> None:
         desk = self._desk
@@ -270,7 +268,7 @@ class Top:
             self._mapping(desk.arrivals[-1].file)
         for offer in offers:
             ui.button(printable(offer.words, 2 * NAME), on_click=lambda offer=offer: desk.open(offer.files)).props(
-                "no-caps outline"
+                "outline"
             ).props(attribute("data-mark", f"offer-{offer.way.value}"))
 
     def _game(self, judged: bool) -> None:
@@ -289,7 +287,7 @@ class Top:
             assert desk.session is not None
             if game.level == DEMONSTRATION:
                 reveal = ui.button("Reveal the truth", on_click=lambda: desk.reveal(_named(desk)))
-                reveal.props("no-caps outline").props("data-mark=reveal")
+                reveal.props("outline").props("data-mark=reveal")
                 return
             names = sorted(desk.session.start.analysis.candidates)
             choices = {NOTHING: "nothing is missing"} | {name: printable(name, NAME) for name in names}
@@ -299,14 +297,12 @@ class Top:
                 answer = ui.select(choices, value=present, label="Your answer", with_input=True).props("dense outlined")
                 answer.classes("min-w-56").props("data-mark=answer")
                 answer.on_value_change(lambda event: setattr(game, "answer", event.value or NOTHING))
-                ui.button("Reveal", on_click=lambda: desk.reveal(answer.value or NOTHING)).props("no-caps").props(
-                    "data-mark=reveal"
-                )
+                ui.button("Reveal", on_click=lambda: desk.reveal(answer.value or NOTHING)).props("data-mark=reveal")
             return
         for sentence in game.verdict.sentences:
             ui.label(printable(sentence)).classes("studio-sentence").props("data-mark=truth")
         ui.label(game.verdict.lesson).classes("studio-muted").props("data-mark=lesson")
-        ui.button("Play again", on_click=_player(desk, game.level)).props("no-caps outline").props("data-mark=again")
+        ui.button("Play again", on_click=_player(desk, game.level)).props("outline").props("data-mark=again")
 
 
 def unbroken(sentence: str) -> str:
