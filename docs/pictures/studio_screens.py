@@ -116,6 +116,19 @@ def broken(page: Page, folder: Path) -> None:
     page.wait_for_timeout(500)
 
 
+def columns(page: Page, folder: Path) -> None:
+    """Bring a file whose columns nobody can guess."""
+    page.locator('[data-mark="upload"] input[type=file]').last.set_input_files(str(folder / "columns.csv"))
+    marked(page, "mapping").wait_for()
+    page.wait_for_timeout(500)
+
+
+def unjudged(page: Page, folder: Path) -> None:
+    """Open a log that has neither a reference nor rests."""
+    drop(page, folder / "moving.csv")
+    page.get_by_text("The log cannot be judged").wait_for()
+
+
 def fault(page: Page, folder: Path) -> None:
     """Open a log in a wrong frame."""
     drop(page, folder / "frame.csv")
@@ -166,7 +179,23 @@ def live(page: Page, _folder: Path) -> None:
 
 VIEWS: dict[str, Callable[[Page, Path], None]] = {
     view.__name__: view
-    for view in (start, failing, fallen, two, reading, files, broken, fault, edit, copied, guess, mystery, live)
+    for view in (
+        start,
+        failing,
+        fallen,
+        two,
+        reading,
+        files,
+        broken,
+        columns,
+        unjudged,
+        fault,
+        edit,
+        copied,
+        guess,
+        mystery,
+        live,
+    )
 }
 
 
@@ -176,6 +205,9 @@ def make_logs(folder: Path) -> None:
     log.write(folder / "walk.parquet")
     log.with_fields(ref_q=None, ref_p=None).write(folder / "sensor.csv")
     imufit.Log.from_arrays(log.t + 0.5, ref_q=log.ref_q).write(folder / "mocap.csv")
+    moving = log.rows(300, 1500).with_fields(ref_q=None, ref_p=None, mag=None)
+    moving.write(folder / "moving.csv")
+    (folder / "columns.csv").write_text("t,U,V,W\n" + "".join(f"{0.01 * k},0,0,9.8\n" for k in range(200)))
     (folder / "broken.csv").write_text("t,acc_x,acc_y,acc_z\n0,1,2,9\n1,1,no,9\n")
     turned = imufit.simulate("handheld", {}, duration=60.0, rate=50.0, seed=6, frame="ENU").to_log()
     turned.write(folder / "frame.csv")

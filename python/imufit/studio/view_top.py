@@ -174,6 +174,10 @@ class Top:
 
     def _welcome(self) -> None:
         desk = self._desk
+        if desk.session is not None:
+            ui.label("Drop the reference of this log here, or another log.").classes("studio-sentence")
+            _uploader(desk)
+            return
         ui.label("Drop a log here, or two files that belong together.").classes("studio-sentence")
         _uploader(desk)
         ui.label("No log at hand? See the loop on a simulated log, or find the effect that one hides.").classes(
