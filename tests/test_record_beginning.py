@@ -3,12 +3,13 @@
 import imufit
 import numpy as np
 import pytest
-from imufit.devices.record import recover
+from imufit.devices.record import record, recover
 from imufit.devices.record.arrived import Chunk
 from imufit.devices.record.beginning import BeginningFile, beginning_path, read_beginning
 from imufit.devices.record.circumstances import Circumstances
 from imufit.devices.record.part import part_path
 from imufit.devices.record.reception import Listening
+from imufit.devices.record.transport import Line
 from imufit.errors import InputError
 from recording_device import Sender, values_of
 
@@ -89,7 +90,13 @@ def test_a_file_of_another_kind_is_refused_and_stays(tmp_path):
         ('"port": "/dev/x"', '"Port": "/dev/x"'),
         ('"port": "/dev/x"', '"port": 7'),
         ('"monotonic": 99.0', '"monotonic": NaN'),
+        ('"monotonic": 99.0', '"monotonic": 1e300'),
+        ('"monotonic": 99.0', f'"monotonic": {10**400}'),
         ('"mapping": null', '"mapping": [1]'),
+        ('"mapping": null', '"mapping": 0'),
+        ("+00:00", ""),
+        ("115200", "115200.5"),
+        ("115200", "1e999"),
         ('"frame": "ENU"', '"frame": "ENX"'),
         ('"baud": 115200', '"baud": "x"'),
         ('"how": {', '"who": {'),
@@ -104,3 +111,16 @@ def test_a_damaged_beginning_is_refused_and_stays(tmp_path, before, after):
     with pytest.raises(InputError, match="is damaged"):
         recover(path)
     assert path.read_bytes() == damaged
+
+
+def test_the_speed_of_a_line_is_a_whole_number():
+    assert Line("loop://", 1e6).baud == 1_000_000
+    for wrong in (0, -9600, 9600.5, float("inf"), "fast", None):
+        with pytest.raises(InputError, match="not the speed of a line"):
+            Line("loop://", wrong)
+
+
+def test_an_unknown_frame_is_refused_before_anything_is_recorded(tmp_path):
+    with pytest.raises(InputError, match="not a frame. Write NED, ENU or NWU"):
+        record("loop://", tmp_path / "a.parquet", frame="ned", duration=0.1)
+    assert list(tmp_path.iterdir()) == []

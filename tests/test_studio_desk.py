@@ -51,15 +51,21 @@ def test_a_log_without_evidence_leaves_the_session_before_it(log, spoilt):
     assert t.size == values.size > 100
 
 
-def test_rows_of_a_first_log_without_evidence_are_drawn_and_a_reference_can_be_joined_to_it(log, spoilt, tmp_path):
-    async def both() -> None:
-        await desk.bring([spoilt])
-        await desk.bring([LogFile(reference, reference.name)])
-
+@pytest.fixture
+def reference(log, tmp_path):
     rows = read(log.path)
-    reference = tmp_path / "poses.csv"
+    path = tmp_path / "poses.csv"
     table = np.column_stack([rows.t, rows.ref_q])
-    np.savetxt(reference, table, delimiter=",", header="t,ref_qw,ref_qx,ref_qy,ref_qz", comments="")
+    np.savetxt(path, table, delimiter=",", header="t,ref_qw,ref_qx,ref_qy,ref_qz", comments="")
+    return LogFile(path, path.name)
+
+
+@pytest.mark.parametrize("brought", [True, False], ids=["dropped", "named when the studio starts"])
+def test_rows_of_a_first_log_without_evidence_are_drawn_and_a_reference_can_be_joined(spoilt, reference, brought):
+    async def both() -> None:
+        await (desk.bring([spoilt]) if brought else desk.open([spoilt]))
+        await desk.bring([reference])
+
     desk = Desk()
     asyncio.run(both())
     assert desk.session is not None
@@ -67,4 +73,30 @@ def test_rows_of_a_first_log_without_evidence_are_drawn_and_a_reference_can_be_j
     assert desk.files == (spoilt,)
     t, values = desk.traces.window(["acc_x"], *desk.traces.span, 100)["acc_x"].line()
     assert t.size == values.size > 100
-    assert [(offer.way, offer.files) for offer in desk.offers] == [(Way.JOIN, (spoilt.joined(desk.arrivals[0].file),))]
+    assert [(offer.way, offer.files) for offer in desk.offers] == [(Way.JOIN, (spoilt.joined(reference),))]
+
+
+def test_a_reference_is_joined_to_the_log_that_is_shown(log, spoilt, reference):
+    async def all_three() -> None:
+        await desk.open([log])
+        await desk.bring([spoilt])
+        await desk.bring([reference])
+
+    desk = Desk()
+    asyncio.run(all_three())
+    assert desk.files == (log,)
+    assert [offer.files for offer in desk.offers] == [(log.joined(reference),)]
+
+
+def test_a_log_with_sensors_can_be_the_reference_of_one_that_cannot_be_judged(log, spoilt):
+    async def both() -> None:
+        await desk.open([spoilt])
+        await desk.bring([log])
+
+    desk = Desk()
+    asyncio.run(both())
+    assert desk.files == (spoilt,)
+    assert [(offer.way, offer.files) for offer in desk.offers] == [
+        (Way.JOIN, (spoilt.joined(log),)),
+        (Way.OPEN, (log,)),
+    ]

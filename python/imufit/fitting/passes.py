@@ -198,7 +198,9 @@ class Passes:
             raise InputError(
                 "no sensor of the log has a sample",
                 file=log.path,
-                remedy=naming(log.path, [printable(name, NAME) for name in self.covariates]),
+                remedy=naming(log.path, [printable(name, NAME) for name in self.covariates])
+                if self.covariates
+                else "Record a sensor beside the reference.",
             )
         if self._leave_out_flat(readings, facts):
             return self.survey()

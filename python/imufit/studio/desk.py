@@ -15,7 +15,7 @@ from nicegui import Event, run
 from imufit.errors import InputError
 from imufit.log import Reading
 from imufit.remedy import Option, Remedy
-from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, offers, remedies
+from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, join_of, offers, remedies
 from imufit.studio.mystery import DEMONSTRATION, Mystery
 from imufit.studio.session import Session
 from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
@@ -69,8 +69,6 @@ class Desk:
         Its logs.
     arrivals : list of Arrival
         Files that were brought and await a choice.
-    opened : list of Arrival
-        Files of the session: a reference that is brought alone can be joined to one of them.
     wanted : LogsWantedError or None
         The session that waits for its logs.
     mystery : Mystery or None
@@ -103,7 +101,6 @@ class Desk:
         self.session: Session | None = None
         self.files: tuple[LogFile, ...] = ()
         self.arrivals: list[Arrival] = []
-        self.opened: list[Arrival] = []
         self.wanted: LogsWantedError | None = None
         self.mystery: Mystery | None = None
         self.joined: tuple[str, ...] = ()
@@ -118,7 +115,7 @@ class Desk:
         self.cures: list[Option] = []
         self.changed: Event[[]] = Event()
         self._folder = tempfile.TemporaryDirectory(prefix="imufit-")
-        self._working = self._failed = False
+        self._working = self._failed = self._unusable = False
         self.troubled: LogFile | None = None
         self._before: Shown | None = None
 
@@ -157,9 +154,11 @@ class Desk:
     @property
     def offers(self) -> list[Offer]:
         """Uses of the files that were brought."""
-        if any(item.sensors for item in self.arrivals):
-            return offers(self.arrivals)
-        return [offer for offer in offers([*self.opened, *self.arrivals]) if offer.way is Way.JOIN]
+        found = offers(self.arrivals)
+        unjudged = self.session is not None and self.session.refused
+        alone = len(self.arrivals) == 1
+        brought = [item for item in self.arrivals if alone and item.reference and (unjudged or not item.sensors)]
+        return [join_of(file, item.file) for file in self.files for item in brought] + found
 
     # --- work
 
@@ -177,6 +176,7 @@ class Desk:
         try:
             return await run.io_bound(work)
         except InputError as error:
+            self._unusable = True
             advice = error.advice
             if file is not None and isinstance(advice, Remedy) and advice.python != advice.shell:
                 # Options of a shell: the page has buttons and a field in their place.
@@ -231,7 +231,7 @@ class Desk:
         self._working = True
         try:
             while (step := next(self._pending(), None)) is not None:
-                self._failed, session = False, self.session
+                self._failed, self._unusable, session = False, False, self.session
                 await self._in_thread(*step)
                 if self._failed and session is self.session:
                     self._give_up()
@@ -249,7 +249,7 @@ class Desk:
             return
         if session.begun:
             session.give_up()
-        elif self._before is None and self.traces is not None and self.traces.built:
+        elif self._unusable and self._before is None and self.traces is not None and self.traces.built:
             session.refused = True
         else:
             self._show(self._before or Shown(None, ()))
@@ -378,7 +378,6 @@ class Desk:
         if self.session is not None and self.session.begun:
             self._before = Shown(self.session, self.files, self.mystery, self.joined, self.traces, self.models)
         self._show(Shown(session, tuple(files), mystery, joined))
-        self.opened = [item for item in self.arrivals if item.file in files]
         self.arrivals, self.wanted = [], None
         self._no_trouble()
         self.changed.emit()

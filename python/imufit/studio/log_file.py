@@ -231,6 +231,17 @@ class Offer:
     words: str
 
 
+def join_of(log: LogFile, reference: LogFile) -> Offer:
+    """Offer to join a reference to a log.
+
+    Parameters
+    ----------
+    log, reference : LogFile
+        The files.
+    """
+    return Offer(Way.JOIN, (log.joined(reference),), f"Join the reference of {reference.name} to {log.name}")
+
+
 def offers(arrivals: Sequence[Arrival]) -> list[Offer]:
     """List the uses of files that were brought, the likeliest first.
 
@@ -245,10 +256,7 @@ def offers(arrivals: Sequence[Arrival]) -> list[Offer]:
         pairs = [(a, b) for a in with_sensors for b in arrivals if b is not a and b.reference]
         # A log that has a reference of its own hardly needs another one.
         pairs.sort(key=lambda pair: (pair[0].reference, bool(pair[1].sensors)))
-        found += [
-            Offer(Way.JOIN, (a.file.joined(b.file),), f"Join the reference of {b.file.name} to {a.file.name}")
-            for a, b in pairs
-        ]
+        found += [join_of(a.file, b.file) for a, b in pairs]
     if len(with_sensors) > 1:
         together = Offer(
             Way.TOGETHER, tuple(item.file for item in with_sensors), "Open all of them as logs of one sensor"

@@ -438,7 +438,10 @@ class Session:
 
     @property
     def has_reference(self) -> bool:
-        """Whether every row is judged by a reference, so that residuals can be drawn; by the columns before the fit."""
+        """Whether every row is judged by a reference, so that residuals can be drawn.
+
+        Before the fit the columns decide.
+        """
         if self._start is None:
             return all("ref_qw" in log.columns or "ref_angle" in log.columns for log in self.logs)
         return self.start.analysis.judged_by == "reference"

@@ -52,7 +52,7 @@ class PanelView:
             self._covariate.classes("min-w-36").props("data-mark=covariate")
         self._note = ui.label("").classes("studio-muted")
         with ui.element("div").classes("studio-charts"):
-            # They are hidden with what is around them: Plotly cannot resize a figure that is hidden itself.
+            # The element around both is hidden: Plotly cannot resize a figure that is hidden itself.
             with ui.element("div").classes("studio-pair") as self._pair:
                 self._panel = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
                 self._panel.props("data-mark=panel")

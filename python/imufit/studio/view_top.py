@@ -269,7 +269,8 @@ class Top:
             ui.label(
                 "This file holds a reference alone: drop the sensor's file as well, or name the columns of a sensor."
             ).classes("studio-sentence")
-            self._mapping(desk.arrivals[-1].file)
+            if not (desk.in_shell and desk.troubled is not None):
+                self._mapping(desk.arrivals[-1].file)
         for offer in offers:
             ui.button(printable(offer.words, 2 * NAME), on_click=lambda offer=offer: desk.open(offer.files)).props(
                 "outline"

@@ -13,6 +13,7 @@ pub mod dictionary;
 pub mod estimate;
 pub mod held_out;
 pub mod problem;
+mod recent;
 pub mod revision;
 pub mod scatter;
 pub mod search;

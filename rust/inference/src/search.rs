@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::f64::consts::LN_2;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use imufit_fit::part::Part;
 use imufit_model::card::Stage;
@@ -15,6 +15,7 @@ use crate::asked::{Asked, Prior};
 use crate::criterion::Criterion;
 use crate::problem::Question;
 use crate::problem::indices;
+use crate::recent::Recent;
 use crate::stack::{Stack, ln_prior, log_sum_exp};
 use crate::varying::{self, Varying};
 
@@ -22,6 +23,8 @@ use crate::varying::{self, Varying};
 const ODDS: f64 = 2.0;
 /// More effects at once are no explanation; whole sensors have seven.
 const MOST: usize = 12;
+/// Stacks that a search keeps: of 189 that a ladder asks for, 83 are different, and one takes some megabytes.
+const KEPT: usize = 8;
 /// Rounds of exchanges; each must raise the evidence.
 const ROUNDS: usize = 3;
 /// Log Bayes factors at the likeliest noise and integrated over it differ by less than this: the noise that a stack leaves out explains no more.
@@ -47,8 +50,7 @@ pub struct Search<'a> {
     /// Slots of candidates whose columns promise more than a fit keeps: they are not there.
     pub refuted: Vec<usize>,
     asked: HashMap<usize, Asked>,
-    /// Stacks by their members: a search comes back to most of them.
-    stacks: Mutex<HashMap<Vec<usize>, Option<Arc<Stack<'a>>>>>,
+    stacks: Recent<Option<Arc<Stack<'a>>>>,
     /// Log Bayes factor from which on a candidate is there: the odds against one of so many.
     pub threshold: f64,
 }
@@ -101,7 +103,7 @@ impl<'a> Search<'a> {
             candidates: candidates.to_vec(),
             refuted: Vec::new(),
             asked,
-            stacks: Mutex::default(),
+            stacks: Recent::new(KEPT),
             threshold: threshold(candidates.len()),
         }
     }
@@ -127,13 +129,9 @@ impl<'a> Search<'a> {
 
     /// The stack of the model and some members.
     pub fn stack(&self, members: &[usize]) -> Option<Arc<Stack<'a>>> {
-        let known = || self.stacks.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(stack) = known().get(members) {
-            return stack.clone();
-        }
-        let stack = Stack::new(self.criterion, &self.parameters(members)).map(Arc::new);
-        known().insert(members.to_vec(), stack.clone());
-        stack
+        self.stacks.of(members, || {
+            Stack::new(self.criterion, &self.parameters(members)).map(Arc::new)
+        })
     }
 
     /// The stack of the model and some members without one slot, be it in the model or a member.

@@ -9,7 +9,7 @@ import zlib
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from imufit.devices.record.arrived import Chunk
 from imufit.devices.record.circumstances import Circumstances
@@ -43,9 +43,9 @@ class BeginningFile:
     path : Path
         File to make.
     about : Circumstances
-        What has to be known to make a log of the rows.
+        All that has to be known to make a log of the rows.
     how : Listening
-        What has to be known to decode them.
+        All that has to be known to decode them.
 
     Raises
     ------
@@ -121,6 +121,12 @@ class Beginning:
     chunks: tuple[Chunk, ...]
 
 
+def _listening(how: dict[str, Any]) -> Listening:
+    if int(how["baud"]) != how["baud"]:
+        raise ValueError("a speed is a whole number")
+    return Listening(how["form"], how["header"], int(how["baud"]))
+
+
 def read_beginning(path: Path) -> Beginning | None:
     """Read the whole chunks, whatever stands behind them.
 
@@ -153,10 +159,10 @@ def read_beginning(path: Path) -> Beginning | None:
                 file=path,
                 remedy="Use the imufit that recorded it.",
             )
-        about, how = Circumstances.from_json(told["about"]), Listening(**told["how"])
+        about, how = Circumstances.from_json(told["about"]), _listening(told["how"])
     except InputError:
         raise
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, OverflowError):
         raise InputError("the beginning of this file is damaged", file=path, remedy="Record again.") from None
     chunks: list[Chunk] = []
     at = end + 1

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Any, Self
+from typing import Any, Final, Self
 
 from imufit.devices.record.rig import AXES
 from imufit.log.metadata import FRAMES
+
+MOST: Final = 1e10
+"""Largest time on the monotonic clock, s: a computer that runs for three centuries."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +34,13 @@ class Circumstances:
         Body axis about which a rig turns; None without one.
     rig_angle : float or None
         Commanded angle at the beginning, rad; None while the rig moves.
+    began : datetime
+        `utc` as a moment.
 
     Raises
     ------
     ValueError
-        A value is not such a one.
+        A value is of another kind or out of range.
     """
 
     port: str
@@ -49,17 +53,21 @@ class Circumstances:
     began: datetime = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
-        texts = [self.port, self.utc, *(self.mapping or {}), *(self.mapping or {}).values()]
+        mapping = {} if self.mapping is None else self.mapping
+        if not isinstance(mapping, Mapping):
+            raise ValueError("this is not a mapping of columns")
+        texts = [self.port, self.utc, *mapping, *mapping.values()]
         numbers = [self.monotonic, 0.0 if self.rig_angle is None else self.rig_angle]
         sound = (
             all(isinstance(text, str) for text in texts)
-            and all(isinstance(number, int | float) and math.isfinite(number) for number in numbers)
+            and all(isinstance(number, int | float) and abs(number) <= MOST for number in numbers)
             and self.frame in FRAMES
             and self.rig_axis in (None, *AXES)
         )
-        if not sound:
+        began = datetime.fromisoformat(self.utc) if sound else None
+        if began is None or began.tzinfo is None:
             raise ValueError("these are not the circumstances of a recording")
-        object.__setattr__(self, "began", datetime.fromisoformat(self.utc))
+        object.__setattr__(self, "began", began)
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, as `from_json` takes them."""

@@ -17,7 +17,7 @@ from imufit.devices.record.part import PartFile, part_path
 from imufit.devices.record.reception import Reception
 from imufit.devices.record.rig import Rig
 from imufit.errors import InputError
-from imufit.log.metadata import Frame
+from imufit.log.metadata import Frame, Metadata
 from imufit.remedy import Remedy, recovering
 
 EVERY: Final = 0.2
@@ -68,7 +68,7 @@ class Journal:
             utc=utc_now(),
             monotonic=time.monotonic(),
             mapping=None if mapping is None else dict(mapping),
-            frame=frame,
+            frame=Metadata.from_mapping({"frame": frame}, None).frame,
             rig_axis=None if rig is None else rig.axis,
             rig_angle=None if rig is None else _plain(rig.angle),
         )

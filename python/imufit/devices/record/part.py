@@ -135,7 +135,7 @@ class PartFile:
         announced : Announced
             The device's announcement.
         about : Circumstances
-            What else has to be known to make a log of them.
+            All else that has to be known to make a log of them.
         """
         self.announced = announced
         told = json.dumps({**about.to_json(), "version": VERSION, "announced": asdict(announced)})
@@ -240,7 +240,7 @@ class Part:
     announced : Announced
         The device's announcement.
     about : Circumstances
-        What else was written at its beginning.
+        All else that was written at its beginning.
     n : int
         Rows of whole batches.
     told : list of dict

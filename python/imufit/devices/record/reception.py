@@ -42,7 +42,7 @@ class Listening:
     Raises
     ------
     ValueError
-        A value is not such a one.
+        A value is of another kind or out of range.
     """
 
     form: str

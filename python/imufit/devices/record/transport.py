@@ -32,6 +32,17 @@ BUSY: Final = 3.0
 _STUCK: Final = 0.01  # longest wait for a line that takes no byte, s: shorter than the time between two reads
 
 
+def _speed(baud: float) -> int:
+    """Return the speed of a line, a whole number of bits per second."""
+    try:
+        whole = int(baud)
+    except (TypeError, ValueError, OverflowError):
+        whole = 0
+    if whole <= 0 or whole != baud:
+        raise InputError(f"{baud!r} is not the speed of a line", remedy="Give bits per second, such as 115200.")
+    return whole
+
+
 class Line:
     """A serial line, opened anew as often as it is lost.
 
@@ -57,7 +68,7 @@ class Line:
 
     def __init__(self, port: str, baud: int = 115200) -> None:
         self.port = port
-        self.baud = baud
+        self.baud = _speed(baud)
         self.opening = 0
         self.lost_since: float | None = None
         self.why = ""
