@@ -46,6 +46,8 @@ HAS_POINTS = """() => {
 }"""
 """Whether the trace has points."""
 HAS_VERDICT = """() => document.querySelector("[data-mark=verdict]") !== null"""
+FOLLOWS = """() => parseInt(document.querySelector("[data-testid=rows]").textContent) > 0"""
+"""Whether rows have come."""
 AT_REST = """() => document.querySelector("[data-mark=busy]").offsetParent === null"""
 """Whether all work is done."""
 ZOOM = """([low, high]) => new Promise((done) => {
@@ -228,6 +230,7 @@ def live(seconds: float, speed: float) -> list[tuple[str, str]]:
             field.fill(emulator.stdout.readline().strip())
             field.press("Enter")
             page.get_by_role("button", name="Connect", exact=True).click()
+            page.wait_for_function(FOLLOWS)
             tools = page.context.new_cdp_session(page)
             held, heaps = [], []
             end = time.monotonic() + seconds
