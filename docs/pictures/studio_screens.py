@@ -117,7 +117,7 @@ def broken(page: Page, folder: Path) -> None:
 
 
 def columns(page: Page, folder: Path) -> None:
-    """Bring a file whose columns nobody can guess."""
+    """Bring a file with columns of unknown names."""
     page.locator('[data-mark="upload"] input[type=file]').last.set_input_files(str(folder / "columns.csv"))
     marked(page, "mapping").wait_for()
     page.wait_for_timeout(500)

@@ -22,7 +22,7 @@ impl<T: Clone> Recent<T> {
         if let Some(known) = self.find(places) {
             return known;
         }
-        // Nobody waits for the lock while it is made.
+        // The lock is free while it is made.
         let made = make();
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.len() >= self.most {
