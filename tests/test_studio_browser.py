@@ -236,9 +236,8 @@ def test_names_from_a_file_are_text(page, folder):
     page.get_by_text(f"acc.column:{HOSTILE[0]}", exact=True).first.click()
     marked(page, "covariate").click()
     page.get_by_role("option", name=HOSTILE[0]).click()
-    idle(page)
-    panel = figure(page, "panel")
-    assert "&lt;script&gt;" in panel["layout"]["xaxis"]["title"]["text"]
+    page.wait_for_function("() => document.querySelector('[data-mark=panel]').textContent.includes('<script>')")
+    assert "&lt;script&gt;" in figure(page, "panel")["layout"]["xaxis"]["title"]["text"]
     assert HOSTILE[0] in marked(page, "panel").text_content()
     assert page.evaluate("window.broken") is None
     assert "\u202e" not in page.content()
@@ -296,7 +295,7 @@ def test_a_wrong_token_host_or_origin_is_refused(address):
     assert status(address) == 200
     assert status(address, Origin=own) == 200
     assert status(bare) == 403
-    assert status(f"{bare}{token[:-1]}x/") == 403
+    assert status(f"{bare}{token[:-1]}{'y' if token.endswith('x') else 'x'}/") == 403
     assert status(address, Host=f"evil.example:{parts.port}") == 403
     assert status(address, Origin="http://evil.example") == 403
     assert status(address, Origin="null") == 403

@@ -266,15 +266,14 @@ class Top:
                 ui.label(printable(note)).classes("studio-muted")
         offers = desk.offers
         if not offers:
-            ui.label(
-                "This file holds a reference alone: drop the sensor's file as well, or name the columns of a sensor."
-            ).classes("studio-sentence")
-            if not (desk.in_shell and desk.troubled is not None):
-                self._mapping(desk.arrivals[-1].file)
+            ui.label("This file holds a reference alone: drop the sensor's file as well.").classes("studio-sentence")
         for offer in offers:
             ui.button(printable(offer.words, 2 * NAME), on_click=lambda offer=offer: desk.open(offer.files)).props(
                 "outline"
             ).props(attribute("data-mark", f"offer-{offer.way.value}"))
+        if len(desk.arrivals) == 1 and not desk.arrivals[0].sensors and not (desk.in_shell and desk.troubled):
+            ui.label("If it holds readings, name their columns:").classes("studio-muted")
+            self._mapping(desk.arrivals[0].file)
 
     def _game(self, judged: bool) -> None:
         desk = self._desk
