@@ -68,9 +68,14 @@ def failing(page: Page, folder: Path) -> None:
     page.wait_for_timeout(900)
 
 
+def bring(page: Page, *files: Path) -> None:
+    """Give files to the page."""
+    page.locator('[data-mark="upload"] input[type=file]').last.set_input_files([str(file) for file in files])
+
+
 def drop(page: Page, *files: Path) -> None:
     """Bring files, and wait until they are judged."""
-    page.locator('[data-mark="upload"] input[type=file]').last.set_input_files([str(file) for file in files])
+    bring(page, *files)
     marked(page, "verdict").or_(marked(page, "arrival")).first.wait_for()
     idle(page)
 
@@ -111,14 +116,14 @@ def files(page: Page, folder: Path) -> None:
 
 def broken(page: Page, folder: Path) -> None:
     """Bring a file that cannot be read."""
-    page.locator('[data-mark="upload"] input[type=file]').last.set_input_files(str(folder / "broken.csv"))
+    bring(page, folder / "broken.csv")
     marked(page, "trouble").wait_for()
     page.wait_for_timeout(500)
 
 
 def columns(page: Page, folder: Path) -> None:
     """Bring a file with columns of unknown names."""
-    page.locator('[data-mark="upload"] input[type=file]').last.set_input_files(str(folder / "columns.csv"))
+    bring(page, folder / "columns.csv")
     marked(page, "mapping").wait_for()
     page.wait_for_timeout(500)
 

@@ -155,10 +155,17 @@ class Desk:
     def offers(self) -> list[Offer]:
         """Uses of the files that were brought."""
         found = offers(self.arrivals)
+        if len(self.arrivals) != 1:
+            return found
+        brought = self.arrivals[0]
         unjudged = self.session is not None and self.session.refused
-        alone = len(self.arrivals) == 1
-        brought = [item for item in self.arrivals if alone and item.reference and (unjudged or not item.sensors)]
-        return [join_of(file, item.file) for file in self.files for item in brought] + found
+        joins = brought.reference and (unjudged or not brought.sensors)
+        return [join_of(file, brought.file) for file in self.files if joins] + found
+
+    @property
+    def unmapped(self) -> LogFile | None:
+        """The file that cannot be read until its columns are named; None where the last problem is another one."""
+        return self.troubled if self.in_shell else None
 
     # --- work
 

@@ -237,8 +237,8 @@ class Top:
         desk = self._desk
         with ui.element("div").classes("studio-error").props('role="alert"'):
             ui.label(printable(desk.trouble)).props("data-mark=trouble")
-            if desk.in_shell and desk.troubled is not None:
-                self._mapping(desk.troubled)
+            if desk.unmapped is not None:
+                self._mapping(desk.unmapped)
                 ui.label(f"In a shell: {printable(desk.in_shell)}").classes("studio-muted").props("data-mark=in-shell")
             with ui.row():
                 for option in desk.cures:
@@ -271,7 +271,7 @@ class Top:
             ui.button(printable(offer.words, 2 * NAME), on_click=lambda offer=offer: desk.open(offer.files)).props(
                 "outline"
             ).props(attribute("data-mark", f"offer-{offer.way.value}"))
-        if len(desk.arrivals) == 1 and not desk.arrivals[0].sensors and not (desk.in_shell and desk.troubled):
+        if len(desk.arrivals) == 1 and not desk.arrivals[0].sensors and desk.unmapped is None:
             ui.label("If it holds readings, name their columns:").classes("studio-muted")
             self._mapping(desk.arrivals[0].file)
 

@@ -9,7 +9,7 @@ import zlib
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from imufit.devices.record.arrived import Chunk
 from imufit.devices.record.circumstances import Circumstances
@@ -121,12 +121,6 @@ class Beginning:
     chunks: tuple[Chunk, ...]
 
 
-def _listening(how: dict[str, Any]) -> Listening:
-    if int(how["baud"]) != how["baud"]:
-        raise ValueError("a speed is a whole number")
-    return Listening(how["form"], how["header"], int(how["baud"]))
-
-
 def read_beginning(path: Path) -> Beginning | None:
     """Read the whole chunks, whatever stands behind them.
 
@@ -159,7 +153,7 @@ def read_beginning(path: Path) -> Beginning | None:
                 file=path,
                 remedy="Use the imufit that recorded it.",
             )
-        about, how = Circumstances.from_json(told["about"]), _listening(told["how"])
+        about, how = Circumstances.from_json(told["about"]), Listening(**told["how"])
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, OverflowError):

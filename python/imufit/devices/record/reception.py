@@ -41,7 +41,7 @@ class Listening:
 
     Raises
     ------
-    ValueError
+    ValueError, TypeError or OverflowError
         A value is of another kind or out of range.
     """
 
@@ -53,7 +53,7 @@ class Listening:
         if (
             self.form not in ("auto", *FORMS)
             or not isinstance(self.header, str | None)
-            or type(self.baud) is not int
+            or self.baud != int(self.baud)
             or self.baud <= 0
         ):
             raise ValueError("this is not how a line is listened to")
