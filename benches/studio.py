@@ -191,6 +191,7 @@ def paged(rows: int, zooms: int) -> list[tuple[str, str]]:
         ("the residuals over time stand after", f"{stood[2]:.0f} s"),
         (f"{zooms} zooms of the page, until the new points are drawn: median", f"{np.median(times):.0f} ms"),
         ("99 of 100 zooms of the page within", f"{np.percentile(times, 99):.0f} ms"),
+        ("slowest zoom of the page", f"{max(times):.0f} ms"),
         ("memory of the server after a tenth of the zooms", f"{held[tenth]:.0f} MB"),
         ("after all of them", f"{held[-1]:.0f} MB"),
         ("memory of the page's script after a tenth of the zooms", f"{heaps[tenth]:.1f} MB"),

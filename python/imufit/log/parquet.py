@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any, Final
@@ -21,8 +22,10 @@ from imufit.log.text_cells import cells_of
 from imufit.remedy import command
 
 _KEY: Final = b"imufit"
-ROW_GROUP: Final = 131_072
-"""Rows of a row group that is written: what a reader has to hold at least."""
+ROW_GROUP: Final = 32_768
+"""Rows of a row group that is written: what a reader has to hold at least, and unpacks to find a row."""
+SKIPPED: Final = 4_096
+"""Rows of a row group that are unpacked at once to find a row within it."""
 SOUGHT: Final = 1 << 20
 """Rows of a row group up to which a row within it is found fast enough to be drawn: pyarrow's groups have as many."""
 _BROKEN: Final = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
@@ -83,7 +86,7 @@ class ParquetSource:
                         remedy="Write the log without this column.",
                     )
 
-    @property
+    @cached_property
     def text(self) -> frozenset[str]:
         """Columns that hold text."""
         return frozenset(
@@ -105,31 +108,44 @@ class ParquetSource:
 
     def blocks(self, columns: Sequence[str]) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
         """Give the named columns block by block."""
-        yield from self.blocks_from(columns, 0)
+        text = [name for name in columns if name in self.text]
+        rows = rows_at_once(NUMBER * (len(columns) - len(text)) + TEXT_CELL * len(text))
+        for start, batch in self._batches(columns, 0, rows):
+            yield start, batch.num_rows, {name: _array(batch.column(name)) for name in columns}
 
     @property
     def seeks(self) -> bool:
         """Whether any row is found without reading many others."""
         return self._largest_group <= SOUGHT
 
-    def blocks_from(self, columns: Sequence[str], row: int) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
-        """Give the named columns block by block, from the row group that holds a row."""
+    def blocks_between(
+        self, columns: Sequence[str], first: int, stop: int
+    ) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
+        """Give rows ``first <= row < stop`` of the named columns block by block; the rest of their group is skipped."""
+        for start, batch in self._batches(columns, first, SKIPPED):
+            if start >= stop:
+                return
+            low, high = max(first - start, 0), min(stop - start, batch.num_rows)
+            if low < high:
+                part = batch.slice(low, high - low)
+                yield start + low, part.num_rows, {name: _array(part.column(name)) for name in columns}
+
+    def _batches(self, columns: Sequence[str], row: int, rows: int) -> Iterator[tuple[int, pa.RecordBatch]]:
+        """Read the named columns by so many rows, from the row group that holds a row; first row and values of each."""
         group = max(bisect_right(self._groups, row) - 1, 0)
         start = self._groups[group] if self._groups else 0
-        text = [name for name in columns if name in self.text]
-        rows = rows_at_once(NUMBER * (len(columns) - len(text)) + TEXT_CELL * len(text))
         try:
             with pq.ParquetFile(
                 self._path,
                 pre_buffer=False,
                 buffer_size=1 << 16,
                 page_checksum_verification=True,
-                read_dictionary=text,
+                read_dictionary=[name for name in columns if name in self.text],
             ) as file:
                 wanted = list(columns) or None
                 groups = range(group, len(self._groups))
                 for batch in file.iter_batches(rows, groups, columns=wanted, use_threads=False):
-                    yield start, batch.num_rows, {name: _array(batch.column(name)) for name in columns}
+                    yield start, batch
                     start += batch.num_rows
         except _BROKEN as error:
             raise InputError(

@@ -87,8 +87,8 @@ class SeekingSource(Source, Protocol):
         """Whether that is fast."""
         ...
 
-    def blocks_from(self, columns: Sequence[str], row: int) -> Iterator[Block]:
-        """Pass over the file from a block that begins at or before a row, with the named columns."""
+    def blocks_between(self, columns: Sequence[str], first: int, stop: int) -> Iterator[Block]:
+        """Give rows ``first <= row < stop`` with the named columns, block by block."""
         ...
 
 

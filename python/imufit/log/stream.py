@@ -225,18 +225,21 @@ class LogStream:
         columns : collection of str, optional
             Columns of the log that are wanted, and the time; those that belong together come together.
         """
-        start, stop = max(start, 0), min(stop, self.n)
+        start, stop = min(max(start, 0), self.n), min(stop, self.n)
+        begin = min(start, self.n - 1)  # one row at least is read, since an empty log has columns, too
         plan = self._plan if columns is None else self._part_of_plan(columns)
         source = self._source
-        found = source.blocks_from(plan.sources, start) if isinstance(source, SeekingSource) else None
-        blocks = source.blocks(plan.sources) if found is None else found
+        if isinstance(source, SeekingSource):
+            blocks = source.blocks_between(plan.sources, begin, max(stop, begin + 1))
+        else:
+            blocks = source.blocks(plan.sources)
         # Impossible readings have been counted when the log was read as a whole.
         unmeasured = Unmeasured(self._place)
         pieces: list[Log] = []
         for first, rows, block in blocks:
             if first >= stop and pieces:
                 break
-            if first + rows > start:
+            if first + rows > begin:
                 piece = self._checked(plan, first, rows, block, unmeasured)
                 pieces.append(piece.rows(max(start - first, 0), max(stop - first, 0)))
         return concatenate(pieces)
