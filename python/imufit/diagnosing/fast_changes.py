@@ -18,10 +18,6 @@ MOST_ROWS = 1 << 18
 """Rows of a log that are looked at, from its start."""
 LEAST = 0.15
 """RMS of a tone or of jumps that counts, over that of the residual: smoothing of a reference leaves small peaks."""
-FASTEST = 0.1
-"""Part of the sampling rate above which a tone may be shaking that no reference follows ..."""
-MOST_OF_IT = 0.7
-"""... unless its RMS is so much of the residual's: half of its power."""
 CHANCE = 1e-6
 """Probability with which noise of a smooth spectrum makes a tone by chance, all frequencies and channels together."""
 
@@ -55,27 +51,24 @@ def _changes(evidence: LogEvidence, step: Array) -> list[tuple[int, float, str]]
     t, residuals = _residuals(evidence, step)
     channels = {index: residual for index, residual in enumerate(residuals) if residual is not None}
     for index, residual in channels.items():
-        square, p_value, shape, least = 0.0, 1.0, "", LEAST
-        step_of_sensor = evidence.facts.sensor_dt[index // 3]
+        square, p_value, shape = 0.0, 1.0, ""
         tone, sweep, jumping = strongest(t, residual), moving(t, residual), telegraph_noise(t, residual)
         if tone is not None:
             frequency, square, p_value = tone
             shape = f"a line at {frequency:.3g} Hz"
-            least = LEAST if frequency * step_of_sensor < FASTEST else MOST_OF_IT
         # A steady line is one in each stretch, too.
         if sweep is not None and sweep[1] > 2.0 * square:
             (first, last), square, p_value = sweep
             shape = f"a line that moves from {first:.3g} to {last:.3g} Hz"
-            least = LEAST if max(first, last) * step_of_sensor < FASTEST else MOST_OF_IT
         if jumping is not None:
-            square, p_value, least = jumping.size**2 * jumping.upper * (1.0 - jumping.upper), 2.0**-jumping.count, LEAST
+            square, p_value = jumping.size**2 * jumping.upper * (1.0 - jumping.upper), 2.0**-jumping.count
             shape = (
                 f"random telegraph noise: {jumping.count} jumps between two levels, the first at {jumping.first:.1f} s"
             )
         # The drop is one of the whitened residual, as that of other causes is; half of it is a log likelihood ratio.
         whitened = square * evidence.slow_gain(index) / evidence.variance[index]
         certain = jumping is not None or p_value * len(channels) <= CHANCE
-        if certain and square >= least**2 * float(np.nanvar(residual)):
+        if certain and square >= LEAST**2 * float(np.nanvar(residual)):
             found.append((index, 0.5 * whitened * int(np.sum(np.isfinite(residual))), shape))
     return found
 

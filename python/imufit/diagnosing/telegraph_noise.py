@@ -18,7 +18,9 @@ CLEAR = 5.0
 ALIKE = 0.3
 """Jumps differ from their middle size by no more than this part, half of them."""
 FEWEST = 8
-"""Jumps, up and down in turn, that chance does not make."""
+"""Jumps that chance does not make ..."""
+IN_TURN = 0.9
+"""... if so many of them are up and down in turn: both jumps of a visit that is shorter than a window may be lost."""
 FEWEST_WINDOWS = 60
 """Fewer windows are not informative."""
 STAYING = 0.7
@@ -69,13 +71,16 @@ def telegraph_noise(t: Array, residual: Array) -> TelegraphNoise | None:
     return next((found for found in tried if found is not None), None)
 
 
-def _stay(means: Array, peaks: list[int], size: float) -> bool:
-    """Return whether means stay on two levels between jumps at these places, away from the jumps themselves."""
+def _stay(means: Array, peaks: list[int], up: NDArray[np.bool_], size: float) -> bool:
+    """Return whether means stay on two levels between jumps at these places, away from the jumps themselves.
+
+    After a jump up they are on the upper level; before the first one on the level that it leaves.
+    """
     number = np.arange(len(means))
     middles = np.asarray(peaks) + 1
     away = np.min(np.abs(number[:, None] - middles), axis=1) > 1
-    other = np.searchsorted(middles, number) % 2 == 1
-    levels = [means[away & side] for side in (other, ~other)]
+    upper = np.concatenate([[not up[0]], up])[np.searchsorted(middles, number)]
+    levels = [means[away & side] for side in (upper, ~upper)]
     if min(map(len, levels)) < FEWEST:
         return False
     apart = abs(float(levels[0].mean() - levels[1].mean()))
@@ -99,13 +104,13 @@ def _jumps(t: Array, residual: Array, rows: int) -> TelegraphNoise | None:
         return None
     sizes = change[peaks]
     middle = float(np.median(np.abs(sizes)))
-    in_turn = np.all(np.sign(sizes[1:]) == -np.sign(sizes[:-1]))
+    in_turn = np.mean(np.sign(sizes[1:]) == -np.sign(sizes[:-1])) >= IN_TURN
     alike = float(np.median(np.abs(np.abs(sizes) - middle))) < 0.5 * ALIKE * middle
     if not (in_turn and alike):
         return None
-    if not _stay(means, peaks, middle):
+    if not _stay(means, peaks, sizes > 0.0, middle):
         return None
     at = t[[(k + 1) * rows for k in peaks]]
     stays = np.diff(np.concatenate([[t[0]], at, [t[-1]]]))
-    share = float(np.sum(stays[1::2]) / np.sum(stays))
+    share = float(np.sum(stays[np.concatenate([[sizes[0] < 0.0], sizes > 0.0])]) / np.sum(stays))
     return TelegraphNoise(middle, float(at[0]), len(peaks), min(share, 1.0 - share))

@@ -257,11 +257,11 @@ pub fn decide(
     let instead: Vec<Shown> = (inquiry.unnamed.iter().zip(&before))
         .map(|(unnamed, ln)| cause(unnamed, *ln))
         .collect();
-    // A coefficient that differs between blocks has a cause without a name, too.
-    let varying = |slot: &usize| (*slot, search.varying(&stack, &members, *slot).varies);
-    let varying: Vec<(usize, f64)> = members
-        .par_iter()
-        .map(varying)
+    // A coefficient that differs between blocks has a cause without a name, be the effect there or not. What differs in several sensors
+    // differs in each of them.
+    let of_one = |slot: &&usize| members.contains(slot) || problem.slots[**slot].effect.sensors().len() == 1;
+    let varying: Vec<(usize, f64)> = (candidates.par_iter().filter(of_one))
+        .map(|slot| (*slot, search.varying(&stack, &members, *slot).varies))
         .filter(|(_, ln)| *ln >= threshold)
         .collect();
     let of_slot = |(slot, ln): &(usize, f64)| (problem.slots[*slot].effect.sensors().to_vec(), *ln);
@@ -305,7 +305,7 @@ pub fn decide(
         .is_some_and(|d| d.wild && (problem.parts.len() == 2 || best.is_none_or(|b| b == d.slot)));
     let kind = match best {
         _ if spoilt => Kind::Unknown,
-        None if members.is_empty() && unexplained.is_empty() && known.seen.is_empty() && !impossible => Kind::Adequate,
+        None if members.is_empty() && left.is_empty() && known.seen.is_empty() && !impossible => Kind::Adequate,
         None => Kind::Unknown,
         Some(first) if unclear.iter().any(|s| acts(first, s)) => Kind::Unknown,
         Some(_) if rivals.is_empty() => Kind::Missing,

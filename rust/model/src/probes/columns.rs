@@ -22,19 +22,19 @@ fn legendre(u: f64) -> [f64; DEGREES] {
     ]
 }
 
-/// Rows on each side over which a speed is taken.
+/// Rows on each side over which a velocity is taken.
 const SPEED_ROWS: usize = 4;
 
-/// Speed of the reference position in every row, m/s; where it is not known, the last one.
-fn speeds(rows: &Rows) -> Vec<f64> {
-    let mut last = 0.0;
+/// Velocity of the reference position in every row, m/s; where it is not known, the last one.
+fn velocities(rows: &Rows) -> Vec<Vector3<f64>> {
+    let mut last = Vector3::zeros();
     (0..rows.len())
         .map(|i| {
             let (before, after) = (i.saturating_sub(SPEED_ROWS), (i + SPEED_ROWS).min(rows.len() - 1));
             if let (Some(p), Some(q)) = (rows.position.get(before), rows.position.get(after)) {
-                let speed = (q - p).norm() / (rows.t[after] - rows.t[before]);
-                if speed.is_finite() {
-                    last = speed;
+                let velocity = (q - p) / (rows.t[after] - rows.t[before]);
+                if velocity.iter().all(|v| v.is_finite()) {
+                    last = velocity;
                 }
             }
             last
@@ -222,10 +222,27 @@ pub(super) fn fill(kind: &Kind, sensor: Sensor, rows: &Rows, out: &mut Columns) 
             }
         }
         Kind::Speed => {
-            let speeds = speeds(rows);
+            let speeds: Vec<f64> = velocities(rows).iter().map(|v| v.norm()).collect();
             for axis in 0..3 {
                 out.set(axis, axis, speeds.iter().copied());
                 out.set(3 + axis, axis, speeds.iter().map(|v| v * v));
+            }
+        }
+        Kind::Velocity => {
+            let velocities = velocities(rows).into_iter().enumerate();
+            for (row, velocity) in velocities {
+                let body = rows.attitude(row).inverse_transform_vector(&velocity);
+                for axis in 0..3 {
+                    out.column(axis, axis)[row] = body[axis];
+                }
+            }
+        }
+        Kind::Changes => {
+            let rate = rows.ideal.rate(sensor);
+            for other in 0..3 {
+                for axis in 0..3 {
+                    out.set(3 * other + axis, axis, rate.axis(other).iter().copied());
+                }
             }
         }
         Kind::Cross(u, v) => {

@@ -48,6 +48,8 @@ enum Kind {
     Other(Motion),
     /// (omega x (omega x r) + domega/dt x r) of each axis with an r of its own.
     OwnLevers,
+    /// k dx/dt of all axes, on every axis.
+    Changes,
     /// k y^2 with y the readings of all axes.
     Squares,
     /// k y with y what follows the axis' own reading with play, of each of the widths of [`WIDTHS`].
@@ -56,6 +58,8 @@ enum Kind {
     Heading,
     /// k v and k v^2, with v the speed of the reference position, m/s.
     Speed,
+    /// k v with v the velocity of the reference position along the axis, m/s.
+    Velocity,
     /// k u v of two vectors of the body frame, on every axis; not the squares of the sensor's own.
     Cross(Motion, Motion),
     /// k x where |x| is below one of [`SMALL`] times the full scale of such a motion.
@@ -145,7 +149,7 @@ pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
                 Kind::TurnBy(Quantity::Time),
                 Kind::DelayBy(Quantity::Time),
             ];
-            let of_motion = [Kind::Heading, Kind::Rate];
+            let of_motion = [Kind::Heading, Kind::Rate, Kind::Changes];
             kinds.extend(in_time.into_iter().chain(of_motion).map(|kind| (sensor, kind)));
             // Specific force on a gyroscope is in the catalogue.
             let others: &[Motion] = match sensor {
@@ -161,7 +165,7 @@ pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
             let by = |q: &Quantity| [Kind::GainBent(*q), Kind::TurnBy(*q), Kind::DelayBy(*q)];
             kinds.extend(quantities.iter().flat_map(by).map(|kind| (sensor, kind)));
             if facts.position_smoothing.is_some() {
-                kinds.push((sensor, Kind::Speed));
+                kinds.extend([Kind::Speed, Kind::Velocity].map(|kind| (sensor, kind)));
             }
             if sensor != Sensor::Mag {
                 let by = |q: &Quantity| [Kind::RateBy(*q), Kind::SquareBy(*q)];

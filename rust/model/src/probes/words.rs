@@ -74,6 +74,18 @@ pub(super) fn card(facts: &LogFacts, sensor: Sensor, kind: &Kind) -> Card {
         ),
         Kind::Heading => (Stage::Offset, on_axes(4), "heading".to_string(), "once or twice a turn"),
         Kind::Speed => (Stage::Offset, on_axes(2), "speed".to_string(), "growing with it"),
+        Kind::Velocity => (Stage::Offset, xyz(), "velocity".to_string(), "growing with it"),
+        Kind::Changes => (
+            Stage::Gain,
+            on_axes(3),
+            match sensor {
+                Sensor::Acc => "df/dt",
+                Sensor::Gyr => "domega/dt",
+                Sensor::Mag => "dm/dt",
+            }
+            .to_string(),
+            "each axis follows changes of its own and of the others",
+        ),
         Kind::Cross(u, v) => (
             Stage::Offset,
             pairs(*u, *v)
