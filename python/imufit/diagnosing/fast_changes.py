@@ -11,6 +11,7 @@ from imufit.diagnosing.tones import moving, strongest
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.rest_passes import RestPasses
+from imufit.model.catalogue import find_effect
 
 Array = NDArray[np.float64]
 
@@ -36,23 +37,26 @@ def fast_changes(analysis: Analysis, step: Array) -> list[Seen]:
     step : ndarray
         (p,) step of every parameter of the evidence that the fit has taken.
     """
+    # A sensor that is known to be shaken shows the shaking itself, which no reference follows.
+    shaken = any(find_effect(effect).of_shaking for effect in analysis.model.effects)
     found: list[Seen] = []
     for log, evidence in enumerate(analysis.logs):
         if isinstance(evidence.passes, RestPasses):
             continue
         several = log if len(analysis.logs) > 1 else None
-        found += [(several, *change) for change in _changes(evidence, analysis.own_step(log, step))]
+        found += [(several, *change) for change in _changes(evidence, analysis.own_step(log, step), shaken=shaken)]
     return found
 
 
-def _changes(evidence: LogEvidence, step: Array) -> list[tuple[int, float, str]]:
+def _changes(evidence: LogEvidence, step: Array, *, shaken: bool) -> list[tuple[int, float, str]]:
     """Find the line or the random telegraph noise of each channel of a log."""
     found = []
     t, residuals = _residuals(evidence, step)
     channels = {index: residual for index, residual in enumerate(residuals) if residual is not None}
     for index, residual in channels.items():
         square, p_value, shape = 0.0, 1.0, ""
-        tone, sweep, jumping = strongest(t, residual), moving(t, residual), telegraph_noise(t, residual)
+        tone, sweep = (None, None) if shaken else (strongest(t, residual), moving(t, residual))
+        jumping = telegraph_noise(t, residual)
         if tone is not None:
             frequency, square, p_value = tone
             shape = f"a line at {frequency:.3g} Hz"

@@ -264,12 +264,14 @@ impl<'a> Search<'a> {
         weighed.testable && weighed.ln_bayes >= self.threshold && !self.refuted.contains(&weighed.slot)
     }
 
-    /// Log Bayes factors of a member beside the others where it may vary from block to block as well; `stack` is that of all members.
+    /// Log Bayes factors of an effect beside the members where it may vary from block to block as well; `stack` is that of all members.
     pub fn varying(&self, stack: &Stack, members: &[usize], slot: usize) -> Varying {
         let others = without(members, slot);
-        self.asked.get(&slot).map_or(Varying::STEADY, |asked| {
-            self.varying_beside(stack, &others, slot, asked)
-        })
+        match self.asked.get(&slot) {
+            Some(asked) => self.varying_beside(stack, &others, slot, asked),
+            // Beside the common part that the model fits.
+            None => self.varying_beside(stack, &others, slot, &Asked::slot(self.criterion, slot)),
+        }
     }
 
     /// The same of any slot beside some members; `stack` has the noise.

@@ -257,10 +257,12 @@ pub fn decide(
     let instead: Vec<Shown> = (inquiry.unnamed.iter().zip(&before))
         .map(|(unnamed, ln)| cause(unnamed, *ln))
         .collect();
-    // A coefficient that differs between blocks has a cause without a name, be the effect there or not. What differs in several sensors
-    // differs in each of them.
+    // A coefficient that drifts or switches has a cause without a name, too, be its effect there or not: where nothing more definite is left,
+    // it is looked for in all effects. What differs in several sensors differs in each of them.
     let of_one = |slot: &&usize| members.contains(slot) || problem.slots[**slot].effect.sensors().len() == 1;
-    let varying: Vec<(usize, f64)> = (candidates.par_iter().filter(of_one))
+    let everything = model.iter().chain(candidates).copied().collect();
+    let asked: Vec<usize> = if unexplained.is_empty() { everything } else { members.clone() };
+    let varying: Vec<(usize, f64)> = (asked.par_iter().filter(of_one))
         .map(|slot| (*slot, search.varying(&stack, &members, *slot).varies))
         .filter(|(_, ln)| *ln >= threshold)
         .collect();

@@ -68,6 +68,12 @@ impl PyEffect {
         }
     }
 
+    /// Whether its size depends on how the sensor is shaken, faster than the reference follows.
+    #[getter]
+    fn of_shaking(&self) -> bool {
+        self.0.size_is_open()
+    }
+
     /// Which rows decide what it adds to one: `row` (that one), `reference` (the reference there besides), `neighbours`
     /// or `history` (all from the start on).
     #[getter]

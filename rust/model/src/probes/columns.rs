@@ -60,7 +60,6 @@ fn part_of(facts: &LogFacts, t: f64) -> f64 {
 /// A quantity less its mean; `None` where the log has it not.
 fn deviation(rows: &Rows, quantity: Quantity) -> Option<Vec<f64>> {
     match quantity {
-        Quantity::Time => Some(rows.t.iter().map(|t| part_of(rows.facts, *t)).collect()),
         Quantity::Temperature => rows.temperature.map(<[f64]>::to_vec),
         Quantity::Column(c) => {
             let mean = rows.facts.covariate_means.get(c)?;

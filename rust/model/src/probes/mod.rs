@@ -110,8 +110,6 @@ impl Motion {
 /// A quantity beside the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Quantity {
-    /// Part of the log that has passed, from -0.5 to 0.5.
-    Time,
     Temperature,
     Column(usize),
 }
@@ -144,13 +142,8 @@ pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
             kinds.extend(pairs.filter(|_| !facts.rests).map(|(u, v)| (sensor, Kind::Cross(u, v))));
         }
         if !facts.rests {
-            let in_time = [
-                Kind::GainInTime,
-                Kind::TurnBy(Quantity::Time),
-                Kind::DelayBy(Quantity::Time),
-            ];
-            let of_motion = [Kind::Heading, Kind::Rate, Kind::Changes];
-            kinds.extend(in_time.into_iter().chain(of_motion).map(|kind| (sensor, kind)));
+            let of_motion = [Kind::GainInTime, Kind::Heading, Kind::Rate, Kind::Changes];
+            kinds.extend(of_motion.map(|kind| (sensor, kind)));
             // Specific force on a gyroscope is in the catalogue.
             let others: &[Motion] = match sensor {
                 Sensor::Acc => &[Motion::Rate, Motion::Field],

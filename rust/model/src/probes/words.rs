@@ -11,7 +11,6 @@ use super::columns::DEGREES;
 /// Card of a probe: its name is the covariate, its signature the shape.
 pub(super) fn card(facts: &LogFacts, sensor: Sensor, kind: &Kind) -> Card {
     let name = |q: Quantity| match q {
-        Quantity::Time => "t".to_string(),
         Quantity::Temperature => "temp".to_string(),
         Quantity::Column(c) => facts.covariates[c].clone(),
     };
@@ -25,13 +24,6 @@ pub(super) fn card(facts: &LogFacts, sensor: Sensor, kind: &Kind) -> Card {
             "its past counts as well",
         ),
         Kind::GainInTime => (Stage::Gain, on_axes(DEGREES), "t".to_string(), "the gain drifts"),
-        Kind::TurnBy(Quantity::Time) => (Stage::Gain, on_axes(2), "t".to_string(), "the mounting turns"),
-        Kind::DelayBy(Quantity::Time) => (
-            Stage::Gain,
-            vec!["tau".to_string()],
-            "t".to_string(),
-            "the delay drifts",
-        ),
         Kind::GainBent(q) => (Stage::Gain, xyz(), name(*q), "its gain follows it, bent"),
         Kind::TurnBy(q) => (Stage::Gain, on_axes(2), name(*q), "the mounting turns with it"),
         Kind::DelayBy(q) => (Stage::Gain, vec!["tau".to_string()], name(*q), "the delay follows it"),
