@@ -236,7 +236,9 @@ def test_names_from_a_file_are_text(page, folder):
     page.get_by_text(f"acc.column:{HOSTILE[0]}", exact=True).first.click()
     marked(page, "covariate").click()
     page.get_by_role("option", name=HOSTILE[0]).click()
-    page.wait_for_function("() => document.querySelector('[data-mark=panel]').textContent.includes('<script>')")
+    # The legend has the name of the effect that is looked at, too.
+    title = "document.querySelector('[data-mark=panel] .xtitle')"
+    page.wait_for_function(f"() => {title} && {title}.textContent.includes('<script>')")
     assert "&lt;script&gt;" in figure(page, "panel")["layout"]["xaxis"]["title"]["text"]
     assert HOSTILE[0] in marked(page, "panel").text_content()
     assert page.evaluate("window.broken") is None

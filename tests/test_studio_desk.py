@@ -51,6 +51,22 @@ def test_a_log_without_evidence_leaves_the_session_before_it(log, spoilt):
     assert t.size == values.size > 100
 
 
+def test_a_problem_meanwhile_does_not_stop_the_work(log):
+    """The second click of a double click comes while the first one's fit is under way."""
+
+    async def twice() -> None:
+        await desk.open([log])
+        add = lambda: desk.session.add("acc.bias")  # noqa: E731
+        await asyncio.gather(desk.attempt(add), desk.attempt(add))
+
+    desk = Desk()
+    asyncio.run(twice())
+    assert "in the model already" in desk.trouble
+    assert desk.session.stack.effects == ("acc.bias",)
+    assert desk.session.made().diagnosis is not None
+    assert desk.busy == ""
+
+
 @pytest.fixture
 def reference(log, tmp_path):
     rows = read(log.path)

@@ -157,5 +157,14 @@ def test_model_of_a_log_without_reference_is_refused_in_words():
 def test_line_of_points_covers_low_and_high_and_breaks_over_gaps():
     points = Points(np.arange(4.0), np.array([1.0, 2.0, np.nan, 4.0]), np.array([1.0, 3.0, np.nan, 5.0]))
     t, values = points.line()
-    assert t.tolist() == [0.0, 1.0, 1.0, 2.0, 3.0, 3.0]
+    assert t.tolist() == [0.0, 0.75, 1.25, 2.0, 2.75, 3.25]
     np.testing.assert_array_equal(values, [1.0, 2.0, 3.0, np.nan, 4.0, 5.0])
+
+
+def test_line_of_a_slope_is_no_staircase():
+    t = np.arange(30.0)
+    points = Points(t, -t - 0.5, -t + 0.5)
+    times, values = points.line()
+    assert np.all(np.diff(times) > 0.0)
+    assert np.all(np.diff(values)[1::2] <= 0.0)
+    np.testing.assert_allclose(values[2:-2], -times[2:-2], atol=0.3)

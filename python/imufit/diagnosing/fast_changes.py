@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
+from imufit.diagnosing.shaking import is_shaken
 from imufit.diagnosing.telegraph_noise import telegraph_noise
 from imufit.diagnosing.tones import moving, strongest
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.rest_passes import RestPasses
-from imufit.model.catalogue import find_effect
 
 Array = NDArray[np.float64]
 
@@ -37,8 +37,7 @@ def fast_changes(analysis: Analysis, step: Array) -> list[Seen]:
     step : ndarray
         (p,) step of every parameter of the evidence that the fit has taken.
     """
-    # A sensor that is known to be shaken shows the shaking itself, which no reference follows.
-    shaken = any(find_effect(effect).of_shaking for effect in analysis.model.effects)
+    shaken = is_shaken(analysis)
     found: list[Seen] = []
     for log, evidence in enumerate(analysis.logs):
         if isinstance(evidence.passes, RestPasses):

@@ -6,15 +6,16 @@ import numpy as np
 
 from imufit import _imufit
 from imufit.diagnosing.fast_changes import Seen
+from imufit.diagnosing.shaking import is_shaken
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS
 from imufit.fitting.rest_passes import RestPasses
 
 ABOVE = 2.0
-"""Residual of the quiet blocks over the stated noise, with the noise of the reference, from which on the stated noise is
-refuted: a data sheet states a density within a third (typical against largest value), and the quiet blocks of noise that
-grows with the rate or with time stand at 1.2 to 1.8 times the stated noise (`imufit grade --set nothing`)."""
+"""Residual of the quiet blocks over the stated noise, with the noise of the reference, from which on the stated noise
+is refuted: a data sheet states a density within a third (typical against largest value), and the quiet blocks of noise
+that grows with the rate or with time stand at 1.2 to 1.8 times the stated noise (`imufit grade --set nothing`)."""
 QUIET = 0.1
 """Part of the blocks that is quiet, whatever the noise of the others grows with."""
 
@@ -36,7 +37,7 @@ def seen_in_rows(analysis: Analysis) -> list[Seen]:
             0.5 * evidence.counts[index] * (1.0 - 1.0 / ratio**2),
             f"it stands at {ratio:.1f} times its stated noise",
         )
-        for log, evidence in enumerate(analysis.logs)
+        for log, evidence in enumerate(() if is_shaken(analysis) else analysis.logs)
         if not isinstance(evidence.passes, RestPasses)
         for index, ratio in _above_stated_noise(evidence).items()
     ]
@@ -50,7 +51,7 @@ def seen_in_rows(analysis: Analysis) -> list[Seen]:
 
 
 def _above_stated_noise(evidence: LogEvidence) -> dict[int, float]:
-    """Residual of quiet blocks that no effect explains over the stated noise, by channel index, where that is above one.
+    """Return the unexplained residual of quiet blocks over the stated noise, by channel index, where that is refuted.
 
     The noise of the reference counts as stated: no other rule uses it.
     """

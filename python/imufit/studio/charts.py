@@ -125,7 +125,8 @@ def residual_panel(panel: Panel, after: Panel | None = None, effect: str = "", o
 def _line(x: Array, y: Array, colour: str, name: str, *, mode: str = "lines", dash: str = "solid") -> list[Figure]:
     line = {"color": colour, "width": LINE, "dash": dash}
     points = {"x": _numbers(x), "y": _numbers(y), "mode": mode, "name": name}
-    return [{"type": "scatter", **points, "line": line, "marker": {"color": colour, "size": 5}}]
+    shown = {"hovertemplate": "%{x:.5g}: %{y:.4g}<extra>%{fullData.name}</extra>"}
+    return [{"type": "scatter", **points, **shown, "line": line, "marker": {"color": colour, "size": 5}}]
 
 
 def _area(x: Array, low: Array, high: Array, colour: str, opacity: float, name: str) -> list[Figure]:
@@ -297,7 +298,7 @@ def fall(
     # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
     edge = [-0.6, max(len(places), SLOTS) - 0.4]
     floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
-    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": 35}
+    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": -35}
     figure = _figure([*bars, *floor], "", "error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final, TypeVar, cast
 
 from nicegui import Event, run
 
@@ -56,6 +56,20 @@ class Shown:
     joined: tuple[str, ...] = ()
     traces: Traces | None = None
     models: dict[Stack, ModelTraces] = field(default_factory=dict)
+
+
+class _FailedError(Exception):
+    """Work that ended with a problem, which has been noted.
+
+    Parameters
+    ----------
+    unusable : bool
+        Whether the person's input is the reason.
+    """
+
+    def __init__(self, *, unusable: bool) -> None:
+        super().__init__()
+        self.unusable = unusable
 
 
 class Desk:
@@ -115,7 +129,7 @@ class Desk:
         self.cures: list[Option] = []
         self.changed: Event[[]] = Event()
         self._folder = tempfile.TemporaryDirectory(prefix="imufit-")
-        self._working = self._failed = self._unusable = False
+        self._working = False
         self.troubled: LogFile | None = None
         self._before: Shown | None = None
 
@@ -176,14 +190,21 @@ class Desk:
         else:
             self.share = done / total if done < total else None
 
-    async def _in_thread(self, words: str, work: Callable[[], Answer], file: LogFile | None = None) -> Answer | None:
+    async def _tried(self, words: str, work: Callable[[], Answer], file: LogFile | None = None) -> Answer | None:
         """Run work in a thread; a problem is noted and gives None."""
+        try:
+            return await self._in_thread(words, work, file)
+        except _FailedError:
+            return None
+
+    async def _in_thread(self, words: str, work: Callable[[], Answer], file: LogFile | None = None) -> Answer:
+        """Run work in a thread; a problem is noted, and `_FailedError` raised."""
         self.busy, self.share = words, None
         self.changed.emit()
         try:
-            return await run.io_bound(work)
+            # It gives None where the server ends meanwhile, when no page is left.
+            return cast(Answer, await run.io_bound(work))
         except InputError as error:
-            self._unusable = True
             advice = error.advice
             if file is not None and isinstance(advice, Remedy) and advice.python != advice.shell:
                 # Options of a shell: the page has buttons and a field in their place.
@@ -191,21 +212,22 @@ class Desk:
                 self.in_shell = advice.shell
             else:
                 self._note(str(error), remedies(advice), file)
+            raise _FailedError(unusable=True) from error
         except (OSError, MemoryError) as error:
             self._note(f"{type(error).__name__}: {error}", [], file)
+            raise _FailedError(unusable=False) from error
         except Exception as error:
             # A fault of the program must not end the page: the person may save the session.
             logging.getLogger(__name__).exception("the studio's work failed")
             self._note(f"internal error: {type(error).__name__}: {error}", [], file)
+            raise _FailedError(unusable=False) from error
         finally:
             self.busy, self.share = "", None
             self.changed.emit()
-        return None
 
     def _note(self, problem: str, cures: list[Option], file: LogFile | None) -> None:
         self._no_trouble()
         self.trouble, self.cures, self.troubled = problem, cures if file is not None else [], file
-        self._failed = True
 
     def _no_trouble(self) -> None:
         self.trouble, self.in_shell, self.cures, self.troubled = "", "", [], None
@@ -238,15 +260,17 @@ class Desk:
         self._working = True
         try:
             while (step := next(self._pending(), None)) is not None:
-                self._failed, self._unusable, session = False, False, self.session
-                await self._in_thread(*step)
-                if self._failed and session is self.session:
-                    self._give_up()
-                    return
+                session = self.session
+                try:
+                    await self._in_thread(*step)
+                except _FailedError as failed:
+                    if session is self.session:
+                        self._give_up(unusable=failed.unusable)
+                        return
         finally:
             self._working = False
 
-    def _give_up(self) -> None:
+    def _give_up(self, *, unusable: bool) -> None:
         """Return to the step before one whose model cannot be fitted, or to the session before one without evidence.
 
         The rows of a first log without evidence stay, to be looked at.
@@ -256,7 +280,7 @@ class Desk:
             return
         if session.begun:
             session.give_up()
-        elif self._unusable and self._before is None and self.traces is not None and self.traces.built:
+        elif unusable and self._before is None and self.traces is not None and self.traces.built:
             session.refused = True
         else:
             self._show(self._before or Shown(None, ()))
@@ -346,7 +370,7 @@ class Desk:
         for file in files:
             if file.path.suffix.lower() == SESSION_ENDING:
                 continue
-            found = await self._in_thread(f"reading {file.name}", lambda file=file: arrived(file), file)  # type: ignore[misc]
+            found = await self._tried(f"reading {file.name}", lambda file=file: arrived(file), file)  # type: ignore[misc]
             if found is not None:
                 self.arrivals = [item for item in self.arrivals if item.file.path != file.path] + [found]
         waiting = [offer for offer in self.offers if offer.way is not Way.OPEN]
@@ -376,7 +400,7 @@ class Desk:
             return Session([log for log, _ in opened]), tuple(words for _, joined in opened for words in joined)
 
         names = " and ".join(file.name for file in files)
-        return await self._in_thread(f"opening {names}", work, files[0])
+        return await self._tried(f"opening {names}", work, files[0])
 
     def _take(
         self, session: Session, files: Sequence[LogFile], joined: tuple[str, ...], mystery: Mystery | None
@@ -454,7 +478,7 @@ class Desk:
             except LogsWantedError as wanted:
                 return wanted
 
-        kept = await self._in_thread(f"opening {path.name}", work)
+        kept = await self._tried(f"opening {path.name}", work)
         self.wanted = kept if isinstance(kept, LogsWantedError) else None
         if kept is None or isinstance(kept, LogsWantedError):
             self.changed.emit()
@@ -496,6 +520,6 @@ class Desk:
         seed : int
             Picks the log.
         """
-        game = await self._in_thread("hiding an effect", lambda: Mystery.hidden(level, seed, self.new_folder()))
+        game = await self._tried("hiding an effect", lambda: Mystery.hidden(level, seed, self.new_folder()))
         if game is not None:
             await self.open([LogFile(game.log, game.log.name)], game)

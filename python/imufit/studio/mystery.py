@@ -53,7 +53,7 @@ LEVELS: Final[dict[int, Level]] = {
     2: Level(
         "A small effect, or none",
         "A small effect is hidden, or nothing at all. Name the effect, or answer that nothing is missing.",
-        "Absence has evidence too: where the error stands at the noise floor, every named effect is a false alarm.",
+        "Absence has evidence too: where nothing is hidden, every named effect is a false alarm.",
     ),
     3: Level(
         "Two effects that look alike",

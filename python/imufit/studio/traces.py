@@ -89,12 +89,24 @@ class Points(NamedTuple):
     high: Array
 
     def line(self) -> tuple[Array, Array]:
-        """Return times and values, (k,) each, of one line that covers from the smallest to the largest value."""
+        """Return times and values, (k,) each, of one line that covers from the smallest to the largest value.
+
+        The two follow one another as the line rises or falls, a quarter of the way to the neighbours: one above the
+        other they would make a staircase of a slope.
+        """
         both = self.low != self.high  # true where both are NaN, too: such a point is needed once
         both &= np.isfinite(self.low)
-        times = np.repeat(self.t, 1 + both)
-        values = np.repeat(self.low, 1 + both)
-        values[np.flatnonzero(both) + np.cumsum(both)[both]] = self.high[both]
+        middle = 0.5 * (self.low + self.high)
+        falls = np.zeros(middle.size, dtype=bool)
+        falls[1:-1] = middle[2:] < middle[:-2]
+        falls[:1], falls[-1:] = middle[1:2] < middle[:1], middle[-1:] < middle[-2:-1]
+        step = np.diff(self.t)
+        aside = 0.25 * np.minimum(np.append(step, step[-1:]), np.append(step[:1], step)) if step.size else 0.0 * self.t
+        second = np.flatnonzero(both) + np.cumsum(both)[both]
+        times, values = np.repeat(self.t, 1 + both), np.repeat(np.where(falls, self.high, self.low), 1 + both)
+        values[second] = np.where(falls, self.low, self.high)[both]
+        times[second] += aside[both]
+        times[second - 1] -= aside[both]
         return times, values
 
 

@@ -32,7 +32,7 @@ class CandidateView:
 
     def __init__(self, desk: Desk, panels: PanelView) -> None:
         self._desk, self._panels = desk, panels
-        self._looked_at = ""
+        self._looked_at = self._pinned = ""
         self._drawn: tuple[object, bool] | None = None
         ui.html("Candidates", tag="h2", sanitize=False)
         self._list = ui.column().classes("w-full gap-0")
@@ -48,6 +48,7 @@ class CandidateView:
         if state == self._drawn:
             return
         self._drawn = state
+        self._pin("")
         self._list.clear()
         self._list.classes(**({"add": "studio-long"} if self._desk.guessing else {"remove": "studio-long"}))
         with self._list:
@@ -67,7 +68,8 @@ class CandidateView:
                 self._candidate(item, diagnosis)
             if shown[FIRST:]:
                 words = quantity.counted(len(shown) - FIRST, "more candidate")
-                with ui.expansion(words).classes("w-full").props("dense"):
+                # A box of its own keeps the card beneath within sight.
+                with ui.expansion(words).classes("w-full").props("dense"), ui.column().classes("gap-0 studio-long"):
                     for item in shown[FIRST:]:
                         self._candidate(item, diagnosis)
 
@@ -81,18 +83,19 @@ class CandidateView:
             .props(attribute("data-mark", f"candidate-{effect}"))
         )
         row.on("mouseenter", lambda: self.look_at(effect))
-        row.on("mouseleave", lambda: self.look_at(""))
+        row.on("mouseleave", lambda: self.look_at(self._pinned))
         with row:
             with ui.element("div").classes("studio-row"):
                 name = ui.label(printable(effect, NAME)).classes("studio-id cursor-pointer")
                 name.props("tabindex=0 role=button")
                 for event in ("click", "keydown.enter"):
-                    name.on(event, lambda: self.look_at("" if self._looked_at == effect else effect))
+                    name.on(event, lambda: self._pin("" if self._pinned == effect else effect))
 
                 async def add() -> None:
                     session = desk.session
-                    if session is not None:
-                        self.look_at("")
+                    # The second click of a double click finds the effect added.
+                    if session is not None and effect not in session.stack.effects:
+                        self._pin("")
                         await desk.attempt(lambda: session.add(effect))
 
                 ui.button("Add", on_click=add).props("dense size=sm" + ("" if named else " outline")).props(
@@ -106,6 +109,11 @@ class CandidateView:
             if named and item.confounded_with:
                 rivals = ", ".join(str(rival) for rival in item.confounded_with[:2])
                 ui.label(f"Rivals, with correlation: {printable(rivals)}").classes("studio-muted")
+
+    def _pin(self, effect: str) -> None:
+        """Keep the card of an effect until another one is kept; a finger has no place to rest."""
+        self._pinned = effect
+        self.look_at(effect)
 
     def look_at(self, effect: str) -> None:
         """Show the card of an effect, and what it would explain; empty puts both away.

@@ -71,7 +71,9 @@ class FallView:
         if figure != self._chart.figure:
             self._chart.update_figure(figure)
         self._floor.set_text(
-            "" if made is None or made.diagnosis is None else _floor_words(session, made.diagnosis.noise)
+            ""
+            if made is None or made.diagnosis is None
+            else _floor_words(session, made.diagnosis.noise, self._desk.channel)
         )
         self._keep.set_text("Put the second model away" if session.second is not None else "Keep as second model")
 
@@ -83,10 +85,12 @@ class FallView:
         await self._desk.update()
 
 
-def _floor_words(session: Session, noise: tuple[NoisePart, ...]) -> str:
-    """Say which parts make the noise floor of the worst channel."""
+def _floor_words(session: Session, noise: tuple[NoisePart, ...], chosen: str | None) -> str:
+    """Say which parts make the noise floor of the channel that is looked at, or of the worst one."""
     made = session.made(session.steps[0].stack)
-    channel = None if made is None or made.comparison is None else worst_channel(made.comparison)
+    if made is None or made.comparison is None:
+        made = session.made()  # a session that was reopened begins with its last step
+    channel = chosen or (None if made is None or made.comparison is None else worst_channel(made.comparison))
     # A missing effect passes for slow noise: parts above the white one wait for the effect.
     parts = [part for part in noise if part.channel == channel and SMALL <= part.share <= 1.0]
     parts.sort(key=lambda part: -part.share)

@@ -97,7 +97,9 @@ class Head:
         text = as_python(desk.files, made.way) if form == "Python" else as_shell(desk.files, made.way)
         with ui.dialog() as dialog, ui.card().style("max-width: 92vw"):
             ui.label(f"The present model as {form}").classes("studio-id")
-            ui.label("The text lies in the clipboard. Run it in the folder of the log.").classes("studio-muted")
+            folder = "Copied. Run it in the folder of the log"
+            first = ": save the log there first." if desk.game_log() is not None else "."
+            ui.label(folder + first).classes("studio-muted")
             ui.label(text).classes("studio-copy").props("data-mark=copied")
             with ui.row():
                 if desk.game_log() is not None:

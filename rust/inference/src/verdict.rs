@@ -261,7 +261,11 @@ pub fn decide(
     // it is looked for in all effects. What differs in several sensors differs in each of them.
     let of_one = |slot: &&usize| members.contains(slot) || problem.slots[**slot].effect.sensors().len() == 1;
     let everything = model.iter().chain(candidates).copied().collect();
-    let asked: Vec<usize> = if unexplained.is_empty() { everything } else { members.clone() };
+    let asked: Vec<usize> = if unexplained.is_empty() {
+        everything
+    } else {
+        members.clone()
+    };
     let varying: Vec<(usize, f64)> = (asked.par_iter().filter(of_one))
         .map(|slot| (*slot, search.varying(&stack, &members, *slot).varies))
         .filter(|(_, ln)| *ln >= threshold)

@@ -31,6 +31,8 @@ WINDOWS: Final = (5, 10, 20, 60)
 """Lengths of the traces, s."""
 EMULATED: Final = "emulate "
 """Begin of the entries of the list of devices that are emulated."""
+RECORDS: Final = "The red button records what comes from now on."
+GUIDES: Final = "Six sides on a table, then free rotation."
 FRAMES: Final = {"NED": "NED: lies z down", "NWU": "NWU: lies z up", "ENU": "ENU: lies z up, yaw from east"}
 """Frames by name, with the way a level device lies."""
 
@@ -86,6 +88,11 @@ def devices() -> list[str]:
     return [*sorted(found.device for found in list_ports.comports()), *(EMULATED + name for name in SCENARIOS)]
 
 
+def _entry(source: Source) -> str:
+    """Return the entry of the list of devices that a source was chosen by."""
+    return EMULATED + source.scenario if source.scenario else source.port
+
+
 class _LivePage:
     """The elements of one browser's page."""
 
@@ -119,11 +126,12 @@ class _LivePage:
     def _connection(self) -> None:
         with ui.column().classes("studio-region gap-2"):
             with ui.row().classes("w-full items-end gap-3"):
-                choices = devices()
+                held = None if _device.listening is None else _entry(_device.listening.source)
+                choices = list(dict.fromkeys([*devices(), *filter(None, [held])]))
                 self._choice = (
                     ui.select(
                         choices,
-                        value=choices[0],
+                        value=held or choices[0],
                         label="device",
                         with_input=True,
                         new_value_mode="add-unique",
@@ -164,7 +172,7 @@ class _LivePage:
                 self._red.props('round color=red-8 aria-label="record" data-testid="record"')
                 self._file = ui.input("log to record", value=str(free_name(Path.cwd(), "recording").name))
                 self._file.classes("grow").props('data-testid="file"')
-            self._recorded = ui.label("The red button records what comes from now on.").classes("text-sm")
+            self._recorded = ui.label(RECORDS).classes("text-sm")
             self._recorded.props('data-testid="recorded"')
             self._look = ui.button("Open in the studio", on_click=self._look_at).props("outline size=sm")
             self._look.props('data-testid="look"').visible = False
@@ -173,7 +181,7 @@ class _LivePage:
         with ui.column().classes("studio-region gap-2"):
             with ui.row().classes("w-full items-center no-wrap gap-3"):
                 self._start = ui.button("Calibrate", on_click=self._calibrate_or_stop).props("outline")
-                self._message = ui.label("Six sides on a table, then free rotation.").classes("text-sm font-medium")
+                self._message = ui.label(GUIDES).classes("text-sm font-medium")
             self._progress = ui.linear_progress(0.0, show_value=False).props("rounded")
             self._progress.visible = False
             with ui.row().classes("gap-1") as self._sides:
@@ -192,8 +200,13 @@ class _LivePage:
                     {seconds: f"{seconds} s" for seconds in WINDOWS}, value=self._seconds, on_change=self._longer
                 ).props('dense options-dense aria-label="length of the traces"')
             self._panels = ui.column().classes("w-full gap-0")
-            with self._panels:
-                ui.label("Connect a device to see its readings.").classes("text-sm")
+            self._ask_for_rows("Connect a device to see its readings.")
+
+    def _ask_for_rows(self, words: str) -> None:
+        """Say in the place of the panels why there are none."""
+        self._panels.clear()
+        with self._panels:
+            ui.label(words).classes("text-sm")
 
     # --- what a person does
 
@@ -205,6 +218,10 @@ class _LivePage:
         try:
             await _device.connect(self._source())
             self._problem.text = ""
+            self._recorded.text = RECORDS
+            self._message.text = GUIDES
+            if not self._plots:
+                self._ask_for_rows("The readings stand here once the device sends some.")
         except InputError as error:
             self._problem.text = printable(str(error))
         finally:
@@ -345,7 +362,7 @@ class _LivePage:
             if listening is not None and listening.calibrated:
                 self._show_result(listening.calibrated)
             elif self._message.text.startswith("Turn") or listening is None:
-                self._message.text = "Six sides on a table, then free rotation."
+                self._message.text = GUIDES
             return
         self._message.text = stage.message
         self._progress.value = stage.progress
