@@ -114,9 +114,8 @@ def _missing(found: Diagnosis, best: Candidate | None) -> str:
     if found.verdict == "unknown" or best is None:
         text = "Something is missing"
         text += f" that no effect of the catalogue explains: {left}." if left else "."
-        doubtful = next((candidate for candidate in found.candidates if candidate.status in DOUBTS), None)
-        if doubtful is not None and not left and best is None:
-            text += f" {doubtful.effect} comes nearest, but {DOUBTS[doubtful.status]}."
+        if not left and best is None:
+            text += _nearest(found)
         return text if best is None else f"{text} {best.effect} would explain a part of it, but not most."
     if found.verdict == "ambiguous":
         rivals = " or ".join(found.ambiguous_with)
@@ -126,6 +125,17 @@ def _missing(found: Diagnosis, best: Candidate | None) -> str:
         )
     text = f"{best.effect} is missing. {best.explanation}"
     return f"{text} Apart from it, {left}." if left else text
+
+
+def _nearest(found: Diagnosis) -> str:
+    """Name the candidate that comes nearest to an explanation, and say why it is none."""
+    doubtful = next((candidate for candidate in found.candidates if candidate.status in DOUBTS), None)
+    if doubtful is not None:
+        return f" {doubtful.effect} comes nearest, but {DOUBTS[doubtful.status]}."
+    seen = next((candidate for candidate in found.candidates if candidate.status == PASSED), None)
+    if seen is None:
+        return ""
+    return f" {seen.effect} has evidence, but does not lower the held-out error: the noise may be another one."
 
 
 def spoilt(faults: Sequence[DataFault]) -> str:

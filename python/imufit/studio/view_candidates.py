@@ -56,9 +56,9 @@ class CandidateView:
                 ui.label("The candidates stand here once they are judged.").classes("studio-muted")
                 return
             shown = [item for item in diagnosis.candidates if item.status != NOT_TESTABLE]
+            if shown:
+                ui.label("Point at an effect, or tap its name, to see what it would explain.").classes("studio-muted")
             if self._desk.guessing:
-                words = "Point at an effect, or tap its name, to see what the effect would explain."
-                ui.label(words).classes("studio-muted")
                 for item in sorted(shown, key=lambda item: item.effect):
                     self._candidate(item, None)
                 return

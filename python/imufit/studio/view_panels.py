@@ -58,6 +58,7 @@ class PanelView:
                 self._panel.props("data-mark=panel")
                 self._spectrum = ui.plotly(charts.empty("")).classes("studio-chart").props("data-mark=spectrum")
             with ui.element("div").classes("studio-chart studio-wide"):
+                ui.label("Drag over a figure to zoom, double-click to see all of it.").classes("studio-muted")
                 # The choice stands over the one figure that it changes.
                 self._trace_kind = ui.toggle(
                     {RESIDUAL: "residual", READING: "reading"}, value=RESIDUAL, on_change=self._other_kind

@@ -82,10 +82,12 @@ def page_with(opener: Opener) -> Callable[[], None]:
 
 
 def devices() -> list[str]:
-    """Return the serial ports of this computer, and the devices that can be emulated."""
+    """Return the serial ports with something on them, the devices that can be emulated, and the other ports."""
     from serial.tools import list_ports  # noqa: PLC0415 - only this page needs it
 
-    return [*sorted(found.device for found in list_ports.comports()), *(EMULATED + name for name in SCENARIOS)]
+    ports = sorted(list_ports.comports(), key=lambda port: port.device)
+    used = [port.device for port in ports if port.hwid != "n/a"]
+    return list(dict.fromkeys([*used, *(EMULATED + name for name in SCENARIOS), *(port.device for port in ports)]))
 
 
 def _entry(source: Source) -> str:
