@@ -34,6 +34,8 @@ VERDICTS = {
 
 PASSED = "passed"
 """Status of an effect that is there, or explains as much as one that is."""
+NOT_SIGNIFICANT = "not significant"
+"""Status of an effect that the log shows not to be there, or does not need beside others."""
 NEXT = 5
 """Candidates behind those that stand out that are shown with them: the answer stays on a screen of 24 lines."""
 NOT_TESTABLE = "not testable here"

@@ -10,13 +10,36 @@ from imufit.figures import quantity
 from imufit.model.catalogue import card_of, find_effect
 from imufit.printable import NAME, printable
 from imufit.results import Candidate, Diagnosis
-from imufit.results.diagnosis import NOT_TESTABLE, PASSED
+from imufit.results.diagnosis import NOT_SIGNIFICANT, NOT_TESTABLE, PASSED
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.view_panels import PanelView
 
 FIRST: Final = 5
 """Candidates that are shown at once: the best and its rivals; the others fold away."""
+
+
+LOWERS: Final = 0.99
+"""Held-out error with a candidate over that without from which on the candidate lowers it for the eye."""
+
+
+def _named(diagnosis: Diagnosis) -> tuple[str | None, ...]:
+    """Return the effect that is missing, and its rivals."""
+    return diagnosis.best, *diagnosis.ambiguous_with
+
+
+def _rank(item: Candidate, diagnosis: Diagnosis) -> tuple[bool, bool, float]:
+    """Return what candidates are sorted by: those that are named, then by the probability that stands beside them."""
+    return item.effect not in _named(diagnosis), item.status != PASSED, -item.probability
+
+
+def _why_not(item: Candidate, diagnosis: Diagnosis) -> list[str]:
+    """Return in words why a candidate is not there, where it is not."""
+    if item.status == PASSED:
+        return []
+    best = diagnosis.best
+    outdone = item.status == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
+    return [f"needless beside {printable(best, NAME)}" if outdone and best is not None else item.status]
 
 
 class CandidateView:
@@ -64,6 +87,7 @@ class CandidateView:
                 return
             if not shown:
                 ui.label("No effect was judged on these data.").classes("studio-muted")
+            shown.sort(key=lambda item: _rank(item, diagnosis))
             for item in shown[:FIRST]:
                 self._candidate(item, diagnosis)
             if shown[FIRST:]:
@@ -76,7 +100,7 @@ class CandidateView:
     def _candidate(self, item: Candidate, diagnosis: Diagnosis | None) -> None:
         """Show one candidate; without a diagnosis the evidence stays hidden, as in a game."""
         desk, effect = self._desk, item.effect
-        named = diagnosis is not None and effect in (diagnosis.best, *diagnosis.ambiguous_with)
+        named = diagnosis is not None and effect in _named(diagnosis)
         row = (
             ui.element("div")
             .classes("studio-item" + (" studio-best" if named else ""))
@@ -94,9 +118,11 @@ class CandidateView:
                 async def add() -> None:
                     session = desk.session
                     # The second click of a double click finds the effect added.
-                    if session is not None and effect not in session.stack.effects:
-                        self._pin("")
-                        await desk.attempt(lambda: session.add(effect))
+                    if session is None or effect in session.stack.model.effects:
+                        return
+                    self._pin("")
+                    off = effect in session.stack.effects
+                    await desk.attempt(lambda: session.switch(effect, True) if off else session.add(effect))
 
                 ui.button("Add", on_click=add).props("dense size=sm" + ("" if named else " outline")).props(
                     attribute("data-mark", f"add-{effect}")
@@ -105,7 +131,7 @@ class CandidateView:
                 return
             drop = f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}"
             words = f"{quantity.probability(item.probability)} probable{diagnosis.shared(item)}, error {drop}"
-            ui.label(words if item.status == PASSED else f"{words}, {item.status}").classes("studio-muted")
+            ui.label(", ".join([words, *_why_not(item, diagnosis)])).classes("studio-muted")
             if named and item.confounded_with:
                 rivals = ", ".join(str(rival) for rival in item.confounded_with[:2])
                 ui.label(f"Rivals, with correlation: {printable(rivals)}").classes("studio-muted")

@@ -39,7 +39,7 @@ class FallView:
             )
             self._keep = ui.button("Keep as second model", icon="splitscreen", on_click=self._keep_second)
             self._keep.props("flat dense size=sm").props("data-mark=second")
-        self._chart = ui.plotly(charts.empty("The error stands here once a log is open.")).classes("studio-chart")
+        self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
         self._floor = ui.label("").classes("studio-muted").props("data-mark=floor")
 
@@ -51,7 +51,7 @@ class FallView:
         self._redo.set_enabled(session is not None and begun and session.can_redo)
         self._keep.set_enabled(begun)
         if session is None or not begun:
-            self._chart.update_figure(charts.empty("The error stands here once the evidence is there."))
+            self._chart.update_figure(charts.empty("Waiting for the evidence."))
             self._floor.set_text("")
             return
         numbers = [session.numbers(step.stack) for step in session.steps]

@@ -372,7 +372,8 @@ def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
 def _icon(icon: str, words: str, action: Callable[[], object] | None) -> ui.button:
     button = ui.button(icon=icon, on_click=action).props(f'flat dense round aria-label="{words}"')
     with button:
-        ui.tooltip(words)
+        # Beside the button: beneath it the words would cover its menu.
+        ui.tooltip(words).props('anchor="center left" self="center right"')
     return button
 
 
