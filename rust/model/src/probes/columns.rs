@@ -221,7 +221,7 @@ pub(super) fn fill(kind: &Kind, sensor: Sensor, rows: &Rows, out: &mut Columns) 
             }
         }
         Kind::Speed => {
-            let speeds: Vec<f64> = velocities(rows).iter().map(|v| v.norm()).collect();
+            let speeds: Vec<f64> = velocities(rows).iter().map(Vector3::norm).collect();
             for axis in 0..3 {
                 out.set(axis, axis, speeds.iter().copied());
                 out.set(3 + axis, axis, speeds.iter().map(|v| v * v));
