@@ -56,8 +56,10 @@ def test_a_problem_meanwhile_does_not_stop_the_work(log):
 
     async def twice() -> None:
         await desk.open([log])
-        add = lambda: desk.session.add("acc.bias")  # noqa: E731
         await asyncio.gather(desk.attempt(add), desk.attempt(add))
+
+    def add() -> None:
+        desk.session.add("acc.bias")
 
     desk = Desk()
     asyncio.run(twice())

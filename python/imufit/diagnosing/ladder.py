@@ -118,9 +118,9 @@ class Climb:
                 futile.add(effect)
                 continue
             futile.clear()
-            alike = (self.diagnosis.best, *self.diagnosis.ambiguous_with)
+            alike = self.diagnosis.named
             if effect in alike and len(alike) > 1:
-                self.tied[effect] = tuple(other for other in alike if other is not None and other != effect)
+                self.tied[effect] = tuple(other for other in alike if other != effect)
             self._take(addition)
             self.diagnosis = self._diagnose()
 

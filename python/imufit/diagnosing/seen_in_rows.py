@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from imufit import _imufit
 from imufit.diagnosing.fast_changes import Seen
 from imufit.diagnosing.shaking import is_shaken
 from imufit.fitting.analysis import Analysis
@@ -56,12 +55,9 @@ def _above_stated_noise(evidence: LogEvidence) -> dict[int, float]:
     The noise of the reference counts as stated: no other rule uses it.
     """
     found: dict[int, float] = {}
-    if not evidence.surveyed.log.metadata.noise:
-        return found
-    _, _, loudness = _imufit.saturate(evidence.raw)
     for index, channel in enumerate(CHANNELS):
         stated = evidence.surveyed.log.metadata.noise.get(channel[:3])
-        variance = evidence.raw_variance[index] * np.quantile(loudness[index], QUIET)
+        variance = evidence.raw_variance[index] * np.quantile(evidence.raw_loudness[index], QUIET)
         if not stated or not np.isfinite(variance):
             continue
         step = evidence.facts.steps[index // 3][index % 3]

@@ -71,16 +71,16 @@ def telegraph_noise(t: Array, residual: Array) -> TelegraphNoise | None:
     return next((found for found in tried if found is not None), None)
 
 
-def _stay(means: Array, peaks: list[int], up: NDArray[np.bool_], size: float) -> bool:
+def _stay(means: Array, peaks: list[int], upper: NDArray[np.bool_], size: float) -> bool:
     """Return whether means stay on two levels between jumps at these places, away from the jumps themselves.
 
-    After a jump up they are on the upper level; before the first one on the level that it leaves.
+    `upper` states for each stay, those before the first and after the last jump too, whether it is on the upper level.
     """
     number = np.arange(len(means))
     middles = np.asarray(peaks) + 1
     away = np.min(np.abs(number[:, None] - middles), axis=1) > 1
-    upper = np.concatenate([[not up[0]], up])[np.searchsorted(middles, number)]
-    levels = [means[away & side] for side in (upper, ~upper)]
+    high = upper[np.searchsorted(middles, number)]
+    levels = [means[away & side] for side in (high, ~high)]
     if min(map(len, levels)) < FEWEST:
         return False
     apart = abs(float(levels[0].mean() - levels[1].mean()))
@@ -108,9 +108,11 @@ def _jumps(t: Array, residual: Array, rows: int) -> TelegraphNoise | None:
     alike = float(np.median(np.abs(np.abs(sizes) - middle))) < 0.5 * ALIKE * middle
     if not (in_turn and alike):
         return None
-    if not _stay(means, peaks, sizes > 0.0, middle):
+    # After a jump up the residual is on the upper level; before the first one on the level that it leaves.
+    upper = np.concatenate([[sizes[0] < 0.0], sizes > 0.0])
+    if not _stay(means, peaks, upper, middle):
         return None
     at = t[[(k + 1) * rows for k in peaks]]
     stays = np.diff(np.concatenate([[t[0]], at, [t[-1]]]))
-    share = float(np.sum(stays[np.concatenate([[sizes[0] < 0.0], sizes > 0.0])]) / np.sum(stays))
+    share = float(np.sum(stays[upper]) / np.sum(stays))
     return TelegraphNoise(middle, float(at[0]), len(peaks), min(share, 1.0 - share))

@@ -41,8 +41,8 @@ class LogEvidence:
         As it stands, and whitened.
     raw_variance, variance : list of float
         Of the residual of each channel that no effect explains, as it stands and whitened.
-    loudness : list of list of float
-        (channels, blocks) variance of each block over that of its channel, whitened.
+    raw_loudness, loudness : list of list of float
+        (channels, blocks) variance of each block over that of its channel, as it stands and whitened.
     floors : list of float
         Noise floor of each channel.
     filters : list of list of float
@@ -57,6 +57,7 @@ class LogEvidence:
     white: _imufit.Evidence
     raw_variance: list[float]
     variance: list[float]
+    raw_loudness: list[list[float]]
     loudness: list[list[float]]
     floors: list[float]
     filters: list[list[float]]
@@ -108,14 +109,14 @@ class LogEvidence:
             floors = [float(np.sqrt(v)) for v in noise]
             _check_samples(surveyed.log, fitted, noise)
             even = [[1.0] * passes.blocks for _ in CHANNELS]
-            return cls(surveyed, slots, raw, raw, noise, noise, even, floors, [[] for _ in CHANNELS], faults)
+            return cls(surveyed, slots, raw, raw, noise, noise, even, even, floors, [[] for _ in CHANNELS], faults)
         _check_samples(surveyed.log, fitted, raw_variance)
         if not any(fault.spoils for fault in faults):
             effects = [slot for slot in slots if slot not in surveyed.probes]
             faults = (*faults, *knock_faults(raw, raw_variance, _places(surveyed, effects), facts))
         floors = _floors(surveyed.log, facts, raw_variance)
         filters: list[list[float]] = [[] for _ in CHANNELS]
-        plain = cls(surveyed, slots, raw, raw, raw_variance, raw_variance, loudness, floors, filters, faults)
+        plain = cls(surveyed, slots, raw, raw, raw_variance, raw_variance, loudness, loudness, floors, filters, faults)
         return plain._whitened(step)
 
     def with_noise_after(self, step: Array) -> LogEvidence:

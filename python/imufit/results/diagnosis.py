@@ -273,6 +273,11 @@ class Diagnosis(Plotted, Result):
         """The candidate named by `best`."""
         return next((item for item in self.candidates if item.effect == self.best), None)
 
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The effect named by `best`, and those that explain the log as well; empty where none is named."""
+        return tuple(effect for effect in (self.best, *self.ambiguous_with) if effect is not None)
+
     def to_dict(self) -> dict[str, Any]:
         """JSON of `diagnose`; model, experiment, sentence, notes, faults of the data and evidence besides."""
         return {
@@ -377,12 +382,12 @@ class Diagnosis(Plotted, Result):
         item : Candidate
             One of the candidates.
         """
-        alike = (self.best, *self.ambiguous_with) if self.verdict == "ambiguous" else ()
-        rivals = [str(name) for name in alike if name not in (None, item.effect)]
+        alike = self.named if self.verdict == "ambiguous" else ()
+        rivals = [name for name in alike if name != item.effect]
         return f", shared with {' and '.join(rivals)}" if item.effect in alike and rivals else ""
 
     def _stands_out(self, item: Candidate) -> bool:
-        return item.status == PASSED or item.effect in (self.best, *self.ambiguous_with)
+        return item.status == PASSED or item.effect in self.named
 
     def unexplained_table(self) -> Table:
         """Dependences without a named cause."""

@@ -164,7 +164,7 @@ class Mystery:
         truth = unseal(self.log)
         hidden_effects = tuple(truth.effects)
         right = answer in hidden_effects if hidden_effects else answer == NOTHING
-        alike = (first.best, *first.ambiguous_with) if first.verdict == "ambiguous" else ()
+        alike = first.named if first.verdict == "ambiguous" else ()
         rival = not right and answer in alike and not set(hidden_effects).isdisjoint(alike)
         self.verdict = Verdict(
             right,
@@ -218,6 +218,5 @@ def _sureness(first: Diagnosis) -> str:
     if first.verdict == "missing" and best >= SURE:
         return "You could have been sure: one effect stands out."
     if first.verdict == "ambiguous":
-        alike = ", ".join(str(name) for name in (first.best, *first.ambiguous_with) if name)
-        return f"You could not have been sure: {alike} explain this log equally well."
+        return f"You could not have been sure: {', '.join(first.named)} explain this log equally well."
     return "You could not have been sure: the evidence names no single effect."

@@ -18,28 +18,23 @@ from imufit.studio.view_panels import PanelView
 FIRST: Final = 5
 """Candidates that are shown at once: the best and its rivals; the others fold away."""
 
-
 LOWERS: Final = 0.99
 """Held-out error with a candidate over that without from which on the candidate lowers it for the eye."""
 
 
-def _named(diagnosis: Diagnosis) -> tuple[str | None, ...]:
-    """Return the effect that is missing, and its rivals."""
-    return diagnosis.best, *diagnosis.ambiguous_with
-
-
 def _rank(item: Candidate, diagnosis: Diagnosis) -> tuple[bool, bool, float]:
     """Return what candidates are sorted by: those that are named, then by the probability that stands beside them."""
-    return item.effect not in _named(diagnosis), item.status != PASSED, -item.probability
+    return item.effect not in diagnosis.named, item.status != PASSED, -item.probability
 
 
-def _why_not(item: Candidate, diagnosis: Diagnosis) -> list[str]:
-    """Return in words why a candidate is not there, where it is not."""
+def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
+    """Return in words why a candidate is not there; empty where it is."""
     if item.status == PASSED:
-        return []
-    best = diagnosis.best
+        return ""
     outdone = item.status == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
-    return [f"needless beside {printable(best, NAME)}" if outdone and best is not None else item.status]
+    if outdone and diagnosis.best is not None:
+        return f", needless beside {printable(diagnosis.best, NAME)}"
+    return f", {item.status}"
 
 
 class CandidateView:
@@ -100,7 +95,7 @@ class CandidateView:
     def _candidate(self, item: Candidate, diagnosis: Diagnosis | None) -> None:
         """Show one candidate; without a diagnosis the evidence stays hidden, as in a game."""
         desk, effect = self._desk, item.effect
-        named = diagnosis is not None and effect in _named(diagnosis)
+        named = diagnosis is not None and effect in diagnosis.named
         row = (
             ui.element("div")
             .classes("studio-item" + (" studio-best" if named else ""))
@@ -131,7 +126,7 @@ class CandidateView:
                 return
             drop = f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}"
             words = f"{quantity.probability(item.probability)} probable{diagnosis.shared(item)}, error {drop}"
-            ui.label(", ".join([words, *_why_not(item, diagnosis)])).classes("studio-muted")
+            ui.label(words + _why_not(item, diagnosis)).classes("studio-muted")
             if named and item.confounded_with:
                 rivals = ", ".join(str(rival) for rival in item.confounded_with[:2])
                 ui.label(f"Rivals, with correlation: {printable(rivals)}").classes("studio-muted")

@@ -257,8 +257,8 @@ pub fn decide(
     let instead: Vec<Shown> = (inquiry.unnamed.iter().zip(&before))
         .map(|(unnamed, ln)| cause(unnamed, *ln))
         .collect();
-    // A coefficient that drifts or switches has a cause without a name, too, be its effect there or not: where nothing more definite is left,
-    // it is looked for in all effects. What differs in several sensors differs in each of them.
+    // A coefficient that drifts or switches has a cause without a name, too, be its effect there or not. All effects are asked where nothing
+    // more definite is left; those of one sensor suffice, since each sensor shows on its own what drifts in several.
     let of_one = |slot: &&usize| members.contains(slot) || problem.slots[**slot].effect.sensors().len() == 1;
     let everything = model.iter().chain(candidates).copied().collect();
     let asked: Vec<usize> = if unexplained.is_empty() {

@@ -173,7 +173,7 @@ def points_of(seed: int, realistic: bool, sizes: Sequence[float]) -> list[PowerP
         simulation = simulate(setting.scenario, {effect: parameters}, simulation_seed, **options)
         diagnosis = SensorModel().fit(simulation.to_log()).diagnose()
         named = diagnosis.verdict in ("missing", "ambiguous")
-        among = named and effect in (diagnosis.best, *diagnosis.ambiguous_with)
+        among = named and effect in diagnosis.named
         alone = diagnosis.verdict == "missing" and diagnosis.best == effect
         found.append(PowerPoint(seed, realistic, size, effect, alone, among and not alone, named and not among))
     return found

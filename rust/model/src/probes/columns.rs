@@ -6,6 +6,7 @@ use crate::effects::lever_arm::accelerations_of_levers;
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
 use crate::temperature_course::PASTS;
+use crate::triple::Triple;
 use nalgebra::Vector3;
 
 /// Legendre polynomials in which a gain may go with time.
@@ -64,6 +65,15 @@ fn deviation(rows: &Rows, quantity: Quantity) -> Option<Vec<f64>> {
         Quantity::Column(c) => {
             let mean = rows.facts.covariate_means.get(c)?;
             Some(rows.covariates.get(c)?.iter().map(|v| v - mean).collect())
+        }
+    }
+}
+
+/// Columns of a vector of which every axis sees every component.
+fn fill_all(vector: &Triple, out: &mut Columns) {
+    for other in 0..3 {
+        for axis in 0..3 {
+            out.set(3 * other + axis, axis, vector.axis(other).iter().copied());
         }
     }
 }
@@ -162,14 +172,7 @@ pub(super) fn fill(kind: &Kind, sensor: Sensor, rows: &Rows, out: &mut Columns) 
                 out.set(3 + axis, axis, rates.iter().map(|w| w * w));
             }
         }
-        Kind::Other(u) => {
-            let vector = u.of(rows);
-            for other in 0..3 {
-                for axis in 0..3 {
-                    out.set(3 * other + axis, axis, vector.axis(other).iter().copied());
-                }
-            }
-        }
+        Kind::Other(u) => fill_all(u.of(rows), out),
         Kind::OwnLevers => {
             for row in 0..rows.len() {
                 for (k, a) in accelerations_of_levers(rows, row).into_iter().enumerate() {
@@ -228,22 +231,14 @@ pub(super) fn fill(kind: &Kind, sensor: Sensor, rows: &Rows, out: &mut Columns) 
             }
         }
         Kind::Velocity => {
-            let velocities = velocities(rows).into_iter().enumerate();
-            for (row, velocity) in velocities {
-                let body = rows.attitude(row).inverse_transform_vector(&velocity);
+            for (row, velocity) in velocities(rows).iter().enumerate() {
+                let body = rows.attitude(row).inverse_transform_vector(velocity);
                 for axis in 0..3 {
                     out.column(axis, axis)[row] = body[axis];
                 }
             }
         }
-        Kind::Changes => {
-            let rate = rows.ideal.rate(sensor);
-            for other in 0..3 {
-                for axis in 0..3 {
-                    out.set(3 * other + axis, axis, rate.axis(other).iter().copied());
-                }
-            }
-        }
+        Kind::Changes => fill_all(rows.ideal.rate(sensor), out),
         Kind::Cross(u, v) => {
             let (first, second) = (u.of(rows), v.of(rows));
             for (k, (i, j)) in pairs(*u, *v).enumerate() {
