@@ -7,6 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pq
 import pytest
 from imufit.errors import InputError
 from imufit.log import Log, open_log, read
@@ -230,10 +233,23 @@ def test_no_sensor(tmp_path: Path) -> None:
     assert "the file has no sensor" in message(save(df, tmp_path / "a.parquet"))
 
 
-def test_column_that_is_there_twice(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text("t,mag_x,mag_y,mag_z,mag_x\n0,1,2,3,4\n")
-    assert message(path) == "a.csv: column mag_x is there twice. Rename or delete one of them."
+def twice(path: Path, name: str, value: object) -> Path:
+    """Save a log with two columns of the same name, as pandas does not let one."""
+    df = frame().assign(first=value, second=value)
+    table = pa.Table.from_pandas(df, preserve_index=False).rename_columns([*df.columns[:-2], name, name])
+    if path.suffix == ".parquet":
+        pq.write_table(table, path)
+    else:
+        pa_csv.write_csv(table, path)
+    return path
+
+
+@pytest.mark.parametrize("value", [1.0, True, "text"])
+@pytest.mark.parametrize("name", ["acc_z", "note"])
+@pytest.mark.parametrize("kind", [".csv", ".parquet"])
+def test_column_that_is_there_twice(tmp_path: Path, kind: str, name: str, value: object) -> None:
+    path = twice(tmp_path / f"a{kind}", name, value)
+    assert message(path) == f"a{kind}: column {name} is there twice. Rename or delete one of them."
 
 
 def test_empty_file(tmp_path: Path, suffix: str) -> None:

@@ -103,6 +103,11 @@ def parquet(metadata: bytes, name: str = "acc_x") -> Callable[[SeedFiles], Files
 
 
 KEPT: dict[str, Kept] = {
+    "csv_note_twice": Kept(
+        "a table with two columns of the same name has no column of that name",
+        CONVERT,
+        own("log.csv", b"t,acc_x,acc_y,acc_z,note,note\n0,0,0,9.8,True,True\n1,0,0,9.8,True,\n"),
+    ),
     "npz_encrypted": Kept("zipfile raises a RuntimeError", ("convert", "log.npz", "-o", "out.csv"), zip_flags(6, 1)),
     "npz_method": Kept("zipfile raises NotImplementedError", ("convert", "log.npz", "-o", "out.csv"), zip_flags(8, 99)),
     "npz_open_bracket": Kept(

@@ -18,7 +18,9 @@ from imufit.errors import InputError
 from imufit.log.arrow_numbers import numbers_of
 from imufit.log.check import is_truth, number_from_text
 from imufit.log.csv_layout import NOT_DATA, is_comment, lines_in, read_layout, split_line, text_of, too_long
+from imufit.log.each_once import check_each_once
 from imufit.log.metadata import Metadata
+from imufit.log.place import Place
 from imufit.log.size import LONGEST_LINE
 from imufit.log.text_cells import cells_of
 
@@ -40,6 +42,7 @@ class CsvSource:
         self._path = path
         self._layout = read_layout(path)
         self.names = self._layout.names
+        check_each_once(self.names, Place(path))
         self.notes = (*self._layout.notes, *self._open_end())
         self.clues = (path.name, *self._layout.before, *self.names)
         self._end = self._last_value()

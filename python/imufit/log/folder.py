@@ -122,12 +122,10 @@ def columns_of(source: CsvSource | TranscriptSource) -> dict[str, NDArray[Any]]:
     Raises
     ------
     InputError
-        It is a transcript, or two columns have the same name.
+        It is a transcript.
     """
     if isinstance(source, TranscriptSource):
         raise InputError("a transcript without a table")
-    if len(set(source.names)) < len(source.names):
-        raise InputError("two columns have the same name")
     pieces: dict[str, list[NDArray[Any]]] = {name: [] for name in source.names}
     for _, _, _ in source.scan([]):
         pass

@@ -162,14 +162,9 @@ def plan_columns(
     Raises
     ------
     InputError
-        A column is missing, misspelt, there twice, or mapped from a column that is not there.
+        A column is missing, misspelt, given twice, or mapped from a column that is not there.
     """
     shown = {name: printable(name, NAME) for name in names}
-    for index, name in enumerate(names):
-        if name in names[:index]:
-            raise place.error(
-                f"column {shown[name]} is there twice", column=name, remedy="Rename or delete one of them."
-            )
     resolved = [_resolve(target, text, names, place) for target, text in (mapping or {}).items()]
     mapped = [column for column in resolved if column.target not in dropped]
     for column in mapped:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.errors import InputError
+from imufit.log.each_once import check_each_once
+from imufit.log.place import Place
 from imufit.log.size import BLOCK_ROWS
 
 if TYPE_CHECKING:
@@ -37,10 +38,7 @@ class FrameSource:
         if df.index.name is not None and df.index.name not in df.columns:
             df = df.reset_index()
         self._columns = {str(name): df.iloc[:, place] for place, name in enumerate(df.columns)}
-        if len(self._columns) < df.shape[1]:
-            names = [str(name) for name in df.columns]
-            twice = next(name for name in names if names.count(name) > 1)
-            raise InputError("the table has this column twice", file="log", column=twice, remedy="Rename one of them.")
+        check_each_once([str(name) for name in df.columns], Place())
         self.n = len(df)
         self.names = tuple(self._columns)
         self.notes: tuple[str, ...] = ()

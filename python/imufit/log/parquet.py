@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.arrow_numbers import numbers_of
+from imufit.log.each_once import check_each_once
 from imufit.log.metadata import Metadata, mapping_from_json
+from imufit.log.place import Place
 from imufit.log.size import NUMBER, TEXT_CELL, TEXT_GROUP, rows_at_once, size_in_words
 from imufit.log.text_cells import cells_of
 from imufit.remedy import command
@@ -56,6 +58,7 @@ class ParquetSource:
             ) from None
         except _BROKEN as error:
             raise self._unreadable(error) from None
+        check_each_once(self._schema.names, Place(path))
         truths = [name for name in self._schema.names if pa.types.is_boolean(_value_type(self._schema, name))]
         self.truths: dict[str, tuple[int | None, str]] = dict.fromkeys(truths, (None, ""))
         listed = [name for name in self._schema.names if pa.types.is_nested(_value_type(self._schema, name))]

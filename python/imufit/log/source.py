@@ -32,7 +32,7 @@ class Source(Protocol):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Columns of the file."""
+        """Columns of the file, each once."""
         ...
 
     @property

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.formats import Recording, Table
 from imufit.log.clock import clocks_of
+from imufit.log.each_once import check_each_once
 from imufit.log.makers import Maker, maker_of
+from imufit.log.place import Place
 from imufit.log.size import BLOCK_ROWS, size_in_words
 from imufit.log.words import time_columns, words_of
 from imufit.printable import NAME, printable
@@ -71,6 +73,7 @@ class TablesSource:
                 remedy="Export the time of each sample with it.",
             )
         self.names = (*(("t",) if self._times else ()), *self._columns)
+        check_each_once(self.names, Place(path))
         self._used = sorted({k for k, _ in self._columns.values()})
         self._merge()
         self.notes = (f"{path.name}: {recording.form}", *(note.rstrip(".") for note in recording.notes))

@@ -13,6 +13,7 @@ from imufit.devices.record.ticks import time_column
 from imufit.errors import InputError
 from imufit.log.check import UNIT_TOLERANCE
 from imufit.log.columns import GROUPS
+from imufit.log.each_once import check_each_once
 from imufit.log.foreign import Plan, RowNumber, plan_columns
 from imufit.log.place import Place
 
@@ -43,6 +44,7 @@ class Columns:
         names = [name for k, name in enumerate(announced.columns) if time is None or k != time[0]]
         place = Place()
         try:
+            check_each_once(["t", *names], place)
             self._plan: Plan = plan_columns(["t", *names], mapping, place)
         except InputError as error:
             who = f" {announced.name}" if announced.name else ""
