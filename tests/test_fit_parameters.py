@@ -9,6 +9,7 @@ import imufit
 import numpy as np
 import pytest
 from imufit import InputError, SensorModel, filters
+from imufit.cli.app import main
 
 EFFECTS = ["gyr.bias", "gyr.scale"]
 
@@ -322,3 +323,24 @@ def test_everything_goes_to_another_process_and_back(log, fit):
         again = pool.submit(described, fit).result()[1]
     assert again.covariance.equals(fit.covariance)
     assert np.array_equal(again.residuals("gyr"), fit.residuals("gyr"), equal_nan=True)
+
+
+def test_the_command_line_fixes_a_parameter(capsys, log, tmp_path):
+    log.write(tmp_path / "walk.parquet")
+    call = ["fit", str(tmp_path / "walk.parquet"), "--effects", ",".join(EFFECTS), "-o", str(tmp_path / "model.toml")]
+    assert main([*call, "--fix", "gyr.scale.z=0.02", "--fix", "gyr.bias.x = -1e-3"]) == 0
+    capsys.readouterr()
+    params = SensorModel.load(tmp_path / "model.toml").params
+    assert [key for key, one in params.items() if one.fixed] == ["gyr.bias.x", "gyr.scale.z"]
+    assert (params["gyr.scale.z"].value, params["gyr.bias.x"].value) == (0.02, -1e-3)
+    assert main([*call, "--fix", "gyr.scale.q=0.02"]) == 2
+    assert "unknown parameter of this model 'gyr.scale.q'" in capsys.readouterr().err
+
+
+def test_a_fixed_value_that_the_log_contradicts_is_named(log):
+    model = SensorModel(EFFECTS)
+    fitted = model.fit(log)
+    true = fitted.params["gyr.scale.z"]
+    for away, named in ((1.0, False), (30.0, True)):
+        model.params["gyr.scale.z"].set(true.value + away * true.stderr, vary=False)
+        assert ("gyr.scale.z is fixed at" in model.fit(log).diagnose().sentence) is named

@@ -145,7 +145,10 @@ def test_a_fixed_value_stays_and_is_fitted_again(session):
     x = held.parameters[0]
     assert (x.value, x.fixed, x.standard_error) == (0.5, True, 0.0)
     assert held.ratio > 2.0 * fitted.ratio
+    assert session.diagnose().sentence.startswith("acc.bias.x is fixed at 0.500 m/s², but the data give ")
+    assert session.step.label == "acc.bias.x fixed"
     session.free("acc.bias", "x")
+    assert session.step.label == "acc.bias.x fitted"
     assert session.fit().numbers == fitted
     with pytest.raises(InputError, match="has no parameter q"):
         session.hold("acc.bias", "q", 0.5)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,13 +11,14 @@ import click
 
 from imufit.cli import engine
 from imufit.cli.arguments import json_option, keep_inputs, model_option, model_output, plot_option
-from imufit.cli.names import check_effects, complete_effect
+from imufit.cli.names import check_effects, complete_effect, unknown
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import logs_argument
 
 if TYPE_CHECKING:
     from imufit.log import Reading
+    from imufit.loop import SensorModel
 
 
 @click.command()
@@ -27,6 +30,13 @@ if TYPE_CHECKING:
     shell_complete=complete_effect,
     help="Effects of the model, in any order.",
 )
+@click.option(
+    "--fix",
+    "fixed",
+    multiple=True,
+    metavar="EFFECT.PARAM=VALUE",
+    help="Keep this parameter at this value, in SI units, e.g. gyr.bias.x=0.01. Repeatable.",
+)
 @model_option
 @model_output
 @json_option
@@ -36,6 +46,7 @@ def fit(
     *,
     reading: Reading,
     effects: tuple[str, ...],
+    fixed: tuple[str, ...],
     model: Path | None,
     output: Path | None,
     json_file: Path | None,
@@ -57,9 +68,11 @@ def fit(
     if repeated:
         raise click.UsageError(f"--effects names {repeated[0]} twice")
     check_effects(names)
+    values = _values(fixed)
     out = Output(json_file)
     with ProgressBar() as progress:
         start = engine.sensor_model(names, model)
+        _fix(start, values)
         fitted = start.fit(engine.open_logs(logs, reading), progress=progress)
     found = fitted.to_dict()
     stack = " + ".join(found["model"])
@@ -72,3 +85,28 @@ def fit(
     out.json(found)
     if plot_file is not None:
         out.plot(plot_file, drawn_parameters(fitted.parameters).root)
+
+
+def _values(texts: Sequence[str]) -> dict[str, float]:
+    """Read texts such as ``gyr.bias.x=0.01``."""
+    values: dict[str, float] = {}
+    for text in texts:
+        key, equals, given = (part.strip() for part in text.partition("="))
+        if not (equals and key and given):
+            raise click.UsageError(f"--fix {text!r}: write EFFECT.PARAM=VALUE, such as gyr.bias.x=0.01")
+        try:
+            value = float(given)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise click.UsageError(f"--fix {text!r}: {given!r} is not a number")
+        values[key] = value
+    return values
+
+
+def _fix(model: SensorModel, values: Mapping[str, float]) -> None:
+    """Keep parameters at given values."""
+    for key, value in values.items():
+        if key not in model.params:
+            raise click.UsageError(f"--fix: {unknown('parameter of this model', key, model.params)}")
+        model.params[key].set(value, vary=False)

@@ -16,6 +16,7 @@ from imufit.diagnosing.agreement import answers_without, disagreements
 from imufit.diagnosing.column_noise import column_noise
 from imufit.diagnosing.curved import fitted
 from imufit.diagnosing.fast_changes import fast_changes
+from imufit.diagnosing.fixed_values import contradicted
 from imufit.diagnosing.seen_in_rows import seen_in_rows
 from imufit.fitting.analysis import Analysis, pooled
 from imufit.fitting.rest_passes import NEEDS_REFERENCE
@@ -98,7 +99,7 @@ def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
         noise=noise_budget(analysis),
     )
     words = sentences.answer(found, best, ratio=fit.ratio, untold=len(unshown), spoilt=result.spoilt)
-    return replace(found, sentence=words)
+    return replace(found, sentence=" ".join((*contradicted(fit), words)))
 
 
 def _decided(fit: FittedStack, excluded: Sequence[str]) -> Verdict:

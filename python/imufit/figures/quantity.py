@@ -8,8 +8,8 @@ import re
 _DEGREES = 180.0 / math.pi
 _GRAVITY = 9.80665
 _PARTS = re.compile(r"(?P<head>\([^()]*\)|rad/s\^2|rad/s|m/s\^2|[^/ ()]+)(?:(?:/| per )(?P<tail>.+))?")
-_SHORT = ((1e-4, 1e6, "µs"), (0.1, 1e3, "ms"))
-"""Times below so many seconds are shown in a smaller unit: no zero stands between the point and the first digit."""
+_SHORT = {"s": ((1e-4, 1e6, "µs"), (0.1, 1e3, "ms")), "m": ((0.1, 1e3, "mm"),)}
+"""Times and lengths below so many s or m are shown in a smaller unit: no zero stands before the first digit."""
 _SPELLING = (("^2", "²"), ("^3", "³"), ("degC", "°C"), ("uT", "µT"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"))
 
 
@@ -21,7 +21,7 @@ def shown_unit(unit: str, size: float | None = None) -> tuple[float, str]:
     unit : str
         SI unit as the library keeps it, e.g. ``rad/s`` or ``1``.
     size : float, optional
-        Largest size of the values, in `unit`: a short time is then shown in ms or µs.
+        Largest size of the values, in `unit`: a short time is then shown in ms or µs, a short length in mm.
 
     Returns
     -------
@@ -36,8 +36,8 @@ def shown_unit(unit: str, size: float | None = None) -> tuple[float, str]:
     (1.0, 'm/s²')
     """
     text = unit.strip()
-    if text == "s" and size is not None and math.isfinite(size) and size != 0.0:
-        return next(((factor, short) for below, factor, short in _SHORT if abs(size) < below), (1.0, text))
+    if text in _SHORT and size is not None and math.isfinite(size) and size != 0.0:
+        return next(((factor, short) for below, factor, short in _SHORT[text] if abs(size) < below), (1.0, text))
     if text in ("", "1", "-"):
         return 100.0, "%"
     parts = _PARTS.fullmatch(text)
@@ -53,6 +53,20 @@ def shown_unit(unit: str, size: float | None = None) -> tuple[float, str]:
         if tail == rate:
             factor, tail = factor / _DEGREES**power, rate.replace("rad", "deg")
     return factor, _pretty(f"{shown}/{tail}" if tail else shown)
+
+
+def axis(name: str, unit: str) -> tuple[float, str]:
+    """Return the factor and the title of the axis of a covariate.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    unit : str
+        SI unit; empty for a column of the log whose unit nothing states.
+    """
+    factor, shown = shown_unit(unit) if unit else (1.0, "as recorded")
+    return factor, f"{name}, {shown}"
 
 
 def _pretty(unit: str) -> str:

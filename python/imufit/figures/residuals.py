@@ -119,7 +119,7 @@ def _claim(panel: PanelLike) -> str:
 def _panel(axes: Axes, panel: PanelLike) -> None:
     """Draw one channel against one covariate."""
     y_factor, y_unit = quantity.shown_unit(panel.channel_unit)
-    x_factor, x_unit = (1.0, "") if panel.covariate_unit in ("", "1") else quantity.shown_unit(panel.covariate_unit)
+    x_factor, x_title = quantity.axis(panel.covariate, panel.covariate_unit)
     centre, mean = x_factor * np.asarray(panel.centre), y_factor * np.asarray(panel.mean)
     band = np.nan_to_num(y_factor * np.asarray(panel.band))
     floor = y_factor * panel.noise_floor
@@ -146,5 +146,5 @@ def _panel(axes: Axes, panel: PanelLike) -> None:
         )
     # From the edge of its cell on, where there is room; a height that is given need not be searched for.
     style.title(axes, _claim(panel), 8.5, x=-0.38, y=1.03)
-    axes.set_xlabel(f"{panel.covariate}, {x_unit}" if x_unit else panel.covariate, fontsize=8)
+    axes.set_xlabel(x_title, fontsize=8)
     axes.set_ylabel(f"residual, {y_unit}", fontsize=8)

@@ -201,6 +201,12 @@ class Analysis:
         along = of.fitted_slots[members:]
         return size + square + problem.ln_evidence(along, of.fitted_slots[:members], list(open_to))
 
+    def freed(self) -> Analysis:
+        """Return the same evidence of a model in which nothing is fixed or bounded."""
+        model = type(self.model)(self.model.effects, self.model.parameters, constants=self.model.constants).of_a_fit()
+        problem = _problem(self.logs, model, self.unnamed, [*self.candidates, *self.probes])
+        return replace(self, model=model, problem=problem)
+
     def of_logs(self, chosen: Sequence[int]) -> Analysis:
         """Return the same evidence of some of the logs alone; effects that none of them can show are left out."""
         logs = [self.logs[k] for k in chosen]

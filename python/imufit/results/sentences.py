@@ -168,6 +168,13 @@ def _differences(found: Sequence[Disagreement]) -> str:
     return "; ".join(map(str, found))
 
 
+def contradicted(held: Parameter, found: Parameter) -> str:
+    """Say of a fixed value how far it is from the value that the logs give."""
+    value = quantity.quantity(held.value, held.unit)
+    estimate = quantity.with_error(found.value, found.standard_error, found.unit)
+    return f"{held.key} is fixed at {value}, but the data give {estimate}: fit the parameter, or correct its value."
+
+
 def unshown(effect: str, reason: str) -> str:
     """Say of an effect that a log cannot show it, and why."""
     return f"This log cannot show {effect}: {reason}."

@@ -80,12 +80,6 @@ def empty(sentence: str) -> Figure:
     return _figure([], "", "", annotations=[note], xaxis=hidden, yaxis=hidden, showlegend=False)
 
 
-def _axis(name: str, unit: str) -> tuple[float, str]:
-    """Return factor and title of an axis."""
-    factor, shown = (1.0, "") if unit in ("", "1") else quantity.shown_unit(unit)
-    return factor, f"{words(name)}, {shown}" if shown else words(name)
-
-
 def residual_panel(panel: Panel, after: Panel | None = None, effect: str = "", other: Panel | None = None) -> Figure:
     """Draw the residual of one channel against one covariate.
 
@@ -100,7 +94,7 @@ def residual_panel(panel: Panel, after: Panel | None = None, effect: str = "", o
     other : Panel, optional
         With the second of two models.
     """
-    x_factor, x_title = _axis(panel.covariate, panel.covariate_unit)
+    x_factor, x_title = quantity.axis(words(panel.covariate), panel.covariate_unit)
     factor, unit = quantity.shown_unit(panel.channel_unit)
     x, mean = x_factor * panel.centre, factor * panel.mean
     band = factor * np.nan_to_num(panel.band)
@@ -114,7 +108,7 @@ def residual_panel(panel: Panel, after: Panel | None = None, effect: str = "", o
         _line(x, mean, BLUE, "now", mode="lines+markers"),
     ]
     if other is not None:
-        traces.append(_line(x_factor * other.centre, factor * other.mean, GREEN, "second model", dash="dashdot"))
+        traces.append(_line(x_factor * other.centre, factor * other.mean, GREEN, "kept model", dash="dashdot"))
     if after is not None:
         name = f"with {words(effect)}"
         traces.append(_line(x_factor * after.centre, factor * after.mean, ORANGE, name, dash="dash"))
@@ -157,7 +151,7 @@ def spectrum(found: Spectrum, other: Spectrum | None = None) -> Figure:
     # The amplitude density has the unit in which sensors are specified.
     lines = _line(found.frequency, factor * np.sqrt(found.density), BLUE, "residual now")
     if other is not None:
-        lines += _line(other.frequency, factor * np.sqrt(other.density), GREEN, "second model", dash="dashdot")
+        lines += _line(other.frequency, factor * np.sqrt(other.density), GREEN, "kept model", dash="dashdot")
     ends = found.frequency[[0, -1]]
     lines += _line(ends, np.full(2, factor * math.sqrt(found.floor)), GREY, "noise floor", dash="dash")
     # Decades alone carry numbers: the others would lie upon one another on a phone.

@@ -237,6 +237,11 @@ class Desk:
         self._no_trouble()
         self.changed.emit()
 
+    def forget_wanted(self) -> None:
+        """Leave the session whose logs are not there."""
+        self.wanted = None
+        self.changed.emit()
+
     async def attempt(self, action: Callable[[], None]) -> None:
         """Change the session, then bring fit, diagnosis and comparison up to date.
 
@@ -326,7 +331,7 @@ class Desk:
         if session.second is not None:
             second = session.made(session.second)
             if second is None or (second.comparison is None and session.has_reference):
-                yield "comparing the second model", lambda: session.compare(session.second, self.progress), None
+                yield "comparing the kept model", lambda: session.compare(session.second, self.progress), None
             if session.second.model != stack.model and session.weighed() is None:
                 yield "weighing the two models", lambda: session.weigh(self.progress), None
 

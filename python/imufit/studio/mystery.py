@@ -56,8 +56,8 @@ LEVELS: Final[dict[int, Level]] = {
         "Absence has evidence too: where nothing is hidden, every named effect is a false alarm.",
     ),
     3: Level(
-        "Two effects that look alike",
-        "One effect is hidden, and this motion leaves it a rival. Name an effect that the log allows.",
+        "An effect with a rival",
+        "One effect is hidden. With this motion another effect looks like it. Name an effect that the log allows.",
         "A log cannot separate effects that its motion does not separate: the remedy is another motion, not more rows.",
     ),
 }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, Final
 
 from imufit.studio.log_file import LogFile, reading_options
@@ -113,25 +112,14 @@ def as_shell(files: Sequence[LogFile], way: Sequence[Stack]) -> str:
         then = [f"--then {effect}" for effect in others]
         lines.append(" ".join(["imufit add", first, *logs, *options, *then, "-o model.toml"]))
     else:
-        lines += ["cat > start.toml <<'END_OF_MODEL'", *_start(model).splitlines(), "END_OF_MODEL"]
-        lines.append(" ".join(["imufit fit", *logs, *options, "--model start.toml", "-o model.toml"]))
+        effects = shlex.quote(",".join(model.effects))
+        fixed = [
+            f"--fix {shlex.quote(f'{entry.effect}.{name}={value!r}')}"
+            for entry in model.entries
+            for name, value in entry.held
+        ]
+        lines.append(" ".join(["imufit fit", *logs, *options, "--effects", effects, *fixed, "-o model.toml"]))
     return "\n".join([*lines, ""])
-
-
-def _start(model: Stack) -> str:
-    """Return the file of a model that fits start from: fixed parameters at their values, all others at zero."""
-    from tempfile import TemporaryDirectory  # noqa: PLC0415  only where a parameter is fixed
-
-    from imufit.loop import SensorModel  # noqa: PLC0415
-
-    stack = SensorModel(list(model.effects))
-    for entry in model.entries:
-        for name, value in entry.held:
-            stack.adjust(entry.effect, name, value=value, vary=False)
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "start.toml"
-        stack.save(path)
-        return path.read_text(encoding="utf-8")
 
 
 def _path(file: LogFile) -> str:

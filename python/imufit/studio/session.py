@@ -245,7 +245,7 @@ class Session:
         """
         SensorModel([effect]).adjust(effect, name, value=value, vary=False)
         held = dict(self.stack.entry(effect).held) | {name: float(value)}
-        self._go(Action.HOLD, effect, self.stack.held(effect, held))
+        self._go(Action.HOLD, effect, self.stack.held(effect, held), parameter=name)
 
     def free(self, effect: str, name: str) -> None:
         """Let fits choose a parameter that was fixed.
@@ -256,7 +256,7 @@ class Session:
             The parameter.
         """
         held = {key: value for key, value in self.stack.entry(effect).held if key != name}
-        self._go(Action.FREE, effect, self.stack.held(effect, held))
+        self._go(Action.FREE, effect, self.stack.held(effect, held), parameter=name)
 
     def go(self, steps: Sequence[Step], position: int) -> None:
         """Take over a way that was kept.
@@ -270,9 +270,11 @@ class Session:
         """
         self.steps, self.position = list(steps), position
 
-    def _go(self, action: Action, effect: str, stack: Stack, expected: float | None = None) -> None:
+    def _go(
+        self, action: Action, effect: str, stack: Stack, expected: float | None = None, parameter: str = ""
+    ) -> None:
         del self.steps[self.position + 1 :]
-        self.steps.append(Step(action, effect, stack, expected))
+        self.steps.append(Step(action, effect, stack, expected, parameter))
         self.position += 1
 
     # --- answers

@@ -80,6 +80,7 @@ def as_toml(kept: Kept) -> str:
                 "effect": step.effect,
                 "stack": _stack_list(step.stack),
                 **({} if step.expected is None else {"expected": step.expected}),
+                **({"parameter": step.parameter} if step.parameter else {}),
             }
             for step in kept.steps
         ],
@@ -130,7 +131,13 @@ def read_session(path: str | Path, beside: Sequence[Path] = ()) -> Kept:
             raise LogsWantedError(file, list(dict.fromkeys(wanted)))
         files = tuple(_file(table, folders) for table in document["logs"])
         steps = tuple(
-            Step(Action(table["action"]), str(table["effect"]), _stack(table["stack"]), table.get("expected"))
+            Step(
+                Action(table["action"]),
+                str(table["effect"]),
+                _stack(table["stack"]),
+                table.get("expected"),
+                str(table.get("parameter", "")),
+            )
             for table in document["steps"]
         )
         position = int(document["position"])

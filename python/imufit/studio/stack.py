@@ -147,30 +147,27 @@ class Step:
         The stack after it.
     expected : float or None
         Held-out error over the noise floor that the evidence predicted, where an effect was added.
+    parameter : str
+        Which parameter of the effect was fixed or freed; empty for other actions.
     """
 
     action: Action
     effect: str
     stack: Stack
     expected: float | None = None
+    parameter: str = ""
 
     @property
     def label(self) -> str:
         """The step in few characters."""
+        key = f"{self.effect}.{self.parameter}" if self.parameter else self.effect
         words = {
             Action.START: "ideal sensor",
             Action.ADD: f"+ {self.effect}",
             Action.REMOVE: f"− {self.effect}",
             Action.ON: f"{self.effect} on",
             Action.OFF: f"{self.effect} off",
-            Action.HOLD: f"{self._held} fixed",
-            Action.FREE: f"{self.effect} fitted",
+            Action.HOLD: f"{key} fixed",
+            Action.FREE: f"{key} fitted",
         }
         return words[self.action]
-
-    @property
-    def _held(self) -> str:
-        """The effect, with the parameters of it that stay at a value."""
-        if self.effect not in self.stack.effects:
-            return self.effect
-        return f"{self.effect}.{','.join(name for name, _ in self.stack.entry(self.effect).held)}"

@@ -18,6 +18,9 @@ from imufit.studio.view_panels import PanelView
 FIRST: Final = 5
 """Candidates that are shown at once: the best and its rivals; the others fold away."""
 
+SHOW_FALL: Final = "document.querySelector('.studio-fall').scrollIntoView({block: 'nearest', behavior: 'smooth'})"
+"""Brings the fall of the error into sight, where it is not: on a phone the candidates fill the screen."""
+
 LOWERS: Final = 0.99
 """Held-out error with a candidate over that without from which on the candidate lowers it for the eye."""
 
@@ -117,6 +120,7 @@ class CandidateView:
                         return
                     self._pin("")
                     off = effect in session.stack.effects
+                    ui.run_javascript(SHOW_FALL)
                     await desk.attempt(lambda: session.switch(effect, True) if off else session.add(effect))
 
                 ui.button("Add", on_click=add).props("dense size=sm" + ("" if named else " outline")).props(

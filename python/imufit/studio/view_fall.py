@@ -37,7 +37,7 @@ class FallView:
             self._redo = _button("redo", "Redo", lambda: desk.attempt(lambda: _session(desk).redo())).props(
                 "data-mark=redo"
             )
-            self._keep = ui.button("Keep as second model", icon="splitscreen", on_click=self._keep_second)
+            self._keep = ui.button("Keep to compare", icon="splitscreen", on_click=self._keep_second)
             self._keep.props("flat dense size=sm").props("data-mark=second")
         self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
@@ -75,7 +75,7 @@ class FallView:
             if made is None or made.diagnosis is None
             else _floor_words(session, made.diagnosis.noise, self._desk.channel)
         )
-        self._keep.set_text("Put the second model away" if session.second is not None else "Keep as second model")
+        self._keep.set_text("Put the kept model away" if session.second is not None else "Keep to compare")
 
     async def _keep_second(self) -> None:
         """Keep the present model beside later ones, or put the kept one away."""

@@ -11,7 +11,7 @@ from imufit.comparing.compare import MIN_SHARE
 from imufit.figures import quantity
 from imufit.fitting.passes import UNITS
 from imufit.printable import NAME, printable
-from imufit.results import Comparison, Spectrum
+from imufit.results import Comparison, Spectrum, Unexplained
 from imufit.results.comparison import Panel
 from imufit.studio import charts
 from imufit.studio.desk import Desk
@@ -101,7 +101,8 @@ class PanelView:
         second = None if session.second is None else session.made(session.second)
         desk = self._desk
         traced = (desk.models.get(Stack()), desk.models.get(session.stack.model))
-        state = (found, second and second.comparison, desk.channel, desk.covariate, self._proposed, *traced)
+        diagnosis = None if made is None else made.diagnosis
+        state = (found, diagnosis, second and second.comparison, desk.channel, desk.covariate, self._proposed, *traced)
         if all(a is b or a == b for a, b in zip(state, self._state, strict=False)) and len(state) == len(self._state):
             return
         self._state = state
@@ -112,12 +113,24 @@ class PanelView:
         self._draw(found, None if second is None else second.comparison, channel)
 
     def _failing(self, found: Comparison) -> str | None:
-        """Return the channel that fails most; where none fails any more, the one that failed at the start."""
+        """Return the channel that the verdict names, or the one that fails most.
+
+        Where none fails any more, this is the one that failed at the start.
+        """
+        if (named := self._left(found)) is not None:
+            return named.channel
         worst = worst_channel(found)
         start = self._at_start()
         if start is None or any(item.channel == worst and item.ratio > FAILS for item in found.channels):
             return worst
         return worst_channel(start)
+
+    def _left(self, found: Comparison) -> Unexplained | None:
+        """Return the dependence that the sentence over the page names, where a panel shows it."""
+        made = None if self._session is None or self._desk.guessing else self._session.made()
+        left = () if made is None or made.diagnosis is None else made.diagnosis.unexplained[:1]
+        shown = {(panel.channel, panel.covariate) for panel in found.panels}
+        return next((item for item in left if (item.channel, item.covariate) in shown), None)
 
     def _at_start(self) -> Comparison | None:
         """Return where the ideal sensor fails."""
@@ -175,6 +188,9 @@ class PanelView:
         names = [panel.covariate for panel in found.panels if panel.channel == channel]
         if self._desk.covariate in names:
             return self._desk.covariate
+        left = self._left(found)
+        if left is not None and left.channel == channel:
+            return left.covariate
         fails = any(item.channel == channel and item.ratio > FAILS for item in found.channels)
         judged = found if fails else self._at_start() or found
         top = next((panel for panel in judged.panels if panel.channel == channel), None)

@@ -29,6 +29,8 @@ MOST_BYTES: Final = 4 * 2**30
 """Largest file that the browser may send: 20 million rows of 14 columns take 2.2 GB."""
 _APART: Final = re.compile(r"(?<=\d) (?=±|%|°|deg|m/s|µT|s\b|Hz)|(?<=±) ")
 """Blanks between a number and its error or unit."""
+PART_JUDGED: Final = "rule"
+"""Icon of an adequate model where a sensor was not judged."""
 ICONS: Final = {"adequate": "check_circle", "missing": "help", "ambiguous": "call_split", "unknown": "error"}
 
 
@@ -200,10 +202,11 @@ class Top:
             "studio-sentence"
         ).props("data-mark=wanted")
         _uploader(self._desk)
+        ui.button("Cancel", on_click=self._desk.forget_wanted).props("flat").props("data-mark=wanted-cancel")
 
     def _verdict(self, diagnosis: Diagnosis) -> None:
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
-            ui.icon(ICONS[diagnosis.verdict], size="sm").props(f'aria-label="{diagnosis.verdict}"')
+            ui.icon(_icon_of(diagnosis), size="sm").props(f'aria-label="{diagnosis.verdict}"')
             ui.label(unbroken(printable(diagnosis.sentence or diagnosis.verdict))).classes("studio-sentence").props(
                 "data-mark=verdict"
             )
@@ -320,6 +323,11 @@ def unbroken(sentence: str) -> str:
         Any text.
     """
     return _APART.sub("\N{NO-BREAK SPACE}", sentence)
+
+
+def _icon_of(diagnosis: Diagnosis) -> str:
+    whole = all(item.judged for item in diagnosis.judged)
+    return ICONS[diagnosis.verdict] if whole or diagnosis.verdict != "adequate" else PART_JUDGED
 
 
 def _named(desk: Desk) -> str:

@@ -18,7 +18,7 @@ CHANGED: Final = 0.005
 
 
 class TwoView:
-    """The second model and the present one on one page.
+    """The kept model and the present one on one page.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class TwoView:
     Attributes
     ----------
     kept : bool
-        Whether a second model is kept.
+        Whether a model is kept.
     """
 
     def __init__(self, desk: Desk) -> None:
@@ -39,7 +39,7 @@ class TwoView:
         self._two = ui.column().classes("w-full gap-1").props("data-mark=two")
 
     def refresh(self) -> None:
-        """Lay out the second model and the present one beside each other, where a second one is kept."""
+        """Lay out the kept model and the present one beside each other, where one is kept."""
         session = self._desk.session
         if session is None or not session.begun or session.second is None:
             self.kept, self._shown = False, ()
@@ -57,7 +57,7 @@ class TwoView:
         self._two.clear()
         with self._two:
             if session.second.model == session.stack.model:
-                ui.label("The second model is the present one. Change the present one to compare.").classes(
+                ui.label("The kept model is the present one. Change the present one to compare.").classes(
                     "studio-muted"
                 )
             elif second is None or present is None:
@@ -68,13 +68,13 @@ class TwoView:
 
 def _two_models(second: Made, present: Made, factor: float | None) -> None:
     """Lay out two models: held-out error, evidence, residual of each channel that changes, parameters."""
-    lower = "second" if second.numbers.ratio < present.numbers.ratio else "present"
+    lower = "kept" if second.numbers.ratio < present.numbers.ratio else "present"
     ui.label(
-        f"Held-out error: {quantity.ratio(second.numbers.ratio)} times the noise floor with the second model, "
+        f"Held-out error: {quantity.ratio(second.numbers.ratio)} times the noise floor with the kept model, "
         f"{quantity.ratio(present.numbers.ratio)} with the present one. The {lower} model stands lower."
     ).classes("studio-sentence").props("data-mark=two-sentence")
     if factor is not None:
-        choice = {"first": "the second model", "second": "the present model", "neither": "neither model"}
+        choice = {"first": "the kept model", "second": "the present model", "neither": "neither model"}
         ui.label(
             f"The log prefers {choice[preferred(factor)]} (ln Bayes factor {factor:+.1f} for the present one)."
         ).classes("studio-sentence").props("data-mark=two-evidence")
@@ -91,7 +91,7 @@ def _two_models(second: Made, present: Made, factor: float | None) -> None:
     keys = dict.fromkeys([*values[0], *values[1]])
     rows += [(printable(key, NAME), values[0].get(key, "–"), values[1].get(key, "–")) for key in keys]
     with ui.element("table").classes("studio-table"):
-        for k, row in enumerate([("", "second model", "present model"), *rows]):
+        for k, row in enumerate([("", "kept model", "present model"), *rows]):
             with ui.element("tr"):
                 for cell in row:
                     with ui.element("th" if k == 0 else "td"):

@@ -1,0 +1,34 @@
+"""Fixed values of a model that its logs contradict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
+
+from imufit.results import sentences
+
+if TYPE_CHECKING:
+    from imufit.fitting import FittedStack
+
+FAR: Final = 4.0
+"""Standard errors between a fixed and a fitted value from which on the log contradicts the fixed one: by chance this
+happens once in 16,000."""
+
+
+def contradicted(fit: FittedStack) -> Iterator[str]:
+    """Say of each fixed value that the logs contradict how far it is from the value that they give, to first order.
+
+    Parameters
+    ----------
+    fit : FittedStack
+        The model and the evidence of its logs.
+    """
+    fixed = {parameter.key: parameter for parameter in fit.parameters if parameter.fixed}
+    if not fixed:
+        return
+    free = fit.analysis.freed()
+    model, _ = free.moved_to(free.estimate())
+    for found in model.listed():
+        held = fixed.get(found.key)
+        if held is not None and abs(found.value - held.value) > FAR * found.standard_error > 0.0:
+            yield sentences.contradicted(held, found)
