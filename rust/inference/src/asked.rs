@@ -16,7 +16,7 @@ pub enum Prior {
 }
 
 /// Columns asked about, over all blocks.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Asked {
     /// Their Gram matrix with every parameter of the problem (parameters x asked).
     pub cross: DMatrix<f64>,

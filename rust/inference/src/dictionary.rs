@@ -36,6 +36,7 @@ pub enum Origin {
 }
 
 /// An unnamed cause with its columns.
+#[derive(Clone, Debug)]
 pub struct Unnamed {
     /// Where it comes from.
     pub origin: Origin,

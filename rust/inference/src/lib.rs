@@ -11,6 +11,7 @@ pub mod courses;
 pub mod criterion;
 pub mod dictionary;
 pub mod estimate;
+pub mod finding;
 pub mod held_out;
 pub mod problem;
 mod recent;

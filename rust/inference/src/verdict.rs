@@ -7,10 +7,9 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::agreement::{self, Disagreement};
-use crate::asked::Asked;
-use crate::bins::{self, Covariate};
 use crate::criterion::Criterion;
 use crate::dictionary::{self, Origin, Unnamed};
+use crate::finding::{self, Finding};
 use crate::held_out::{self, HeldOut};
 use crate::problem::{Problem, indices};
 use crate::search::{self, Plausible, Search, Weighed};
@@ -66,27 +65,6 @@ pub struct Candidate {
     pub held_out: (f64, f64),
 }
 
-/// A dependence that no effect of the catalogue explains.
-#[derive(Clone, Debug)]
-pub struct Finding {
-    /// Channel index.
-    pub channel: usize,
-    /// The covariate.
-    pub covariate: String,
-    /// The log concerned; `None` for all.
-    pub log: Option<usize>,
-    /// Log Bayes factor beside the named effects.
-    pub ln_bayes: f64,
-    /// Whitened square that it explains beside them, in units of the noise variance.
-    pub drop: f64,
-    /// Indices of the channels in which it explains that.
-    pub channels: Vec<usize>,
-    /// How the channel depends on the covariate.
-    pub shape: String,
-    /// Slot of the probe that shows it, if one does.
-    pub probe: Option<usize>,
-}
-
 /// What Gram matrices do not hold, and passes over the rows have found.
 #[derive(Clone, Debug, Default)]
 pub struct Known {
@@ -108,9 +86,12 @@ pub struct Known {
 pub struct Named {
     /// Slots of the effects.
     members: Vec<usize>,
-    /// Log Bayes factors of the unnamed causes beside the model alone, and beside these effects.
+    /// Log Bayes factors of the unnamed causes beside the model alone.
     before: Vec<f64>,
-    left: Vec<f64>,
+    /// Unnamed causes beside these effects, the likeliest first, and their log Bayes factors.
+    unexplained: Vec<(Arc<Unnamed>, f64)>,
+    /// Effects of the model, of these or of the catalogue whose coefficient drifts or switches, by slot, and the log Bayes factors of that.
+    varying: Vec<(usize, f64)>,
     /// True if what explains most cannot be so large.
     too_large: bool,
 }
@@ -119,7 +100,7 @@ impl Named {
     /// True if these can be an answer to an inquiry.
     fn is_of(&self, inquiry: &Inquiry) -> bool {
         let offered = |m: &usize| inquiry.search.candidates.contains(m);
-        self.left.len() == inquiry.unnamed.len() && self.members.iter().all(offered)
+        self.before.len() == inquiry.unnamed.len() && self.members.iter().all(offered)
     }
 }
 
@@ -149,8 +130,6 @@ pub struct Verdict {
 /// Share of all that is explained in the sensors of the best effect that named effects must have, or the answer is "unknown".
 const NAMED_SHARE: f64 = 0.8;
 
-/// A course is told of the channels in which it explains this part, at least, of what it explains in the one that shows it most.
-const SHOWN: f64 = 0.1;
 /// Two columns may differ by this many times their noise (in variance) and still count as the same.
 const NOISE: f64 = 2.0;
 /// Log odds by which a cause without a name is less likely than one of the catalogue, before the log is seen.
@@ -159,7 +138,7 @@ const UNNAMED: f64 = 5.0;
 /// Everything that is asked of one problem.
 struct Inquiry<'a> {
     search: Search<'a>,
-    unnamed: Vec<Unnamed>,
+    unnamed: Vec<Arc<Unnamed>>,
     threshold: f64,
 }
 
@@ -171,7 +150,7 @@ impl Inquiry<'_> {
 
     /// The same, worked out in full only where they may exceed some value, and not at all where none of some sensors shows them.
     fn exceeding(&self, stack: &Stack, least: f64, sensors: &[Sensor]) -> Vec<f64> {
-        let of = |unnamed: &Unnamed| {
+        let of = |unnamed: &Arc<Unnamed>| {
             let shown = sensors_of(self.search.criterion.problem, &unnamed.origin);
             if !shown.iter().any(|s| sensors.contains(s)) {
                 return 0.0;
@@ -213,9 +192,12 @@ pub fn decide(
         Vec::new()
     } else {
         dictionary::fixed(&criterion, probes)
+            .into_iter()
+            .map(Arc::new)
+            .collect()
     };
     let threshold = search::threshold(unnamed.len()) + UNNAMED;
-    let mut inquiry = Inquiry {
+    let inquiry = Inquiry {
         search,
         unnamed,
         threshold,
@@ -230,48 +212,19 @@ pub fn decide(
     let Named {
         mut members,
         before,
-        left,
+        unexplained,
+        varying,
         too_large,
     } = named.clone();
     let search = &inquiry.search;
     let stack = search.stack(&members)?;
-    let mut unexplained: Vec<(usize, f64)> = (0..left.len())
-        .into_par_iter()
-        .filter(|k| left[*k] >= threshold)
-        .map(|k| {
-            (
-                k,
-                left[k].min(dictionary::varying(search, &stack, &members, &inquiry.unnamed[k])),
-            )
-        })
-        .filter(|(_, ln)| *ln >= threshold)
-        .collect();
-    for (course, ln) in inquiry.courses(&stack, threshold, &Sensor::ALL) {
-        unexplained.push((inquiry.unnamed.len(), ln));
-        inquiry.unnamed.push(course);
-    }
-    unexplained.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let search = &inquiry.search;
     let acts = |slot: usize, sensor: &Sensor| problem.slots[slot].effect.sensors().contains(sensor);
     let cause = |unnamed: &Unnamed, ln: f64| (sensors_of(problem, &unnamed.origin), ln);
     let instead: Vec<Shown> = (inquiry.unnamed.iter().zip(&before))
         .map(|(unnamed, ln)| cause(unnamed, *ln))
         .collect();
-    // A coefficient that drifts or switches has a cause without a name, too, be its effect there or not. All effects are asked where nothing
-    // more definite is left; those of one sensor suffice, since each sensor shows on its own what drifts in several.
-    let of_one = |slot: &&usize| members.contains(slot) || problem.slots[**slot].effect.sensors().len() == 1;
-    let everything = model.iter().chain(candidates).copied().collect();
-    let asked: Vec<usize> = if unexplained.is_empty() {
-        everything
-    } else {
-        members.clone()
-    };
-    let varying: Vec<(usize, f64)> = (asked.par_iter().filter(of_one))
-        .map(|slot| (*slot, search.varying(&stack, &members, *slot).varies))
-        .filter(|(_, ln)| *ln >= threshold)
-        .collect();
     let of_slot = |(slot, ln): &(usize, f64)| (problem.slots[*slot].effect.sensors().to_vec(), *ln);
-    let left: Vec<Shown> = (unexplained.iter().map(|(k, ln)| cause(&inquiry.unnamed[*k], *ln)))
+    let left: Vec<Shown> = (unexplained.iter().map(|(unnamed, ln)| cause(unnamed, *ln)))
         .chain(varying.iter().map(of_slot))
         .collect();
     // Where more is left than effects explain, their names are those of the nearest shapes.
@@ -321,11 +274,11 @@ pub fn decide(
     let correlations = correlations(problem, model, best, &candidates);
     let found = unexplained
         .iter()
-        .flat_map(|(k, ln)| told(problem, &stack, &inquiry.unnamed[*k], *ln));
-    let differing = varying.iter().map(|(slot, ln)| differs(problem, *slot, *ln));
+        .flat_map(|(unnamed, ln)| finding::told(problem, &stack, unnamed, *ln));
+    let differing = varying.iter().map(|(slot, ln)| finding::differs(problem, *slot, *ln));
     let mut findings: Vec<Finding> = known.seen.iter().cloned().chain(found).chain(differing).collect();
     findings.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
-    let findings = strongest(findings);
+    let findings = finding::strongest(findings);
     Some(Verdict {
         kind,
         named,
@@ -392,12 +345,50 @@ fn named(inquiry: &Inquiry, alone: &Stack, weighed: &[Weighed]) -> Option<Named>
     } else {
         beside_unnamed(inquiry)?
     };
+    let stack = inquiry.search.stack(&members)?;
+    let unexplained = unexplained(inquiry, &members, &stack, &left);
+    let varying = varying(inquiry, &members, &stack, unexplained.is_empty());
     Some(Named {
         members,
         before,
-        left,
+        unexplained,
+        varying,
         too_large,
     })
+}
+
+/// Causes without a name that are there beside members, by evidence; `left` are the log Bayes factors of those with columns of their own.
+fn unexplained(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) -> Vec<(Arc<Unnamed>, f64)> {
+    let steady = |(unnamed, ln): (&Arc<Unnamed>, &f64)| {
+        let steady = || dictionary::varying(&inquiry.search, stack, members, unnamed);
+        let ln = if *ln < inquiry.threshold { *ln } else { ln.min(steady()) };
+        (unnamed.clone(), ln)
+    };
+    let fixed: Vec<(Arc<Unnamed>, f64)> = inquiry.unnamed.par_iter().zip(left).map(steady).collect();
+    let courses = inquiry.courses(stack, inquiry.threshold, &Sensor::ALL);
+    let courses = courses.into_iter().map(|(course, ln)| (Arc::new(course), ln));
+    let there = |(_, ln): &(Arc<Unnamed>, f64)| *ln >= inquiry.threshold;
+    let mut found: Vec<(Arc<Unnamed>, f64)> = fixed.into_iter().filter(there).chain(courses).collect();
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    found
+}
+
+/// Effects whose coefficient drifts or switches, with the log Bayes factors of that: a cause without a name, be the effect there or not. All
+/// effects are asked where nothing more definite is left (`all`); those of one sensor suffice, since each sensor shows on its own what drifts in
+/// several.
+fn varying(inquiry: &Inquiry, members: &[usize], stack: &Stack, all: bool) -> Vec<(usize, f64)> {
+    let search = &inquiry.search;
+    let slots = &search.criterion.problem.slots;
+    let of_one = |slot: &&usize| members.contains(slot) || slots[**slot].effect.sensors().len() == 1;
+    let asked: Vec<usize> = if all {
+        search.model.iter().chain(&search.candidates).copied().collect()
+    } else {
+        members.to_vec()
+    };
+    (asked.par_iter().filter(of_one))
+        .map(|slot| (*slot, search.varying(stack, members, *slot).varies))
+        .filter(|(_, ln)| *ln >= inquiry.threshold)
+        .collect()
 }
 
 /// Effects that are there beside one another and beside unnamed causes, and the log Bayes factors of these.
@@ -641,139 +632,4 @@ fn correlations(
             (first.slot, c.slot, correlation)
         })
         .collect()
-}
-
-/// The first finding of each channel over each covariate of a log: the others say the same in other words.
-fn strongest(findings: Vec<Finding>) -> Vec<Finding> {
-    let mut kept: Vec<Finding> = Vec::new();
-    for finding in findings {
-        let same = |k: &Finding| (k.channel, &k.covariate, k.log) == (finding.channel, &finding.covariate, finding.log);
-        if !kept.iter().any(same) {
-            kept.push(finding);
-        }
-    }
-    kept
-}
-
-/// An unnamed cause in words, channel by channel.
-fn told(problem: &Problem, stack: &Stack, unnamed: &Unnamed, ln_bayes: f64) -> Vec<Finding> {
-    let several = problem.parts.len() > 1;
-    let sums = &problem.sums;
-    let mut channels: Vec<usize> = unnamed.asked.sums.iter().map(|(c, _)| sums[*c].channel).collect();
-    channels.dedup();
-    let common = |channel: usize, covariate: String, log: Option<usize>, shape: String| Finding {
-        channel,
-        covariate,
-        log,
-        ln_bayes,
-        drop: stack.explained(&unnamed.asked),
-        channels: channels.clone(),
-        shape,
-        probe: None,
-    };
-    vec![match &unnamed.origin {
-        Origin::Bins(parts) => return by_shape(stack, &unnamed.asked, parts, &common),
-        Origin::Course(places, course) => {
-            let in_words = |place: usize| {
-                let sums = &problem.sums[place];
-                let facts = &problem.parts[sums.log].white.layout.facts;
-                let blocks = sums.count.len() as f64;
-                let block = (facts.t_end - facts.t_start) / blocks;
-                let words = course.words(|at| facts.t_start + block * at, blocks);
-                common(
-                    sums.channel,
-                    course.covariate(sums.channel % 3).to_string(),
-                    several.then_some(sums.log),
-                    words,
-                )
-            };
-            return showing(stack, unnamed, places).into_iter().map(in_words).collect();
-        }
-        Origin::Probe(slot) => {
-            let equations = stack.equations(&unnamed.asked);
-            let certainties: Vec<f64> = equations.map_or_else(Vec::new, |e| {
-                (0..e.score.len())
-                    .map(|k| e.score[k].powi(2) / e.information[(k, k)].max(f64::MIN_POSITIVE))
-                    .collect()
-            });
-            let of = bins::of_probe(&problem.slots[*slot], &certainties);
-            Finding {
-                probe: Some(*slot),
-                ..common(of.channel, of.covariate, None, of.shape)
-            }
-        }
-    }]
-}
-
-/// What looks like an effect and is not the same in all blocks, in words.
-fn differs(problem: &Problem, slot: usize, ln_bayes: f64) -> Finding {
-    let effect = &problem.slots[slot].effect;
-    let channels: Vec<usize> = (effect.sensors().iter())
-        .flat_map(|s| 3 * s.index()..3 * s.index() + 3)
-        .filter(|channel| problem.sums.iter().any(|sums| sums.channel == *channel))
-        .collect();
-    Finding {
-        channel: channels.first().copied().unwrap_or_default(),
-        covariate: "t".to_string(),
-        log: None,
-        ln_bayes,
-        drop: 2.0 * ln_bayes,
-        channels,
-        shape: format!("what looks like {} is not the same all the time", effect.card().id),
-        probe: None,
-    }
-}
-
-/// What the bins of some channels show, those first that show it most.
-fn by_shape(
-    stack: &Stack,
-    asked: &Asked,
-    parts: &[(usize, Arc<Covariate>)],
-    common: &dyn Fn(usize, String, Option<usize>, String) -> Finding,
-) -> Vec<Finding> {
-    let Some(equations) = stack.equations(asked) else {
-        return Vec::new();
-    };
-    let m = equations.score.len();
-    let ridge = DMatrix::from_fn(m, m, |i, j| {
-        equations.information[(i, j)] * if i == j { 1.0 + 1e-6 } else { 1.0 }
-    });
-    let Some(shape) = ridge.cholesky().map(|factor| factor.solve(&equations.score)) else {
-        return Vec::new();
-    };
-    let mut first = 0;
-    let told = |(channel, covariate): &(usize, Arc<Covariate>)| {
-        // Axes may differ in their bins.
-        let own = first..first + dictionary::contrasts(stack.criterion.problem, covariate).map_or(0, |q| q.ncols());
-        first = own.end;
-        let square: f64 = own.clone().map(|j| shape[j] * equations.score[j]).sum();
-        let word = bins::shape_name(&shape.as_slice()[own]).to_string();
-        (square, common(*channel, covariate.name.clone(), covariate.log, word))
-    };
-    shown_most(parts.iter().map(told).collect())
-}
-
-/// What shows a cause, by the square that each explains, without what shows hardly any of it; the one that shows most comes first.
-fn shown_most<T>(mut all: Vec<(f64, T)>) -> Vec<T> {
-    all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let most = all.first().map_or(0.0, |(square, _)| *square);
-    let shown = all.into_iter().filter(|(square, _)| *square >= SHOWN * most);
-    shown.map(|(_, what)| what).collect()
-}
-
-/// The channels (by their places among the sums) that show a course, the one that shows it most first.
-fn showing(stack: &Stack, unnamed: &Unnamed, places: &[usize]) -> Vec<usize> {
-    let Some(equations) = stack.equations(&unnamed.asked) else {
-        return vec![places[0]];
-    };
-    let Origin::Course(_, course) = &unnamed.origin else {
-        return vec![places[0]];
-    };
-    let width = course.parameters();
-    let square = |k: usize| -> f64 {
-        (k * width..(k + 1) * width)
-            .map(|j| equations.score[j].powi(2) / equations.information[(j, j)].max(f64::MIN_POSITIVE))
-            .sum()
-    };
-    shown_most((0..places.len()).map(|k| (square(k), places[k])).collect())
 }

@@ -204,7 +204,7 @@ impl PyProblem {
         }
         let seen = seen
             .into_iter()
-            .map(|(log, channel, ln_bayes, shape)| verdict::Finding {
+            .map(|(log, channel, ln_bayes, shape)| imufit_inference::finding::Finding {
                 channel,
                 covariate: "t".to_string(),
                 log,
