@@ -71,7 +71,6 @@ def test_index_links_every_page():
         ("rust/fit/src/whitening.rs", "MAX_ORDER", "filter of at most {} taps"),
         ("rust/model/src/bandwidth.rs", "TOLERANCE", "{}\\,\\sigma_{{\\text{{ref}}}}"),
         ("python/imufit/fitting/passes.py", "BLOCKS", "B = {} blocks"),
-        ("python/imufit/diagnosing/ladder.py", "MATTERS", "at least {:.1%} off the held-out error"),
     ],
 )
 def test_method_states_the_constants_of_the_code(file, constant, words):

@@ -14,10 +14,6 @@ from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
 from imufit.results.diagnosis import PASSED
 
 MAX_STEPS = 12
-MATTERS = 0.002
-"""Share of the held-out error that counts: less does not justify an effect of which no parameter is certain."""
-TOLD = 2.0
-"""Standard errors that at least one parameter of an addition must be away from zero."""
 
 
 def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
@@ -112,8 +108,7 @@ class Climb:
                 break
             expected = next(c.held_out_after for c in self.diagnosis.candidates if c.effect == effect)
             addition = self._add(effect, expected)
-            lower = addition.after < addition.before
-            if not (lower and (_told(addition) or _matters(addition))):
+            if not _foretells(addition.fit, self.fit):
                 # The fit did not confirm the evidence: the next one may.
                 futile.add(effect)
                 continue
@@ -198,14 +193,13 @@ def _beside_the_unsure(fit: FittedStack) -> str | None:
         candidates = [slot for slot in candidates if slot != best and slot not in rivals]
 
 
-def _told(addition: Addition) -> bool:
-    """Return whether any added parameter differs from zero in the fit."""
-    return any(not abs(p.value) <= TOLD * p.standard_error for p in addition.parameters)
+def _foretells(fit: FittedStack, before: FittedStack) -> bool:
+    """Return whether a fit foretells data that it did not use better than the fit before.
 
-
-def _matters(addition: Addition) -> bool:
-    """Return whether the held-out error falls by enough to count."""
-    return addition.before - addition.after >= MATTERS * addition.before
+    Each channel counts in units of its own noise: a sensor that is shaken does not hide what an effect takes off
+    another one.
+    """
+    return float(fit.estimate.folds.sum()) < float(before.estimate.folds.sum())
 
 
 def _sentence(start: float, end: float, steps: list[Step], diagnosis: Diagnosis) -> str:
