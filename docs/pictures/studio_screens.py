@@ -130,7 +130,7 @@ def columns(page: Page, folder: Path) -> None:
 
 def unjudged(page: Page, folder: Path) -> None:
     """Open a log that has neither a reference nor rests."""
-    drop(page, folder / "moving.csv")
+    bring(page, folder / "moving.csv")
     page.get_by_text("The log cannot be judged").wait_for()
 
 

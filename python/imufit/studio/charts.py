@@ -32,6 +32,8 @@ SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
 DECADES: Final = 6
 """Numbers that the logarithmic axis of the fall has room for."""
+ROOM: Final = 1.45
+"""Height of the fall's axis over its highest bar: the bar's number has 13 px over a plot of some 80 px on a phone."""
 LINE: Final = 1.6
 """Width of a line, px."""
 LOGARITHMIC_ABOVE: Final = 8.0
@@ -282,12 +284,13 @@ def fall(
     above["cliponaxis"] = False
     bars.append({"type": "scatter", "mode": "markers+text", **above, "marker": unseen, "hoverinfo": "skip"})
     heights = [value for value in [*ratios, *(value for _, value in known)] if math.isfinite(value) and value > 0.0]
+    heights += [] if best is None else [best[1]]
     top, low = max([*heights, 1.0]), min([*heights, 1.0])
     logarithmic = top / low > LOGARITHMIC_ABOVE
     scale: dict[str, Any] = (
         {"type": "log", "range": [math.log10(0.6 * low), math.log10(5.0 * top)], "tickvals": _decades(low, top)}
         if logarithmic
-        else {"range": [0.0, 1.22 * top]}
+        else {"range": [0.0, ROOM * top]}
     )
     # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
     edge = [-0.6, max(len(places), SLOTS) - 0.4]

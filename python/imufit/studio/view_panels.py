@@ -22,6 +22,7 @@ PIXELS: Final = 1200
 """Points of a trace: as many as a wide screen shows beside each other."""
 FAILS: Final = 1.05
 """Residual over noise floor from which on a channel fails: below, the excess is a tenth of the noise's variance."""
+FAILS_WHERE: Final = "Where it fails"
 TIME: Final = "t"
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
@@ -44,7 +45,7 @@ class PanelView:
         self._kind = RESIDUAL
         self._state: tuple[Any, ...] = ()
         self._setting = False
-        ui.html("Where it fails", tag="h2", sanitize=False)
+        self._title = ui.html(FAILS_WHERE, tag="h2", sanitize=False)
         with ui.element("div").classes("studio-row flex-wrap"):
             self._channel = ui.select([], label="channel", on_change=self._chosen).props("dense outlined")
             self._channel.classes("min-w-28").props("data-mark=channel")
@@ -84,6 +85,7 @@ class PanelView:
         found = None if made is None else made.comparison
         judged = session.begun and session.has_reference
         self._covariate.visible = self._trace_kind.visible = judged
+        self._title.set_content(FAILS_WHERE if session.has_reference and not session.refused else "Readings")
         self._pair.visible = session.has_reference and not session.refused
         if not judged:
             if session.begun:
