@@ -120,6 +120,11 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     page.goto(f"{address}live")
     page.get_by_role("button", name="Disconnect").click()
     page.get_by_text("Not connected").wait_for(timeout=PATIENCE)
+
+    # so does it after the device has gone, on a page that is loaded again, too
+    page.reload()
+    page.get_by_test_id("look").click()
+    page.wait_for_function("() => document.querySelector('[data-mark=logs]')?.textContent === 'calibration-1.parquet'")
     assert asked == []
     assert wrong == []
     page.close()

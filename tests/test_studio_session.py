@@ -145,7 +145,10 @@ def test_a_fixed_value_stays_and_is_fitted_again(session):
     x = held.parameters[0]
     assert (x.value, x.fixed, x.standard_error) == (0.5, True, 0.0)
     assert held.ratio > 2.0 * fitted.ratio
-    assert session.diagnose().sentence.startswith("acc.bias.x is fixed at 0.500 m/s², but the data give ")
+    found = session.diagnose()
+    assert found.sentence.startswith("acc.bias.x is fixed at 0.500 m/s², but the data give ")
+    assert found.sentence.endswith(": fit the parameter, or correct its value.")
+    assert found.unexplained == ()
     assert session.step.label == "acc.bias.x fixed"
     session.free("acc.bias", "x")
     assert session.step.label == "acc.bias.x fitted"
@@ -231,6 +234,12 @@ def test_a_session_comes_back_from_its_file(session, folder):
     path.write_text(text.replace('"acc.bias"', '"acc.nothing"'))
     with pytest.raises(InputError, match="unknown"):
         read_session(path)
+
+
+def test_a_sensor_model_is_no_session(tmp_path):
+    imufit.SensorModel(["gyr.bias"]).save(tmp_path / "model.toml")
+    with pytest.raises(InputError, match="a sensor model or a calibration, not a session"):
+        read_session(tmp_path / "model.toml")
 
 
 def test_two_files_are_offered_to_be_joined(tmp_path):

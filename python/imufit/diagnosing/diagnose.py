@@ -98,8 +98,12 @@ def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
         judged=judged(analysis),
         noise=noise_budget(analysis),
     )
-    words = sentences.answer(found, best, ratio=fit.ratio, untold=len(unshown), spoilt=result.spoilt)
-    return replace(found, sentence=" ".join((*contradicted(fit), words)))
+    if wrong := tuple(contradicted(fit)):
+        # What is left follows the wrong value, and names no other cause.
+        return replace(found, sentence=" ".join(wrong), unexplained=())
+    return replace(
+        found, sentence=sentences.answer(found, best, ratio=fit.ratio, untold=len(unshown), spoilt=result.spoilt)
+    )
 
 
 def _decided(fit: FittedStack, excluded: Sequence[str]) -> Verdict:

@@ -10,6 +10,8 @@ from typing import Any, Final
 from imufit.errors import InputError
 from imufit.log import Reading
 from imufit.model.catalogue import find_effect
+from imufit.model.model_file import KIND as MODEL_KIND
+from imufit.remedy import command
 from imufit.studio.log_file import LogFile, reading_options
 from imufit.studio.stack import Action, Entry, Stack, Step
 from imufit.whole_toml import read_toml, toml_text
@@ -120,6 +122,12 @@ def read_session(path: str | Path, beside: Sequence[Path] = ()) -> Kept:
     """
     file = Path(path)
     document, _ = read_toml(file, "the session")
+    if document.get("kind") == MODEL_KIND:
+        raise InputError(
+            "this is a sensor model or a calibration, not a session",
+            file=file,
+            remedy="It corrects the readings of a log: " + command("apply", "imufit.SensorModel.load(FILE).apply"),
+        )
     if document.get("kind") != KIND:
         raise InputError(f'the key kind is {document.get("kind")!r}, not "{KIND}"', file=file)
     if document.get("format") != FORMAT:

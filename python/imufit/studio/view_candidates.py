@@ -120,8 +120,11 @@ class CandidateView:
                         return
                     self._pin("")
                     off = effect in session.stack.effects
-                    ui.run_javascript(SHOW_FALL)
+                    client = ui.context.client
+                    client.run_javascript(SHOW_FALL)
                     await desk.attempt(lambda: session.switch(effect, True) if off else session.add(effect))
+                    # The sentence on top has another height by now, and the effect's card is gone.
+                    client.run_javascript(SHOW_FALL)
 
                 ui.button("Add", on_click=add).props("dense size=sm" + ("" if named else " outline")).props(
                     attribute("data-mark", f"add-{effect}")

@@ -37,8 +37,9 @@ class FallView:
             self._redo = _button("redo", "Redo", lambda: desk.attempt(lambda: _session(desk).redo())).props(
                 "data-mark=redo"
             )
-            self._keep = ui.button("Keep to compare", icon="splitscreen", on_click=self._keep_second)
-            self._keep.props("flat dense size=sm").props("data-mark=second")
+        # In a row of its own: its other words must not move Undo beneath the pointer.
+        self._keep = ui.button("Keep to compare", icon="splitscreen", on_click=self._keep_second)
+        self._keep.props("flat dense size=sm").props("data-mark=second")
         self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
         self._floor = ui.label("").classes("studio-muted").props("data-mark=floor")

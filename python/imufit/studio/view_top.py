@@ -288,6 +288,8 @@ class Top:
         title = level.title if game.level == DEMONSTRATION else f"Mystery log, level {game.level}"
         # After the reveal nothing is left to be done here.
         words = title if game.verdict is not None else f"{title}: {level.words}"
+        if game.level == DEMONSTRATION and game.verdict is None and _named(desk) != NOTHING:
+            words = f"{title}: {ADDED}"
         ui.label(words).classes("studio-sentence").props("data-mark=game")
         if game.verdict is None:
             if not judged:
@@ -312,6 +314,10 @@ class Top:
             ui.label(printable(sentence)).classes("studio-sentence").props("data-mark=truth")
         ui.label(game.verdict.lesson).classes("studio-muted").props("data-mark=lesson")
         ui.button("Play again", on_click=_player(desk, game.level)).props("outline").props("data-mark=again")
+
+
+ADDED: Final = "The bars show what the effect took off the error. Reveal the truth, or add another effect."
+"""Task of the demonstration once an effect is added."""
 
 
 def unbroken(sentence: str) -> str:

@@ -20,7 +20,7 @@ from imufit.log.metadata import Frame
 from imufit.printable import printable
 from imufit.rests.poses import SIDES
 from imufit.studio.body import Body, angles_in_words, side_rotation
-from imufit.studio.live.listening import Listening, Source, free_name, shown_state
+from imufit.studio.live.listening import Listening, Recorded, Source, free_name, shown_state
 from imufit.studio.live.panels import groups, panel
 
 Array = NDArray[np.float64]
@@ -42,6 +42,13 @@ class _Device:
 
     def __init__(self) -> None:
         self.listening: Listening | None = None
+        self._last = Recorded()
+
+    @property
+    def recorded(self) -> Recorded:
+        """The present recording, or the last one: it is there to be opened after its device has gone."""
+        own = None if self.listening is None else self.listening.recorded
+        return self._last if own is None or own.path is None else own
 
     async def connect(self, source: Source) -> None:
         """Follow a device."""
@@ -55,6 +62,8 @@ class _Device:
         held, self.listening = self.listening, None
         if held is not None:
             await asyncio.to_thread(held.close)
+            if held.recorded.path is not None:
+                self._last = held.recorded
 
 
 _device = _Device()
@@ -251,15 +260,15 @@ class _LivePage:
         listening = _device.listening
         if listening is None:
             self._recorded.text = "Connect a device first."
-        elif listening.recorded.running:
+        elif _device.recorded.running:
             listening.stop()
         else:
             listening.record(self._path("recording"))
 
     async def _look_at(self) -> None:
         """Go to the studio with the log that was recorded last."""
-        listening = _device.listening
-        if listening is None or (path := listening.recorded.path) is None:
+        path = _device.recorded.path
+        if path is None:
             return
         ui.navigate.to("./")
         await self._opener(path)
@@ -291,7 +300,7 @@ class _LivePage:
         state = None if listening is None else listening.state
         for key, words in shown_state(state).items():
             self._figures[key].text = words
-        self._show_recording(listening)
+        self._show_recording(_device.recorded)
         self._show_guide(listening)
         if listening is None:
             self._name.text = "Not connected"
@@ -335,10 +344,7 @@ class _LivePage:
         with self._scene:
             self._body = Body(("measured",), compass="mag_x" in columns)
 
-    def _show_recording(self, listening: Listening | None) -> None:
-        if listening is None:
-            return
-        recorded = listening.recorded
+    def _show_recording(self, recorded: Recorded) -> None:
         self._red.props(f"icon={'stop' if recorded.running else 'fiber_manual_record'}")
         self._red.props(f'aria-label="{"stop" if recorded.running else "record"}"')
         self._file.set_enabled(not recorded.running)
