@@ -152,6 +152,13 @@ def step_back_and_compare(page, ladder):
     heights = wait_for_bars(page, len(ladder["steps"]) + 4)
     assert heights[-1] > heights[-2]
     assert "fixed" in marked(page, f"value-{first}.x").inner_text()
+    # a game asks before it takes the place of a model that was built
+    marked(page, "mystery").click()
+    marked(page, "level-1").click()
+    marked(page, "replace").wait_for()
+    page.get_by_role("button", name="Cancel").click()
+    marked(page, "replace").wait_for(state="detached")
+    assert bars(page) == heights
 
 
 def copy_and_save(page, folder):

@@ -7,6 +7,7 @@ import numpy as np
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS
+from imufit.fitting.rest_passes import RestPasses
 from imufit.results import Judged
 
 
@@ -32,6 +33,8 @@ def _reason(analysis: Analysis, sensor: str) -> str | None:
 def _of_log(evidence: LogEvidence, sensor: str) -> str | None:
     channels = [k for k, name in enumerate(CHANNELS) if name[:3] == sensor]
     if sensor not in evidence.facts.sensors:
+        if isinstance(evidence.passes, RestPasses):
+            return "the log has no reference, and too few rests to judge by instead"
         return "no sample has a reference beside it"
     if not any(np.isfinite(evidence.raw_variance[k]) for k in channels):
         return "too few samples have a reference around them"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Final
 
@@ -58,7 +58,7 @@ class Head:
                 for number, level in LEVELS.items():
                     if number == DEMONSTRATION:
                         continue
-                    ui.menu_item(f"Level {number}: {level.title}", _player(desk, number)).props(
+                    ui.menu_item(f"Level {number}: {level.title}", self._asked(number)).props(
                         attribute("data-mark", f"level-{number}")
                     )
             for path, title in server.other_pages():
@@ -72,6 +72,31 @@ class Head:
         self._logs.set_text(names or "no log")
         for button in (self._save, self._copy):
             button.set_enabled(desk.session is not None and desk.session.begun)
+
+    def _asked(self, level: int) -> Callable[[], object]:
+        """Return what begins a game; where a model was built on a log of one's own, the person is asked first."""
+        desk, play = self._desk, _player(self._desk, level)
+
+        def ask() -> object:
+            session = desk.session
+            if session is None or desk.mystery is not None or not session.can_undo:
+                return play()
+            with ui.dialog() as dialog, ui.card():
+                ui.label("The game takes the place of the open session.")
+
+                async def begin() -> None:
+                    dialog.close()
+                    await play()
+
+                with ui.row():
+                    ui.button("Save the session", on_click=self._download).props("outline")
+                    ui.button("Play", on_click=begin).props("data-mark=replace")
+                    ui.button("Cancel", on_click=dialog.close).props("flat")
+            dialog.on("hide", dialog.delete)
+            dialog.open()
+            return None
+
+        return ask
 
     def _download(self) -> None:
         try:
@@ -348,7 +373,7 @@ def _number_of(desk: Desk, name: str | None) -> int:
     return names.index(name) if name in names else 0
 
 
-def _player(desk: Desk, level: int, seed: int | None = None) -> Callable[[], object]:
+def _player(desk: Desk, level: int, seed: int | None = None) -> Callable[[], Awaitable[None]]:
     return lambda: desk.play(level, secrets.randbelow(SEEDS) if seed is None else seed)
 
 

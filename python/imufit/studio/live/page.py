@@ -37,6 +37,10 @@ FRAMES: Final = {"NED": "NED: lies z down", "NWU": "NWU: lies z up", "ENU": "ENU
 """Frames by name, with the way a level device lies."""
 
 
+FIRST: Final = "six_sides"
+"""Emulated device that is offered first: its motion is that of a calibration, so that each button of the page works."""
+
+
 class _Device:
     """The one device of the server: a page that is loaded again finds the recording running."""
 
@@ -96,7 +100,8 @@ def devices() -> list[str]:
 
     ports = sorted(list_ports.comports(), key=lambda port: port.device)
     used = [port.device for port in ports if port.hwid != "n/a"]
-    return list(dict.fromkeys([*used, *(EMULATED + name for name in SCENARIOS), *(port.device for port in ports)]))
+    emulated = (EMULATED + name for name in (FIRST, *SCENARIOS))
+    return list(dict.fromkeys([*used, *emulated, *(port.device for port in ports)]))
 
 
 def _entry(source: Source) -> str:
@@ -304,7 +309,7 @@ class _LivePage:
         self._show_guide(listening)
         if listening is None:
             self._name.text = "Not connected"
-            self._rest.text = ""
+            self._rest.text = self._angles.text = ""
             return
         if listening.problem:
             self._problem.text = printable(listening.problem)
