@@ -99,7 +99,7 @@ def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
         noise=noise_budget(analysis),
     )
     if wrong := tuple(contradicted(fit)):
-        # What is left follows the wrong value, and names no other cause.
+        # The residual follows the wrong value, and names no other cause.
         return replace(found, sentence=" ".join(wrong), unexplained=())
     return replace(
         found, sentence=sentences.answer(found, best, ratio=fit.ratio, untold=len(unshown), spoilt=result.spoilt)

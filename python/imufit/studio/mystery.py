@@ -29,11 +29,14 @@ class Level:
         Its name, and the task.
     lesson : str
         The sentence on the method that the level teaches.
+    nothing : bool
+        Whether there may be nothing hidden.
     """
 
     title: str
     words: str
     lesson: str
+    nothing: bool = False
 
 
 DEMONSTRATION: Final = 0
@@ -54,6 +57,7 @@ LEVELS: Final[dict[int, Level]] = {
         "A small effect, or none",
         "A small effect is hidden, or nothing at all. Name the effect, or answer that nothing is missing.",
         "Absence has evidence too: where nothing is hidden, every named effect is a false alarm.",
+        nothing=True,
     ),
     3: Level(
         "An effect with a rival",

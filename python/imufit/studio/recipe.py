@@ -14,6 +14,10 @@ JOINED: Final = "joined{}.parquet"
 """Log that the shell's commands write where two files are joined."""
 
 
+UNITS: Final = "# Values are in SI units; shares are parts of one."
+"""Comment over copied text that holds fixed values, in Python and in a shell."""
+
+
 def as_python(files: Sequence[LogFile], way: Sequence[Stack]) -> str:
     """Return a program that makes the present model, to the last digit.
 
@@ -24,7 +28,7 @@ def as_python(files: Sequence[LogFile], way: Sequence[Stack]) -> str:
     way : sequence of Stack
         Models from the ideal sensor to the present one, each fitted from the one before.
     """
-    lines = ["import imufit", ""]
+    lines = ["import imufit", "", *([UNITS] if way[-1].holds else [])]
     names = []
     for k, file in enumerate(files):
         names.append("log" if len(files) == 1 else f"log_{k + 1}")
@@ -92,7 +96,7 @@ def as_shell(files: Sequence[LogFile], way: Sequence[Stack]) -> str:
         Models from the ideal sensor to the present one, each fitted from the one before.
     """
     model = way[-1]
-    lines: list[str] = []
+    lines: list[str] = [UNITS] if model.holds else []
     logs: list[str] = []
     for k, file in enumerate(files):
         if file.reference is None:

@@ -18,8 +18,8 @@ from imufit.studio.view_panels import PanelView
 FIRST: Final = 5
 """Candidates that are shown at once: the best and its rivals; the others fold away."""
 
-SHOW_FALL: Final = "document.querySelector('.studio-fall').scrollIntoView({block: 'nearest', behavior: 'smooth'})"
-"""Brings the fall of the error into sight, where it is not: on a phone the candidates fill the screen."""
+INTO_SIGHT: Final = "document.querySelector('{}').scrollIntoView({{block: 'nearest', behavior: 'smooth'}})"
+"""Script that brings an element into sight, where it is not: on a phone the candidates fill the screen."""
 
 LOWERS: Final = 0.99
 """Held-out error with a candidate over that without from which on the candidate lowers it for the eye."""
@@ -57,7 +57,7 @@ class CandidateView:
         self._drawn: tuple[object, bool] | None = None
         ui.html("Candidates", tag="h2", sanitize=False)
         self._list = ui.column().classes("w-full gap-0")
-        self._card = ui.column().classes("w-full gap-1 studio-item").props("data-mark=card")
+        self._card = ui.column().classes("w-full gap-1 studio-item studio-card").props("data-mark=card")
         self._card.visible = False
 
     def refresh(self) -> None:
@@ -121,10 +121,10 @@ class CandidateView:
                     self._pin("")
                     off = effect in session.stack.effects
                     client = ui.context.client
-                    client.run_javascript(SHOW_FALL)
+                    client.run_javascript(INTO_SIGHT.format(".studio-fall"))
                     await desk.attempt(lambda: session.switch(effect, True) if off else session.add(effect))
                     # The sentence on top has another height by now, and the effect's card is gone.
-                    client.run_javascript(SHOW_FALL)
+                    client.run_javascript(INTO_SIGHT.format(".studio-fall"))
 
                 ui.button("Add", on_click=add).props("dense size=sm" + ("" if named else " outline")).props(
                     attribute("data-mark", f"add-{effect}")
@@ -142,6 +142,9 @@ class CandidateView:
         """Keep the card of an effect until another one is kept; a finger has no place to rest."""
         self._pinned = effect
         self.look_at(effect)
+        if effect:
+            # On a phone the card lies beneath the list.
+            ui.run_javascript(INTO_SIGHT.format(".studio-card"))
 
     def look_at(self, effect: str) -> None:
         """Show the card of an effect, and what it would explain; empty puts both away.

@@ -82,6 +82,8 @@ class FallView:
         """Keep the present model beside later ones, or put the kept one away."""
         session = _session(self._desk)
         session.second = None if session.second is not None else session.stack
+        if session.second is not None:
+            ui.notify("The model is kept. Change the present one: both stand side by side below the figures.")
         self._desk.changed.emit()
         await self._desk.update()
 

@@ -104,7 +104,10 @@ class Head:
         except InputError as error:
             ui.notify(str(error))
             return
-        ui.download.content(text.encode(), f"{Path(self._desk.files[0].name).stem}-session.toml")
+        name = f"{Path(self._desk.files[0].name).stem}-session.toml"
+        ui.download.content(text.encode(), name)
+        log = self._desk.game_log()
+        ui.notify(f"Saved {printable(name, NAME)}" + ("." if log is None else f", and the log {log.name}."))
         self._download_game()
 
     def _download_game(self) -> None:
@@ -182,6 +185,7 @@ class Top:
             desk.mystery,
             verdict,
             answer,
+            bool(desk.busy) and session is None,
         )
         if state == self._state and self._state:
             return
@@ -198,7 +202,8 @@ class Top:
                 self._game(made is not None and diagnosis is not None)
             if diagnosis is not None and not desk.guessing:
                 self._verdict(diagnosis)
-            if (session is None or session.refused) and not desk.arrivals and desk.wanted is None:
+            waiting = session is None and not desk.busy
+            if (waiting or (session is not None and session.refused)) and not desk.arrivals and desk.wanted is None:
                 self._welcome()
 
     def _welcome(self) -> None:
@@ -208,6 +213,11 @@ class Top:
             _uploader(desk)
             return
         ui.label("Drop a log here, or two files that belong together.").classes("studio-sentence")
+        ui.label(
+            "A log is a table (CSV, Parquet, NPZ), or a file of a phone, a logger or an autopilot. It holds time, "
+            "specific force and angular rate, and at best the attitude that a reference measured. The second file "
+            "holds that reference where it was recorded apart."
+        ).classes("studio-muted")
         _uploader(desk)
         ui.label("No log at hand? See the loop on a simulated log, or find the effect that one hides.").classes(
             "studio-muted"
@@ -326,14 +336,17 @@ class Top:
                 reveal.props("outline").props("data-mark=reveal")
                 return
             names = sorted(desk.session.start.analysis.candidates)
-            choices = {NOTHING: "nothing is missing"} | {name: printable(name, NAME) for name in names}
+            choices = {NOTHING: "nothing is missing"} if level.nothing else {}
+            choices |= {name: printable(name, NAME) for name in names}
             with ui.row().classes("items-center"):
                 # Who added an effect has named it; another choice stays until the reveal.
                 present = _named(desk) if game.answer is None else game.answer
-                answer = ui.select(choices, value=present, label="Your answer", with_input=True).props("dense outlined")
+                value = present if present in choices else None
+                answer = ui.select(choices, value=value, label="Your answer", with_input=True).props("dense outlined")
                 answer.classes("min-w-56").props("data-mark=answer")
-                answer.on_value_change(lambda event: setattr(game, "answer", event.value or NOTHING))
-                ui.button("Reveal", on_click=lambda: desk.reveal(answer.value or NOTHING)).props("data-mark=reveal")
+                answer.on_value_change(lambda event: setattr(game, "answer", event.value))
+                reveal = ui.button("Reveal", on_click=lambda: desk.reveal(answer.value)).props("data-mark=reveal")
+                reveal.bind_enabled_from(answer, "value", lambda chosen: chosen is not None)
             return
         for sentence in game.verdict.sentences:
             ui.label(printable(sentence)).classes("studio-sentence").props("data-mark=truth")
