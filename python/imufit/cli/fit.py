@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ from imufit.cli.names import check_effects, complete_effect, unknown
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import logs_argument
+from imufit.cli.settings import number_of
 
 if TYPE_CHECKING:
     from imufit.log import Reading
@@ -94,13 +94,7 @@ def _values(texts: Sequence[str]) -> dict[str, float]:
         key, equals, given = (part.strip() for part in text.partition("="))
         if not (equals and key and given):
             raise click.UsageError(f"--fix {text!r}: write EFFECT.PARAM=VALUE, such as gyr.bias.x=0.01")
-        try:
-            value = float(given)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise click.UsageError(f"--fix {text!r}: {given!r} is not a number")
-        values[key] = value
+        values[key] = number_of("--fix", text, given)
     return values
 
 

@@ -49,11 +49,22 @@ def settings_from(assignments: Sequence[str]) -> dict[str, dict[str, float]]:
                 if known[group]
                 else f"--set: {group} has no settings"
             )
-        try:
-            value = float(number)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise click.UsageError(f"--set {text!r}: {number.strip()!r} is not a number")
-        settings.setdefault(group, {})[name] = value
+        settings.setdefault(group, {})[name] = number_of("--set", text, number)
     return settings
+
+
+def number_of(option: str, text: str, number: str) -> float:
+    """Read the number of an assignment `text` such as ``NAME=VALUE``.
+
+    Raises
+    ------
+    click.UsageError
+        Not a finite number.
+    """
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise click.UsageError(f"{option} {text!r}: {number.strip()!r} is not a number")
+    return value

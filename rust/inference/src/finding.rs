@@ -10,7 +10,7 @@ use crate::dictionary::{self, Origin, Unnamed};
 use crate::problem::Problem;
 use crate::stack::Stack;
 
-/// A course is told of the channels in which it explains this part, at least, of what it explains in the one that shows it most.
+/// A course is reported for each channel in which it explains at least this part of what it explains in the channel that shows it most.
 const SHOWN: f64 = 0.1;
 
 /// A dependence that no effect of the catalogue explains.
