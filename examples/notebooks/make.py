@@ -96,6 +96,8 @@ def run(made: NotebookNode) -> NotebookNode:
             timeout=LONGEST,
             kernel_name="python3",
             record_timing=False,
+            # A print may leave the kernel in two messages, where its flush falls between them.
+            coalesce_streams=True,
             resources={"metadata": {"path": EXAMPLES}},
         )
         client.execute(env=environment)
