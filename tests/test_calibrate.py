@@ -600,3 +600,10 @@ def test_slow_turn_is_no_row_of_poses(angle_deg, duration):
     used = [pose for pose in find_poses(Log.from_arrays(t, acc=acc, gyr=gyr)).poses if pose.used]
     shown = [np.degrees(np.arctan2(pose.mean[0], pose.mean[2])) for pose in used]
     np.testing.assert_allclose(shown, [0.0, angle_deg], atol=0.1)
+
+
+def test_a_calibration_that_lowers_nothing_is_said_to():
+    perfect = calibrate(six(typical(acc_gain=np.eye(3), acc_bias=np.zeros(3), bias_slope=np.zeros(3))))
+    helped = calibrate(six())
+    assert perfect.sensors["acc"].sentence().endswith("The calibration does not lower this error.")
+    assert "does not lower" not in helped.sensors["acc"].sentence()

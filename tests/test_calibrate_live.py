@@ -110,6 +110,10 @@ def test_rotation_about_one_axis_is_no_free_rotation_whatever_the_hard_iron():
     for field in turned(rng, 1500):
         free.step(field + iron)
     assert free.complete
+    # Iron that comes near at the end moves the middle: what is complete stays complete.
+    for field in turned(rng, 1500, [0.0, 0.0, 1.0]):
+        free.step(field + 5.0 * iron)
+    assert free.complete
     for field in turned(rng, 1500, [0.0, 0.0, 1.0]) + rng.normal(0.0, 0.3, (1500, 3)):
         one.step(field + iron)
     assert not one.complete

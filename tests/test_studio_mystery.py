@@ -30,7 +30,7 @@ def test_a_large_effect_is_named_by_the_evidence(tmp_path):
     unit = next(unit for key, unit, _ in find_effect(truth).parameters if key == name)
     assert f"{name} = {quantity.quantity(value, unit)}" in right.sentences[1]
     assert "> 99.9 %" in right.sentences[2]
-    assert "You could have been sure" in right.sentences[-1]
+    assert right.sentences[-1] == f"You could have been sure: {truth} stands out, with a probability of > 99.9 %."
     assert right.lesson == LEVELS[1].lesson
     wrong = game.reveal(NOTHING, first)
     assert not wrong.right
@@ -40,7 +40,9 @@ def test_a_large_effect_is_named_by_the_evidence(tmp_path):
 def test_nothing_may_be_hidden(tmp_path):
     game, first = played(2, 0, tmp_path)
     assert not unseal(game.log).effects
-    assert game.reveal(NOTHING, first).right
+    right = game.reveal(NOTHING, first)
+    assert right.right
+    assert right.lesson == LEVELS[2].absence
     false_alarm = game.reveal("acc.bias", first)
     assert not false_alarm.right
     assert "You could not have named an effect" in false_alarm.sentences[-1]

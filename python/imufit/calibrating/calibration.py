@@ -213,7 +213,9 @@ class SensorCalibration(Part):
         left_out = (
             f"{shown[2]} on what the fit did not see" if np.isfinite(self.held_out) else "nothing could be left out"
         )
-        return f"{name}: {what} {shown[0]} before, {shown[1]} after, {left_out} (RMS)."
+        sentence = f"{name}: {what} {shown[0]} before, {shown[1]} after, {left_out} (RMS)."
+        unseen = self.held_out if np.isfinite(self.held_out) else self.after
+        return sentence if unseen < self.before else f"{sentence} The calibration does not lower this error."
 
 
 @dataclass(frozen=True, repr=False)

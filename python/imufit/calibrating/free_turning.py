@@ -56,7 +56,8 @@ class FreeTurning:
         mag : (3,) array
             Magnetic flux density, uT; NaN where there is none.
         """
-        if not np.isfinite(mag).all():
+        # A middle that moves later must not ask for directions again.
+        if self.complete or not np.isfinite(mag).all():
             return
         if self._kept:
             away = float(np.linalg.norm(mag - self._kept[-1]))

@@ -310,6 +310,10 @@ def _decades(low: float, top: float) -> list[float]:
     return [10.0**power for power in range(first, last + 1, -(-(last - first) // DECADES))]
 
 
+LOOKS: Final = {"kept model": (GREEN, "dashdot"), "now": (BLUE, "solid"), "predicted": (BLUE, "dash")}
+"""Looks of the lines of a trace by name, the others grey: dashes let the line beneath be seen where two agree."""
+
+
 def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:
     """Draw quantities of one channel over time.
 
@@ -323,9 +327,8 @@ def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *,
         The quantity.
     """
     factor, shown = quantity.shown_unit(unit)
-    # Dashes let the line beneath be seen where two lines agree.
-    looks = ((GREY, "solid"), (BLUE, "dash" if title == "reading" else "solid"))
     drawn: list[Figure] = []
-    for (name, t, values), (colour, dash) in zip(lines, looks, strict=False):
+    for name, t, values in lines:
+        colour, dash = LOOKS.get(name, (GREY, "solid"))
         drawn += _line(t, factor * values, colour, name, dash=dash)
     return _figure(drawn, "time, s", f"{title} of {words(channel)}, {shown}")

@@ -325,7 +325,7 @@ class Desk:
         if made.diagnosis is None:
             yield f"effects missing in {words}", lambda: session.diagnose(stack, self.progress), None
         if session.has_reference:
-            for model in dict.fromkeys((stack.model, Stack())):
+            for model in self._models_drawn(session):
                 if model not in self.models:
                     yield "residuals over time", partial(self._drawn_model, model), None
         if session.second is not None:
@@ -334,6 +334,12 @@ class Desk:
                 yield "comparing the kept model", lambda: session.compare(session.second, self.progress), None
             if session.second.model != stack.model and session.weighed() is None:
                 yield "weighing the two models", lambda: session.weigh(self.progress), None
+
+    @staticmethod
+    def _models_drawn(session: Session) -> list[Stack]:
+        """List the models whose residuals are drawn: the present one, the ideal sensor, the kept one."""
+        second = () if session.second is None else (session.second.model,)
+        return list(dict.fromkeys((session.stack.model, Stack(), *second)))
 
     def _drawn_rows(self) -> Traces:
         """Make the pass over the rows of the log that is drawn; those read so far are shown meanwhile."""
@@ -348,7 +354,7 @@ class Desk:
         assert self.session is not None
         assert self.traces is not None
         found = self.session.model_traces(self.traces, model)
-        kept = {Stack(), self.session.stack.model}
+        kept = self._models_drawn(self.session)
         self.models = {key: value for key, value in self.models.items() if key in kept} | {model: found}
         return found
 
@@ -491,6 +497,9 @@ class Desk:
         opened = await self._opened(kept.files)
         if opened is not None:
             session, joined = opened
+            # A log of the same name in another folder would be another log.
+            logs = " and ".join(str(file.path) for file in kept.files)
+            joined = (f"The session {path.name} was opened with {logs}.", *joined)
             session.go(kept.steps, kept.position)
             session.second = kept.second
             self._take(session, kept.files, joined, None)

@@ -29,14 +29,19 @@ class Level:
         Its name, and the task.
     lesson : str
         The sentence on the method that the level teaches.
-    nothing : bool
-        Whether there may be nothing hidden.
+    absence : str
+        The same for a log in which nothing is hidden; empty where a level hides an effect in every log.
     """
 
     title: str
     words: str
     lesson: str
-    nothing: bool = False
+    absence: str = ""
+
+    @property
+    def nothing(self) -> bool:
+        """Whether there may be nothing hidden."""
+        return bool(self.absence)
 
 
 DEMONSTRATION: Final = 0
@@ -56,8 +61,8 @@ LEVELS: Final[dict[int, Level]] = {
     2: Level(
         "A small effect, or none",
         "A small effect is hidden, or nothing at all. Name the effect, or answer that nothing is missing.",
-        "Absence has evidence too: where nothing is hidden, every named effect is a false alarm.",
-        nothing=True,
+        "A small effect shows once many rows agree on it: the probability counts all rows, the eye a few.",
+        absence="Absence has evidence too: where nothing is hidden, every named effect is a false alarm.",
     ),
     3: Level(
         "An effect with a rival",
@@ -179,9 +184,13 @@ class Mystery:
                 _evidence(truth, first),
                 _sureness(first),
             ),
-            LEVELS[self.level].lesson,
+            _lesson(LEVELS[self.level], hidden_effects),
         )
         return self.verdict
+
+
+def _lesson(level: Level, truth: Sequence[str]) -> str:
+    return level.lesson if truth or not level.nothing else level.absence
 
 
 def _said(truth: Sequence[str], answer: str, right: bool, rival: bool) -> str:
@@ -216,11 +225,12 @@ def _evidence(truth: Truth, first: Diagnosis) -> str:
 
 def _sureness(first: Diagnosis) -> str:
     """Say how sure one could have been."""
-    best = first.candidates[0].probability if first.candidates else math.nan
+    named = first.best_candidate
+    best = math.nan if named is None else named.probability
     if first.verdict == "adequate":
         return "You could not have named an effect: no effect stands out of the noise of this log."
     if first.verdict == "missing" and best >= SURE:
-        return "You could have been sure: one effect stands out."
+        return f"You could have been sure: {first.best} stands out, with a probability of {quantity.probability(best)}."
     if first.verdict == "ambiguous":
         return f"You could not have been sure: {', '.join(first.named)} explain this log equally well."
     return "You could not have been sure: the evidence names no single effect."

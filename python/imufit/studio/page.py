@@ -18,6 +18,7 @@ from imufit.studio.view_noise import NoiseView
 from imufit.studio.view_panels import PanelView
 from imufit.studio.view_top import Head, Top
 from imufit.studio.view_two import TwoView
+from imufit.studio.view_words import WordsView
 
 AHEAD_S: Final = 0.02
 """Time that the server has for sending the numbers of a change, s."""
@@ -49,6 +50,7 @@ def page_of(desk: Desk) -> Callable[[], None]:
                 fall = FallView(desk)
             with _region("left") as left:
                 model = ModelView(desk)
+                vocabulary = WordsView(desk)
             with _region("two") as beside:
                 two = TwoView(desk)
 
@@ -61,9 +63,10 @@ def page_of(desk: Desk) -> Callable[[], None]:
             for view in (head, model, fall, two):
                 view.refresh()
             beside.visible = two.kept
+            main.classes(**({"add": "studio-kept"} if two.kept else {"remove": "studio-kept"}))
 
         def pictures() -> None:
-            for view in (top, candidates, panels):
+            for view in (top, candidates, panels, vocabulary):
                 view.refresh()
             noise.renew()
             body.renew()

@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from imufit.figures import quantity
+from imufit.model.catalogue import find_effect
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -167,7 +170,15 @@ class Step:
             Action.REMOVE: f"− {self.effect}",
             Action.ON: f"{self.effect} on",
             Action.OFF: f"{self.effect} off",
-            Action.HOLD: f"{key} fixed",
+            Action.HOLD: f"{key} {self._value()} fixed",
             Action.FREE: f"{key} fitted",
         }
         return words[self.action]
+
+    def _value(self) -> str:
+        """Return the value at which the parameter was fixed, in the shown unit; empty for other steps."""
+        value = dict(self.stack.entry(self.effect).held).get(self.parameter) if self.parameter else None
+        if value is None:
+            return ""
+        units = {name: unit for name, unit, _ in find_effect(self.effect).parameters}
+        return quantity.quantity(value, units[self.parameter])

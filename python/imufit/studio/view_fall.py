@@ -83,7 +83,7 @@ class FallView:
         session = _session(self._desk)
         session.second = None if session.second is not None else session.stack
         if session.second is not None:
-            ui.notify("The model is kept. Change the present one: both stand side by side below the figures.")
+            ui.notify("The model is kept. Change the present one: both stand side by side beside the bars.")
         self._desk.changed.emit()
         await self._desk.update()
 

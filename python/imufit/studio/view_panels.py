@@ -24,6 +24,7 @@ FAILS: Final = 1.05
 """Residual over noise floor from which on a channel fails: below, the excess is a tenth of the noise's variance."""
 FAILS_WHERE: Final = "Where it fails"
 TIME: Final = "t"
+UNDER_WAY: Final = "The fit is under way: spectrum and trace are those of the model before."
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
 
@@ -102,7 +103,8 @@ class PanelView:
             return
         second = None if session.second is None else session.made(session.second)
         desk = self._desk
-        traced = (desk.models.get(Stack()), desk.models.get(session.stack.model))
+        traced = [desk.models.get(model) for model in (Stack(), session.stack.model)]
+        traced.append(None if session.second is None else desk.models.get(session.second.model))
         diagnosis = None if made is None else made.diagnosis
         state = (found, diagnosis, second and second.comparison, desk.channel, desk.covariate, self._proposed, *traced)
         if all(a is b or a == b for a, b in zip(state, self._state, strict=False)) and len(state) == len(self._state):
@@ -146,6 +148,7 @@ class PanelView:
         if panel is not None:
             self._state = ()
             self._panel.update_figure(charts.residual_panel(panel))
+        self._note.set_text(UNDER_WAY)
 
     def _refresh_readings(self) -> None:
         """Show the readings over time: of a log without a reference, or before the evidence is there."""
@@ -259,6 +262,7 @@ class PanelView:
             return
         begin, end = self._window or span
         start, now = desk.models.get(Stack()), desk.models.get(session.stack.model)
+        kept = None if session.second is None else desk.models.get(session.second.model)
         # Before the residuals are there, and on a log that has none, the readings stand in their place.
         kind = READING if start is None and now is None else self._kind
 
@@ -269,8 +273,10 @@ class PanelView:
                 if now is not None:
                     lines.append(("predicted", *now.window([channel], begin, end, PIXELS)[channel][1].line()))
             else:
-                for name, model in (("ideal sensor", start), ("now", now if now is not start else None)):
-                    if model is not None:
+                for name, model in {"ideal sensor": start, "kept model": kept, "now": now}.items():
+                    # The same model is drawn once: under its first name, the present one as such.
+                    others = {"kept model": (start, now), "now": (start,)}.get(name, ())
+                    if model is not None and all(model is not other for other in others):
                         lines.append((name, *model.window([channel], begin, end, PIXELS)[channel][0].line()))
             return lines
 

@@ -29,6 +29,8 @@ MOST_BYTES: Final = 4 * 2**30
 """Largest file that the browser may send: 20 million rows of 14 columns take 2.2 GB."""
 _APART: Final = re.compile(r"(?<=\d) (?=±|%|°|deg|m/s|µT|s\b|Hz)|(?<=±) ")
 """Blanks between a number and its error or unit."""
+NOTES: Final = 2
+"""Notes that stand open: as many lines as the sentence over them has; the others fold away."""
 PART_JUDGED: Final = "rule"
 """Icon of an adequate model where a sensor was not judged."""
 ICONS: Final = {"adequate": "check_circle", "missing": "help", "ambiguous": "call_split", "unknown": "error"}
@@ -257,10 +259,13 @@ class Top:
                     self._cure(option, number, "mend")
         for words in self._desk.joined:
             ui.label(printable(words)).classes("studio-muted").props("data-mark=joined")
-        if diagnosis.notes:
-            words = f"{quantity.counted(len(diagnosis.notes), 'note')} on these data"
+        shown, folded = diagnosis.notes[:NOTES], diagnosis.notes[NOTES:]
+        for note in shown:
+            ui.label(printable(note)).classes("studio-muted")
+        if folded:
+            words = f"{quantity.counted(len(folded), 'more note')} on these data"
             with ui.expansion(words).classes("w-full").props("dense"):
-                for note in diagnosis.notes:
+                for note in folded:
                     ui.label(printable(note)).classes("studio-muted")
 
     def _cure(self, option: Option, number: int, mark: str) -> None:
@@ -422,11 +427,7 @@ def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
 
 
 def _icon(icon: str, words: str, action: Callable[[], object] | None) -> ui.button:
-    button = ui.button(icon=icon, on_click=action).props(f'flat dense round aria-label="{words}"')
-    with button:
-        # Beside the button: beneath it the words would cover its menu.
-        ui.tooltip(words).props('anchor="center left" self="center right"')
-    return button
+    return ui.button(words, icon=icon, on_click=action).props(f'flat dense aria-label="{words}"')
 
 
 def _turn(dark: ui.dark_mode) -> None:

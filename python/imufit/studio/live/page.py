@@ -32,6 +32,7 @@ WINDOWS: Final = (5, 10, 20, 60)
 EMULATED: Final = "emulate "
 """Begin of the entries of the list of devices that are emulated."""
 RECORDS: Final = "The red button records what comes from now on."
+FIRST_CONNECT: Final = "Connect a device first."
 GUIDES: Final = "Six sides on a table, then free rotation."
 FRAMES: Final = {"NED": "NED: lies z down", "NWU": "NWU: lies z up", "ENU": "ENU: lies z up, yaw from east"}
 """Frames by name, with the way a level device lies."""
@@ -209,7 +210,7 @@ class _LivePage:
     def _traces(self) -> None:
         with ui.column().classes("studio-region gap-1"):
             with ui.row().classes("w-full items-center"):
-                ui.label("Readings").classes("font-medium")
+                self._heading = ui.label("Readings").classes("font-medium")
                 ui.space()
                 ui.label("green: at rest").classes("text-sm")
                 ui.select(
@@ -235,7 +236,6 @@ class _LivePage:
             await _device.connect(self._source())
             self._problem.text = ""
             self._recorded.text = RECORDS
-            self._message.text = GUIDES
             if not self._plots:
                 self._ask_for_rows("The readings stand here once the device sends some.")
         except InputError as error:
@@ -264,7 +264,7 @@ class _LivePage:
     def _record_or_stop(self) -> None:
         listening = _device.listening
         if listening is None:
-            self._recorded.text = "Connect a device first."
+            ui.notify(FIRST_CONNECT)
         elif _device.recorded.running:
             listening.stop()
         else:
@@ -286,7 +286,7 @@ class _LivePage:
     def _calibrate_or_stop(self) -> None:
         listening = _device.listening
         if listening is None:
-            self._message.text = "Connect a device first."
+            ui.notify(FIRST_CONNECT)
         elif listening.stage is not None:
             listening.stop()
         else:
@@ -310,7 +310,9 @@ class _LivePage:
         if listening is None:
             self._name.text = "Not connected"
             self._rest.text = self._angles.text = ""
+            self._heading.text = "Last readings" if self._plots else "Readings"
             return
+        self._heading.text = "Readings"
         if listening.problem:
             self._problem.text = printable(listening.problem)
         if state is None:
@@ -358,6 +360,7 @@ class _LivePage:
         name = printable(recorded.path.name)
         self._look.visible = not recorded.running
         if recorded.running:
+            self._file.value = recorded.path.name
             said = recorded.message or "recording"
             self._recorded.text = f"{said} {name}: {recorded.rows} rows, {recorded.seconds:.0f} s"
         elif self._recorded.text != f"{name}: {recorded.message}":
@@ -374,7 +377,7 @@ class _LivePage:
             self._draw_side(None)
             if listening is not None and listening.calibrated:
                 self._show_result(listening.calibrated)
-            elif self._message.text.startswith("Turn") or listening is None:
+            else:
                 self._message.text = GUIDES
             return
         self._message.text = stage.message
@@ -403,8 +406,8 @@ class _LivePage:
     def _show_result(self, sentences: tuple[str, ...]) -> None:
         shown = tuple(child.text for child in self._result.default_slot.children if isinstance(child, ui.label))
         said = tuple(printable(sentence) for sentence in sentences)
+        self._message.text = "The calibration has ended."
         if shown != said:
-            self._message.text = "Calibrated."
             self._result.clear()
             with self._result:
                 for sentence in said:

@@ -1,0 +1,44 @@
+"""Words of the page with their definitions, those of the glossary that the present answer uses."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from nicegui import ui
+
+from imufit.glossary import used_in
+from imufit.studio.desk import Desk
+
+ALWAYS: Final = ("residual", "noise floor", "held-out error", "covariate", "probability")
+"""Words that stand on the page whatever the answer."""
+
+
+class WordsView:
+    """The words on one page, folded away.
+
+    Parameters
+    ----------
+    desk : Desk
+        The state that it shows.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._texts: tuple[str, ...] = ()
+        with ui.expansion("Words used here").classes("w-full").props("dense data-mark=words"):
+            self._list = ui.column().classes("w-full gap-1")
+
+    def refresh(self) -> None:
+        """List the words of the present answer."""
+        session = self._desk.session
+        made = None if session is None or not session.begun else session.made()
+        diagnosis = None if made is None or self._desk.guessing else made.diagnosis
+        said = () if diagnosis is None else (diagnosis.sentence, *diagnosis.notes)
+        texts = (*ALWAYS, *(text for text in said if text))
+        if texts == self._texts:
+            return
+        self._texts = texts
+        self._list.clear()
+        with self._list:
+            for term in used_in(texts):
+                ui.label(f"{term.word}: {term.means.replace('`', '')}").classes("studio-muted")
