@@ -427,7 +427,9 @@ def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
 
 
 def _icon(icon: str, words: str, action: Callable[[], object] | None) -> ui.button:
-    return ui.button(words, icon=icon, on_click=action).props(f'flat dense aria-label="{words}"')
+    with ui.button(icon=icon, on_click=action).props(f'flat dense aria-label="{words}"') as button:
+        ui.label(words).classes("studio-words")
+    return button
 
 
 def _turn(dark: ui.dark_mode) -> None:

@@ -9,7 +9,7 @@ from nicegui import ui
 from imufit.glossary import used_in
 from imufit.studio.desk import Desk
 
-ALWAYS: Final = ("residual", "noise floor", "held-out error", "covariate", "probability")
+ALWAYS: Final = ("residual", "noise floor", "held-out error", "covariate")
 """Words that stand on the page whatever the answer."""
 
 
@@ -33,7 +33,7 @@ class WordsView:
         session = self._desk.session
         made = None if session is None or not session.begun else session.made()
         diagnosis = None if made is None or self._desk.guessing else made.diagnosis
-        said = () if diagnosis is None else (diagnosis.sentence, *diagnosis.notes)
+        said = () if diagnosis is None else ("probability", diagnosis.sentence, *diagnosis.notes)
         texts = (*ALWAYS, *(text for text in said if text))
         if texts == self._texts:
             return
