@@ -8,7 +8,7 @@ from imufit.lab.simulate import simulate
 
 EFFECT = "gyr.vibration_rectification"
 SMALL = 0.03
-"""Relative error that is allowed: the tones of the machine beat, in the power of the readings and not in the simulator's."""
+"""Relative error that is allowed: tones of the machine beat, which the power of the simulator does not."""
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

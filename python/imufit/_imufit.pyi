@@ -474,6 +474,7 @@ class _Estimate(TypedDict):
     held_out: float
     folds: _Array
     training: float
+    samples: float
 
 @final
 class Kind:

@@ -20,9 +20,12 @@ if TYPE_CHECKING:
 
 LESS = 0.01
 """Part of what the best fit takes off the square of the held-out error by which another may take off less: a late
-reference and a gyroscope that would have to be early and low-passed differ by 0.1 % where smoothing the reference's
-noise
-pays, a delay and a low-pass of a gyroscope by 0.3 %."""
+reference and a gyroscope that would have to be early and low-passed differ by 0.1 % where smoothing the noise of the
+reference pays, a delay and a low-pass of a gyroscope by 0.3 %."""
+CHANCE = 2.0
+"""Log of the odds that a difference of errors must have to count, that of the criterion (`ODDS` in
+`rust/inference/src/search.rs`). Of n samples of white noise a square smaller by 1/n makes the data likelier by the
+root of e."""
 
 
 def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
@@ -71,25 +74,30 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
 
 def _guarded(without: Tried, fits: dict[int, Tried]) -> dict[int, float]:
     """Return log evidences by slot, minus infinity where another fit takes off more of the error by what counts."""
-    lowest = min((each.held_out for each in fits.values() if np.isfinite(each.ln_evidence)), default=np.inf)
+    known = [each for each in fits.values() if np.isfinite(each.ln_evidence)]
+    lowest = min(known, key=lambda each: each.held_out, default=None)
     return {
-        slot: each.ln_evidence if as_low(each.held_out, lowest, without.held_out) else -np.inf
+        slot: each.ln_evidence if lowest is None or as_low(each, lowest, without.held_out) else -np.inf
         for slot, each in fits.items()
     }
 
 
-def as_low(error: float, lowest: float, start: float) -> bool:
-    """Return whether a held-out error is as low as the lowest one but for what does not count.
+def as_low(fit: Tried, lowest: Tried, start: float) -> bool:
+    """Return whether a fit's held-out error is as low as the lowest one but for what does not count.
 
     The evidence of a large log rests on the noise at frequencies that hold little of the error; where the error is not
     the same, it decides. Only the fall of the error is compared, since the error holds noise of the reference as well.
 
     Parameters
     ----------
-    error, lowest, start : float
-        The error, the lowest one, and that without what lowers it.
+    fit, lowest : Tried
+        The fit, and the one with the lowest error.
+    start : float
+        Held-out error without what lowers it.
     """
-    return error**2 <= lowest**2 + LESS * max(start**2 - lowest**2, 0.0)
+    square = lowest.held_out**2
+    by_chance = 2.0 * CHANCE / max(lowest.samples, 1.0) * square
+    return fit.held_out**2 <= square + max(LESS * (start**2 - square), by_chance)
 
 
 class Tried(NamedTuple):
@@ -101,12 +109,15 @@ class Tried(NamedTuple):
         Log of its marginal likelihood.
     held_out : float
         Its held-out error.
+    samples : float
+        Number of samples that this is of.
     analysis : Analysis
         Its evidence, without columns of effects that are not in it.
     """
 
     ln_evidence: float
     held_out: float
+    samples: float
     analysis: Analysis
 
 
@@ -127,7 +138,7 @@ def tried(fit: FittedStack, model: EffectStack) -> Tried:
     lost = [key for key, effect in known.items() if effect.reference_part == "bandwidth" and key not in model.effects]
     analysis, estimate = fit.analysis.solved_for(model, fit.own, only=lost)
     evidence = fit.analysis.ln_likelihood(analysis, estimate, analysis.candidate_slots)
-    return Tried(evidence, estimate.held_out, analysis)
+    return Tried(evidence, estimate.held_out, estimate.samples, analysis)
 
 
 def _curved(analysis: Analysis, slot: int) -> bool:

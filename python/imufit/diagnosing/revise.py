@@ -92,7 +92,7 @@ class _Search:
             self.seen.add(frozenset(model.effects))
             found = tried(self.fit, model)
             likelihood = _likelihood(self.fit, model, found)
-            if likelihood > self.most and as_low(found.held_out, self.first.held_out, self.start):
+            if likelihood > self.most and as_low(found, self.first, self.start):
                 self.most = likelihood
                 errors = self.first.held_out, found.held_out
                 self.way = [Revision(effect, instead, *errors) for effect, instead in way]

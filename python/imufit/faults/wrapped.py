@@ -6,11 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.faults.samples import samples
 from imufit.results import fault_words
 from imufit.results.data_fault import DataFault
+
+Array = NDArray[np.float64]
 
 BEYOND: Final = 0.8
 """Part of the end of the range from which on an ideal reading may be beyond it, errors of it aside."""
@@ -25,6 +28,8 @@ LEAST: Final = 10
 """Rows that chance does not make: of ten, nine are so near once in a hundred times."""
 WITHIN: Final = 0.8
 """Part of the end of the range up to which ideal readings show the sensor's scale."""
+GAIN: Final = 0.3
+"""Deviation of the scale of a sensor from 1 before it is seen: no gain is named above this."""
 
 
 def wrapped_faults(parts: Sequence[Mapping[str, Any]], facts: _imufit.Facts) -> list[DataFault]:
@@ -53,9 +58,8 @@ def wrapped_faults(parts: Sequence[Mapping[str, Any]], facts: _imufit.Facts) -> 
         reading, ideal = reading[known], ideal[known]
         end = float(np.abs(reading).max())
         inside = np.abs(ideal) < WITHIN * end
-        power = float(ideal[inside] @ ideal[inside])
         # Of a sensor with an error of scale, what is beyond by several ranges would seem to be somewhere else.
-        ideal = ideal * (float(reading[inside] @ ideal[inside]) / power if power > 0.0 else 1.0)
+        ideal = ideal * _scale(reading[inside], ideal[inside])
         off = ideal - reading
         beyond = (np.abs(ideal) > BEYOND * end) & (np.abs(off) > OFF * end)
         turns = np.round(off / (2.0 * end))
@@ -66,3 +70,16 @@ def wrapped_faults(parts: Sequence[Mapping[str, Any]], facts: _imufit.Facts) -> 
         words = fault_words.wrapped(sensor, end, wrapped, count)
         found.append(DataFault("wrapped", sensor, None, facts.t_start, facts.t_end, facts.n, *words, spoils=True))
     return found
+
+
+def _scale(reading: Array, ideal: Array) -> float:
+    """Return the scale of a sensor, near 1 where its ideal readings are too small to determine the scale.
+
+    What is left beside the scale may be alike in all samples (a bias, a mount), so that they count as one.
+    """
+    if not ideal.size:
+        return 1.0
+    square, product = float(np.mean(ideal**2)), float(np.mean(reading * ideal))
+    left = float(np.mean(reading**2)) - (product**2 / square if square > 0.0 else 0.0)
+    known = max(left, 0.0) / GAIN**2
+    return (product + known) / (square + known) if square + known > 0.0 else 1.0

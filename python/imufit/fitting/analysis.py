@@ -45,6 +45,8 @@ class Estimate:
         (p,) step of every parameter of the evidence.
     held_out, training : float
         Residual RMS over noise floor on data not used for the fit, and on all data.
+    samples : float
+        Number of samples of all channels that both are of.
     folds : ndarray
         (folds,) whitened sum of squares on data not used for the fit, of each part of the log that was left out.
     """
@@ -55,6 +57,7 @@ class Estimate:
     step: Array
     held_out: float
     training: float
+    samples: float
     folds: Array
 
 
@@ -307,7 +310,14 @@ class Analysis:
         values |= {slot: self._within_reach(slot, values[slot] + step) for slot, step in steps.items()}
         values = {slot: self._allowed(slot, at) for slot, at in values.items()}
         return Estimate(
-            values, errors, covariance, result["full_step"], result["held_out"], result["training"], result["folds"]
+            values,
+            errors,
+            covariance,
+            result["full_step"],
+            result["held_out"],
+            result["training"],
+            result["samples"],
+            result["folds"],
         )
 
     def _fixed(self, slot: int) -> NDArray[np.bool_]:

@@ -135,7 +135,7 @@ impl PyProblem {
     }
 
     /// Fits the slots given: step (k,) and covariance (k, k) of their k parameters, SI units, zero for those that are not fitted, not a number
-    /// for those at a bound; which of them are fitted, and which of these stand at a bound; full step (p,) of all; held-out and training residual RMS over noise floor; whitened held-out sum of squares of each fold.
+    /// for those at a bound; which of them are fitted, and which of these stand at a bound; full step (p,) of all; held-out and training residual RMS over noise floor; number of samples; whitened held-out sum of squares of each fold.
     fn estimate<'py>(&self, py: Python<'py>, slots: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
         self.known(&slots)?;
         let all = &self.0.slots;
@@ -176,6 +176,7 @@ impl PyProblem {
         out.set_item("held_out", base.ratio)?;
         out.set_item("folds", PyArray1::from_vec(py, base.white))?;
         out.set_item("training", (square / n.max(1.0)).sqrt())?;
+        out.set_item("samples", n)?;
         Ok(out)
     }
 
