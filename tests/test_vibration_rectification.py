@@ -3,7 +3,6 @@
 import imufit
 import numpy as np
 import pytest
-from imufit.lab.grade import trial
 from imufit.lab.simulate import simulate
 
 EFFECT = "gyr.vibration_rectification"
@@ -20,8 +19,3 @@ def test_the_coefficient_is_that_of_the_sensor_whose_machine_runs_now_and_then(s
     assert np.allclose([parameters[axis].value / truth[axis] for axis in truth], 1.0, atol=SMALL)
     assert all(parameter.stderr < SMALL * abs(parameter.value) for parameter in parameters.values())
     assert imufit.ladder(made.to_log()).diagnosis.verdict == "adequate"
-
-
-@pytest.mark.parametrize("seed", [3_300_034, 3_300_035, 3_300_044])
-def test_a_second_effect_beside_it_is_found_and_nothing_is_left(seed):
-    assert not trial("two", seed).marks.faults

@@ -19,8 +19,8 @@ use crate::zeros::{Modes, Strength};
 const VARYING: [f64; 7] = [0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
 
 /// Neighbouring blocks agree by so many standard deviations in what a cause that drifts or switches shows: chance makes as many in one of
-/// 160. Noise that follows the motion differs from block to block, too, but of any two blocks independently: in `imufit grade --set nothing`
-/// it makes 1.6 at most, drifts and switches of the second simulator make 3 to 5.
+/// 160. Noise that follows the motion differs from block to block, too, but of any two blocks independently: it makes
+/// more in 1 of 400 logs of `imufit grade --set nothing`, drifts and switches of the second simulator make 3 to 5.
 const AGREE: f64 = 2.5;
 
 /// Part of the largest information that is added to each, so that what the log does not show has a solution: it moves none that is shown.
