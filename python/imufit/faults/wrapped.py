@@ -75,7 +75,7 @@ def wrapped_faults(parts: Sequence[Mapping[str, Any]], facts: _imufit.Facts) -> 
 def _scale(reading: Array, ideal: Array) -> float:
     """Return the scale of a sensor, near 1 where its ideal readings are too small to determine the scale.
 
-    What is left beside the scale may be alike in all samples (a bias, a mount), so that they count as one.
+    The rest beside the scale may be alike in all samples (a bias, a mount), so that they count as one.
     """
     if not ideal.size:
         return 1.0
