@@ -28,8 +28,9 @@ LEAST: Final = 10
 """Rows that chance does not make: of ten, nine are so near once in a hundred times."""
 WITHIN: Final = 0.8
 """Part of the end of the range up to which ideal readings show the sensor's scale."""
-GAIN: Final = 0.3
-"""Deviation of the scale of a sensor from 1 before it is seen: no gain is named above this."""
+ALIKE: Final = 0.05
+"""Part of the end of the range by which readings may be off alike, by a bias or a mount. Ideal readings that are
+smaller do not show the sensor's scale."""
 
 
 def wrapped_faults(parts: Sequence[Mapping[str, Any]], facts: _imufit.Facts) -> list[DataFault]:
@@ -59,7 +60,7 @@ def wrapped_faults(parts: Sequence[Mapping[str, Any]], facts: _imufit.Facts) -> 
         end = float(np.abs(reading).max())
         inside = np.abs(ideal) < WITHIN * end
         # Of a sensor with an error of scale, what is beyond by several ranges would seem to be somewhere else.
-        ideal = ideal * _scale(reading[inside], ideal[inside])
+        ideal = ideal * _scale(reading[inside], ideal[inside], ALIKE * end)
         off = ideal - reading
         beyond = (np.abs(ideal) > BEYOND * end) & (np.abs(off) > OFF * end)
         turns = np.round(off / (2.0 * end))
@@ -72,14 +73,8 @@ def wrapped_faults(parts: Sequence[Mapping[str, Any]], facts: _imufit.Facts) -> 
     return found
 
 
-def _scale(reading: Array, ideal: Array) -> float:
-    """Return the scale of a sensor, near 1 where its ideal readings are too small to determine the scale.
-
-    The rest beside the scale may be alike in all samples (a bias, a mount), so that they count as one.
-    """
-    if not ideal.size:
-        return 1.0
-    square, product = float(np.mean(ideal**2)), float(np.mean(reading * ideal))
-    left = float(np.mean(reading**2)) - (product**2 / square if square > 0.0 else 0.0)
-    known = max(left, 0.0) / GAIN**2
+def _scale(reading: Array, ideal: Array, alike: float) -> float:
+    """Return the scale of a sensor, near 1 where ideal readings are smaller than what all may be off by alike."""
+    square, product = float(ideal @ ideal), float(reading @ ideal)
+    known = ideal.size * alike**2
     return (product + known) / (square + known) if square + known > 0.0 else 1.0
