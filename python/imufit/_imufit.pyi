@@ -604,6 +604,7 @@ class _Residual(TypedDict):
 @final
 class Problem:
     NEAR: float
+    ODDS: float
     def __new__(
         cls,
         logs: Sequence[

@@ -22,10 +22,6 @@ LESS = 0.01
 """Part of what the best fit takes off the square of the held-out error by which another may take off less: a late
 reference and a gyroscope that would have to be early and low-passed differ by 0.1 % where smoothing the noise of the
 reference pays, a delay and a low-pass of a gyroscope by 0.3 %."""
-CHANCE = 2.0
-"""Log of the odds that a difference of errors must have to count, that of the criterion (`ODDS` in
-`rust/inference/src/search.rs`). Of n samples of white noise a square smaller by 1/n makes the data likelier by the
-root of e."""
 
 
 def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
@@ -87,6 +83,7 @@ def as_low(fit: Tried, lowest: Tried, start: float) -> bool:
 
     The evidence of a large log rests on the noise at frequencies that hold little of the error; where the error is not
     the same, it decides. Only the fall of the error is compared, since the error holds noise of the reference as well.
+    Of n samples of white noise a square smaller by 1/n makes the data likelier by the root of e.
 
     Parameters
     ----------
@@ -96,7 +93,7 @@ def as_low(fit: Tried, lowest: Tried, start: float) -> bool:
         Held-out error without what lowers it.
     """
     square = lowest.held_out**2
-    by_chance = 2.0 * CHANCE / max(lowest.samples, 1.0) * square
+    by_chance = 2.0 * Problem.ODDS / max(lowest.samples, 1.0) * square
     return fit.held_out**2 <= square + max(LESS * (start**2 - square), by_chance)
 
 

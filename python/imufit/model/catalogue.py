@@ -165,3 +165,14 @@ def load_effects(path: str | Path) -> list[str]:
     if not added:
         raise InputError("the file defines no new effect", file=file, remedy="Use the decorator @imufit.effect(...).")
     return added
+
+
+def units_of(effect_id: str) -> dict[str, str]:
+    """Return the SI unit of each parameter of an effect, by its name.
+
+    Parameters
+    ----------
+    effect_id : str
+        Its id.
+    """
+    return {name: unit for name, unit, _ in find_effect(effect_id).parameters}

@@ -8,7 +8,7 @@ from typing import Any
 
 from imufit.errors import InputError
 from imufit.log.columns import LARGEST_COVARIATE
-from imufit.model.catalogue import find_effect
+from imufit.model.catalogue import find_effect, units_of
 from imufit.model.limits import Limits
 from imufit.printable import NAME, printable
 from imufit.whole_toml import HOW_TO_END, read_toml, write_toml
@@ -70,7 +70,7 @@ class ModelFile:
                 for key, of_effect in self.limits.items()
             }
         document["parameters"] = self.parameters
-        document["units"] = {key: _units(key) for key in self.effects}
+        document["units"] = {key: units_of(key) for key in self.effects}
         if self.standard_errors:
             document["standard_errors"] = self.standard_errors
         write_toml(path, document)
@@ -122,7 +122,7 @@ class ModelFile:
             Names it.
         """
         for key in self.effects:
-            for name, unit in _units(key).items():
+            for name, unit in units_of(key).items():
                 if name not in self.parameters.get(key, {}):
                     raise InputError(
                         f"parameter {name} of {key} is missing",
@@ -138,7 +138,7 @@ class ModelFile:
         """Refuse a file without a mark where something that belongs to the model may have stood behind its end."""
         for words, table in (("units", self.units), ("standard errors", self.standard_errors)):
             for key in self.effects if table else ():
-                if _units(key).keys() != table.get(key, {}).keys():
+                if units_of(key).keys() != table.get(key, {}).keys():
                     raise InputError(f"{words} of {key} are not complete: is the file cut off?", remedy=HOW_TO_END)
         known = set(self.constants.get("covariate_means", {}))
         known |= {"temp"} if "temperature_mean" in self.constants else set()
@@ -158,10 +158,6 @@ def is_usable(value: Any) -> bool:
 def shown(value: Any) -> str:
     """Return what a file holds, printable and not too long for a message."""
     return printable(repr(value), NAME)
-
-
-def _units(effect_id: str) -> dict[str, str]:
-    return {name: unit for name, unit, _ in find_effect(effect_id).parameters}
 
 
 def _table(value: Any, name: str) -> dict[str, Any]:

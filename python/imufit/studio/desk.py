@@ -15,6 +15,7 @@ from nicegui import Event, run
 from imufit.errors import InputError
 from imufit.log import Reading
 from imufit.remedy import Option, Remedy
+from imufit.results import Diagnosis
 from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, join_of, offers, remedies
 from imufit.studio.mystery import DEMONSTRATION, Mystery
 from imufit.studio.session import Session
@@ -150,6 +151,13 @@ class Desk:
         """Whether a game is on whose truth is not revealed: the evidence's names stay hidden."""
         game = self.mystery
         return game is not None and game.verdict is None and game.level != DEMONSTRATION
+
+    @property
+    def diagnosis(self) -> Diagnosis | None:
+        """Diagnosis on top of the present model; None while it is not there."""
+        session = self.session
+        made = None if session is None or not session.begun else session.made()
+        return None if made is None else made.diagnosis
 
     def reveal(self, answer: str) -> None:
         """End the game with an answer.

@@ -12,7 +12,7 @@ from imufit.errors import InputError
 from imufit.figures import quantity
 from imufit.lab.simulate import hidden, simulate, unseal
 from imufit.lab.simulated_log import save_simulation
-from imufit.model.catalogue import find_effect
+from imufit.model.catalogue import units_of
 from imufit.results import Diagnosis
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ def _values(truth: Truth) -> list[str]:
     """Give the values of each hidden effect, to be held beside the fitted ones."""
     sentences = []
     for effect, hidden_values in truth.effects.items():
-        units = {name: unit for name, unit, _ in find_effect(effect).parameters}
+        units = units_of(effect)
         shown = (f"{name} = {quantity.quantity(value, units[name])}" for name, value in hidden_values.items())
         sentences.append(f"Hidden in {effect}: {', '.join(shown)}.")
     return sentences

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from imufit.figures import quantity
-from imufit.model.catalogue import find_effect
+from imufit.model.catalogue import units_of
 
 
 @dataclass(frozen=True)
@@ -180,5 +180,4 @@ class Step:
         value = dict(self.stack.entry(self.effect).held).get(self.parameter) if self.parameter else None
         if value is None:
             return ""
-        units = {name: unit for name, unit, _ in find_effect(self.effect).parameters}
-        return quantity.quantity(value, units[self.parameter])
+        return quantity.quantity(value, units_of(self.effect)[self.parameter])

@@ -68,9 +68,7 @@ class CandidateView:
 
     def refresh(self) -> None:
         """Show the candidates on top of the present model."""
-        session = self._desk.session
-        made = None if session is None or not session.begun else session.made()
-        diagnosis = None if made is None else made.diagnosis
+        diagnosis = self._desk.diagnosis
         state = (diagnosis, self._desk.guessing)
         if state == self._drawn:
             return

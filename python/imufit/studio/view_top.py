@@ -171,8 +171,7 @@ class Top:
         """Show the verdict, what awaits a choice, problems and the game."""
         desk = self._desk
         session = desk.session
-        made = None if session is None or not session.begun else session.made()
-        diagnosis = None if made is None else made.diagnosis
+        diagnosis = desk.diagnosis
         verdict = None if desk.mystery is None else desk.mystery.verdict
         brought = tuple(item.file for item in desk.arrivals)
         answer = _named(desk) if desk.guessing else ""
@@ -201,7 +200,7 @@ class Top:
             if desk.arrivals:
                 self._choice()
             if desk.mystery is not None:
-                self._game(made is not None and diagnosis is not None)
+                self._game(diagnosis is not None)
             if diagnosis is not None and not desk.guessing:
                 self._verdict(diagnosis)
             waiting = session is None and not desk.busy

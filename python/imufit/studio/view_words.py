@@ -30,9 +30,7 @@ class WordsView:
 
     def refresh(self) -> None:
         """List the words of the present answer."""
-        session = self._desk.session
-        made = None if session is None or not session.begun else session.made()
-        diagnosis = None if made is None or self._desk.guessing else made.diagnosis
+        diagnosis = None if self._desk.guessing else self._desk.diagnosis
         said = () if diagnosis is None else ("probability", diagnosis.sentence, *diagnosis.notes)
         texts = (*ALWAYS, *(text for text in said if text))
         if texts == self._texts:

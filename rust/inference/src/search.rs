@@ -20,7 +20,7 @@ use crate::stack::{Stack, ln_prior, log_sum_exp};
 use crate::varying::{self, Varying};
 
 /// Log odds that something is there before a name is given: one false name in a thousand logs, were all components of the noise right.
-const ODDS: f64 = 2.0;
+pub const ODDS: f64 = 2.0;
 /// More effects at once are no explanation; whole sensors have seven.
 const MOST: usize = 12;
 /// Stacks that a search keeps: of 189 that a ladder asks for, 83 are different, and one takes some megabytes.

@@ -272,6 +272,10 @@ impl PyProblem {
     #[classattr]
     const NEAR: f64 = revision::NEAR;
 
+    /// Log of the odds that a difference must have to count.
+    #[classattr]
+    const ODDS: f64 = search::ODDS;
+
     /// Log Bayes factor from which on one of so many candidates is there.
     #[staticmethod]
     fn threshold(candidates: usize) -> f64 {
