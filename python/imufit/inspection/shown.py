@@ -21,7 +21,6 @@ from imufit.log.columns import SENSOR_NAMES
 from imufit.model.catalogue import effects, find_effect
 from imufit.model.effect_stack import EffectStack
 from imufit.progress import Progress
-from imufit.results.diagnosis import PASSED
 from imufit.results.effect_sight import EffectSight, ParameterSight
 from imufit.results.log_info import MotionInfo
 
@@ -125,9 +124,6 @@ class _Sight:
         self._asked = {candidate.slot: candidate for candidate in decided.candidates}
         self._least = 2.0 * _imufit.Problem.threshold(len(analysis.candidates))
         self._alike = _Alike(analysis, [*analysis.unnamed, *(analysis.slots[slot] for slot in self._offsets)])
-        beside = [analysis.slots[slot] for slot, asked in self._asked.items() if asked.status.words == PASSED]
-        known = [*analysis.unnamed, *beside]
-        self._beside = known, [analysis.slots[slot] for slot in self._offsets if analysis.slots[slot] not in known]
 
     def of(self, key: str) -> EffectSight:
         """Say what the log shows of one effect."""
@@ -198,20 +194,19 @@ class _Sight:
         return tuple(ParameterSight(name, unit, error, smallest(size, error), size) for name, unit, size, error in kept)
 
     def _as_asked(self, effect: _imufit.Effect, asked: _imufit.Candidate) -> tuple[ParameterSight, ...]:
-        """Sizes at which the diagnosis itself would see a candidate, beside all that it finds and the offsets."""
-        shadow = self._alike.shadow(effect.id, *self._beside)
+        """Sizes at which the diagnosis itself would see a candidate."""
         testable = asked.status != Status.NOT_TESTABLE
         found = []
-        for (name, unit, size), (_, error), least, factor in zip(
-            effect.parameters, asked.parameters, asked.detectable, shadow, strict=True
+        for (name, unit, size), (_, error), least in zip(
+            effect.parameters, asked.parameters, asked.detectable, strict=True
         ):
             if name in effect.searched:
                 continue
             typical = None if size is None else abs(size)
-            known = testable and error > 0.0 and np.isfinite(least) and np.isfinite(factor)
-            told = known and (typical is None or factor * error <= UNTOLD * typical)
-            smallest = factor * (least + POWER * error) if told else np.inf
-            found.append(ParameterSight(name, unit, float(factor * error), float(smallest), typical))
+            known = testable and error > 0.0 and np.isfinite(least)
+            told = known and (typical is None or error <= UNTOLD * typical)
+            smallest = least + POWER * error if told else np.inf
+            found.append(ParameterSight(name, unit, float(error), float(smallest), typical))
         return tuple(found)
 
     def _steps(self, size: float | None, error: float, sizes: list[tuple[float, float]]) -> float:
@@ -272,7 +267,6 @@ class _Alike:
                 whole[np.ix_(active, active)] += gram[: len(active), : len(active)] / variance
         offsets = np.concatenate([np.empty(0, int), *(places[key] for key in along if key in places)]).astype(int)
         self._own = np.diag(whole).copy()
-        self._whole = whole
         left = _without(whole, offsets)
         names = [key for key in places if key in analysis.candidates and key not in along]
         self._bases = {key: _whitening(left[np.ix_(at, at)], self._own[at]) for key, at in places.items()}
@@ -290,31 +284,6 @@ class _Alike:
         squares = np.sum(base**2, axis=1)
         whole = base.shape[1] == base.shape[0]
         return np.where(squares > 0.0, np.sqrt(squares), np.inf) if whole else np.full(base.shape[0], np.inf)
-
-    def shadow(self, key: str, along: list[str], besides: list[str]) -> Array:
-        """Return by how much effects fitted along besides make the standard errors of one larger, (parameters,).
-
-        Parameters
-        ----------
-        key : str
-            The effect.
-        along : list of str
-            What is fitted along in any case.
-        besides : list of str
-            What is fitted along besides.
-        """
-        at = self._places[key]
-        if not besides or key in besides:
-            return np.ones(at.size)
-
-        def variances(keys: list[str]) -> Array:
-            others = [self._places[each] for each in keys if each in self._places and each != key]
-            left = _without(self._whole, np.concatenate([np.empty(0, int), *others]).astype(int))[np.ix_(at, at)]
-            scale = np.sqrt(np.maximum(self._own[at], np.finfo(float).tiny))
-            # The rest of a direction beside the others counts from rounding on.
-            return np.diag(np.linalg.inv(left / np.outer(scale, scale) + VANISHES * np.eye(at.size))).copy()
-
-        return np.asarray(np.sqrt(np.maximum(variances([*along, *besides]) / variances(along), 1.0)))
 
     def like(self, key: str) -> list[str]:
         """Effects that can do whatever this one does."""

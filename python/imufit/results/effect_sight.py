@@ -25,7 +25,7 @@ class ParameterSight(Part):
     name, unit : str
         Of the parameter, SI.
     standard_error : float
-        It would have in this log, beside a constant offset of every sensor.
+        That of a diagnosis of this log.
     smallest : float
         Size from which on a diagnosis of this log names the effect in four of five cases.
     typical : float or None
