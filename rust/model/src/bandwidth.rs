@@ -169,7 +169,13 @@ impl Bandwidth {
         } else {
             LocalReference::position(window, None)
         };
-        let Some(mut reference) = reference else { return };
+        let Some(reference) = reference else { return };
+        let mut hint = 0;
+        let mut local_fit = |at: f64, width: Smoothing| {
+            let near = reference.near(at, width.half_width, &mut hint)?;
+            let fit = LocalFit::new(near.t, at, width)?;
+            Some((fit, near.values, near.first))
+        };
         let lowest = reference.lowest();
         if self.spacing.is_none() {
             self.spacing = Some(reference.spacing()).filter(|s| *s > 0.0);
@@ -180,7 +186,7 @@ impl Bandwidth {
             .and_then(|apart| Turns::of(window, reference.times(), apart));
         for row in rows {
             let at = window.t[row];
-            if let Some((fit, values, _)) = reference.local_fit(at, NOISE_FIT, self.of_attitude) {
+            if let Some((fit, values, _)) = local_fit(at, NOISE_FIT) {
                 let (sum, freedom) = fit.residual(&values);
                 self.noise_sum += sum;
                 self.noise_freedom += freedom;
@@ -196,19 +202,19 @@ impl Bandwidth {
             };
             let mut last: Option<(usize, Vec<f64>, [f64; 3])> = None;
             let weights_of = |fit: &LocalFit| {
-                let all = fit.weights();
+                let all = fit.weights(lowest);
                 [0, 1, 2]
                     .map(|k| self.order + k)
                     .map(|order| all.iter().map(|w| w[order - lowest]).collect::<Vec<f64>>())
             };
             for (k, width) in WIDTHS.iter().enumerate() {
-                let Some((fit, values, _)) = reference.local_fit(at, *width, self.of_attitude) else {
+                let Some((fit, values, _)) = local_fit(at, *width) else {
                     continue;
                 };
                 let both = weights_of(&fit);
                 sample.found[0][k] = Found::of(&both, &values);
                 if k < ORDERED
-                    && let Some((fit, values, first)) = reference.local_fit(at, width.tapered(), self.of_attitude)
+                    && let Some((fit, values, first)) = local_fit(at, width.tapered())
                 {
                     let weights = weights_of(&fit);
                     sample.found[1][k] = Found::of(&weights, &values);

@@ -6,7 +6,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::facts::LogFacts;
 use crate::kinematics_memory::{Differentiation, KinematicsRows};
-use crate::reference::{self, Kinematics, Widths};
+use crate::reference::{Kinematics, Widths};
 use crate::reference_clock::ReferenceClock;
 use crate::rig::{Play, RigError, Slack};
 use crate::sensor::Sensor;
@@ -160,9 +160,7 @@ fn kinematics(window: &Window, facts: &LogFacts, clock: ReferenceClock, motion: 
         position: facts.position_smoothing.map(of_position),
         clock,
     };
-    facts.kinematics.of(window, facts.n, how, || {
-        reference::kinematics(window, how.attitude, how.position, Some(facts.reference_dt), clock)
-    })
+    facts.kinematics.of(window, facts.n, how, Some(facts.reference_dt))
 }
 
 impl Ideal {

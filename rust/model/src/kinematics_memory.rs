@@ -1,20 +1,22 @@
 //! Kinematics of a log, kept from one pass over it to the next.
 //!
-//! At uneven time stamps the local polynomials are most of the work of a pass, and every pass over a log, whatever effects it is taken
-//! for, asks for the same ones again.
+//! The local polynomials would be most of the work of a pass, and every pass over a log, whatever effects it is taken for and whatever
+//! clock it reads the reference by, asks for the same ones again.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex};
 
-use crate::reference::{Kinematics, Widths};
+use crate::reference::{Kinematics, Widths, WindowReference};
 use crate::reference_clock::ReferenceClock;
 use crate::window::Window;
 
 /// Kinematics of some rows; `None` where the reference does not tell.
 pub type KinematicsRows = Arc<Vec<Option<Kinematics>>>;
 
-/// Rows kept at most, about 260 bytes each; of a log with more nothing is kept.
-const MOST_ROWS: usize = 1 << 20;
+/// Rows kept at most, about 260 bytes each and 70 MB together; of a log with more no rows are kept.
+const MOST_ROWS: usize = 1 << 18;
+/// Rows whose polynomials are kept at most: of two quantities by three widths 1.4 kB each, 180 MB together.
+const MOST_POLYNOMIALS: usize = 1 << 17;
 
 /// How the reference is differentiated, and by which clock it is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,16 +40,34 @@ struct Stretch {
 /// By the rows they begin and end at.
 type Stretches = HashMap<(usize, usize), Stretch>;
 
-#[derive(Debug, Default)]
+/// Polynomials of a stretch of rows.
+struct Read {
+    place: (usize, usize),
+    fingerprint: u64,
+    widths: (Widths, Option<Widths>),
+    rows: usize,
+    reference: Arc<WindowReference>,
+}
+
+#[derive(Default)]
 struct Kept {
     rows: usize,
     /// Those used last come last.
     kinds: Vec<(Differentiation, Stretches)>,
+    /// In the order in which they were made.
+    read: VecDeque<Read>,
+    read_rows: usize,
 }
 
 /// Kinematics of a log, shared by all copies of its facts.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub struct KinematicsMemory(Arc<Mutex<Kept>>);
+
+impl std::fmt::Debug for KinematicsMemory {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("KinematicsMemory").finish_non_exhaustive()
+    }
+}
 
 /// A number that changes with any value of a window's reference.
 fn fingerprint(window: &Window) -> u64 {
@@ -60,29 +80,66 @@ fn fingerprint(window: &Window) -> u64 {
 }
 
 impl KinematicsMemory {
-    /// Kinematics of the core rows of a window, from memory where they are known; `n` is the number of rows of the log.
-    pub fn of(
-        &self,
-        window: &Window,
-        n: usize,
-        how: Differentiation,
-        work_out: impl FnOnce() -> Vec<Option<Kinematics>>,
-    ) -> KinematicsRows {
-        if n > MOST_ROWS {
-            return Arc::new(work_out());
-        }
+    /// Kinematics of the core rows of a window, from memory where they are known; `n` is the number of rows of the log, `spacing` the usual
+    /// time between reference samples.
+    pub fn of(&self, window: &Window, n: usize, how: Differentiation, spacing: Option<f64>) -> KinematicsRows {
         let place = (window.offset + window.begin, window.offset + window.end);
         let now = fingerprint(window);
+        let work_out = || {
+            let reference = self.reference(window, place, now, how, spacing);
+            Arc::new(reference.kinematics(window, how.clock))
+        };
+        if n > MOST_ROWS {
+            return work_out();
+        }
         if let Some(known) = self.find(&how, place, now) {
             return known;
         }
-        let found = Arc::new(work_out());
+        let found = work_out();
         let stretch = Stretch {
             fingerprint: now,
             rows: found.clone(),
         };
         self.keep(how, place, stretch);
         found
+    }
+
+    /// Polynomials of a window's reference, from memory where they are known.
+    fn reference(
+        &self,
+        window: &Window,
+        place: (usize, usize),
+        now: u64,
+        how: Differentiation,
+        spacing: Option<f64>,
+    ) -> Arc<WindowReference> {
+        let widths = (how.attitude, how.position);
+        let same = |r: &&Read| r.place == place && r.fingerprint == now && r.widths == widths;
+        if let Ok(kept) = self.0.lock()
+            && let Some(known) = kept.read.iter().rfind(same)
+        {
+            return known.reference.clone();
+        }
+        let reference = Arc::new(WindowReference::new(window, how.attitude, how.position, spacing));
+        let rows = window.t.len();
+        if let Ok(mut kept) = self.0.lock()
+            && rows <= MOST_POLYNOMIALS
+        {
+            while kept.read_rows + rows > MOST_POLYNOMIALS
+                && let Some(gone) = kept.read.pop_front()
+            {
+                kept.read_rows -= gone.rows;
+            }
+            kept.read_rows += rows;
+            kept.read.push_back(Read {
+                place,
+                fingerprint: now,
+                widths,
+                rows,
+                reference: reference.clone(),
+            });
+        }
+        reference
     }
 
     fn find(&self, how: &Differentiation, place: (usize, usize), now: u64) -> Option<KinematicsRows> {
@@ -121,7 +178,7 @@ impl KinematicsMemory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::smoothing::NARROWEST;
+    use crate::smoothing::{NARROWEST, Smoothing};
 
     fn window<'a>(t: &'a [f64], q: &'a [f64]) -> Window<'a> {
         Window {
@@ -150,44 +207,34 @@ mod tests {
         let q: Vec<f64> = t.iter().flat_map(|_| [1.0, 0.0, 0.0, 0.0]).collect();
         let other: Vec<f64> = t.iter().flat_map(|_| [0.0, 1.0, 0.0, 0.0]).collect();
         let memory = KinematicsMemory::default();
-        let asked = |q: &[f64], how: Differentiation, copy: &KinematicsMemory| {
-            let mut count = 0;
-            copy.of(&window(&t, q), 50, how, || {
-                count += 1;
-                vec![None; 50]
-            });
-            count
-        };
-        assert_eq!(asked(&q, HOW, &memory), 1);
-        assert_eq!(asked(&q, HOW, &memory.clone()), 0);
-        assert_eq!(
-            asked(
-                &q,
-                Differentiation {
-                    clock: later(0.01),
-                    ..HOW
-                },
-                &memory
-            ),
-            1
-        );
-        assert_eq!(asked(&q, HOW, &memory), 0);
-        assert_eq!(asked(&other, HOW, &memory), 1);
+        let asked = |q: &[f64], how: Differentiation, copy: &KinematicsMemory| copy.of(&window(&t, q), 50, how, None);
+        let first = asked(&q, HOW, &memory);
+        assert!(Arc::ptr_eq(&first, &asked(&q, HOW, &memory.clone())));
+        let clock = later(0.01);
+        assert!(!Arc::ptr_eq(
+            &first,
+            &asked(&q, Differentiation { clock, ..HOW }, &memory)
+        ));
+        // Another clock reads the same polynomials.
+        assert_eq!(memory.0.lock().expect("free").read.len(), 1);
+        assert!(Arc::ptr_eq(&first, &asked(&q, HOW, &memory)));
+        assert!(!Arc::ptr_eq(&first, &asked(&other, HOW, &memory)));
+        assert_eq!(memory.0.lock().expect("free").read.len(), 2);
     }
 
     #[test]
     fn no_more_is_kept_than_there_is_room_for() {
-        let t: Vec<f64> = (0..50).map(|i| 0.01 * f64::from(i)).collect();
+        let n = MOST_ROWS / 3;
+        let t: Vec<f64> = (0..n).map(|i| 0.01 * i as f64).collect();
         let q: Vec<f64> = t.iter().flat_map(|_| [1.0, 0.0, 0.0, 0.0]).collect();
         let memory = KinematicsMemory::default();
-        let n = MOST_ROWS / 3;
-        for k in 0..6 {
-            let how = Differentiation {
-                clock: later(f64::from(k)),
-                ..HOW
-            };
-            memory.of(&window(&t, &q), n, how, || vec![None; n]);
-            assert!(memory.0.lock().expect("free").rows <= MOST_ROWS);
+        for k in 0..5 {
+            let clock = later(0.01 * f64::from(k));
+            memory.of(&window(&t, &q), n, Differentiation { clock, ..HOW }, None);
+            let attitude = Widths::alike(Smoothing::uniform(2, 1 + k as usize));
+            memory.of(&window(&t, &q), n, Differentiation { attitude, ..HOW }, None);
+            let kept = memory.0.lock().expect("free");
+            assert!(kept.rows <= MOST_ROWS && kept.read_rows <= MOST_POLYNOMIALS && !kept.read.is_empty());
         }
     }
 }

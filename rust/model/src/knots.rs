@@ -72,8 +72,8 @@ impl Knots {
         }
     }
 
-    /// Range of knots for a fit around `at`; `None` where the reference does not reach far enough on both sides.
-    pub(crate) fn around(&self, at: f64, half_width: usize, hint: &mut usize) -> Option<(usize, usize, usize)> {
+    /// The knot in the middle of a fit around `at`; `None` where the reference does not reach far enough on both sides.
+    pub(crate) fn nearest(&self, at: f64, half_width: usize, hint: &mut usize) -> Option<usize> {
         let n = self.t.len();
         if n == 0 {
             return None;
@@ -95,6 +95,6 @@ impl Knots {
         }
         // Between two segments the nearest knot may lie far away.
         let reach = 0.75 * (self.t[k + 1.min(last - 1 - k)] - self.t[k - 1.min(k - first)]);
-        ((at - self.t[k]).abs() <= reach).then_some((k, k - half_width, k + half_width + 1))
+        ((at - self.t[k]).abs() <= reach).then_some(k)
     }
 }

@@ -16,6 +16,7 @@ mod interpolated;
 pub mod kinematics_memory;
 pub mod knots;
 mod packets;
+pub mod polynomials;
 pub mod probes;
 pub mod reference;
 pub mod reference_clock;

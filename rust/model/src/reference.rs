@@ -3,13 +3,16 @@
 //! Around each time the attitude is written R(t) = R_c exp(phi(t)) with R_c the nearest knot; phi is a local polynomial
 //! ([`crate::smoothing`]), so that omega = J_r(phi) dphi/dt with the right Jacobian J_r of SO(3).
 
+use std::array::from_fn;
+
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::interpolated::Course;
 use crate::knots::Knots;
+use crate::polynomials::Polynomials;
 use crate::reference_clock::ReferenceClock;
 use crate::rotation_rates::{RotationRates, rates};
-use crate::smoothing::{self, Derivatives, LocalFit, Smoothing, Weights};
+use crate::smoothing::{Derivatives, Smoothing};
 use crate::usual_step::usual_step;
 use crate::window::Window;
 
@@ -36,60 +39,26 @@ pub struct Kinematics {
     pub acceleration_detail: Vector3<f64>,
 }
 
-/// Weights of the last fit, kept while the knots have the same spacing. Where they never have, weights are not worth having.
-#[derive(Default)]
-struct WeightCache {
-    offsets: Vec<f64>,
-    fit: LocalFit,
-    weights: Weights,
-    /// Fits since the spacing was last the same.
-    uneven: usize,
+/// What the reference says at each knot.
+enum Samples {
+    Attitudes(Vec<UnitQuaternion<f64>>),
+    Positions(Vec<[f64; 3]>),
 }
 
-/// After so many fits with a spacing of their own the next ones are expected to have one too.
-const UNEVEN: usize = 4;
-
-impl WeightCache {
-    /// Derivatives from the order `lowest` on around `at` of the polynomial through values at times `t`.
-    fn derivatives(
-        &mut self,
-        t: &[f64],
-        at: f64,
-        smoothing: Smoothing,
-        values: &[[f64; 3]],
-        lowest: usize,
-    ) -> Option<Derivatives> {
-        let tolerance = 1e-9 * (t[t.len() - 1] - t[0]);
-        let same =
-            self.offsets.len() == t.len() && self.offsets.iter().zip(t).all(|(o, v)| (v - at - o).abs() <= tolerance);
-        if same && !self.weights.is_empty() {
-            self.uneven = 0;
-            return Some(smoothing::apply(&self.weights, values));
-        }
-        self.uneven = if same { 0 } else { self.uneven + 1 };
-        self.offsets.clear();
-        self.offsets.extend(t.iter().map(|v| v - at));
-        self.weights.clear();
-        if self.uneven > UNEVEN {
-            return smoothing::derivatives(t, at, smoothing, values, lowest);
-        }
-        if !self.fit.prepare(t, at, smoothing, lowest) {
-            return None;
-        }
-        self.fit.weights_into(&mut self.weights);
-        Some(smoothing::apply(&self.weights, values))
-    }
-}
-
-/// One local fit of a whole window: knots, values around each, weights.
-pub struct LocalReference<'a> {
-    window: &'a Window<'a>,
+/// Attitude or position of the reference over a window: its knots, and what surrounds each.
+pub struct LocalReference {
     knots: Knots,
-    hint: usize,
-    cache: WeightCache,
-    values: Vec<[f64; 3]>,
-    /// Attitude at each knot; empty for positions.
-    attitudes: Vec<UnitQuaternion<f64>>,
+    samples: Samples,
+}
+
+/// Knots around a time, with their values relative to the middle one (attitudes) or to the first (positions).
+pub struct Surroundings<'a> {
+    /// Times of the knots, s.
+    pub t: &'a [f64],
+    /// Rotation vectors, rad, or positions, m.
+    pub values: Vec<[f64; 3]>,
+    /// Number of the first of these knots.
+    pub first: usize,
 }
 
 fn quaternion_at(column: &[f64], row: usize) -> UnitQuaternion<f64> {
@@ -97,6 +66,8 @@ fn quaternion_at(column: &[f64], row: usize) -> UnitQuaternion<f64> {
     UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]))
 }
 
+/// Rotation vectors longer than this, rad, are about to wrap around.
+const WRAPS: f64 = 2.8;
 /// Up to this square of x the series of [`ARC_SINE`] is exact to rounding.
 const SMALL: f64 = 0.04;
 /// asin(x) / x in powers of x squared.
@@ -130,10 +101,10 @@ fn rotation_vector(turn: &UnitQuaternion<f64>) -> Vector3<f64> {
     turn.scaled_axis()
 }
 
-impl<'a> LocalReference<'a> {
+impl LocalReference {
     /// Attitude knots of a window; `None` without a reference attitude. `spacing` is the usual time between knots,
     /// taken from the window if not given.
-    pub fn attitude(window: &'a Window<'a>, spacing: Option<f64>) -> Option<Self> {
+    pub fn attitude(window: &Window, spacing: Option<f64>) -> Option<Self> {
         let q = window.attitude?;
         let known = |i: usize| q[4 * i..4 * i + 4].iter().all(|v| v.is_finite());
         let change = |i: usize, j: usize| {
@@ -150,11 +121,14 @@ impl<'a> LocalReference<'a> {
         };
         let knots = Knots::new(window, known, change, course, spacing);
         let attitudes = knots.row.iter().map(|row| quaternion_at(q, *row)).collect();
-        Some(Self::new(window, knots, attitudes))
+        Some(Self {
+            knots,
+            samples: Samples::Attitudes(attitudes),
+        })
     }
 
     /// Position knots of a window; `None` without a reference position.
-    pub fn position(window: &'a Window<'a>, spacing: Option<f64>) -> Option<Self> {
+    pub fn position(window: &Window, spacing: Option<f64>) -> Option<Self> {
         let p = window.position?;
         let known = |i: usize| p[3 * i..3 * i + 3].iter().all(|v| v.is_finite());
         let change = |i: usize, j: usize| {
@@ -171,7 +145,12 @@ impl<'a> LocalReference<'a> {
             }
         };
         let knots = Knots::new(window, known, change, course, spacing);
-        Some(Self::new(window, knots, Vec::new()))
+        let at = |row: &usize| from_fn(|axis| p[3 * row + axis]);
+        let positions = knots.row.iter().map(at).collect();
+        Some(Self {
+            knots,
+            samples: Samples::Positions(positions),
+        })
     }
 
     /// Usual time between the knots.
@@ -184,90 +163,61 @@ impl<'a> LocalReference<'a> {
         self.knots.packet
     }
 
-    fn new(window: &'a Window<'a>, knots: Knots, attitudes: Vec<UnitQuaternion<f64>>) -> Self {
-        Self {
-            window,
-            knots,
-            hint: 0,
-            cache: WeightCache::default(),
-            values: Vec::new(),
-            attitudes,
-        }
+    /// Number of the knot nearest to a time, with so many on each side of it; `None` where there are fewer. The search begins at `hint`.
+    pub fn nearest(&self, at: f64, half_width: usize, hint: &mut usize) -> Option<usize> {
+        self.knots.nearest(at, half_width, hint)
     }
 
-    /// Collects the attitudes around `at` as rotation vectors from the nearest knot; the nearest knot's attitude, the times.
-    fn rotations(&mut self, at: f64, half_width: usize) -> Option<(UnitQuaternion<f64>, usize, usize)> {
-        let (k, first, last) = self.knots.around(at, half_width, &mut self.hint)?;
-        let centre = *self.attitudes.get(k)?;
-        let back = centre.inverse();
-        self.values.clear();
-        for attitude in &self.attitudes[first..last] {
-            let phi = rotation_vector(&(back * attitude));
-            // Past this angle the rotation vector is about to wrap around.
-            if phi.norm_squared() > 2.8 * 2.8 {
-                return None;
+    /// What lies around a knot; `None` where a rotation vector is about to wrap around.
+    pub fn around(&self, knot: usize, half_width: usize) -> Option<Surroundings<'_>> {
+        let (first, last) = (knot.checked_sub(half_width)?, knot + half_width + 1);
+        let values = match &self.samples {
+            Samples::Attitudes(attitudes) => {
+                let back = attitudes[knot].inverse();
+                let vector = |attitude| {
+                    let phi = rotation_vector(&(back * attitude));
+                    (phi.norm_squared() <= WRAPS * WRAPS).then_some([phi.x, phi.y, phi.z])
+                };
+                attitudes[first..last].iter().map(vector).collect::<Option<Vec<_>>>()?
             }
-            self.values.push([phi.x, phi.y, phi.z]);
-        }
-        Some((centre, first, last))
+            Samples::Positions(positions) => {
+                // The first value is taken off so that large coordinates keep their digits.
+                let origin = positions[first];
+                let from_first = |p: &[f64; 3]| from_fn(|axis| p[axis] - origin[axis]);
+                positions[first..last].iter().map(from_first).collect()
+            }
+        };
+        Some(Surroundings {
+            t: &self.knots.t[first..last],
+            values,
+            first,
+        })
     }
 
-    fn positions(&mut self, at: f64, half_width: usize) -> Option<(usize, usize)> {
-        let column = self.window.position?;
-        let (_, first, last) = self.knots.around(at, half_width, &mut self.hint)?;
-        self.values.clear();
-        // The first value is taken off so that large coordinates keep their digits.
-        let origin = 3 * self.knots.row[first];
-        for j in first..last {
-            let i = 3 * self.knots.row[j];
-            self.values.push([
-                column[i] - column[origin],
-                column[i + 1] - column[origin + 1],
-                column[i + 2] - column[origin + 2],
-            ]);
+    /// The same around the knot nearest to a time.
+    pub fn near(&self, at: f64, half_width: usize, hint: &mut usize) -> Option<Surroundings<'_>> {
+        self.around(self.nearest(at, half_width, hint)?, half_width)
+    }
+
+    /// Attitude at a knot; none for positions.
+    pub fn attitude_at(&self, knot: usize) -> Option<UnitQuaternion<f64>> {
+        match &self.samples {
+            Samples::Attitudes(attitudes) => attitudes.get(knot).copied(),
+            Samples::Positions(_) => None,
         }
-        Some((first, last))
     }
 
     /// Order of the first of the four derivatives: of a position the value is relative to an arbitrary origin.
-    pub fn lowest(&self) -> usize {
-        usize::from(self.attitudes.is_empty())
-    }
-
-    /// Value and first three derivatives of the rotation vector around `at`, and the attitude it starts from.
-    pub fn rotation_derivatives(&mut self, at: f64, s: Smoothing) -> Option<(UnitQuaternion<f64>, Derivatives)> {
-        let (centre, first, last) = self.rotations(at, s.half_width)?;
-        let d = self
-            .cache
-            .derivatives(&self.knots.t[first..last], at, s, &self.values, 0)?;
-        Some((centre, d))
-    }
-
-    /// First to fourth derivative of the position around `at`.
-    pub fn position_derivatives(&mut self, at: f64, s: Smoothing) -> Option<Derivatives> {
-        let (first, last) = self.positions(at, s.half_width)?;
-        self.cache
-            .derivatives(&self.knots.t[first..last], at, s, &self.values, 1)
+    pub const fn lowest(&self) -> usize {
+        match self.samples {
+            Samples::Attitudes(_) => 0,
+            Samples::Positions(_) => 1,
+        }
     }
 
     /// Times of the knots, s.
     pub fn times(&self) -> &[f64] {
         &self.knots.t
-    }
-
-    /// A fit around `at` with its values and its first knot, for judging how wide the polynomial may be.
-    pub fn local_fit(&mut self, at: f64, s: Smoothing, of_attitude: bool) -> Option<(LocalFit, Vec<[f64; 3]>, usize)> {
-        let (first, last) = if of_attitude {
-            let (_, first, last) = self.rotations(at, s.half_width)?;
-            (first, last)
-        } else {
-            self.positions(at, s.half_width)?
-        };
-        Some((
-            LocalFit::new(&self.knots.t[first..last], at, s, usize::from(!of_attitude))?,
-            self.values.clone(),
-            first,
-        ))
     }
 }
 
@@ -304,87 +254,66 @@ fn above_velocity(d: &Derivatives) -> [Vector3<f64>; 3] {
     [d[1], d[2], d[3]].map(Vector3::from)
 }
 
-/// Kinematics of each core row of the window, by a clock; `None` in a row where the reference does not tell.
-pub fn kinematics(
-    window: &Window,
-    attitude: Widths,
-    position: Option<Widths>,
-    spacing: Option<f64>,
-    clock: ReferenceClock,
-) -> Vec<Option<Kinematics>> {
-    let mut rotation = LocalReference::attitude(window, spacing);
-    let mut translation = position.and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w.value)));
-    // What enters columns comes from a wider polynomial; it needs a cache of its own.
-    let wider = |w: Widths| Some(w.columns).filter(|c| *c != w.value);
-    let mut smooth_rotation = wider(attitude).and_then(|w| LocalReference::attitude(window, spacing).map(|r| (r, w)));
-    let mut smooth_translation = position
-        .and_then(wider)
-        .and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w)));
-    let still_wider = |w: Widths| Some(w.bends).filter(|b| *b != w.columns);
-    let mut bent_rotation =
-        still_wider(attitude).and_then(|w| LocalReference::attitude(window, spacing).map(|r| (r, w)));
-    let mut bent_translation = position
-        .and_then(still_wider)
-        .and_then(|w| LocalReference::position(window, spacing).map(|r| (r, w)));
-    (window.begin..window.end)
-        .map(|i| {
-            let at = clock.at(window.t[i]);
-            let (centre, d) = rotation.as_mut()?.rotation_derivatives(at, attitude.value)?;
-            let phi = Vector3::from(d[0]);
-            let mut turning = rates_of(&d);
-            let mut omega_detail = Vector3::zeros();
-            if let Some((reference, width)) = smooth_rotation.as_mut() {
-                let smooth = rates_of(&reference.rotation_derivatives(at, *width)?.1);
-                omega_detail = turning.omega - smooth.omega;
-                turning = smooth;
+/// Attitude and position of a window's reference by their polynomials, whatever the clock.
+pub struct WindowReference {
+    rotation: Option<Polynomials>,
+    translation: Option<Polynomials>,
+}
+
+impl WindowReference {
+    /// Of a window; `spacing` is the usual time between reference samples.
+    pub fn new(window: &Window, attitude: Widths, position: Option<Widths>, spacing: Option<f64>) -> Self {
+        let polynomials = |reference: Option<LocalReference>, widths| Some(Polynomials::new(reference?, widths));
+        Self {
+            rotation: polynomials(LocalReference::attitude(window, spacing), attitude),
+            translation: position.and_then(|w| polynomials(LocalReference::position(window, spacing), w)),
+        }
+    }
+
+    /// Kinematics of each core row of the window, by a clock; `None` in a row where the reference does not tell.
+    pub fn kinematics(&self, window: &Window, clock: ReferenceClock) -> Vec<Option<Kinematics>> {
+        let mut rotation = self.rotation.as_ref().map(Polynomials::reader);
+        let mut translation = self.translation.as_ref().map(Polynomials::reader);
+        let mut at = |t: f64| {
+            let turning = rotation.as_mut()?.at(t)?;
+            let of_value = rates_of(&turning.value);
+            let columns = turning.columns.as_ref().map_or(of_value, rates_of);
+            let alpha_rate = turning.bends.as_ref().map_or(columns, rates_of).alpha_rate;
+            let [mut full, mut smooth, mut snap] = [[Vector3::zeros(); 3]; 3];
+            if let Some(reader) = translation.as_mut() {
+                let moving = reader.at(t)?;
+                full = above_velocity(&moving.value);
+                smooth = moving.columns.as_ref().map_or(full, above_velocity);
+                snap = moving.bends.as_ref().map_or(smooth, above_velocity);
             }
-            // Where the widest polynomial does not reach, the one of the columns has to do.
-            let bent =
-                |(reference, width): &mut (LocalReference, Smoothing)| reference.rotation_derivatives(at, *width);
-            if let Some((_, d)) = bent_rotation.as_mut().and_then(bent) {
-                turning.alpha_rate = rates_of(&d).alpha_rate;
-            }
-            let mut acceleration_detail = Vector3::zeros();
-            let [acceleration, jerk, mut snap] = match translation.as_mut() {
-                None => [Vector3::zeros(); 3],
-                Some((reference, s)) => {
-                    let all = above_velocity(&reference.position_derivatives(at, *s)?);
-                    match smooth_translation.as_mut() {
-                        None => all,
-                        Some((reference, width)) => {
-                            let smooth = above_velocity(&reference.position_derivatives(at, *width)?);
-                            acceleration_detail = all[0] - smooth[0];
-                            smooth
-                        }
-                    }
-                }
-            };
-            let bent =
-                |(reference, width): &mut (LocalReference, Smoothing)| reference.position_derivatives(at, *width);
-            if let Some(d) = bent_translation.as_mut().and_then(bent) {
-                [_, _, snap] = above_velocity(&d);
-            }
+            let ([acceleration, jerk, _], snap) = (smooth, snap[2]);
             // On the clock of the sensors.
             let rate = clock.rate();
             Some(Kinematics {
-                attitude: centre * UnitQuaternion::from_scaled_axis(phi),
-                omega: turning.omega * rate,
-                alpha: turning.alpha * rate.powi(2),
-                alpha_rate: turning.alpha_rate * rate.powi(3),
+                attitude: turning.centre? * UnitQuaternion::from_scaled_axis(Vector3::from(turning.value[0])),
+                omega: columns.omega * rate,
+                alpha: columns.alpha * rate.powi(2),
+                alpha_rate: alpha_rate * rate.powi(3),
                 acceleration: acceleration * rate.powi(2),
                 jerk: jerk * rate.powi(3),
                 snap: snap * rate.powi(4),
-                omega_detail: omega_detail * rate,
-                acceleration_detail: acceleration_detail * rate.powi(2),
+                omega_detail: (of_value.omega - columns.omega) * rate,
+                acceleration_detail: (full[0] - acceleration) * rate.powi(2),
             })
-        })
-        .collect()
+        };
+        let times = &window.t[window.begin..window.end];
+        times.iter().map(|t| at(clock.at(*t))).collect()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::smoothing::NARROWEST;
+
+    fn read(window: &Window, clock: ReferenceClock) -> Vec<Option<Kinematics>> {
+        WindowReference::new(window, Widths::alike(NARROWEST), None, None).kinematics(window, clock)
+    }
 
     /// Two sines about fixed axes one after the other: omega and alpha are known in closed form.
     fn truth(t: f64) -> (UnitQuaternion<f64>, Vector3<f64>, Vector3<f64>) {
@@ -424,16 +353,11 @@ mod tests {
         };
         for shift in [0.0, 0.0037] {
             let mut worst = (0.0_f64, 0.0_f64);
-            let k = kinematics(
-                &window,
-                Widths::alike(NARROWEST),
-                None,
-                None,
-                ReferenceClock {
-                    delay: shift,
-                    ..ReferenceClock::default()
-                },
-            );
+            let clock = ReferenceClock {
+                delay: shift,
+                ..ReferenceClock::default()
+            };
+            let k = read(&window, clock);
             for (i, k) in k.iter().enumerate().skip(5).take(n as usize - 10) {
                 let k = k.expect("inside");
                 let (_, omega, alpha) = truth(t[i] + shift);
@@ -442,7 +366,7 @@ mod tests {
             }
             assert!(worst.0 < 1e-6 * 5.0 && worst.1 < 1e-5 * 60.0, "{worst:?}");
         }
-        assert!(kinematics(&window, Widths::alike(NARROWEST), None, None, ReferenceClock::default())[3].is_none());
+        assert!(read(&window, ReferenceClock::default())[3].is_none());
     }
 
     #[test]
@@ -473,7 +397,7 @@ mod tests {
             attitude: Some(&q),
             ..Window::over(&t)
         };
-        let k = kinematics(&window, Widths::alike(NARROWEST), None, None, ReferenceClock::default());
+        let k = read(&window, ReferenceClock::default());
         assert!((97..123).all(|i| k[i].is_none()));
         assert!(k[90].is_some() && k[130].is_some());
     }

@@ -168,6 +168,7 @@ mod tests {
 
     use super::*;
     use crate::reference::LocalReference;
+    use crate::smoothing::LocalFit;
     use crate::smoothing::Smoothing;
 
     const WIDTH: Smoothing = Smoothing::uniform(6, 15).tapered();
@@ -197,12 +198,15 @@ mod tests {
             readings: [None, Some(&gyr), None],
             ..Window::over(&t)
         };
-        let mut reference = LocalReference::attitude(&window, None).expect("an attitude");
+        let reference = LocalReference::attitude(&window, None).expect("an attitude");
         let turns = Turns::of(&window, reference.times(), reference.spacing()).expect("a gyroscope");
-        let (mut seen, mut square, mut white) = (SeenBends::default(), 0.0, 0.0);
+        let (mut seen, mut square, mut white, mut hint) = (SeenBends::default(), 0.0, 0.0, 0);
         for row in (100..3900).step_by(3) {
-            let (fit, values, first) = reference.local_fit(t[row], WIDTH, true).expect("within the log");
-            let weights = fit.weights();
+            let near = reference
+                .near(t[row], WIDTH.half_width, &mut hint)
+                .expect("within the log");
+            let (values, first) = (near.values, near.first);
+            let weights = LocalFit::new(near.t, t[row], WIDTH).expect("determined").weights(0);
             let derivatives: [[f64; 3]; 3] = std::array::from_fn(|order| {
                 std::array::from_fn(|axis| weights.iter().zip(&values).map(|(w, v)| w[order + 1] * v[axis]).sum())
             });

@@ -3,8 +3,9 @@
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use crate::bandwidth::Bandwidth;
-use crate::reference::LocalReference;
-use crate::smoothing::{Smoothing, derivatives};
+use crate::polynomials::Polynomials;
+use crate::reference::{LocalReference, Widths};
+use crate::smoothing::{Smoothing, expansion};
 use crate::triple::Triple;
 use crate::window::{HOLD_ROWS, Window};
 
@@ -85,14 +86,16 @@ pub fn derivative(x: &Triple, t: &[f64], width: Smoothing) -> Triple {
     let readings = interleaved(x);
     let window = as_position(t, &readings);
     let mut out = Triple::default();
-    let Some(mut samples) = LocalReference::position(&window, None) else {
+    let Some(samples) = LocalReference::position(&window, None) else {
         return out;
     };
+    let samples = Polynomials::new(samples, Widths::alike(width));
+    let mut samples = samples.reader();
     let rows = sampled(x);
     let gap = HOLD_ROWS;
     let mut next = 0;
     for i in 0..t.len() {
-        let rate = samples.position_derivatives(t[i], width).map(|d| d[0]);
+        let rate = samples.at(t[i]).map(|local| local.value[0]);
         while next < rows.len() && rows[next] < i {
             next += 1;
         }
@@ -115,14 +118,8 @@ fn at_the_end(x: &Triple, t: &[f64], rows: &[usize], i: usize, next: usize, gap:
     }
     let times: Vec<f64> = near.iter().map(|k| t[*k]).collect();
     let values: Vec<[f64; 3]> = near.iter().map(|k| x.row(*k).into()).collect();
-    derivatives(
-        &times,
-        t[i],
-        Smoothing::uniform(END.degree.min(near.len() - 1), END.half_width),
-        &values,
-        1,
-    )
-    .map(|d| d[0])
+    let smoothing = Smoothing::uniform(END.degree.min(near.len() - 1), END.half_width);
+    Some(expansion(&times, t[i], smoothing, &values)?.derivatives(0.0, 1)[0])
 }
 
 /// The attitude of every row, the last known one held; NaN where none is near.
