@@ -170,13 +170,15 @@ impl Bandwidth {
             LocalReference::position(window, None)
         };
         let Some(reference) = reference else { return };
+        let lowest = reference.lowest();
         let mut hint = 0;
         let mut local_fit = |at: f64, width: Smoothing| {
-            let near = reference.near(at, width.half_width, &mut hint)?;
-            let fit = LocalFit::new(near.t, at, width)?;
-            Some((fit, near.values, near.first))
+            let knot = reference.nearest(at, &mut hint)?;
+            let near = reference.around(knot, width.half_width);
+            let values = near.within(width.half_width)?.to_vec();
+            let fit = LocalFit::new(reference.times_around(knot, width.half_width), at, width, lowest)?;
+            Some((fit, values, knot - width.half_width))
         };
-        let lowest = reference.lowest();
         if self.spacing.is_none() {
             self.spacing = Some(reference.spacing()).filter(|s| *s > 0.0);
             self.packet = reference.packet();
@@ -202,7 +204,7 @@ impl Bandwidth {
             };
             let mut last: Option<(usize, Vec<f64>, [f64; 3])> = None;
             let weights_of = |fit: &LocalFit| {
-                let all = fit.weights(lowest);
+                let all = fit.weights();
                 [0, 1, 2]
                     .map(|k| self.order + k)
                     .map(|order| all.iter().map(|w| w[order - lowest]).collect::<Vec<f64>>())

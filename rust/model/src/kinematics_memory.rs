@@ -15,8 +15,8 @@ pub type KinematicsRows = Arc<Vec<Option<Kinematics>>>;
 
 /// Rows kept at most, about 260 bytes each and 70 MB together; of a log with more no rows are kept.
 const MOST_ROWS: usize = 1 << 18;
-/// Rows whose polynomials are kept at most: of two quantities by three widths 1.4 kB each, 180 MB together.
-const MOST_POLYNOMIALS: usize = 1 << 17;
+/// Numbers of what lies around the knots that are kept at most, 128 MB.
+const MOST_NUMBERS: usize = 1 << 24;
 
 /// How the reference is differentiated, and by which clock it is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,12 +40,12 @@ struct Stretch {
 /// By the rows they begin and end at.
 type Stretches = HashMap<(usize, usize), Stretch>;
 
-/// Polynomials of a stretch of rows.
+/// The reference of a stretch of rows.
 struct Read {
     place: (usize, usize),
     fingerprint: u64,
     widths: (Widths, Option<Widths>),
-    rows: usize,
+    numbers: usize,
     reference: Arc<WindowReference>,
 }
 
@@ -56,7 +56,7 @@ struct Kept {
     kinds: Vec<(Differentiation, Stretches)>,
     /// In the order in which they were made.
     read: VecDeque<Read>,
-    read_rows: usize,
+    read_numbers: usize,
 }
 
 /// Kinematics of a log, shared by all copies of its facts.
@@ -104,7 +104,7 @@ impl KinematicsMemory {
         found
     }
 
-    /// Polynomials of a window's reference, from memory where they are known.
+    /// What lies around the knots of a window's reference, from memory where they are known.
     fn reference(
         &self,
         window: &Window,
@@ -121,21 +121,21 @@ impl KinematicsMemory {
             return known.reference.clone();
         }
         let reference = Arc::new(WindowReference::new(window, how.attitude, how.position, spacing));
-        let rows = window.t.len();
+        let numbers = reference.numbers();
         if let Ok(mut kept) = self.0.lock()
-            && rows <= MOST_POLYNOMIALS
+            && numbers <= MOST_NUMBERS
         {
-            while kept.read_rows + rows > MOST_POLYNOMIALS
+            while kept.read_numbers + numbers > MOST_NUMBERS
                 && let Some(gone) = kept.read.pop_front()
             {
-                kept.read_rows -= gone.rows;
+                kept.read_numbers -= gone.numbers;
             }
-            kept.read_rows += rows;
+            kept.read_numbers += numbers;
             kept.read.push_back(Read {
                 place,
                 fingerprint: now,
                 widths,
-                rows,
+                numbers,
                 reference: reference.clone(),
             });
         }
@@ -215,7 +215,7 @@ mod tests {
             &first,
             &asked(&q, Differentiation { clock, ..HOW }, &memory)
         ));
-        // Another clock reads the same polynomials.
+        // Another clock reads the same reference.
         assert_eq!(memory.0.lock().expect("free").read.len(), 1);
         assert!(Arc::ptr_eq(&first, &asked(&q, HOW, &memory)));
         assert!(!Arc::ptr_eq(&first, &asked(&other, HOW, &memory)));
@@ -234,7 +234,7 @@ mod tests {
             let attitude = Widths::alike(Smoothing::uniform(2, 1 + k as usize));
             memory.of(&window(&t, &q), n, Differentiation { attitude, ..HOW }, None);
             let kept = memory.0.lock().expect("free");
-            assert!(kept.rows <= MOST_ROWS && kept.read_rows <= MOST_POLYNOMIALS && !kept.read.is_empty());
+            assert!(kept.rows <= MOST_ROWS && kept.read_numbers <= MOST_NUMBERS && !kept.read.is_empty());
         }
     }
 }

@@ -72,8 +72,8 @@ impl Knots {
         }
     }
 
-    /// The knot in the middle of a fit around `at`; `None` where the reference does not reach far enough on both sides.
-    pub(crate) fn nearest(&self, at: f64, half_width: usize, hint: &mut usize) -> Option<usize> {
+    /// The knot nearest to a time; `None` where the reference does not reach so far. The search begins at `hint`.
+    pub(crate) fn nearest(&self, at: f64, hint: &mut usize) -> Option<usize> {
         let n = self.t.len();
         if n == 0 {
             return None;
@@ -90,11 +90,14 @@ impl Knots {
             k += 1;
         }
         let (first, last) = self.segment[k];
-        if k < first + half_width || k + half_width >= last {
-            return None;
-        }
         // Between two segments the nearest knot may lie far away.
         let reach = 0.75 * (self.t[k + 1.min(last - 1 - k)] - self.t[k - 1.min(k - first)]);
         ((at - self.t[k]).abs() <= reach).then_some(k)
+    }
+
+    /// Knots on each side of one, up to the nearer end of its segment.
+    pub(crate) fn reach(&self, knot: usize) -> usize {
+        let (first, last) = self.segment[knot];
+        (knot - first).min(last - 1 - knot)
     }
 }

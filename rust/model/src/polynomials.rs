@@ -1,61 +1,67 @@
-//! Polynomials of one reference quantity, one of each width around each knot.
+//! Local polynomials of one reference quantity at any time: for its value, for columns, for second derivatives.
 //!
-//! A polynomial through the same knots is the same at whatever time it is read: it is worked out once, and every clock reads it.
+//! What lies around a knot is worked out once, for every width and every clock.
 
 use std::sync::OnceLock;
 
-use nalgebra::UnitQuaternion;
+use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::reference::{LocalReference, Widths};
-use crate::smoothing::{self, Derivatives, Expansion, LocalFit, PowerWeights, Smoothing};
+use crate::reference::{LocalReference, Surroundings, Widths};
+use crate::smoothing::{self, Derivatives, LocalFit, Smoothing, Weights};
 
-/// Polynomials of one width; `None` around a knot whose surroundings do not determine one.
-struct OfWidth {
-    smoothing: Smoothing,
-    around: Vec<OnceLock<Option<Expansion>>>,
-}
-
-/// Polynomials of one reference quantity.
+/// One reference quantity and how it is differentiated.
 pub struct Polynomials {
     reference: LocalReference,
-    value: OfWidth,
-    /// Where they are wider than those for the value.
-    columns: Option<OfWidth>,
-    /// Where they are wider than those for the columns.
-    bends: Option<OfWidth>,
+    widths: Widths,
+    /// Around each knot, for the widest polynomial.
+    around: Vec<OnceLock<Surroundings>>,
 }
 
 /// What the polynomials say of one time.
 pub struct Local {
     /// Attitude that rotation vectors start from; none for positions.
-    pub centre: Option<UnitQuaternion<f64>>,
-    /// By the polynomial for the value.
-    pub value: Derivatives,
-    /// By that for columns; none where it is the same.
-    pub columns: Option<Derivatives>,
-    /// By that for second derivatives; none where it is the same or does not reach.
-    pub bends: Option<Derivatives>,
+    centre: Option<UnitQuaternion<f64>>,
+    value: Derivatives,
+    /// None where it is the same as by the polynomial for the value.
+    columns: Option<Derivatives>,
+    /// None where it is the same as by that for columns, or does not reach.
+    bends: Option<Derivatives>,
 }
 
-impl OfWidth {
-    fn new(smoothing: Smoothing, knots: usize) -> Self {
-        let mut around = Vec::new();
-        around.resize_with(knots, OnceLock::new);
-        Self { smoothing, around }
+impl Local {
+    /// The attitude; none where positions were read.
+    pub fn attitude(&self) -> Option<UnitQuaternion<f64>> {
+        Some(self.centre? * UnitQuaternion::from_scaled_axis(self.value[0].into()))
+    }
+
+    /// Derivative of the lowest order by the polynomial for the value.
+    pub const fn lowest(&self) -> [f64; 3] {
+        self.value[0]
+    }
+
+    /// What follows from the derivatives by the polynomials for the value, for columns and for second derivatives.
+    pub fn by_width(&self, of: impl Fn(&Derivatives) -> [Vector3<f64>; 3]) -> [[Vector3<f64>; 3]; 3] {
+        let value = of(&self.value);
+        let columns = self.columns.as_ref().map_or(value, &of);
+        [value, columns, self.bends.as_ref().map_or(columns, &of)]
     }
 }
 
 impl Polynomials {
     /// Of a reference, to be worked out where they are asked for.
     pub fn new(reference: LocalReference, widths: Widths) -> Self {
-        let knots = reference.times().len();
-        let other = |wider: Smoothing, than: Smoothing| (wider != than).then(|| OfWidth::new(wider, knots));
+        let mut around = Vec::new();
+        around.resize_with(reference.times().len(), OnceLock::new);
         Self {
-            value: OfWidth::new(widths.value, knots),
-            columns: other(widths.columns, widths.value),
-            bends: other(widths.bends, widths.columns),
             reference,
+            widths,
+            around,
         }
+    }
+
+    /// Numbers that these keep at most.
+    pub fn numbers(&self) -> usize {
+        self.around.len() * 3 * (2 * self.widths.widest() + 1)
     }
 
     /// For times in rising order.
@@ -63,7 +69,7 @@ impl Polynomials {
         Reader {
             of: self,
             hint: 0,
-            spacings: Default::default(),
+            caches: Default::default(),
         }
     }
 }
@@ -72,44 +78,47 @@ impl Polynomials {
 pub struct Reader<'a> {
     of: &'a Polynomials,
     hint: usize,
-    spacings: [EvenSpacing; 3],
+    caches: [WeightCache; 3],
 }
 
 impl Reader<'_> {
     /// What the reference says of a time; `None` where it does not reach.
     pub fn at(&mut self, t: f64) -> Option<Local> {
-        let of = self.of;
-        let [for_value, for_columns, for_bends] = &mut self.spacings;
-        let mut read = |width: &OfWidth, spacing: &mut EvenSpacing| {
-            let knot = of.reference.nearest(t, width.smoothing.half_width, &mut self.hint)?;
-            let centre = of.reference.times()[knot];
-            let found = width.around[knot].get_or_init(|| {
-                let near = of.reference.around(knot, width.smoothing.half_width)?;
-                spacing.expansion(near.t, centre, width.smoothing, &near.values)
-            });
-            Some((knot, found.as_ref()?.derivatives(t - centre, of.reference.lowest())))
+        let Polynomials {
+            reference,
+            widths,
+            around,
+        } = self.of;
+        let knot = reference.nearest(t, &mut self.hint)?;
+        let around = around[knot].get_or_init(|| reference.around(knot, widths.widest()));
+        let [for_value, for_columns, for_bends] = &mut self.caches;
+        let read = |smoothing: Smoothing, cache: &mut WeightCache| {
+            let values = around.within(smoothing.half_width)?;
+            let times = reference.times_around(knot, smoothing.half_width);
+            cache.derivatives(times, t, smoothing, values, reference.lowest())
         };
-        let (knot, value) = read(&of.value, for_value)?;
-        let columns = match &of.columns {
-            None => None,
-            Some(width) => Some(read(width, for_columns)?.1),
+        let value = read(widths.value, for_value)?;
+        let columns = match widths.columns {
+            same if same == widths.value => None,
+            wider => Some(read(wider, for_columns)?),
         };
         // Where the widest polynomial does not reach, the one of the columns has to do.
-        let bends = of.bends.as_ref().and_then(|width| Some(read(width, for_bends)?.1));
+        let wider = Some(widths.bends).filter(|b| *b != widths.columns);
         Some(Local {
-            centre: of.reference.attitude_at(knot),
+            centre: reference.attitude_at(knot),
             value,
             columns,
-            bends,
+            bends: wider.and_then(|wider| read(wider, for_bends)),
         })
     }
 }
 
 /// Weights of the last fit, kept while the knots have the same spacing. Where they never have, weights are not worth having.
 #[derive(Default)]
-struct EvenSpacing {
+struct WeightCache {
     offsets: Vec<f64>,
-    weights: Option<PowerWeights>,
+    fit: LocalFit,
+    weights: Weights,
     /// Fits since the spacing was last the same.
     uneven: usize,
 }
@@ -117,23 +126,34 @@ struct EvenSpacing {
 /// After so many fits with a spacing of their own the next ones are expected to have one too.
 const UNEVEN: usize = 4;
 
-impl EvenSpacing {
-    /// The polynomial through values at times `t`, around `at`; `None` if these do not determine it.
-    fn expansion(&mut self, t: &[f64], at: f64, smoothing: Smoothing, values: &[[f64; 3]]) -> Option<Expansion> {
+impl WeightCache {
+    /// Derivatives from the order `lowest` on around `at` of the polynomial through values at times `t`.
+    fn derivatives(
+        &mut self,
+        t: &[f64],
+        at: f64,
+        smoothing: Smoothing,
+        values: &[[f64; 3]],
+        lowest: usize,
+    ) -> Option<Derivatives> {
         let tolerance = 1e-9 * (t[t.len() - 1] - t[0]);
         let same =
             self.offsets.len() == t.len() && self.offsets.iter().zip(t).all(|(o, v)| (v - at - o).abs() <= tolerance);
-        self.uneven = if same { 0 } else { self.uneven + 1 };
-        if let Some(weights) = self.weights.as_ref().filter(|_| same) {
-            return Some(weights.apply(values));
+        if same && !self.weights.is_empty() {
+            self.uneven = 0;
+            return Some(smoothing::apply(&self.weights, values));
         }
+        self.uneven = if same { 0 } else { self.uneven + 1 };
         self.offsets.clear();
         self.offsets.extend(t.iter().map(|v| v - at));
-        self.weights = None;
+        self.weights.clear();
         if self.uneven > UNEVEN {
-            return smoothing::expansion(t, at, smoothing, values);
+            return smoothing::derivatives(t, at, smoothing, values, lowest);
         }
-        let weights = LocalFit::new(t, at, smoothing)?.power_weights();
-        Some(self.weights.insert(weights).apply(values))
+        if !self.fit.prepare(t, at, smoothing, lowest) {
+            return None;
+        }
+        self.fit.weights_into(&mut self.weights);
+        Some(smoothing::apply(&self.weights, values))
     }
 }

@@ -11,7 +11,7 @@ use crate::interpolated::Course;
 use crate::knots::Knots;
 use crate::polynomials::Polynomials;
 use crate::reference_clock::ReferenceClock;
-use crate::rotation_rates::{RotationRates, rates};
+use crate::rotation_rates::rates;
 use crate::smoothing::{Derivatives, Smoothing};
 use crate::usual_step::usual_step;
 use crate::window::Window;
@@ -51,14 +51,19 @@ pub struct LocalReference {
     samples: Samples,
 }
 
-/// Knots around a time, with their values relative to the middle one (attitudes) or to the first (positions).
-pub struct Surroundings<'a> {
-    /// Times of the knots, s.
-    pub t: &'a [f64],
-    /// Rotation vectors, rad, or positions, m.
-    pub values: Vec<[f64; 3]>,
-    /// Number of the first of these knots.
-    pub first: usize,
+/// Values around a knot: rotation vectors from its attitude, rad, or positions relative to its own, m.
+pub struct Surroundings {
+    /// Knots on each side.
+    pub reach: usize,
+    values: Vec<[f64; 3]>,
+}
+
+impl Surroundings {
+    /// Values of the knot and of so many on each side, where it has these.
+    pub fn within(&self, half_width: usize) -> Option<&[[f64; 3]]> {
+        let margin = self.reach.checked_sub(half_width)?;
+        Some(&self.values[margin..self.values.len() - margin])
+    }
 }
 
 fn quaternion_at(column: &[f64], row: usize) -> UnitQuaternion<f64> {
@@ -163,40 +168,39 @@ impl LocalReference {
         self.knots.packet
     }
 
-    /// Number of the knot nearest to a time, with so many on each side of it; `None` where there are fewer. The search begins at `hint`.
-    pub fn nearest(&self, at: f64, half_width: usize, hint: &mut usize) -> Option<usize> {
-        self.knots.nearest(at, half_width, hint)
+    /// Number of the knot nearest to a time; `None` where none is near. The search begins at `hint`.
+    pub fn nearest(&self, at: f64, hint: &mut usize) -> Option<usize> {
+        self.knots.nearest(at, hint)
     }
 
-    /// What lies around a knot; `None` where a rotation vector is about to wrap around.
-    pub fn around(&self, knot: usize, half_width: usize) -> Option<Surroundings<'_>> {
-        let (first, last) = (knot.checked_sub(half_width)?, knot + half_width + 1);
-        let values = match &self.samples {
+    /// What lies around a knot, at most so many knots to each side: nothing beyond a gap, nor where a rotation vector is about to wrap around.
+    pub fn around(&self, knot: usize, most: usize) -> Surroundings {
+        let most = most.min(self.knots.reach(knot));
+        let rows = knot - most..=knot + most;
+        let (reach, values) = match &self.samples {
             Samples::Attitudes(attitudes) => {
                 let back = attitudes[knot].inverse();
-                let vector = |attitude| {
-                    let phi = rotation_vector(&(back * attitude));
-                    (phi.norm_squared() <= WRAPS * WRAPS).then_some([phi.x, phi.y, phi.z])
-                };
-                attitudes[first..last].iter().map(vector).collect::<Option<Vec<_>>>()?
+                let vectors: Vec<_> = attitudes[rows].iter().map(|a| rotation_vector(&(back * a))).collect();
+                let wraps = |k: usize| vectors[k].norm_squared() > WRAPS * WRAPS;
+                let reach = (1..=most)
+                    .find(|d| wraps(most - d) || wraps(most + d))
+                    .map_or(most, |d| d - 1);
+                let kept = &vectors[most - reach..=most + reach];
+                (reach, kept.iter().map(|phi| [phi.x, phi.y, phi.z]).collect())
             }
             Samples::Positions(positions) => {
-                // The first value is taken off so that large coordinates keep their digits.
-                let origin = positions[first];
-                let from_first = |p: &[f64; 3]| from_fn(|axis| p[axis] - origin[axis]);
-                positions[first..last].iter().map(from_first).collect()
+                // What is taken off so that large coordinates keep their digits does not matter to derivatives.
+                let origin = positions[knot];
+                let relative = |p: &[f64; 3]| from_fn(|axis| p[axis] - origin[axis]);
+                (most, positions[rows].iter().map(relative).collect())
             }
         };
-        Some(Surroundings {
-            t: &self.knots.t[first..last],
-            values,
-            first,
-        })
+        Surroundings { reach, values }
     }
 
-    /// The same around the knot nearest to a time.
-    pub fn near(&self, at: f64, half_width: usize, hint: &mut usize) -> Option<Surroundings<'_>> {
-        self.around(self.nearest(at, half_width, hint)?, half_width)
+    /// Times of a knot and of so many on each side, s.
+    pub fn times_around(&self, knot: usize, half_width: usize) -> &[f64] {
+        &self.knots.t[knot - half_width..=knot + half_width]
     }
 
     /// Attitude at a knot; none for positions.
@@ -241,12 +245,19 @@ impl Widths {
             bends: smoothing,
         }
     }
+
+    /// Most knots that any of them takes on each side.
+    pub fn widest(&self) -> usize {
+        let Self { value, columns, bends } = self;
+        value.half_width.max(columns.half_width).max(bends.half_width)
+    }
 }
 
-/// Rates from a rotation vector and its first three derivatives.
-fn rates_of(d: &Derivatives) -> RotationRates {
+/// Rates from a rotation vector and its first three derivatives: angular rate, its first and its second derivative.
+fn rates_of(d: &Derivatives) -> [Vector3<f64>; 3] {
     let [phi, d, dd, ddd] = d.map(Vector3::from);
-    rates(phi, d, dd, ddd)
+    let found = rates(phi, d, dd, ddd);
+    [found.omega, found.alpha, found.alpha_rate]
 }
 
 /// What the position's polynomial gives: acceleration, jerk and snap.
@@ -270,35 +281,35 @@ impl WindowReference {
         }
     }
 
+    /// Numbers that are kept at most.
+    pub fn numbers(&self) -> usize {
+        let both = [&self.rotation, &self.translation];
+        both.into_iter().flatten().map(Polynomials::numbers).sum()
+    }
+
     /// Kinematics of each core row of the window, by a clock; `None` in a row where the reference does not tell.
     pub fn kinematics(&self, window: &Window, clock: ReferenceClock) -> Vec<Option<Kinematics>> {
         let mut rotation = self.rotation.as_ref().map(Polynomials::reader);
         let mut translation = self.translation.as_ref().map(Polynomials::reader);
         let mut at = |t: f64| {
             let turning = rotation.as_mut()?.at(t)?;
-            let of_value = rates_of(&turning.value);
-            let columns = turning.columns.as_ref().map_or(of_value, rates_of);
-            let alpha_rate = turning.bends.as_ref().map_or(columns, rates_of).alpha_rate;
-            let [mut full, mut smooth, mut snap] = [[Vector3::zeros(); 3]; 3];
-            if let Some(reader) = translation.as_mut() {
-                let moving = reader.at(t)?;
-                full = above_velocity(&moving.value);
-                smooth = moving.columns.as_ref().map_or(full, above_velocity);
-                snap = moving.bends.as_ref().map_or(smooth, above_velocity);
-            }
-            let ([acceleration, jerk, _], snap) = (smooth, snap[2]);
+            let [[of_value, ..], [omega, alpha, _], [.., alpha_rate]] = turning.by_width(rates_of);
+            let [[of_position, ..], [acceleration, jerk, _], [.., snap]] = match translation.as_mut() {
+                None => [[Vector3::zeros(); 3]; 3],
+                Some(reader) => reader.at(t)?.by_width(above_velocity),
+            };
             // On the clock of the sensors.
             let rate = clock.rate();
             Some(Kinematics {
-                attitude: turning.centre? * UnitQuaternion::from_scaled_axis(Vector3::from(turning.value[0])),
-                omega: columns.omega * rate,
-                alpha: columns.alpha * rate.powi(2),
+                attitude: turning.attitude()?,
+                omega: omega * rate,
+                alpha: alpha * rate.powi(2),
                 alpha_rate: alpha_rate * rate.powi(3),
                 acceleration: acceleration * rate.powi(2),
                 jerk: jerk * rate.powi(3),
                 snap: snap * rate.powi(4),
-                omega_detail: (of_value.omega - columns.omega) * rate,
-                acceleration_detail: (full[0] - acceleration) * rate.powi(2),
+                omega_detail: (of_value - omega) * rate,
+                acceleration_detail: (of_position - acceleration) * rate.powi(2),
             })
         };
         let times = &window.t[window.begin..window.end];

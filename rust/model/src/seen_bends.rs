@@ -202,13 +202,14 @@ mod tests {
         let turns = Turns::of(&window, reference.times(), reference.spacing()).expect("a gyroscope");
         let (mut seen, mut square, mut white, mut hint) = (SeenBends::default(), 0.0, 0.0, 0);
         for row in (100..3900).step_by(3) {
-            let near = reference
-                .near(t[row], WIDTH.half_width, &mut hint)
-                .expect("within the log");
-            let (values, first) = (near.values, near.first);
-            let weights = LocalFit::new(near.t, t[row], WIDTH).expect("determined").weights(0);
+            let knot = reference.nearest(t[row], &mut hint).expect("within the log");
+            let (half, near) = (WIDTH.half_width, reference.around(knot, WIDTH.half_width));
+            let (values, first) = (near.within(half).expect("within the log"), knot - half);
+            let weights = LocalFit::new(reference.times_around(knot, half), t[row], WIDTH, 0)
+                .expect("determined")
+                .weights();
             let derivatives: [[f64; 3]; 3] = std::array::from_fn(|order| {
-                std::array::from_fn(|axis| weights.iter().zip(&values).map(|(w, v)| w[order + 1] * v[axis]).sum())
+                std::array::from_fn(|axis| weights.iter().zip(values).map(|(w, v)| w[order + 1] * v[axis]).sum())
             });
             let third: Vec<f64> = weights.iter().map(|w| w[3]).collect();
             square += derivatives[2].iter().map(|v| v * v).sum::<f64>();

@@ -71,37 +71,13 @@ const TERMS: usize = MAX_DEGREE + 1;
 pub const NARROWEST: Smoothing = Smoothing::uniform(8, 4);
 
 /// Normal equations of one local polynomial in Legendre polynomials of u = (t - t_at) / scale, which keeps them well conditioned.
+#[derive(Default)]
 pub struct LocalFit {
     terms: usize,
     scale: f64,
+    lowest: usize,
     factor: [[f64; TERMS]; TERMS],
     basis: Vec<[f64; TERMS]>,
-}
-
-/// What the value of each of some knots counts for in the powers of their polynomial.
-pub struct PowerWeights {
-    terms: usize,
-    per_scale: f64,
-    of_knots: Vec<[f64; TERMS]>,
-}
-
-impl PowerWeights {
-    /// The polynomial through values at these knots.
-    pub fn apply(&self, values: &[[f64; 3]]) -> Expansion {
-        let mut sums = [[0.0; TERMS]; 3];
-        for (w, v) in self.of_knots.iter().zip(values) {
-            for (sums, v) in sums.iter_mut().zip(v) {
-                for (s, w) in sums.iter_mut().zip(w) {
-                    *s += w * v;
-                }
-            }
-        }
-        Expansion {
-            terms: self.terms,
-            per_scale: self.per_scale,
-            powers: from_fn(|n| from_fn(|axis| sums[axis][n])),
-        }
-    }
 }
 
 /// Four derivatives with respect to time, each of the next higher order; order 0 is the value.
@@ -122,27 +98,16 @@ const RECURRENCE: [(f64, f64); PRODUCTS] = {
     out
 };
 
-/// `LEGENDRE[k][n]`, what the power n of u counts for in the Legendre polynomial of degree k.
-const LEGENDRE: [[f64; TERMS]; TERMS] = {
-    let mut out = [[0.0; TERMS]; TERMS];
-    out[0][0] = 1.0;
-    out[1][1] = 1.0;
-    let mut k = 2;
-    while k < TERMS {
-        let (a, b) = RECURRENCE[k];
-        out[k][0] = -b * out[k - 2][0];
-        let mut n = 1;
-        while n < TERMS {
-            out[k][n] = a * out[k - 1][n - 1] - b * out[k - 2][n];
-            n += 1;
-        }
-        k += 1;
-    }
-    out
-};
-
-/// Four derivatives, and one more where the lowest is of order 1.
-const ORDERS: usize = 5;
+/// Derivatives of order 0 to 4 of the Legendre polynomials at u = 0.
+const AT_ZERO: [[f64; TERMS]; 5] = [
+    [1.0, 0.0, -0.5, 0.0, 0.375, 0.0, -0.3125, 0.0, 0.273_437_5],
+    [0.0, 1.0, 0.0, -1.5, 0.0, 1.875, 0.0, -2.1875, 0.0],
+    [0.0, 0.0, 3.0, 0.0, -7.5, 0.0, 13.125, 0.0, -19.6875],
+    [0.0, 0.0, 0.0, 15.0, 0.0, -52.5, 0.0, 118.125, 0.0],
+    [0.0, 0.0, 0.0, 0.0, 105.0, 0.0, -472.5, 0.0, 1299.375],
+];
+/// Highest order of the lowest of four derivatives.
+const HIGHEST_LOWEST: usize = AT_ZERO.len() - 4;
 
 /// Runs a function with the number of terms as a constant: the loops over terms, where all the time goes at uneven time stamps, are
 /// then unrolled.
@@ -160,45 +125,6 @@ macro_rules! with_terms {
             _ => $function::<TERMS>($($argument),*),
         }
     };
-}
-
-/// A polynomial in powers of u = (t - centre) / scale.
-#[derive(Clone, Copy, Debug)]
-pub struct Expansion {
-    terms: usize,
-    per_scale: f64,
-    powers: [[f64; 3]; TERMS],
-}
-
-impl Expansion {
-    /// Derivatives of order `lowest` (0 or 1) and the three next ones at `after` the centre, s.
-    #[inline]
-    pub fn derivatives(&self, after: f64, lowest: usize) -> Derivatives {
-        with_terms!(self.terms, derivatives_of(self, after * self.per_scale, lowest))
-    }
-}
-
-/// Derivatives at u: those of order m over m! are what Horner's rule leaves of each other (Knuth 1997, 4.6.4).
-#[inline]
-fn derivatives_of<const T: usize>(expansion: &Expansion, u: f64, lowest: usize) -> Derivatives {
-    let mut over_factorial = [[0.0; 3]; ORDERS];
-    for power in expansion.powers[..T].iter().rev() {
-        for order in (1..ORDERS).rev() {
-            let below = over_factorial[order - 1];
-            for (sum, below) in over_factorial[order].iter_mut().zip(below) {
-                *sum = *sum * u + below;
-            }
-        }
-        for (sum, power) in over_factorial[0].iter_mut().zip(power) {
-            *sum = *sum * u + power;
-        }
-    }
-    let mut unit = 1.0;
-    for (order, derivative) in over_factorial.iter_mut().enumerate() {
-        *derivative = derivative.map(|v| v * unit);
-        unit *= (order + 1) as f64 * expansion.per_scale;
-    }
-    from_fn(|k| over_factorial[lowest.min(ORDERS - 4) + k])
 }
 
 /// Products reach twice the highest degree.
@@ -324,8 +250,15 @@ fn products<const T: usize>(sums: &[[f64; LANES]; PRODUCTS]) -> [[f64; TERMS]; T
     out
 }
 
-/// The polynomial through values at knots, in one go: nothing is kept for other values.
-fn fitted<const T: usize>(t: &[f64], at: f64, scale: f64, kernel: Kernel, values: &[[f64; 3]]) -> Option<Expansion> {
+/// Four derivatives of the polynomial through values at knots, in one go: nothing is kept for other values.
+fn fitted<const T: usize>(
+    t: &[f64],
+    at: f64,
+    scale: f64,
+    kernel: Kernel,
+    values: &[[f64; 3]],
+    lowest: usize,
+) -> Option<Derivatives> {
     let mut sums = [[0.0; LANES]; PRODUCTS];
     let mut right = [[[0.0; LANES]; 3]; T];
     let per_scale = scale.recip();
@@ -342,28 +275,35 @@ fn fitted<const T: usize>(t: &[f64], at: f64, scale: f64, kernel: Kernel, values
     if !factorise::<T>(&mut factor, DETERMINED * t.len() as f64) {
         return None;
     }
-    let mut powers = [[0.0; 3]; TERMS];
+    let mut out = [[0.0; 3]; 4];
     for axis in 0..3 {
         let mut c = [0.0; TERMS];
         for k in 0..T {
             c[k] = right[k][axis].iter().sum();
         }
         solve::<T>(&factor, &mut c);
-        for (n, power) in powers.iter_mut().enumerate().take(T) {
-            power[axis] = (n..T).map(|k| LEGENDRE[k][n] * c[k]).sum();
+        let mut unit = if lowest == 0 { 1.0 } else { per_scale };
+        for (out, at_zero) in out.iter_mut().zip(&AT_ZERO[lowest..]) {
+            let value: f64 = (0..T).map(|k| at_zero[k] * c[k]).sum();
+            out[axis] = value * unit;
+            unit *= per_scale;
         }
     }
-    Some(Expansion {
-        terms: T,
-        per_scale,
-        powers,
-    })
+    Some(out)
 }
 
-/// The polynomial through values at times `t`, around `at`; `None` if these do not determine it.
-pub fn expansion(t: &[f64], at: f64, smoothing: Smoothing, values: &[[f64; 3]]) -> Option<Expansion> {
+/// Derivatives of order `lowest` (0 or 1) and the three next ones around `at` of the polynomial through values at times `t`; `None` if these
+/// do not determine it.
+pub fn derivatives(
+    t: &[f64],
+    at: f64,
+    smoothing: Smoothing,
+    values: &[[f64; 3]],
+    lowest: usize,
+) -> Option<Derivatives> {
     let (terms, scale) = terms_and_scale(t, at, smoothing.degree)?;
-    with_terms!(terms, fitted(t, at, scale, smoothing.kernel, values))
+    let (lowest, kernel) = (lowest.min(HIGHEST_LOWEST), smoothing.kernel);
+    with_terms!(terms, fitted(t, at, scale, kernel, values, lowest))
 }
 
 /// Number of terms, and the scale of time; `None` where there are too few knots.
@@ -413,66 +353,64 @@ fn solve<const T: usize>(factor: &[[f64; TERMS]; TERMS], b: &mut [f64; TERMS]) {
     }
 }
 
-/// Linear combinations of the polynomials at each knot, as many as there are terms.
-fn combined<const T: usize>(basis: &[[f64; TERMS]], coefficients: &[[f64; TERMS]; TERMS]) -> Vec<[f64; TERMS]> {
-    let at_knot = |b: &[f64; TERMS]| {
-        let mut sum = [0.0; TERMS];
+/// Linear combinations of the polynomials at each knot, four at a time.
+fn combined<const T: usize>(basis: &[[f64; TERMS]], coefficients: &[[f64; 4]; TERMS], out: &mut Weights) {
+    out.clear();
+    out.extend(basis.iter().map(|b| {
+        let mut sum = [0.0; 4];
         for k in 0..T {
-            for (s, c) in sum[..T].iter_mut().zip(coefficients[k]) {
+            for (s, c) in sum.iter_mut().zip(coefficients[k]) {
                 *s += b[k] * c;
             }
         }
         sum
-    };
-    basis.iter().map(at_knot).collect()
+    }));
 }
 
 impl LocalFit {
-    /// Prepares the fit around `at` through knots at times `t`; `None` if the knots do not determine the polynomial.
-    pub fn new(t: &[f64], at: f64, smoothing: Smoothing) -> Option<Self> {
-        let (terms, scale) = terms_and_scale(t, at, smoothing.degree)?;
-        let mut basis = Vec::new();
-        let mut factor = with_terms!(terms, gram(t, at, scale, smoothing.kernel, &mut basis));
+    /// Prepares the fit around `at` through knots at times `t`, for derivatives of order `lowest` (0 or 1) and the three next ones; `None`
+    /// if the knots do not determine the polynomial.
+    pub fn new(t: &[f64], at: f64, smoothing: Smoothing, lowest: usize) -> Option<Self> {
+        let mut fit = Self::default();
+        fit.prepare(t, at, smoothing, lowest).then_some(fit)
+    }
+
+    /// The same in place; false if the knots do not determine the polynomial.
+    pub fn prepare(&mut self, t: &[f64], at: f64, smoothing: Smoothing, lowest: usize) -> bool {
+        let kernel = smoothing.kernel;
+        let Some((terms, scale)) = terms_and_scale(t, at, smoothing.degree) else {
+            return false;
+        };
+        (self.terms, self.scale, self.lowest) = (terms, scale, lowest.min(HIGHEST_LOWEST));
+        self.factor = with_terms!(terms, gram(t, at, scale, kernel, &mut self.basis));
         let least = DETERMINED * t.len() as f64;
-        with_terms!(terms, factorise(&mut factor, least)).then_some(Self {
-            terms,
-            scale,
-            factor,
-            basis,
-        })
+        with_terms!(terms, factorise(&mut self.factor, least))
     }
 
     fn solve(&self, b: &mut [f64; TERMS]) {
         with_terms!(self.terms, solve(&self.factor, b));
     }
 
-    /// What each knot's value counts for in every power, so that knots of equal spacing share one solution.
-    pub fn power_weights(&self) -> PowerWeights {
-        let mut coefficients = [[0.0; TERMS]; TERMS];
-        for power in 0..self.terms {
-            let mut c = [0.0; TERMS];
-            for k in power..self.terms {
-                c[k] = LEGENDRE[k][power];
-            }
-            self.solve(&mut c);
-            for (of_knot, c) in coefficients.iter_mut().zip(c) {
-                of_knot[power] = c;
-            }
-        }
-        PowerWeights {
-            terms: self.terms,
-            per_scale: self.scale.recip(),
-            of_knots: with_terms!(self.terms, combined(&self.basis, &coefficients)),
-        }
+    /// Weights of the knots' values, so that knots of equal spacing share one solution.
+    pub fn weights(&self) -> Weights {
+        let mut weights = Weights::new();
+        self.weights_into(&mut weights);
+        weights
     }
 
-    /// What each knot's value counts for in the derivatives of order `lowest` (0 or 1) and the three next ones.
-    pub fn weights(&self, lowest: usize) -> Weights {
-        let all = self.power_weights();
-        let lowest = lowest.min(ORDERS - 4);
-        let units: [f64; 4] = from_fn(|k| (1..=lowest + k).map(|n| n as f64 * all.per_scale).product());
-        let of_four = |w: &[f64; TERMS]| from_fn(|k| w[lowest + k] * units[k]);
-        all.of_knots.iter().map(of_four).collect()
+    /// The same in place.
+    pub fn weights_into(&self, weights: &mut Weights) {
+        let mut coefficients = [[0.0; 4]; TERMS];
+        let mut unit = if self.lowest == 0 { 1.0 } else { self.scale };
+        for order in 0..4 {
+            let mut c = AT_ZERO[self.lowest + order];
+            self.solve(&mut c);
+            for (k, c) in c.iter().enumerate().take(self.terms) {
+                coefficients[k][order] = c / unit;
+            }
+            unit *= self.scale;
+        }
+        with_terms!(self.terms, combined(&self.basis, &coefficients, weights));
     }
 
     /// Sum of squared residuals of the fit to `values`, and its degrees of freedom, where all knots count alike.
@@ -495,6 +433,19 @@ impl LocalFit {
     }
 }
 
+/// Applies weights to values: four derivatives, each with three components.
+pub fn apply(weights: &[[f64; 4]], values: &[[f64; 3]]) -> Derivatives {
+    let mut out = [[0.0; 4]; 3];
+    for (w, v) in weights.iter().zip(values) {
+        for (sums, v) in out.iter_mut().zip(v) {
+            for (s, w) in sums.iter_mut().zip(w) {
+                *s += w * v;
+            }
+        }
+    }
+    [0, 1, 2, 3].map(|order| out.map(|axis| axis[order]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -512,40 +463,35 @@ mod tests {
                 [1.0 + 2.0 * u + 3.0 * u * u, u * u * u, 4.0 * u]
             })
             .collect();
-        let smoothing = Smoothing::uniform(6, 7);
-        let fit = LocalFit::new(&t, at, smoothing).expect("determined");
-        let weighted = fit.power_weights().apply(&values);
-        let at_once = expansion(&t, at, smoothing, &values).expect("determined");
-        // Around another time the polynomial is the same.
-        let elsewhere = expansion(&t, at + 0.004, smoothing, &values).expect("determined");
-        for (expansion, after) in [(weighted, 0.0), (at_once, 0.0), (elsewhere, -0.004)] {
-            let d = expansion.derivatives(after, 0);
-            for (got, want) in [
-                (d[0][0], 1.0),
-                (d[1][0], 2.0),
-                (d[2][0], 6.0),
-                (d[3][1], 6.0),
-                (d[1][2], 4.0),
-            ] {
-                assert!((got - want).abs() < 1e-7, "{got} {want}");
-            }
+        let fit = LocalFit::new(&t, at, Smoothing::uniform(6, 7), 0).expect("determined");
+        let d = apply(&fit.weights(), &values);
+        for (got, want) in [
+            (d[0][0], 1.0),
+            (d[1][0], 2.0),
+            (d[2][0], 6.0),
+            (d[3][1], 6.0),
+            (d[1][2], 4.0),
+        ] {
+            assert!((got - want).abs() < 1e-7, "{got} {want}");
         }
         assert!(fit.residual(&values).0 < 1e-24);
-        let d = at_once.derivatives(0.0, 0);
-        let first: f64 = fit.weights(0).iter().zip(&values).map(|(w, v)| w[1] * v[0]).sum();
-        assert!((first - d[1][0]).abs() < 1e-9);
+        let at_once = derivatives(&t, at, Smoothing::uniform(6, 7), &values, 0).expect("determined");
+        for (a, b) in d.as_flattened().iter().zip(at_once.as_flattened()) {
+            assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} {b}");
+        }
     }
 
     #[test]
     fn the_fourth_derivative_comes_with_the_first_three() {
         let t: Vec<f64> = (0..15).map(|i| f64::from(i) + 0.2 * f64::from(i * 7 % 5)).collect();
         let values: Vec<[f64; 3]> = t.iter().map(|v| [(v - 7.0).powi(4), (v - 7.0).powi(6), 1.0]).collect();
-        let smoothing = Smoothing::uniform(8, 7);
-        let d = expansion(&t, 7.0, smoothing, &values)
-            .expect("determined")
-            .derivatives(0.5, 1);
-        let weights = LocalFit::new(&t, 7.5, smoothing).expect("determined").weights(1);
-        let weighted = |order: usize, axis: usize| weights.iter().zip(&values).map(|(w, v)| w[order] * v[axis]).sum();
+        let d = derivatives(&t, 7.5, Smoothing::uniform(8, 7), &values, 1).expect("determined");
+        let weighted = apply(
+            &LocalFit::new(&t, 7.5, Smoothing::uniform(8, 7), 1)
+                .expect("determined")
+                .weights(),
+            &values,
+        );
         let wanted = [
             [0.5, 3.0, 12.0, 24.0],
             [6.0 / 32.0, 30.0 / 16.0, 120.0 / 8.0, 360.0 / 4.0],
@@ -553,7 +499,7 @@ mod tests {
         ];
         for (axis, wanted) in wanted.iter().enumerate() {
             for (order, want) in wanted.iter().enumerate() {
-                for got in [d[order][axis], weighted(order, axis)] {
+                for got in [d[order][axis], weighted[order][axis]] {
                     assert!((got - want).abs() < 1e-7, "{got} {want}");
                 }
             }
@@ -577,7 +523,7 @@ mod tests {
     fn a_taper_keeps_polynomials_and_hardly_passes_what_is_fast() {
         let t: Vec<f64> = (0..41).map(f64::from).collect();
         let passed = |smoothing: Smoothing, frequency: f64| {
-            let weights = LocalFit::new(&t, 20.0, smoothing).expect("determined").weights(0);
+            let weights = LocalFit::new(&t, 20.0, smoothing, 0).expect("determined").weights();
             assert!((weights.iter().map(|w| w[0]).sum::<f64>() - 1.0).abs() < 1e-9);
             let wave = weights
                 .iter()
@@ -597,6 +543,6 @@ mod tests {
 
     #[test]
     fn too_few_knots_are_refused() {
-        assert!(LocalFit::new(&[0.0, 0.1, 0.2], 0.1, Smoothing::uniform(6, 1)).is_none());
+        assert!(LocalFit::new(&[0.0, 0.1, 0.2], 0.1, Smoothing::uniform(6, 1), 0).is_none());
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use crate::bandwidth::Bandwidth;
 use crate::polynomials::Polynomials;
 use crate::reference::{LocalReference, Widths};
-use crate::smoothing::{Smoothing, expansion};
+use crate::smoothing::{Smoothing, derivatives};
 use crate::triple::Triple;
 use crate::window::{HOLD_ROWS, Window};
 
@@ -95,7 +95,7 @@ pub fn derivative(x: &Triple, t: &[f64], width: Smoothing) -> Triple {
     let gap = HOLD_ROWS;
     let mut next = 0;
     for i in 0..t.len() {
-        let rate = samples.at(t[i]).map(|local| local.value[0]);
+        let rate = samples.at(t[i]).map(|local| local.lowest());
         while next < rows.len() && rows[next] < i {
             next += 1;
         }
@@ -118,8 +118,14 @@ fn at_the_end(x: &Triple, t: &[f64], rows: &[usize], i: usize, next: usize, gap:
     }
     let times: Vec<f64> = near.iter().map(|k| t[*k]).collect();
     let values: Vec<[f64; 3]> = near.iter().map(|k| x.row(*k).into()).collect();
-    let smoothing = Smoothing::uniform(END.degree.min(near.len() - 1), END.half_width);
-    Some(expansion(&times, t[i], smoothing, &values)?.derivatives(0.0, 1)[0])
+    derivatives(
+        &times,
+        t[i],
+        Smoothing::uniform(END.degree.min(near.len() - 1), END.half_width),
+        &values,
+        1,
+    )
+    .map(|d| d[0])
 }
 
 /// The attitude of every row, the last known one held; NaN where none is near.
