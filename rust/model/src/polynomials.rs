@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::reference::{LocalReference, Surroundings, Widths};
+use crate::reference::{LocalReference, Neighbourhood, Widths};
 use crate::smoothing::{self, Derivatives, LocalFit, Smoothing, Weights};
 
 /// One reference quantity and how it is differentiated.
@@ -14,7 +14,7 @@ pub struct Polynomials {
     reference: LocalReference,
     widths: Widths,
     /// Around each knot, for the widest polynomial.
-    around: Vec<OnceLock<Surroundings>>,
+    around: Vec<OnceLock<Neighbourhood>>,
 }
 
 /// What the polynomials say of one time.

@@ -52,13 +52,13 @@ pub struct LocalReference {
 }
 
 /// Values around a knot: rotation vectors from its attitude, rad, or positions relative to its own, m.
-pub struct Surroundings {
+pub struct Neighbourhood {
     /// Knots on each side.
     pub reach: usize,
     values: Vec<[f64; 3]>,
 }
 
-impl Surroundings {
+impl Neighbourhood {
     /// Values of the knot and of so many on each side, where it has these.
     pub fn within(&self, half_width: usize) -> Option<&[[f64; 3]]> {
         let margin = self.reach.checked_sub(half_width)?;
@@ -174,7 +174,7 @@ impl LocalReference {
     }
 
     /// What lies around a knot, at most so many knots to each side: nothing beyond a gap, nor where a rotation vector is about to wrap around.
-    pub fn around(&self, knot: usize, most: usize) -> Surroundings {
+    pub fn around(&self, knot: usize, most: usize) -> Neighbourhood {
         let most = most.min(self.knots.reach(knot));
         let rows = knot - most..=knot + most;
         let (reach, values) = match &self.samples {
@@ -195,7 +195,7 @@ impl LocalReference {
                 (most, positions[rows].iter().map(relative).collect())
             }
         };
-        Surroundings { reach, values }
+        Neighbourhood { reach, values }
     }
 
     /// Times of a knot and of so many on each side, s.
