@@ -21,6 +21,8 @@ const RIDGE: f64 = 1e-6;
 const SENSORS: usize = 3;
 /// What the noise of the reference's heading is called among those of the sensors.
 const HEADING: usize = SENSORS;
+/// Sources of noise, the reference's heading first.
+const SOURCES: [usize; SENSORS + 1] = [HEADING, 0, 1, 2];
 /// Deviations by which the heading of a reference may wander over a log, rad: from none, by that of a good gyroscope, to that of a filter
 /// that has not settled.
 const WANDERS: [f64; 7] = [0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3];
@@ -247,20 +249,26 @@ impl<'a> Stack<'a> {
         strengths.par_iter().filter_map(of).collect()
     }
 
+    /// Looks at strengths of a sensor, or of the heading, for the likeliest one; `None` where the equations cannot be solved.
+    fn look(&mut self, sensor: usize, strengths: &[usize]) -> Option<()> {
+        if strengths.is_empty() {
+            return Some(());
+        }
+        let points = self.points_of(sensor, strengths);
+        self.best[sensor] = points.iter().max_by(|a, b| a.ln_z.total_cmp(&b.ln_z))?.strength;
+        self.points[sensor] = points;
+        Some(())
+    }
+
     fn fill(&mut self) -> Option<()> {
-        for round in 0..2 {
-            // The noise of one sensor hardly depends on that of the others: a second look only where there was some.
-            if round > 0 && self.best.iter().filter(|k| **k > 0).count() < 2 {
-                break;
-            }
-            for sensor in [HEADING, 0, 1, 2] {
-                let possible = self.possible(sensor);
-                if possible.is_empty() {
-                    continue;
-                }
-                let points = self.points_of(sensor, &possible);
-                self.best[sensor] = points.iter().max_by(|a, b| a.ln_z.total_cmp(&b.ln_z))?.strength;
-                self.points[sensor] = points;
+        for sensor in SOURCES {
+            let possible = self.possible(sensor);
+            self.look(sensor, &possible)?;
+        }
+        // The noise of one sensor hardly depends on that of the others: a second look only where there was some, at what counts.
+        if self.best.iter().filter(|k| **k > 0).count() > 1 {
+            for sensor in SOURCES {
+                self.look(sensor, &self.counting(sensor))?;
             }
         }
         for sensor in 0..self.points.len() {
