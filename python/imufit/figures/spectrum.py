@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
 from imufit.figures import place, quantity, style
@@ -122,7 +122,7 @@ def _sensor(axes: Axes, sensor: str, spectra: Sequence[SpectrumLike]) -> None:
     if peak > 0.0:
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        style.decades(axes.yaxis)
         for scale in (axes.xaxis, axes.yaxis):
             scale.set_major_formatter(lambda value, _: quantity.number(float(value), 1))
             scale.set_minor_formatter(NullFormatter())

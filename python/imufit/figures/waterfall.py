@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from imufit.figures import place, quantity, style
@@ -62,10 +62,11 @@ def waterfall(
     bottom = 0.75 * float(everything.min()) if logarithmic else 0.0
     if logarithmic:
         axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_major_formatter(lambda value, _: quantity.number(float(value), 1))
     axes.set_ylim(bottom, top * (1.6 if logarithmic else 1.12))
+    if logarithmic:
+        style.decades(axes.yaxis)
     axes.bar(0, start - bottom, bottom=bottom, width=0.62, color=style.GREY, zorder=2)
     if count:
         falls = after <= before

@@ -118,6 +118,7 @@ def page(
         shares=_shares(comparison),
         attitude=ladder.attitude if ladder is not None else comparison.attitude if comparison is not None else None,
         diagnosis=diagnosis,
+        notes=tuple(dict.fromkeys(note for each in (comparison, diagnosis) if each is not None for note in each.notes)),
         standing=_candidate_table(standing),
         others=_candidate_table([item for item in candidates if item not in standing]),
         explanations=_explanations(standing, diagnosis),
@@ -234,7 +235,7 @@ def _candidate_table(candidates: Sequence[Candidate]) -> Table:
         (
             item.effect,
             item.status,
-            f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}",
+            item.error_change,
             quantity.p_value(item.p_value),
             ", ".join(in_lines(item.parameters)) if item.status == PASSED else "-",
             _typical(item),

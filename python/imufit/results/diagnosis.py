@@ -154,6 +154,12 @@ class Candidate(Part):
         return abs(self.gain_error * (self.held_out_before - self.held_out_after) / self.gain)
 
     @property
+    def error_change(self) -> str:
+        """Held-out error without and with the effect alone, e.g. ``2.17 → 1.31``; some lower it beside others only."""
+        before, after = quantity.ratio(self.held_out_before), quantity.ratio(self.held_out_after)
+        return f"{before} → {after}" if self.held_out_after < self.held_out_before else f"stays at {before}"
+
+    @property
     def smallest_detectable(self) -> str:
         """Smallest sizes that this log would have shown, on one line."""
         by_size: dict[str, list[str]] = {}
@@ -170,8 +176,7 @@ class Candidate(Part):
 
     def __str__(self) -> str:
         return (
-            f"{self.effect}: held-out error {quantity.ratio(self.held_out_before)} -> "
-            f"{quantity.ratio(self.held_out_after)}, probability {quantity.probability(self.probability)}. "
+            f"{self.effect}: held-out error {self.error_change}, probability {quantity.probability(self.probability)}. "
             f"{self.explanation}"
         )
 
@@ -367,7 +372,7 @@ class Diagnosis(Plotted, Result):
         return (
             item.effect,
             item.status,
-            f"{quantity.ratio(item.held_out_before)} → {quantity.ratio(item.held_out_after)}",
+            item.error_change,
             f"{quantity.probability(item.probability)}{self.shared(item)}",
             in_words(item.parameters) if item.status == PASSED else "-",
             item.smallest_detectable,

@@ -30,12 +30,6 @@ def _rank(item: Candidate, diagnosis: Diagnosis) -> tuple[bool, bool, float]:
     return item.effect not in diagnosis.named, item.status != PASSED, -item.probability
 
 
-def _drop(item: Candidate) -> str:
-    """Return in words what a candidate does to the held-out error."""
-    before, after = quantity.ratio(item.held_out_before), quantity.ratio(item.held_out_after)
-    return f"error {before} → {after}" if item.held_out_after < item.held_out_before else f"error stays at {before}"
-
-
 def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
     """Return in words why a candidate is not there; empty where it is."""
     if item.status == PASSED:
@@ -135,7 +129,9 @@ class CandidateView:
                 )
             if diagnosis is None:
                 return
-            words = f"{quantity.probability(item.probability)} probable{diagnosis.shared(item)}, {_drop(item)}"
+            words = (
+                f"{quantity.probability(item.probability)} probable{diagnosis.shared(item)}, error {item.error_change}"
+            )
             ui.label(words + _why_not(item, diagnosis)).classes("studio-muted")
             if named and item.confounded_with:
                 rivals = ", ".join(str(rival) for rival in item.confounded_with[:2])
