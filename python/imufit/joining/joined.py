@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+KNOWN = 3.0
+"""Standard errors from which on a turn is stated: chance makes one so large once in 370 joins (normal distribution)."""
+
 
 class Compared(Enum):
     """The compared quantity of two recordings, in words."""
@@ -141,6 +144,12 @@ class Joined(Plotted, Result):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Further notes for the reader."""
+        if self.traces.compared is not Compared.RATES:
+            return self._on_the_mount()
+        return (*self._on_the_mount(), "The lag includes a delay of the gyroscope: two clocks do not show it apart.")
+
+    def _on_the_mount(self) -> tuple[str, ...]:
+        """Notes on how the sensor is turned."""
         angle = np.rad2deg(self.left)
         if self.mount is None:
             return ("The reference has positions alone: the log has no attitude.",)
@@ -163,7 +172,7 @@ class Joined(Plotted, Result):
         if self.left >= SMALL:
             whole = "The sensor's axes are not parallel to those of the reference body: the whole turn was applied."
             return (*settled, whole)
-        if angle > 0.05:
+        if self.left > KNOWN * self.mount_error:
             return (*settled, f"The sensor is turned by {angle:.1f} deg besides: `ref.alignment` finds it.")
         return settled
 
