@@ -237,3 +237,64 @@ def test_damaged_archives_are_refused(tmp_path: Path, sound: Log) -> None:
             (tmp_path / name).write_bytes(content[:cut])
             with pytest.raises(InputError):
                 LogStream(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "mapping",
+    [
+        "t=millis[ms]",
+        "temp=21[degC]",
+        "acc_x=ax[16384LSB/g],acc_y=ay[16384LSB/g],acc_z=az[16384LSB/g]",
+        "gyr_x=gx[131LSB/dps],gyr_y=gy[131LSB/dps],gyr_z=gz[131LSB/dps]",
+    ],
+)
+def test_a_mapping_overrides_only_the_columns_that_it_names(mapping: str, tmp_path: Path, sound: Log) -> None:
+    path = counts(tmp_path / "sketch.csv", sound)
+    same(read(path, parse_mapping(mapping)), sound, "acc", "gyr")
+
+
+def test_a_sensor_whose_unit_is_open_is_asked_about_with_a_mapping_too(tmp_path: Path, sound: Log) -> None:
+    path = table(tmp_path / "a.csv", ["millis", *xyz("g*")], np.round(sound.t * 1e3), np.round(sound.gyr * 7000))
+    with pytest.raises(InputError, match="does not state the unit of the gyroscope") as caught:
+        read(path, {"t": "millis[ms]"})
+    complete = parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])
+    assert complete["t"] == "millis[ms]"
+    assert read(path, complete).gyr is not None
+
+
+@pytest.mark.parametrize(
+    ("scale", "mapping", "rate", "likely"),
+    [
+        (1.0, "", "1e+05 Hz", "s"),
+        (1.0, "t=millis[ms]", "1e+05 Hz", "s"),
+        (1e3, "t=millis[us]", "1e+05 Hz", "ms"),
+        (1e6, "t=millis[ns]", "1e+05 Hz", "us"),
+    ],
+)
+def test_a_rate_of_no_sensor_asks_about_the_clock_before_any_unit(
+    scale: float, mapping: str, rate: str, likely: str, tmp_path: Path, sound: Log
+) -> None:
+    acc, gyr = np.round(sound.acc / STANDARD_GRAVITY * 16384), np.round(np.degrees(sound.gyr) * 131)
+    path = table(tmp_path / "a.csv", ["millis", *xyz("a*"), *xyz("g*")], sound.t * scale, acc, gyr)
+    with pytest.raises(InputError) as caught:
+        read(path, parse_mapping(mapping) or None)
+    assert caught.value.column == "millis"
+    assert rate in caught.value.problem
+    assert f"looks like {likely}" in caught.value.problem
+    repaired = parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])
+    assert repaired == {"t": f"millis[{likely}]"}
+    same(read(path, repaired), sound, "acc", "gyr")
+
+
+def test_a_log_in_its_own_names_is_asked_about_its_clock_before_its_units(tmp_path: Path, sound: Log) -> None:
+    names = ["t", *xyz("acc_*"), *xyz("gyr_*")]
+    path = table(tmp_path / "a.csv", names, sound.t, sound.acc / STANDARD_GRAVITY, np.degrees(sound.gyr))
+    with pytest.raises(InputError, match=r"1e\+05 Hz.*looks like s"):
+        read(path, {"t": "t[ms]"})
+
+
+def test_a_clock_too_slow_to_follow_a_turn_is_asked_about_before_the_gyroscope(tmp_path: Path, sound: Log) -> None:
+    path = counts(tmp_path / "sketch.csv", sound)
+    with pytest.raises(InputError, match=r"steps are around 10, which looks like ms") as caught:
+        read(path, {"t": "millis[s]"})
+    same(read(path, parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])), sound, "acc", "gyr")

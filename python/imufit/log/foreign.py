@@ -165,7 +165,7 @@ def plan_columns(
         A column is missing, misspelt, given twice, or mapped from a column that is not there.
     """
     shown = {name: printable(name, NAME) for name in names}
-    resolved = [_resolve(target, text, names, place) for target, text in (mapping or {}).items()]
+    resolved = [resolve(target, text, names, place) for target, text in (mapping or {}).items()]
     mapped = [column for column in resolved if column.target not in dropped]
     for column in mapped:
         if column.name in dropped:
@@ -202,8 +202,25 @@ def plan_columns(
     return Plan(tuple(columns), notes)
 
 
-def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> PlannedColumn:
-    """Find the column, sign and unit, or the constant, that a mapping's source text means."""
+def resolve(target: str, text: str, names: Sequence[str], place: Place) -> PlannedColumn:
+    """Find the column, sign and unit, or the constant, that a mapping's source text means.
+
+    Parameters
+    ----------
+    target : str
+        Column of the log.
+    text : str
+        Its source, such as ``-AccX[g]``.
+    names : sequence of str
+        Columns of the file.
+    place : Place
+        To name the file in errors.
+
+    Raises
+    ------
+    InputError
+        The column is not in the file, or the unit is not one of the target.
+    """
     bare, unit = bracket(text)
     if target == "t":
         for name, order in ((text.strip(), ""), (bare, unit)):

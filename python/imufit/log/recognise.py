@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -12,16 +12,26 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.clock import Clock, clocks_of
-from imufit.log.clock_text import seconds_from_cells
+from imufit.log.clock_text import ORDERS, seconds_from_cells
 from imufit.log.columns import CONTRACT, EULER, GROUPS, LARGEST_COVARIATE, SENSOR_NAMES, SENSORS, WHOLE_TURN
+from imufit.log.foreign import PlannedColumn, resolve
 from imufit.log.makers import Maker, maker_of
 from imufit.log.metadata import STANDARD_GRAVITY, Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import counted_on
 from imufit.log.time_unit import time_unit
 from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, turned
-from imufit.log.unit_check import HEAD, OtherUnitError, check_units, units_of_force, without_gravity
-from imufit.log.units import conversion, lookup
+from imufit.log.unit_check import (
+    HEAD,
+    OtherUnitError,
+    check_rate,
+    check_steps,
+    check_units,
+    rate_unit_by_size,
+    units_of_force,
+    without_gravity,
+)
+from imufit.log.units import Conversion, conversion, lookup
 from imufit.log.words import Words, sensor_of, strange, time_columns, unit_of, words_of
 from imufit.remedy import Remedy
 
@@ -137,9 +147,11 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
     found, computed = _with_gravity(source, found)
     chosen = {group: candidates[0] for group, candidates in found.items()}
     several = [group for group, candidates in found.items() if len(candidates) > 1 and _alike(candidates)]
-    readings = _Readings.of(source, clock, chosen, names, given)
+    readings = _Readings.of(source, clock, chosen, given, place)
     units = readings.units()
     asked = [group for group in chosen if units[group] is None]
+    if "gyr" in asked:
+        readings.check_clock(place)
     if clock is not None:
         asked = ["t", *asked] if clock.unit is None else asked
         several = ["t", *several] if len(clocks) > 1 else several
@@ -151,14 +163,6 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
     left = tuple(column for each in computed for column in each.columns)
     warm = _temperature(parsed, names, given)
     timed = {"t": f"{clock.source}[{clock.unit or clock.likely}]"} if clock is not None else {}
-    if mapping:
-        chosen = {group: each for group, each in chosen.items() if group not in (*asked, *several)}
-        timed = {} if "t" in (*asked, *several) else timed
-        return Recognised(
-            {**timed, **_mapping(chosen, units, maker), **warm, **given},
-            (*told, *_notes(place, maker, timed, chosen, units)),
-            left,
-        )
     proposed = {group: units[group] or readings.likely(group, units) for group in chosen}
     complete = {**given, **timed, **warm, **_mapping(chosen, proposed, maker)}
     timeless = "t" in wanted and clock is None and not counted
@@ -382,6 +386,7 @@ class _Readings:
 
     chosen: Mapping[str, _Candidate]
     rows: Mapping[str, Array]
+    own: Mapping[str, PlannedColumn] = field(default_factory=dict)
     t: Array | None = None
 
     @classmethod
@@ -390,27 +395,48 @@ class _Readings:
         source: Readable,
         clock: Clock | None,
         chosen: Mapping[str, _Candidate],
-        names: Sequence[str],
         given: Mapping[str, str],
+        place: Place,
     ) -> _Readings:
-        """Read them, where a unit has to be found in them."""
+        """Read them and the columns that are known already, where a unit has to be found in them.
+
+        Raises
+        ------
+        InputError
+            The rows are closer together than any sensor samples: its time is asked about before its units.
+        """
         if all(each.unit is not None for each in chosen.values()):
             return cls(chosen, {})
         columns = [column for each in chosen.values() for column in each.columns]
-        own = ("t", *GROUPS["acc"], *GROUPS["ref_q"])
+        own = _known(source.names, given, place)
         own_clock = clock.columns if clock is not None else ()
-        cells = _first_cells(source, [*columns, *own_clock, *(c for c in own if c in names and c not in given)])
+        cells = _first_cells(source, [*columns, *own_clock, *(name for each in own.values() for name in each.names)])
         rows = {column: _numbers(values) for column, values in cells.items()}
-        time = clock.times(cells) if clock is not None else rows.get("t")
-        known = None if time is None else np.isfinite(time)
-        if time is None or known is None:
-            return cls(chosen, rows)
-        return cls(chosen, {name: values[known] for name, values in rows.items()}, time[known])
+        time = clock.times(cells) if clock is not None else _times(own.get("t"), cells)
+        if time is None:
+            return cls(chosen, rows, own)
+        if clock is None:
+            check_rate(time, abs(own["t"].conversion.factor), own["t"].origin, place)
+        elif clock.unit is not None:
+            tick = 1.0 if clock.unit in ORDERS else conversion("t", clock.unit).factor
+            check_rate(time, tick, clock.source, place)
+        known = np.isfinite(time)
+        return cls(chosen, {name: values[known] for name, values in rows.items()}, own, time[known])
+
+    def check_clock(self, place: Place) -> None:
+        """Refuse a time given by the user whose steps are so long that no turning shows the gyroscope's unit."""
+        if self.t is not None and "t" in self.own:
+            column = self.own["t"]
+            check_steps(self.t, abs(column.conversion.factor), column.origin, place)
 
     def _stacked(self, group: str) -> Array | None:
-        wanted = self.chosen[group].columns if group in self.chosen else GROUPS[group]
-        there = all(column in self.rows for column in wanted)
-        return np.stack([self.rows[column] for column in wanted], axis=1) if there else None
+        """Readings of a sensor: as they stand in the file, or in SI where their unit is known already."""
+        if group in self.chosen:
+            return np.stack([self.rows[column] for column in self.chosen[group].columns], axis=1)
+        known = [self.own[column] for column in GROUPS[group] if column in self.own]
+        if len(known) < len(GROUPS[group]) or any(each.name is None for each in known):
+            return None
+        return np.stack([each.conversion.apply(self.rows[each.name]) for each in known if each.name], axis=1)
 
     def units(self) -> dict[str, str | None]:
         """Find the unit of each group: as its names state, else as the readings show."""
@@ -433,13 +459,37 @@ class _Readings:
     def likely(self, group: str, units: Mapping[str, str | None]) -> str:
         """Propose a unit where nothing shows it."""
         if group == "gyr":
-            return _LIKELY_GYR.get(units.get("acc") or "m/s^2", COUNTS)
+            rates = self._stacked("gyr") if units.get("acc") is None and self.rows else None
+            by_size = None if rates is None else rate_unit_by_size(rates)[1]
+            return by_size[2] if by_size is not None else _LIKELY_GYR.get(units.get("acc") or "m/s^2", COUNTS)
         if group == "mag":
             field = self._stacked("mag")
             size = np.empty(0) if field is None else np.linalg.norm(field, axis=1)
             size = size[np.isfinite(size) & (size > 0.0)]
             return f"*{_USUAL_FIELD / float(np.median(size)):.3g}" if size.size else "uT"
         return "g"
+
+
+def _known(names: Sequence[str], given: Mapping[str, str], place: Place) -> dict[str, PlannedColumn]:
+    """Find the time, the sensors and the reference that a mapping names, or that bear a log's own names."""
+    wanted = {"t", *(column for group in (*SENSORS, "ref_q") for column in GROUPS[group])}
+    known = {name: PlannedColumn(name, name, Conversion()) for name in names if name in wanted}
+    for target in wanted & given.keys():
+        try:
+            known[target] = resolve(target, given[target], names, place)
+        except InputError:
+            known.pop(target, None)  # said once all columns are planned
+    return known
+
+
+def _times(column: PlannedColumn | None, cells: Mapping[str, NDArray[Any]]) -> Array | None:
+    """Times of the first rows by a column that is known to be the time, s; None without it."""
+    if column is None:
+        return None
+    if column.name is None:
+        return column.conversion.apply(column.source.numbers(0, max(map(len, cells.values()), default=0)))
+    clock = Clock(column.name, column.order or None, "s", column.day, np.empty(0))
+    return column.conversion.apply(clock.times(cells))
 
 
 def _first_cells(source: Readable, columns: Sequence[str]) -> dict[str, NDArray[Any]]:

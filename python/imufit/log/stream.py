@@ -125,7 +125,8 @@ class LogStream:
         head = self._head()
         clock = "stated" if "t" in found.mapping else clock
         read = {**head.sensors(), "temp": head.temp}
-        odd = check_units(head.t, read, self._metadata, self._place, self._plan.origin, clock)
+        tick = abs(self._plan.time.conversion.factor)
+        odd = check_units(head.t, read, self._metadata, self._place, self._plan.origin, clock, tick)
         self._columns = head.columns
         told = reading.notes(stated, self._place)
         notes = (*self._source.notes, *found.notes, *told, *self._plan.notes, self._repair.note, *odd)
