@@ -298,3 +298,27 @@ def test_a_clock_too_slow_to_follow_a_turn_is_asked_about_before_the_gyroscope(t
     with pytest.raises(InputError, match=r"steps are around 10, which looks like ms") as caught:
         read(path, {"t": "millis[s]"})
     same(read(path, parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])), sound, "acc", "gyr")
+
+
+@pytest.mark.parametrize(("name", "taken"), [("temperature", 25.0), ("Temperature", -5.0), ("imu_temp", 31.0)])
+def test_a_temperature_without_a_unit_is_taken_where_it_reads_as_degrees_celsius(
+    name: str, taken: float, tmp_path: Path, sound: Log
+) -> None:
+    own = ["t", *xyz("acc_*"), *xyz("gyr_*"), name]
+    foreign = ["t", *xyz("a*"), *xyz("g*"), name]
+    for header in (own, foreign):
+        path = table(tmp_path / "a.csv", header, sound.t, sound.acc, sound.gyr, np.full(sound.n, taken))
+        log = read(path)
+        assert log.temp is not None
+        np.testing.assert_allclose(log.temp, taken)
+        assert any(f"temp from {name} in degC" in note for note in log.notes)
+
+
+@pytest.mark.parametrize(("name", "value"), [("temperature", 298.0), ("temperature", 77.0), ("motor_temp", 25.0)])
+def test_a_temperature_in_an_open_unit_or_of_another_part_is_not_the_sensors(
+    name: str, value: float, tmp_path: Path, sound: Log
+) -> None:
+    header = ["t", *xyz("acc_*"), *xyz("gyr_*"), name]
+    log = read(table(tmp_path / "a.csv", header, sound.t, sound.acc, sound.gyr, np.full(sound.n, value)))
+    assert log.temp is None
+    assert name in log.covariates

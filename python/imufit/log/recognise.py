@@ -47,6 +47,9 @@ _ROW_STEP: Final = 0.01
 """The same as a step, s."""
 _USUAL_FIELD: Final = 50.0
 """Magnitude of the earth's field in the middle latitudes, uT (World Magnetic Model)."""
+_TEMPERATURES: Final = (-40.0, 55.0)
+"""Median of a temperature in degC whose unit is not stated: the cold end of these sensors' range of operation (TDK
+InvenSense, ICM-42688-P data sheet DS-000347), and the heat of a warm board, below 13 degC in degF."""
 _NUMBERED: Final = re.compile(r"(?:(?P<table>.*)\.)?c(?P<number>\d+)")
 """Name of a column of a table without a header."""
 
@@ -98,7 +101,7 @@ class _Candidate:
     arbitrary: bool = False
 
 
-def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place) -> Recognised:
+def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place, bare: bool = False) -> Recognised:
     """Find the time and the sensors that neither the file's names nor the user's mapping already give.
 
     Parameters
@@ -109,6 +112,8 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         The user's own mapping, which stands above what is found.
     place : Place
         To name the file in errors.
+    bare : bool
+        True if the file needs neither a sensor nor a reference: its time is found nevertheless.
 
     Raises
     ------
@@ -127,6 +132,7 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
     maker = maker_of(source.clues)
     parsed = [_parsed(name, names) for name in names if name not in CONTRACT and name not in taken]
     stem = place.file.stem if place.file is not None else ""
+    warm = _temperature(source, parsed, given)
     if maker is not None:
         parsed = [words for words in parsed if maker.takes(_table(words.column, stem), words.column)]
     found = _found(wanted, parsed, maker, stem)
@@ -139,10 +145,10 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
     clocks = _clocks(source, found.pop("t", []), maker)
     counted = {} if clocks or "t" not in wanted else _counted(source, maker)
     given = {**given, **counted}
-    if not any(group in found for group in SENSORS) and not ((clocks or counted) and _has_any(names, given)):
+    if not any(group in found for group in SENSORS) and not ((clocks or counted) and (bare or _has_any(names, given))):
         if "t" in wanted and not counted and not mapping:
             _ask_time_and_units(source, place)
-        return Recognised(given, told)
+        return Recognised({**warm, **given}, (*told, *_notes(place, None, {}, {}, {}, warm)))
     clock = clocks[0] if clocks else None
     found, computed = _with_gravity(source, found)
     chosen = {group: candidates[0] for group, candidates in found.items()}
@@ -161,7 +167,6 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         for each in computed
     )
     left = tuple(column for each in computed for column in each.columns)
-    warm = _temperature(parsed, names, given)
     timed = {"t": f"{clock.source}[{clock.unit or clock.likely}]"} if clock is not None else {}
     proposed = {group: units[group] or readings.likely(group, units) for group in chosen}
     complete = {**given, **timed, **warm, **_mapping(chosen, proposed, maker)}
@@ -174,7 +179,7 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
             column="t" if timeless else clock.column if first == "t" and clock else chosen[first].columns[0],
             remedy=_remedy(complete, place),
         )
-    return Recognised(complete, (*told, *_notes(place, maker, timed or counted, chosen, units)), left)
+    return Recognised(complete, (*told, *_notes(place, maker, timed or counted, chosen, units, warm)), left)
 
 
 def _ask_time_and_units(source: Readable, place: Place) -> None:
@@ -272,17 +277,25 @@ def _angles(source: Readable, names: Sequence[str], given: Mapping[str, str]) ->
     return {target: f"{name}[{unit}]" for target, (name, _) in found.items()}
 
 
-def _temperature(parsed: Sequence[Words], names: Sequence[str], given: Mapping[str, str]) -> dict[str, str]:
-    """Find the one column that is a temperature in a stated unit."""
-    if _has("temp", names, given):
+def _temperature(source: Readable, parsed: Sequence[Words], given: Mapping[str, str]) -> dict[str, str]:
+    """Find the one column that is a temperature in a stated unit; else the one that reads as degC."""
+    if _has("temp", source.names, given):
         return {}
-    found = []
+    stated, plain = [], []
     for words in parsed:
         rest = tuple(word for word in words.words if word not in ("temp", "temperature", "temperatur"))
-        unit = unit_of("temp", rest, words.bracket)[0] if len(rest) < len(words.words) else None
+        if len(rest) == len(words.words):
+            continue
+        unit, rest = unit_of("temp", rest, words.bracket)
         if unit is not None:
-            found.append(f"{words.column}[{unit}]")
-    return {"temp": found[0]} if len(found) == 1 else {}
+            stated.append(f"{words.column}[{unit}]")
+        elif not (words.bracket or words.axis or strange(rest)):
+            plain.append(words.column)
+    if stated or len(plain) != 1:
+        return {"temp": stated[0]} if len(stated) == 1 else {}
+    readings = _first_rows(source, plain)[plain[0]]
+    usual = float(np.median(readings[np.isfinite(readings)])) if np.isfinite(readings).any() else np.nan
+    return {"temp": f"{plain[0]}[degC]"} if _TEMPERATURES[0] <= usual < _TEMPERATURES[1] else {}
 
 
 def _remedy(mapping: Mapping[str, str], place: Place) -> Remedy:
@@ -430,7 +443,7 @@ class _Readings:
             check_steps(self.t, abs(column.conversion.factor), column.origin, place)
 
     def _stacked(self, group: str) -> Array | None:
-        """Readings of a sensor: as they stand in the file, or in SI where their unit is known already."""
+        """Stack the readings of a sensor: as they stand in the file, or in SI where their unit is known already."""
         if group in self.chosen:
             return np.stack([self.rows[column] for column in self.chosen[group].columns], axis=1)
         known = [self.own[column] for column in GROUPS[group] if column in self.own]
@@ -483,7 +496,7 @@ def _known(names: Sequence[str], given: Mapping[str, str], place: Place) -> dict
 
 
 def _times(column: PlannedColumn | None, cells: Mapping[str, NDArray[Any]]) -> Array | None:
-    """Times of the first rows by a column that is known to be the time, s; None without it."""
+    """Read the times of the first rows by a column that is known to be the time, s; None without it."""
     if column is None:
         return None
     if column.name is None:
@@ -554,9 +567,11 @@ def _notes(
     timed: Mapping[str, str],
     chosen: Mapping[str, _Candidate],
     units: Mapping[str, str | None],
+    warm: Mapping[str, str],
 ) -> tuple[str, ...]:
     parts = [f"t from {text[:-1].replace('[', ' in ')}" for text in timed.values()]
     parts += [f"{group} from {' '.join(each.columns)} in {units[group]}" for group, each in chosen.items()]
+    parts += [f"temp from {text[:-1].replace('[', ' in ')}" for text in warm.values()]
     taken = ", ".join(parts)
     if not taken:
         return ()

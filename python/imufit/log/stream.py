@@ -102,11 +102,12 @@ class LogStream:
         bare: bool,
     ) -> None:
         self._path, self._source, self._metadata = path, source, reading.metadata(metadata)
-        self._place = Place(path, source.line_of)
+        # A file that needs no sensor is the REFERENCE of a join, which has an option of its own.
+        self._place = Place(path, source.line_of, "--reference-map" if bare else "--map")
         names = source.names
         dropped = reading.dropped(names, [*CONTRACT, *EULER, *(reading.mapping or {})], self._place)
         left = _Left(source, dropped) if dropped else source
-        found = recognise(left, completed(reading.mapping, left, self._place), self._place)
+        found = recognise(left, completed(reading.mapping, left, self._place), self._place, bare)
         dropped = reading.dropped(names, found.mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
         self._plan = plan_columns(

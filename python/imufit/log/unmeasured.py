@@ -121,7 +121,7 @@ class Unmeasured:
             problem = f"{value} is not a reading"
         elif target in LARGEST:
             problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that {target} can measure"
-            remedy += " Or is it another unit? " + when_read(Remedy("mapping=", "--map")) + " takes it."
+            remedy += " Or is it another unit? " + when_read(Remedy("mapping=", self._place.option)) + " takes it."
         else:
             problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that is measured"
         raise self._place.error(problem, row=row, column=seen.name, remedy=remedy)
