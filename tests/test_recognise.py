@@ -322,3 +322,41 @@ def test_a_temperature_in_an_open_unit_or_of_another_part_is_not_the_sensors(
     log = read(table(tmp_path / "a.csv", header, sound.t, sound.acc, sound.gyr, np.full(sound.n, value)))
     assert log.temp is None
     assert name in log.covariates
+
+
+def test_a_missing_axis_is_said_before_the_open_unit_of_another_sensor(tmp_path: Path, sound: Log) -> None:
+    header = ["t", "ay", "az", *xyz("g*")]
+    acc = sound.acc[:, 1:] / STANDARD_GRAVITY
+    path = table(tmp_path / "a.csv", header, sound.t, acc, np.degrees(sound.gyr))
+    with pytest.raises(InputError) as caught:
+        read(path)
+    assert caught.value.problem.startswith("the accelerometer lacks a column for x although ay and az are there")
+    assert "unit of the gyroscope" in caught.value.problem
+    assert "--drop acc" in str(caught.value.shell_remedy)
+    complete = parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])
+    same(read(path, complete, drop="acc"), sound, "gyr")
+
+
+def test_a_sensor_without_an_axis_can_be_left_out(tmp_path: Path, sound: Log) -> None:
+    header = ["t", *xyz("a*"), "gx", "gy"]
+    path = table(tmp_path / "a.csv", header, sound.t, sound.acc, sound.gyr[:, :2])
+    with pytest.raises(InputError, match="gyroscope lacks a column for z although gx and gy are there"):
+        read(path)
+    same(read(path, drop="gyr"), sound, "acc")
+
+
+def test_all_missing_columns_are_said_at_once(tmp_path: Path, sound: Log) -> None:
+    path = table(tmp_path / "a.csv", ["ay", "az", "gx", "gy"], sound.acc[:, 1:], sound.gyr[:, :2])
+    with pytest.raises(InputError, match=r"lacks a column for x .* lacks a column for z .* column t is missing"):
+        read(path)
+    own = ["acc_y", "acc_z", "gyr_x", "gyr_y"]
+    path = table(tmp_path / "b.csv", own, sound.acc[:, 1:], sound.gyr[:, :2])
+    with pytest.raises(InputError, match=r"column t is missing; column acc_x is missing .* column gyr_z is missing"):
+        read(path)
+
+
+@pytest.mark.parametrize("header", ["millis,ax,ay,az,gx,gy,gz", "t,ay,az", "t,acc_x,acc_y"])
+def test_a_header_without_rows_says_so_and_nothing_else(header: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(header + "\n", encoding="utf-8")
+    with pytest.raises(InputError, match="header but no rows"):
+        read(tmp_path / "a.csv")

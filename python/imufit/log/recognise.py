@@ -32,8 +32,8 @@ from imufit.log.unit_check import (
     without_gravity,
 )
 from imufit.log.units import Conversion, conversion, lookup
-from imufit.log.words import Words, sensor_of, strange, time_columns, unit_of, words_of
-from imufit.remedy import Remedy
+from imufit.log.words import Words, meant, sensor_of, strange, time_columns, unit_of, words_of
+from imufit.remedy import Remedy, mapped, option, reading
 
 Array = NDArray[np.float64]
 
@@ -142,10 +142,15 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place,
         found |= {group: each for group, each in _found(wanted, parsed, maker, stem).items() if group != "t"}
     if names and not mapping and not found and all(_NUMBERED.fullmatch(name) for name in names):
         raise _without_names(source, place)
+    lacking = _lacking([group for group in wanted if group not in found], parsed)
     clocks = _clocks(source, found.pop("t", []), maker)
     counted = {} if clocks or "t" not in wanted else _counted(source, maker)
     given = {**given, **counted}
-    if not any(group in found for group in SENSORS) and not ((clocks or counted) and (bare or _has_any(names, given))):
+    if (
+        not lacking
+        and not found.keys() & set(SENSORS)
+        and not ((clocks or counted) and (bare or _has_any(names, given)))
+    ):
         if "t" in wanted and not counted and not mapping:
             _ask_time_and_units(source, place)
         return Recognised({**warm, **given}, (*told, *_notes(place, None, {}, {}, {}, warm)))
@@ -171,14 +176,10 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place,
     proposed = {group: units[group] or readings.likely(group, units) for group in chosen}
     complete = {**given, **timed, **warm, **_mapping(chosen, proposed, maker)}
     timeless = "t" in wanted and clock is None and not counted
-    if asked or several or timeless:
-        complete = {**({"t": ROW_RATE} if timeless else {}), **complete}
-        first = (asked or several or ["t"])[0]
-        raise place.error(
-            _question(asked, several, timeless),
-            column="t" if timeless else clock.column if first == "t" and clock else chosen[first].columns[0],
-            remedy=_remedy(complete, place),
-        )
+    left_open = _Open(lacking, tuple(asked), tuple(several), timeless)
+    if left_open:
+        at = {group: each.columns[0] for group, each in chosen.items()} | ({"t": clock.column} if clock else {})
+        raise left_open.error(complete, at, bool(chosen) or _has_any(names, given), place)
     return Recognised(complete, (*told, *_notes(place, maker, timed or counted, chosen, units, warm)), left)
 
 
@@ -332,6 +333,89 @@ def _found(
     """Columns that may be each of the groups, without the groups that have none."""
     found = {group: _candidates(group, parsed, maker, stem) for group in wanted}
     return {group: candidates for group, candidates in found.items() if candidates}
+
+
+def _lacking(absent: Sequence[str], parsed: Sequence[Words]) -> dict[str, dict[str, str]]:
+    """Find the sensors that have columns for some of their axes alone, and the column of each of these axes."""
+    found: dict[str, dict[str, str]] = {}
+    for words in parsed:
+        target = meant(words.column)
+        group = next((each for each in absent if each in SENSORS and target in GROUPS[each]), None)
+        if group is not None and target is not None:
+            found.setdefault(group, {})[target[-1]] = words.column
+    return {group: there for group, there in found.items() if set(there) != set("xyz")}
+
+
+@dataclass(frozen=True)
+class _Open:
+    """Everything about a file that has to be asked.
+
+    Parameters
+    ----------
+    lacking : dict
+        Columns of the sensors that lack an axis, by their axes.
+    asked : tuple of str
+        Groups whose unit is open.
+    several : tuple of str
+        Groups that several columns may be.
+    timeless : bool
+        Whether the time is missing.
+    """
+
+    lacking: dict[str, dict[str, str]]
+    asked: tuple[str, ...]
+    several: tuple[str, ...]
+    timeless: bool
+
+    def __bool__(self) -> bool:
+        return bool(self.lacking) or self._mappable
+
+    @property
+    def _mappable(self) -> bool:
+        """Whether a mapping can answer a part of it."""
+        return bool(self.asked or self.several or self.timeless)
+
+    def error(self, complete: Mapping[str, str], at: Mapping[str, str], sound: bool, place: Place) -> InputError:
+        """Ask all of it at once, first for the missing columns.
+
+        Parameters
+        ----------
+        complete : mapping
+            The one mapping for the whole file.
+        at : mapping
+            Column to be named for each group.
+        sound : bool
+            Whether the file has a sensor with all of its axes.
+        place : Place
+            To name the file.
+        """
+        mapping = {**({"t": ROW_RATE} if self.timeless else {}), **complete} if self._mappable else {}
+        if self.lacking:
+            column = next(iter(next(iter(self.lacking.values())).values()))
+            remedy = self._without(mapping, place) if sound else "Add the missing columns."
+        else:
+            column = "t" if self.timeless else at[(self.asked or self.several)[0]]
+            remedy = _remedy(mapping, place)
+        return place.error(self._question(), column=column, remedy=remedy)
+
+    def _without(self, mapping: Mapping[str, str], place: Place) -> Remedy:
+        """Say how the file is read without the sensors that lack an axis."""
+        dropped = option("drop", ",".join(self.lacking))
+        how = dropped + Remedy(", ", " ") + mapped(mapping) if mapping else dropped
+        return "Add the missing columns, or leave the others of that sensor out with " + reading(place.file, how) + "."
+
+    def _question(self) -> str:
+        parts = [
+            f"the {SENSOR_NAMES[group]} lacks a column for {' and '.join(axis for axis in 'xyz' if axis not in there)}"
+            f" although {' and '.join(there.values())} {'is' if len(there) == 1 else 'are'} there"
+            for group, there in self.lacking.items()
+        ]
+        parts += ["column t is missing"] if self.timeless else []
+        if self.asked:
+            parts.append(f"the file does not state the unit of {_named(self.asked)}, and the readings do not show it")
+        if self.several:
+            parts.append(f"several columns may be {_named(self.several)}")
+        return "; ".join(parts)
 
 
 def _has(group: str, names: Sequence[str], given: Mapping[str, str]) -> bool:
@@ -499,9 +583,9 @@ def _times(column: PlannedColumn | None, cells: Mapping[str, NDArray[Any]]) -> A
     """Read the times of the first rows by a column that is known to be the time, s; None without it."""
     if column is None:
         return None
-    if column.name is None:
+    if not isinstance(column.source, str):
         return column.conversion.apply(column.source.numbers(0, max(map(len, cells.values()), default=0)))
-    clock = Clock(column.name, column.order or None, "s", column.day, np.empty(0))
+    clock = Clock(column.source, column.order or None, "s", column.day, np.empty(0))
     return column.conversion.apply(clock.times(cells))
 
 
@@ -546,15 +630,6 @@ def _mapping(chosen: Mapping[str, _Candidate], units: Mapping[str, str | None], 
         for group, each in chosen.items()
         for target, column in zip(GROUPS.get(group, (group,)), each.columns, strict=True)
     }
-
-
-def _question(asked: Sequence[str], several: Sequence[str], timeless: bool) -> str:
-    parts = ["column t is missing"] if timeless else []
-    if asked:
-        parts.append(f"the file does not state the unit of {_named(asked)}, and the readings do not show it")
-    if several:
-        parts.append(f"several columns may be {_named(several)}")
-    return "; ".join(parts)
 
 
 def _named(groups: Sequence[str]) -> str:

@@ -11,6 +11,7 @@ from typing import Any, Self
 
 from numpy.typing import NDArray
 
+from imufit.errors import InputError
 from imufit.log.assemble import check_truth_values, fields_of, time_of
 from imufit.log.columns import CONTRACT, EULER, GROUPS
 from imufit.log.completed import completed
@@ -62,6 +63,8 @@ class LogStream:
         drop: str | Sequence[str] = (),
     ) -> None:
         file = Path(path)
+        if not file.name:
+            file = file.resolve()  # "." has no name to be called by
         source = open_source(file)
         # a source that states that it is a log may have rows as far apart as stated
         is_log = bool(source.embedded) or sidecar_path(file).is_file()
@@ -107,18 +110,22 @@ class LogStream:
         names = source.names
         dropped = reading.dropped(names, [*CONTRACT, *EULER, *(reading.mapping or {})], self._place)
         left = _Left(source, dropped) if dropped else source
-        found = recognise(left, completed(reading.mapping, left, self._place), self._place, bare)
-        dropped = reading.dropped(names, found.mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
-        self._plan = plan_columns(
-            names,
-            found.mapping,
-            self._place,
-            bare,
-            rest=bare or not several,
-            dropped=dropped,
-            computed=found.computed,
-        )
+        try:
+            found = recognise(left, completed(reading.mapping, left, self._place), self._place, bare)
+            self._plan = plan_columns(
+                names,
+                found.mapping,
+                self._place,
+                bare,
+                rest=bare or not several,
+                dropped=reading.dropped(names, found.mapping, self._place),
+                computed=found.computed,
+            )
+        except InputError:
+            if next(iter(source.scan([])), None) is None:
+                raise self._no_rows() from None  # which columns the rows would need is a later question
+            raise
         if isinstance(self._source, TablesSource):
             self._source.choose(self._plan.sources)
         self._repair = self._scan()
@@ -145,7 +152,7 @@ class LogStream:
             scan.add(time_of(self._plan, block, start, rows, self._place), written)
         check_truth_values(self._plan, self._source.truths, self._place)
         if self._source.n == 0:
-            raise self._place.error("the file has a header but no rows", remedy="Record or copy it again.")
+            raise self._no_rows()
         repair = scan.finish()
         if repair.often:
             copies = Copies(repair)
@@ -155,6 +162,9 @@ class LogStream:
             if copies.many:
                 raise scan.repeated()
         return repair
+
+    def _no_rows(self) -> InputError:
+        return self._place.error("the file has a header but no rows", remedy="Record or copy it again.")
 
     def _head(self) -> Log:
         pieces: list[Log] = []
