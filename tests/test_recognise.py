@@ -6,6 +6,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import imufit
 import numpy as np
 import pytest
 from imufit.errors import InputError
@@ -360,3 +361,18 @@ def test_a_header_without_rows_says_so_and_nothing_else(header: str, tmp_path: P
     (tmp_path / "a.csv").write_text(header + "\n", encoding="utf-8")
     with pytest.raises(InputError, match="header but no rows"):
         read(tmp_path / "a.csv")
+
+
+def test_a_quaternion_beside_the_readings_is_offered_where_a_reference_is_missing(tmp_path: Path, sound: Log) -> None:
+    made = simulate("handheld", {}, seed=4711, duration=40.0)
+    header = ["t", *xyz("a*"), *xyz("g*"), "qw", "qx", "qy", "qz"]
+    path = table(tmp_path / "a.csv", header, sound.t, sound.acc, sound.gyr, made.ref_q)
+    log = read(path)
+    assert log.ref_q is None
+    with pytest.raises(InputError, match="no reference attitude") as caught:
+        imufit.compare(log)
+    mapping = parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])
+    assert mapping == {"ref_qw": "qw", "ref_qx": "qx", "ref_qy": "qy", "ref_qz": "qz"}
+    mapped = read(path, mapping)
+    same(mapped, sound, "acc", "gyr")
+    assert mapped.ref_q is not None
