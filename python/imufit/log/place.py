@@ -8,7 +8,7 @@ from pathlib import Path
 
 from imufit.errors import InputError
 from imufit.printable import NAME, printable
-from imufit.remedy import Remedy, mapped, reading
+from imufit.remedy import MAP, Remedy, mapped, reading
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Place:
 
     file: Path | None = None
     line_of: Callable[[int], int | None] | None = None
-    option: str = "--map"
+    option: str = MAP
 
     @property
     def name(self) -> str:

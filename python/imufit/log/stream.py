@@ -31,7 +31,7 @@ from imufit.log.unit_check import HEAD, Clock, check_units
 from imufit.log.unmeasured import Unmeasured
 from imufit.log.writer import write_rows
 from imufit.printable import NAME, printable
-from imufit.remedy import Remedy
+from imufit.remedy import MAP, REFERENCE_MAP, Remedy
 
 
 class LogStream:
@@ -106,7 +106,7 @@ class LogStream:
     ) -> None:
         self._path, self._source, self._metadata = path, source, reading.metadata(metadata)
         # A file that needs no sensor is the REFERENCE of a join, which has an option of its own.
-        self._place = Place(path, source.line_of, "--reference-map" if bare else "--map")
+        self._place = Place(path, source.line_of, REFERENCE_MAP if bare else MAP)
         names = source.names
         dropped = reading.dropped(names, [*CONTRACT, *EULER, *(reading.mapping or {})], self._place)
         left = _Left(source, dropped) if dropped else source

@@ -163,7 +163,7 @@ class Unmeasured:
 
 def _lone(values: Mapping[str, Array]) -> dict[str, NDArray[np.bool_]]:
     """Find the rows in which a column of a sensor has no value although another one of that sensor has one."""
-    found = {}
+    found: dict[str, NDArray[np.bool_]] = {}
     for sensor in SENSORS:
         empty = {column: np.isnan(values[column]) for column in GROUPS[sensor] if column in values}
         if empty:
