@@ -524,7 +524,7 @@ class _Readings:
         """Refuse a time given by the user whose steps are so long that no turning shows the gyroscope's unit."""
         if self.t is not None and "t" in self.own:
             column = self.own["t"]
-            check_steps(self.t, abs(column.conversion.factor), column.origin, place)
+            check_steps(self.t, abs(column.conversion.factor), column.origin, place, stated=True)
 
     def _stacked(self, group: str) -> Array | None:
         """Stack the readings of a sensor: as they stand in the file, or in SI where their unit is known already."""

@@ -259,13 +259,15 @@ def check_rate(t: Array, tick: float, column: str, place: Place) -> None:
     )
 
 
-def check_steps(t: Array, tick: float, column: str, place: Place) -> None:
+def check_steps(t: Array, tick: float, column: str, place: Place, stated: bool = False) -> None:
     """Refuse rows so far apart that no turning can be followed.
 
     Parameters
     ----------
     t, tick, column, place
         As for `check_rate`.
+    stated : bool
+        Whether the user stated that unit: the remedy does not propose it again.
 
     Raises
     ------
@@ -277,7 +279,13 @@ def check_steps(t: Array, tick: float, column: str, place: Place) -> None:
         return
     dt = float(np.median(np.diff(t)))
     if dt >= SLOWEST_STEP:
-        raise _other_clock(f"the time steps are around {dt:g}", time_unit(t / tick) or "ms", place, column)
+        unit = time_unit(t / tick) or "ms"
+        source = f"{column}[{unit}]"
+        raise place.error(
+            f"the time steps are around {dt:g}, which looks like {unit}, not s",
+            column="t",
+            remedy="Use " + place.mapped({"t": source}) if stated else _time_from(source, column, place),
+        )
 
 
 def _slow_clock(t: Array, place: Place, column: str) -> list[str]:
@@ -290,14 +298,6 @@ def _slow_clock(t: Array, place: Place, column: str) -> list[str]:
         f"{place.name}: rows are {step:.4g} s apart, and nothing turns that would show whether t is in s: if it is in "
         f"{unit}, use {place.mapped({'t': f'{column}[{unit}]'})}"
     ]
-
-
-def _other_clock(seen: str, unit: str, place: Place, column: str) -> InputError:
-    return place.error(
-        f"{seen}, which looks like {unit}, not s",
-        column="t",
-        remedy=_time_from(f"{column}[{unit}]", column, place),
-    )
 
 
 def _time_from(source: str, column: str, place: Place) -> Remedy:
