@@ -13,7 +13,7 @@ import pytest
 from imufit import InputError, SensorModel
 from imufit.cli.app import main
 from imufit.lab.simulate import Noise, simulate
-from imufit.log import Log, gaps
+from imufit.log import Log, LogStream, gaps
 from imufit.model.catalogue import effects
 from imufit.model.effect import forget
 from imufit.results import LogInfo
@@ -329,3 +329,15 @@ def test_what_a_recording_can_show_agrees_with_its_diagnosis(name: str):
                 compared.append(own[parameter.name].standard_error / parameter.standard_error)
     assert len(compared) > 30
     assert np.allclose(compared, 1.0, rtol=0.01)
+
+
+def test_a_folder_is_named_where_it_is_the_current_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "walk"
+    folder.mkdir()
+    rows = ["t,acc_x,acc_y,acc_z", *(f"{0.01 * k:.2f},0,0.1,9.8" for k in range(300))]
+    (folder / "acc.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    (folder / "words.csv").write_text("a,b\nc,d\ne,f\n", encoding="utf-8")
+    monkeypatch.chdir(folder)
+    found = imufit.info(LogStream(Path()), effects=False)
+    assert found.sentence.startswith("walk: 300 rows")
+    assert not any(note.startswith(":") for note in found.contents.notes)

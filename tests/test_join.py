@@ -12,7 +12,7 @@ import pytest
 from imufit.cli.app import main
 from imufit.errors import InputError
 from imufit.joining import join_as_found, with_attitude
-from imufit.log import Log, read
+from imufit.log import Log, LogStream, read
 from join_pairs import Pair, pair, repetitive, unrelated
 from recording import recording
 from scipy.spatial.transform import Rotation
@@ -308,3 +308,21 @@ def test_a_known_lag_that_leaves_nothing_in_common_is_refused() -> None:
     one = pair(3001)
     with pytest.raises(InputError, match="less than a few seconds of motion"):
         imufit.join(sensor_of(one), reference_of(one), lag=one.lag + 5000.0)
+
+
+@pytest.mark.parametrize("name", ["time", "Time", "t_s", "timestamp"])
+def test_the_time_of_a_reference_is_found_by_its_name(name: str, tmp_path: Path) -> None:
+    t = np.arange(300) * 0.01
+    rows = np.column_stack([t, np.ones(300), np.zeros((300, 3))])
+    np.savetxt(tmp_path / "ref.csv", rows, delimiter=",", header=f"{name},qw,qx,qy,qz", comments="")
+    reference = LogStream(tmp_path / "ref.csv", bare=True).read()
+    assert reference.duration == pytest.approx(2.99)
+    assert set(reference.covariates) == {"qw", "qx", "qy", "qz"}
+
+
+def test_a_reference_without_a_known_time_names_the_option_of_its_own(tmp_path: Path) -> None:
+    rows = np.column_stack([np.arange(300) * 0.01, np.ones(300)])
+    np.savetxt(tmp_path / "ref.csv", rows, delimiter=",", header="c,qw", comments="")
+    with pytest.raises(InputError, match="column t is missing") as caught:
+        LogStream(tmp_path / "ref.csv", bare=True)
+    assert "--reference-map 't=row[100Hz]'" in str(caught.value.shell_remedy)

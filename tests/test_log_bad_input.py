@@ -405,3 +405,23 @@ def test_values_that_are_no_numbers_in_npz(tmp_path: Path) -> None:
     assert message(tmp_path / "a.npz") == (
         "a.npz: column z: the array holds values of type complex128. Save it as numbers or text."
     )
+
+
+@pytest.mark.parametrize(
+    "prose",
+    [
+        "Notes on the recording.\n\nThe sensor was mounted, on Tuesday, at the left arm.\nIt moved, and then, it stood."
+        "\nDone.\n",
+        "All of this was recorded.\nNothing was lost.\n",
+    ],
+)
+def test_prose_is_not_called_a_damaged_table(prose: str, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text(prose, encoding="utf-8")
+    with pytest.raises(InputError, match="not a table of numbers"):
+        read(tmp_path / "notes.txt")
+
+
+def test_a_cut_table_of_numbers_still_names_the_line(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t,acc_x,acc_y,acc_z\n0,0,0,9.8\n0.01,0,0,9.8\n0.02,0\n", encoding="utf-8")
+    with pytest.raises(InputError, match="the file was cut off"):
+        read(tmp_path / "a.csv")

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import imufit
 import numpy as np
 import pytest
 from imufit.errors import InputError
@@ -237,3 +238,141 @@ def test_damaged_archives_are_refused(tmp_path: Path, sound: Log) -> None:
             (tmp_path / name).write_bytes(content[:cut])
             with pytest.raises(InputError):
                 LogStream(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "mapping",
+    [
+        "t=millis[ms]",
+        "temp=21[degC]",
+        "acc_x=ax[16384LSB/g],acc_y=ay[16384LSB/g],acc_z=az[16384LSB/g]",
+        "gyr_x=gx[131LSB/dps],gyr_y=gy[131LSB/dps],gyr_z=gz[131LSB/dps]",
+    ],
+)
+def test_a_mapping_overrides_only_the_columns_that_it_names(mapping: str, tmp_path: Path, sound: Log) -> None:
+    path = counts(tmp_path / "sketch.csv", sound)
+    same(read(path, parse_mapping(mapping)), sound, "acc", "gyr")
+
+
+def test_a_sensor_whose_unit_is_open_is_asked_about_with_a_mapping_too(tmp_path: Path, sound: Log) -> None:
+    path = table(tmp_path / "a.csv", ["millis", *xyz("g*")], np.round(sound.t * 1e3), np.round(sound.gyr * 7000))
+    with pytest.raises(InputError, match="does not state the unit of the gyroscope") as caught:
+        read(path, {"t": "millis[ms]"})
+    complete = parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])
+    assert complete["t"] == "millis[ms]"
+    assert read(path, complete).gyr is not None
+
+
+@pytest.mark.parametrize(
+    ("scale", "mapping", "rate", "likely"),
+    [
+        (1.0, "", "1e+05 Hz", "s"),
+        (1.0, "t=millis[ms]", "1e+05 Hz", "s"),
+        (1e3, "t=millis[us]", "1e+05 Hz", "ms"),
+        (1e6, "t=millis[ns]", "1e+05 Hz", "us"),
+    ],
+)
+def test_a_rate_of_no_sensor_asks_about_the_clock_before_any_unit(
+    scale: float, mapping: str, rate: str, likely: str, tmp_path: Path, sound: Log
+) -> None:
+    acc, gyr = np.round(sound.acc / STANDARD_GRAVITY * 16384), np.round(np.degrees(sound.gyr) * 131)
+    path = table(tmp_path / "a.csv", ["millis", *xyz("a*"), *xyz("g*")], sound.t * scale, acc, gyr)
+    with pytest.raises(InputError) as caught:
+        read(path, parse_mapping(mapping) or None)
+    assert caught.value.column == "millis"
+    assert rate in caught.value.problem
+    assert f"looks like {likely}" in caught.value.problem
+    repaired = parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])
+    assert repaired == {"t": f"millis[{likely}]"}
+    same(read(path, repaired), sound, "acc", "gyr")
+
+
+def test_a_log_in_its_own_names_is_asked_about_its_clock_before_its_units(tmp_path: Path, sound: Log) -> None:
+    names = ["t", *xyz("acc_*"), *xyz("gyr_*")]
+    path = table(tmp_path / "a.csv", names, sound.t, sound.acc / STANDARD_GRAVITY, np.degrees(sound.gyr))
+    with pytest.raises(InputError, match=r"1e\+05 Hz.*looks like s"):
+        read(path, {"t": "t[ms]"})
+
+
+def test_a_clock_too_slow_to_follow_a_turn_is_asked_about_before_the_gyroscope(tmp_path: Path, sound: Log) -> None:
+    path = counts(tmp_path / "sketch.csv", sound)
+    with pytest.raises(InputError, match=r"steps are around 10, which looks like ms") as caught:
+        read(path, {"t": "millis[s]"})
+    same(read(path, parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])), sound, "acc", "gyr")
+
+
+@pytest.mark.parametrize(("name", "taken"), [("temperature", 25.0), ("Temperature", -5.0), ("imu_temp", 31.0)])
+def test_a_temperature_without_a_unit_is_taken_where_it_reads_as_degrees_celsius(
+    name: str, taken: float, tmp_path: Path, sound: Log
+) -> None:
+    own = ["t", *xyz("acc_*"), *xyz("gyr_*"), name]
+    foreign = ["t", *xyz("a*"), *xyz("g*"), name]
+    for header in (own, foreign):
+        path = table(tmp_path / "a.csv", header, sound.t, sound.acc, sound.gyr, np.full(sound.n, taken))
+        log = read(path)
+        assert log.temp is not None
+        np.testing.assert_allclose(log.temp, taken)
+        assert any(f"temp from {name} in degC" in note for note in log.notes)
+
+
+@pytest.mark.parametrize(("name", "value"), [("temperature", 298.0), ("temperature", 77.0), ("motor_temp", 25.0)])
+def test_a_temperature_in_an_open_unit_or_of_another_part_is_not_the_sensors(
+    name: str, value: float, tmp_path: Path, sound: Log
+) -> None:
+    header = ["t", *xyz("acc_*"), *xyz("gyr_*"), name]
+    log = read(table(tmp_path / "a.csv", header, sound.t, sound.acc, sound.gyr, np.full(sound.n, value)))
+    assert log.temp is None
+    assert name in log.covariates
+
+
+def test_a_missing_axis_is_said_before_the_open_unit_of_another_sensor(tmp_path: Path, sound: Log) -> None:
+    header = ["t", "ay", "az", *xyz("g*")]
+    acc = sound.acc[:, 1:] / STANDARD_GRAVITY
+    path = table(tmp_path / "a.csv", header, sound.t, acc, np.degrees(sound.gyr))
+    with pytest.raises(InputError) as caught:
+        read(path)
+    assert caught.value.problem.startswith("the accelerometer lacks a column for x although ay and az are there")
+    assert "unit of the gyroscope" in caught.value.problem
+    assert "--drop acc" in str(caught.value.shell_remedy)
+    complete = parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])
+    same(read(path, complete, drop="acc"), sound, "gyr")
+
+
+def test_a_sensor_without_an_axis_can_be_left_out(tmp_path: Path, sound: Log) -> None:
+    header = ["t", *xyz("a*"), "gx", "gy"]
+    path = table(tmp_path / "a.csv", header, sound.t, sound.acc, sound.gyr[:, :2])
+    with pytest.raises(InputError, match="gyroscope lacks a column for z although gx and gy are there"):
+        read(path)
+    same(read(path, drop="gyr"), sound, "acc")
+
+
+def test_all_missing_columns_are_said_at_once(tmp_path: Path, sound: Log) -> None:
+    path = table(tmp_path / "a.csv", ["ay", "az", "gx", "gy"], sound.acc[:, 1:], sound.gyr[:, :2])
+    with pytest.raises(InputError, match=r"lacks a column for x .* lacks a column for z .* column t is missing"):
+        read(path)
+    own = ["acc_y", "acc_z", "gyr_x", "gyr_y"]
+    path = table(tmp_path / "b.csv", own, sound.acc[:, 1:], sound.gyr[:, :2])
+    with pytest.raises(InputError, match=r"column t is missing; column acc_x is missing .* column gyr_z is missing"):
+        read(path)
+
+
+@pytest.mark.parametrize("header", ["millis,ax,ay,az,gx,gy,gz", "t,ay,az", "t,acc_x,acc_y"])
+def test_a_header_without_rows_says_so_and_nothing_else(header: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(header + "\n", encoding="utf-8")
+    with pytest.raises(InputError, match="header but no rows"):
+        read(tmp_path / "a.csv")
+
+
+def test_a_quaternion_beside_the_readings_is_offered_where_a_reference_is_missing(tmp_path: Path, sound: Log) -> None:
+    made = simulate("handheld", {}, seed=4711, duration=40.0)
+    header = ["t", *xyz("a*"), *xyz("g*"), "qw", "qx", "qy", "qz"]
+    path = table(tmp_path / "a.csv", header, sound.t, sound.acc, sound.gyr, made.ref_q)
+    log = read(path)
+    assert log.ref_q is None
+    with pytest.raises(InputError, match="no reference attitude") as caught:
+        imufit.compare(log)
+    mapping = parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])
+    assert mapping == {"ref_qw": "qw", "ref_qx": "qx", "ref_qy": "qy", "ref_qz": "qz"}
+    mapped = read(path, mapping)
+    same(mapped, sound, "acc", "gyr")
+    assert mapped.ref_q is not None

@@ -11,7 +11,7 @@ from imufit import Log
 from imufit.cli.app import main
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
-from imufit.log import LogStream
+from imufit.log import LogStream, read
 
 ROW = 1234
 
@@ -106,3 +106,18 @@ def test_tables_and_arrays_are_held_to_the_same(sound: Log):
     read = Log.from_dataframe(table)
     assert np.isnan(read.ref_q[ROW]).all()
     assert np.isfinite(np.delete(read.ref_q, ROW, axis=0)).all()
+
+
+def test_an_empty_cell_beside_readings_of_the_other_axes_is_counted_and_said(tmp_path: Path) -> None:
+    rows = ["t,acc_x,acc_y,acc_z", *(f"{0.01 * k:.2f},0,{'NaN' if k in (3, 7) else 0.1},9.8" for k in range(20))]
+    (tmp_path / "a.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    found = [note for note in read(tmp_path / "a.csv").notes if "acc_y" in note]
+    assert len(found) == 1
+    assert "row 3 (line 5), column acc_y: the cell is empty" in found[0]
+    assert "has 2 such cells" in found[0]
+
+
+def test_a_sample_that_is_missing_as_a_whole_is_not_an_empty_cell(tmp_path: Path) -> None:
+    rows = ["t,acc_x,acc_y,acc_z", *(f"{0.01 * k:.2f},{',,' if k % 2 else '0,0,9.8'}" for k in range(20))]
+    (tmp_path / "a.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    assert not any("empty" in note for note in read(tmp_path / "a.csv").notes)

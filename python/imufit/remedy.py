@@ -42,6 +42,11 @@ def told_to(reader: Reader) -> Iterator[None]:
         _reader = before
 
 
+MAP: Final = "--map"
+"""Option that maps the columns of a log."""
+REFERENCE_MAP: Final = "--reference-map"
+"""Option of a join that maps the columns of its reference."""
+
 Option = tuple[str, Any]
 """A keyword argument of the library and its value: ``("frame", "ENU")``, ``("mapping", {"acc_x": "AccX[g]"})``."""
 
@@ -140,7 +145,7 @@ def recovering(part: str | Path, port: str | None = None) -> Remedy:
     )
 
 
-def mapped(columns: Mapping[str, str], shell: str = "--map") -> Remedy:
+def mapped(columns: Mapping[str, str], shell: str = MAP) -> Remedy:
     """Name the mapping that makes columns of a log, such as ``mapping={'acc_x': 'AccX[g]'}`` and ``--map acc_x=...``.
 
     Parameters

@@ -20,6 +20,7 @@ from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS, UNITS
 from imufit.fitting.rest_passes import RestPasses
 from imufit.fitting.row_residuals import residual_chunks
+from imufit.log.attitude_columns import attitude_offered
 from imufit.log.segments import is_gap
 from imufit.progress import Progress
 from imufit.remedy import command
@@ -120,7 +121,8 @@ def _refuse_rests(analysis: Analysis) -> None:
                 + command("diagnose")
                 + "`, which judges the rests of such a log, or `"
                 + command("calibrate")
-                + "`.",
+                + "`."
+                + attitude_offered(each.surveyed.log),
             )
 
 

@@ -19,6 +19,7 @@ from imufit.fitting.computed_columns import computed_columns
 from imufit.fitting.range_end import RangeEnd
 from imufit.fitting.readings_seen import ReadingsSeen
 from imufit.log import Chunk, LogSource
+from imufit.log.attitude_columns import attitude_offered
 from imufit.log.columns import SENSOR_NAMES
 from imufit.log.foreign import naming
 from imufit.model.effect import registered
@@ -176,7 +177,7 @@ class Passes:
             raise InputError(
                 "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz)",
                 file=log.path,
-                remedy="Add the reference, or ref_angle with the metadata rig_axis.",
+                remedy="Add the reference, or ref_angle with the metadata rig_axis." + attitude_offered(log),
             )
         self.column_noise = {name: each.share for name, each in zip(names, noise, strict=True)}
         if empty := [name for name, rows in zip(self.covariates, known[1:], strict=True) if rows == 0]:

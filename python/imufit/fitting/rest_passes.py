@@ -12,6 +12,7 @@ from imufit.errors import InputError
 from imufit.fitting.passes import CHUNK_ROWS, MIN_ROWS, Passes
 from imufit.fitting.rests import FEWEST_RESTS, RestReadings, read_rests
 from imufit.log import LogSource, whole
+from imufit.log.attitude_columns import attitude_offered
 from imufit.progress import Progress
 
 NEEDS_REFERENCE = "it needs a reference attitude"
@@ -69,7 +70,8 @@ class RestPasses(Passes):
                     "Add the reference, or ref_angle with the metadata rig_axis; or record the sensor lying still in "
                     f"at least {FEWEST_RESTS} attitudes, two seconds each, with turns between, or on all six sides, "
                     "labelled in the column pose."
-                ),
+                )
+                + attitude_offered(log),
             )
         columns = {"temp": log.temp, **{name: log.covariates[name] for name in self.covariates}}
         known = {name: 0.0 if c is None else float(np.isfinite(c).any()) for name, c in columns.items()}

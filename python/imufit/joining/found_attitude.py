@@ -14,11 +14,11 @@ from imufit.joining.join import join
 from imufit.joining.joined import Joined
 from imufit.joining.reference import KINDS, with_attitude
 from imufit.log import Log
+from imufit.log.attitude_columns import quaternions_named
 from imufit.log.columns import WHOLE_TURN
 from imufit.log.scalar_first import rotation_from_quaternions
 from imufit.remedy import Remedy, option
 
-_NAMED: Final = re.compile(r"(?P<base>.*?)[._ ]?q?[._ ]?(?P<part>[wxyz])", re.IGNORECASE)
 _NUMBERED: Final = re.compile(r"(?P<base>.*?)(?:\[(?P<index>\d)\]|_?(?P<digit>\d))")
 _ATTITUDE: Final = re.compile(r"q|quat|orient|rot|att|dcm|\br$", re.IGNORECASE)
 _ANGLE: Final = re.compile(r"(?P<base>.*?)(?P<part>roll|pitch|yaw).*", re.IGNORECASE)
@@ -153,13 +153,8 @@ def _ways(reference: Log) -> Iterator[Way]:
 
 
 def _quaternions(names: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
-    named: dict[str, dict[str, str]] = {}
-    for name in names:
-        if found := _NAMED.fullmatch(name):
-            named.setdefault(found["base"], {})[found["part"].lower()] = name
-    for parts in named.values():
-        if set(parts) == set("wxyz"):
-            yield "quaternion", tuple(parts[part] for part in "wxyz")
+    for named in quaternions_named(names):
+        yield "quaternion", named
     for base, numbered in _by_number(names).items():
         if _ATTITUDE.search(base) and set(numbered) == {0, 1, 2, 3}:
             yield "quaternion", tuple(numbered[k] for k in range(4))

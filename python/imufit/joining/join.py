@@ -22,7 +22,7 @@ from imufit.joining.search import FASTER, Candidate, Correlation, comparable
 from imufit.log import Log
 from imufit.log.assemble import attitude_of_rig
 from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
-from imufit.remedy import Remedy, mapped, option, reading, template, when_read
+from imufit.remedy import REFERENCE_MAP, Remedy, mapped, option, reading, template, when_read
 
 Array = NDArray[np.float64]
 
@@ -210,7 +210,7 @@ def _courses(log: Log, reference: Log) -> tuple[Course, Course, NDArray[np.intp]
             remedy="Name its columns, e.g. "
             + reading(
                 reference.path or "reference.csv",
-                mapped({f"ref_q{part}": part for part in "wxyz"}, shell="--reference-map"),
+                mapped({f"ref_q{part}": part for part in "wxyz"}, shell=REFERENCE_MAP),
             )
             + ".",
         )

@@ -134,6 +134,12 @@ def read_layout(path: Path) -> Layout:
         lines = [line.replace(",", ".") for line in lines]
     header, names, notes = _header(lines, table, separator, width, path)
     first = 0 if header is None else header + 1
+    if not _holds_numbers([split_line(lines[i], separator) for i in table if i >= first]):
+        raise InputError(
+            "this is not a table of numbers: most lines are words",
+            file=path,
+            remedy="Give the file with the readings: a header, and a line of numbers for each sample.",
+        )
     units = next((i for i in table if i >= first), None) if header is not None else None
     if units is not None and (fields := split_line(lines[units], separator)) and _are_units(fields, len(names)):
         names = tuple(f"{name} ({unit})" if unit else name for name, unit in zip(names, fields, strict=True))
@@ -144,6 +150,12 @@ def read_layout(path: Path) -> Layout:
     offset = sum(len(piece) + 1 for piece in pieces[:first])
     before = tuple(line for line in lines[: table[0] if header is None else header] if line.strip())
     return Layout(separator, names, header, min(offset, path.stat().st_size), first, notes, decimal, before)
+
+
+def _holds_numbers(rows: list[list[str]]) -> bool:
+    """Whether at least half of the last rows that hold anything hold a number."""
+    filled = [row for row in rows[-_LINES:] if any(row)]
+    return 2 * sum(any(_numeric(field) for field in row) for row in filled) >= len(filled)
 
 
 def _decimal(lines: list[str], separator: str) -> str:

@@ -165,7 +165,7 @@ def plan_columns(
         A column is missing, misspelt, given twice, or mapped from a column that is not there.
     """
     shown = {name: printable(name, NAME) for name in names}
-    resolved = [_resolve(target, text, names, place) for target, text in (mapping or {}).items()]
+    resolved = [resolve(target, text, names, place) for target, text in (mapping or {}).items()]
     mapped = [column for column in resolved if column.target not in dropped]
     for column in mapped:
         if column.name in dropped:
@@ -202,8 +202,25 @@ def plan_columns(
     return Plan(tuple(columns), notes)
 
 
-def _resolve(target: str, text: str, names: Sequence[str], place: Place) -> PlannedColumn:
-    """Find the column, sign and unit, or the constant, that a mapping's source text means."""
+def resolve(target: str, text: str, names: Sequence[str], place: Place) -> PlannedColumn:
+    """Find the column, sign and unit, or the constant, that a mapping's source text means.
+
+    Parameters
+    ----------
+    target : str
+        Column of the log.
+    text : str
+        Its source, such as ``-AccX[g]``.
+    names : sequence of str
+        Columns of the file.
+    place : Place
+        To name the file in errors.
+
+    Raises
+    ------
+    InputError
+        The column is not in the file, or the unit is not one of the target.
+    """
     bare, unit = bracket(text)
     if target == "t":
         for name, order in ((text.strip(), ""), (bare, unit)):
@@ -333,24 +350,35 @@ def naming(file: str | Path | None, free: Sequence[str]) -> Remedy:
 
 
 def _missing(missing: dict[str, str], targets: Sequence[str], place: Place) -> InputError:
-    """Error for the first missing column, with the mapping for all of them."""
-    first = min(missing, key=CONTRACT.index)
-    known = {column: name for column, name in missing.items() if name}
-    pairs = {column: known[column] for column in sorted(known, key=CONTRACT.index)}
-    if not missing[first]:
-        group = next((group for group in GROUPS.values() if first in group), ())
-        there = [column for column in group if column in targets]
-        problem = f"column {first} is missing" + (f" although {' and '.join(there)} are there" if there else "")
-        remedy = Remedy.of(f"Add it, or leave out the others of {', '.join(group)}.")
-        if first == "t":
-            remedy = "Give time in s, for a fixed rate with " + place.mapped({"t": "row[100Hz]", **pairs}) + "."
-            remedy += "" if pairs or set(targets) & set(CONTRACT) else _listing(targets)
-        return place.error(problem, column=first, remedy=remedy)
-    return place.error(
-        f"column {first} is missing; did you mean {missing[first]}?",
-        column=first,
-        remedy="Use " + place.mapped(pairs),
+    """Error for all missing columns, with the mapping for those that have a likely source."""
+    named = {column: missing[column] for column in sorted(missing, key=CONTRACT.index)}
+    pairs = {column: name for column, name in named.items() if name}
+    first = next((column for column in named if column not in pairs), next(iter(named)))
+    touched = [group for group in GROUPS.values() if any(column in named for column in group)]
+    problems, others = ["column t is missing"] if "t" in named and "t" not in pairs else [], []
+    for group in touched:
+        absent = [column for column in group if column in named and column not in pairs]
+        if absent:
+            there = [column for column in group if column in targets or column in pairs]
+            beside = f" although {' and '.join(there)} {'is' if len(there) == 1 else 'are'} there" if there else ""
+            problems.append(f"{_these(absent)} missing{beside}")
+            others.append(", ".join(group))
+    if not problems:
+        problem = f"column {first} is missing; did you mean {pairs[first]}?"
+        return place.error(problem, column=first, remedy="Use " + place.mapped(pairs))
+    remedy = Remedy.of(
+        f"Add {'it' if len(problems) == 1 else 'them'}, or leave out the others of {' and '.join(others)}."
     )
+    if first == "t":
+        remedy = "Give time in s, for a fixed rate with " + place.mapped({"t": "row[100Hz]", **pairs}) + "."
+        remedy += f" Add the others, or leave out {' and '.join(others)}." if others else ""
+        remedy += "" if pairs or set(targets) & set(CONTRACT) else _listing(targets)
+    return place.error("; ".join(problems), column=first, remedy=remedy)
+
+
+def _these(columns: Sequence[str]) -> str:
+    """Name columns, as the subject of a sentence."""
+    return f"column {columns[0]} is" if len(columns) == 1 else f"columns {' and '.join(columns)} are"
 
 
 def _listing(names: Sequence[str]) -> str:

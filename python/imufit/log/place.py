@@ -8,7 +8,7 @@ from pathlib import Path
 
 from imufit.errors import InputError
 from imufit.printable import NAME, printable
-from imufit.remedy import Remedy, mapped, reading
+from imufit.remedy import MAP, Remedy, mapped, reading
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,13 @@ class Place:
         File concerned; None for tables in memory.
     line_of : callable, optional
         Gives the line in the file (from 1) of a data row (from 0).
+    option : str
+        Option of the command line that maps columns of this file.
     """
 
     file: Path | None = None
     line_of: Callable[[int], int | None] | None = None
+    option: str = MAP
 
     @property
     def name(self) -> str:
@@ -39,7 +42,7 @@ class Place:
         columns : mapping
             Source text for each column of the log.
         """
-        return reading(self.file, mapped(columns))
+        return reading(self.file, mapped(columns, self.option))
 
     def error(
         self, problem: str, *, row: int | None = None, column: str | None = None, remedy: str | Remedy | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -12,18 +12,28 @@ from numpy.typing import NDArray
 
 from imufit.errors import InputError
 from imufit.log.clock import Clock, clocks_of
-from imufit.log.clock_text import seconds_from_cells
+from imufit.log.clock_text import ORDERS, seconds_from_cells
 from imufit.log.columns import CONTRACT, EULER, GROUPS, LARGEST_COVARIATE, SENSOR_NAMES, SENSORS, WHOLE_TURN
+from imufit.log.foreign import PlannedColumn, resolve
 from imufit.log.makers import Maker, maker_of
 from imufit.log.metadata import STANDARD_GRAVITY, Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import counted_on
 from imufit.log.time_unit import time_unit
 from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, turned
-from imufit.log.unit_check import HEAD, OtherUnitError, check_units, units_of_force, without_gravity
-from imufit.log.units import conversion, lookup
-from imufit.log.words import Words, sensor_of, strange, time_columns, unit_of, words_of
-from imufit.remedy import Remedy
+from imufit.log.unit_check import (
+    HEAD,
+    OtherUnitError,
+    check_rate,
+    check_steps,
+    check_units,
+    rate_unit_by_size,
+    units_of_force,
+    without_gravity,
+)
+from imufit.log.units import Conversion, conversion, lookup
+from imufit.log.words import Words, meant, sensor_of, strange, time_columns, unit_of, words_of
+from imufit.remedy import Remedy, mapped, option, reading
 
 Array = NDArray[np.float64]
 
@@ -37,6 +47,9 @@ _ROW_STEP: Final = 0.01
 """The same as a step, s."""
 _USUAL_FIELD: Final = 50.0
 """Magnitude of the earth's field in the middle latitudes, uT (World Magnetic Model)."""
+_TEMPERATURES: Final = (-40.0, 55.0)
+"""Median of a temperature in degC whose unit is not stated: the cold end of these sensors' range of operation (TDK
+InvenSense, ICM-42688-P data sheet DS-000347), and the heat of a warm board, below 13 degC in degF."""
 _NUMBERED: Final = re.compile(r"(?:(?P<table>.*)\.)?c(?P<number>\d+)")
 """Name of a column of a table without a header."""
 
@@ -88,7 +101,7 @@ class _Candidate:
     arbitrary: bool = False
 
 
-def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place) -> Recognised:
+def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place, bare: bool = False) -> Recognised:
     """Find the time and the sensors that neither the file's names nor the user's mapping already give.
 
     Parameters
@@ -99,6 +112,8 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         The user's own mapping, which stands above what is found.
     place : Place
         To name the file in errors.
+    bare : bool
+        True if the file needs neither a sensor nor a reference: its time is found nevertheless.
 
     Raises
     ------
@@ -117,6 +132,7 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
     maker = maker_of(source.clues)
     parsed = [_parsed(name, names) for name in names if name not in CONTRACT and name not in taken]
     stem = place.file.stem if place.file is not None else ""
+    warm = _temperature(source, parsed, given)
     if maker is not None:
         parsed = [words for words in parsed if maker.takes(_table(words.column, stem), words.column)]
     found = _found(wanted, parsed, maker, stem)
@@ -126,20 +142,27 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         found |= {group: each for group, each in _found(wanted, parsed, maker, stem).items() if group != "t"}
     if names and not mapping and not found and all(_NUMBERED.fullmatch(name) for name in names):
         raise _without_names(source, place)
+    lacking = _lacking([group for group in wanted if group not in found], parsed)
     clocks = _clocks(source, found.pop("t", []), maker)
     counted = {} if clocks or "t" not in wanted else _counted(source, maker)
     given = {**given, **counted}
-    if not any(group in found for group in SENSORS) and not ((clocks or counted) and _has_any(names, given)):
+    if (
+        not lacking
+        and not found.keys() & set(SENSORS)
+        and not ((clocks or counted) and (bare or _has_any(names, given)))
+    ):
         if "t" in wanted and not counted and not mapping:
             _ask_time_and_units(source, place)
-        return Recognised(given, told)
+        return Recognised({**warm, **given}, (*told, *_notes(place, None, {}, {}, {}, warm)))
     clock = clocks[0] if clocks else None
     found, computed = _with_gravity(source, found)
     chosen = {group: candidates[0] for group, candidates in found.items()}
     several = [group for group, candidates in found.items() if len(candidates) > 1 and _alike(candidates)]
-    readings = _Readings.of(source, clock, chosen, names, given)
+    readings = _Readings.of(source, clock, chosen, given, place)
     units = readings.units()
     asked = [group for group in chosen if units[group] is None]
+    if "gyr" in asked:
+        readings.check_clock(place)
     if clock is not None:
         asked = ["t", *asked] if clock.unit is None else asked
         several = ["t", *several] if len(clocks) > 1 else several
@@ -149,28 +172,15 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place)
         for each in computed
     )
     left = tuple(column for each in computed for column in each.columns)
-    warm = _temperature(parsed, names, given)
     timed = {"t": f"{clock.source}[{clock.unit or clock.likely}]"} if clock is not None else {}
-    if mapping:
-        chosen = {group: each for group, each in chosen.items() if group not in (*asked, *several)}
-        timed = {} if "t" in (*asked, *several) else timed
-        return Recognised(
-            {**timed, **_mapping(chosen, units, maker), **warm, **given},
-            (*told, *_notes(place, maker, timed, chosen, units)),
-            left,
-        )
     proposed = {group: units[group] or readings.likely(group, units) for group in chosen}
     complete = {**given, **timed, **warm, **_mapping(chosen, proposed, maker)}
     timeless = "t" in wanted and clock is None and not counted
-    if asked or several or timeless:
-        complete = {**({"t": ROW_RATE} if timeless else {}), **complete}
-        first = (asked or several or ["t"])[0]
-        raise place.error(
-            _question(asked, several, timeless),
-            column="t" if timeless else clock.column if first == "t" and clock else chosen[first].columns[0],
-            remedy=_remedy(complete, place),
-        )
-    return Recognised(complete, (*told, *_notes(place, maker, timed or counted, chosen, units)), left)
+    left_open = _Open(lacking, tuple(asked), tuple(several), timeless)
+    if left_open:
+        at = {group: each.columns[0] for group, each in chosen.items()} | ({"t": clock.column} if clock else {})
+        raise left_open.error(complete, at, bool(chosen) or _has_any(names, given), place)
+    return Recognised(complete, (*told, *_notes(place, maker, timed or counted, chosen, units, warm)), left)
 
 
 def _ask_time_and_units(source: Readable, place: Place) -> None:
@@ -268,17 +278,25 @@ def _angles(source: Readable, names: Sequence[str], given: Mapping[str, str]) ->
     return {target: f"{name}[{unit}]" for target, (name, _) in found.items()}
 
 
-def _temperature(parsed: Sequence[Words], names: Sequence[str], given: Mapping[str, str]) -> dict[str, str]:
-    """Find the one column that is a temperature in a stated unit."""
-    if _has("temp", names, given):
+def _temperature(source: Readable, parsed: Sequence[Words], given: Mapping[str, str]) -> dict[str, str]:
+    """Find the one column that is a temperature in a stated unit; else the one that reads as degC."""
+    if _has("temp", source.names, given):
         return {}
-    found = []
+    stated, plain = [], []
     for words in parsed:
         rest = tuple(word for word in words.words if word not in ("temp", "temperature", "temperatur"))
-        unit = unit_of("temp", rest, words.bracket)[0] if len(rest) < len(words.words) else None
+        if len(rest) == len(words.words):
+            continue
+        unit, rest = unit_of("temp", rest, words.bracket)
         if unit is not None:
-            found.append(f"{words.column}[{unit}]")
-    return {"temp": found[0]} if len(found) == 1 else {}
+            stated.append(f"{words.column}[{unit}]")
+        elif not (words.bracket or words.axis or strange(rest)):
+            plain.append(words.column)
+    if stated or len(plain) != 1:
+        return {"temp": stated[0]} if len(stated) == 1 else {}
+    readings = _first_rows(source, plain)[plain[0]]
+    usual = float(np.median(readings[np.isfinite(readings)])) if np.isfinite(readings).any() else np.nan
+    return {"temp": f"{plain[0]}[degC]"} if _TEMPERATURES[0] <= usual < _TEMPERATURES[1] else {}
 
 
 def _remedy(mapping: Mapping[str, str], place: Place) -> Remedy:
@@ -315,6 +333,89 @@ def _found(
     """Columns that may be each of the groups, without the groups that have none."""
     found = {group: _candidates(group, parsed, maker, stem) for group in wanted}
     return {group: candidates for group, candidates in found.items() if candidates}
+
+
+def _lacking(absent: Sequence[str], parsed: Sequence[Words]) -> dict[str, dict[str, str]]:
+    """Find the sensors that have columns for some of their axes alone, and the column of each of these axes."""
+    found: dict[str, dict[str, str]] = {}
+    for words in parsed:
+        target = meant(words.column)
+        group = next((each for each in absent if each in SENSORS and target in GROUPS[each]), None)
+        if group is not None and target is not None:
+            found.setdefault(group, {})[target[-1]] = words.column
+    return {group: there for group, there in found.items() if set(there) != set("xyz")}
+
+
+@dataclass(frozen=True)
+class _Open:
+    """Everything about a file that has to be asked.
+
+    Parameters
+    ----------
+    lacking : dict
+        Columns of the sensors that lack an axis, by their axes.
+    asked : tuple of str
+        Groups whose unit is open.
+    several : tuple of str
+        Groups that several columns may be.
+    timeless : bool
+        Whether the time is missing.
+    """
+
+    lacking: dict[str, dict[str, str]]
+    asked: tuple[str, ...]
+    several: tuple[str, ...]
+    timeless: bool
+
+    def __bool__(self) -> bool:
+        return bool(self.lacking) or self._mappable
+
+    @property
+    def _mappable(self) -> bool:
+        """Whether a mapping can answer a part of it."""
+        return bool(self.asked or self.several or self.timeless)
+
+    def error(self, complete: Mapping[str, str], at: Mapping[str, str], sound: bool, place: Place) -> InputError:
+        """Ask all of it at once, first for the missing columns.
+
+        Parameters
+        ----------
+        complete : mapping
+            The one mapping for the whole file.
+        at : mapping
+            Column to be named for each group.
+        sound : bool
+            Whether the file has a sensor with all of its axes.
+        place : Place
+            To name the file.
+        """
+        mapping = {**({"t": ROW_RATE} if self.timeless else {}), **complete} if self._mappable else {}
+        if self.lacking:
+            column = next(iter(next(iter(self.lacking.values())).values()))
+            remedy = self._without(mapping, place) if sound else "Add the missing columns."
+        else:
+            column = "t" if self.timeless else at[(self.asked or self.several)[0]]
+            remedy = _remedy(mapping, place)
+        return place.error(self._question(), column=column, remedy=remedy)
+
+    def _without(self, mapping: Mapping[str, str], place: Place) -> Remedy:
+        """Say how the file is read without the sensors that lack an axis."""
+        dropped = option("drop", ",".join(self.lacking))
+        how = dropped + Remedy(", ", " ") + mapped(mapping) if mapping else dropped
+        return "Add the missing columns, or leave the others of that sensor out with " + reading(place.file, how) + "."
+
+    def _question(self) -> str:
+        parts = [
+            f"the {SENSOR_NAMES[group]} lacks a column for {' and '.join(axis for axis in 'xyz' if axis not in there)}"
+            f" although {' and '.join(there.values())} {'is' if len(there) == 1 else 'are'} there"
+            for group, there in self.lacking.items()
+        ]
+        parts += ["column t is missing"] if self.timeless else []
+        if self.asked:
+            parts.append(f"the file does not state the unit of {_named(self.asked)}, and the readings do not show it")
+        if self.several:
+            parts.append(f"several columns may be {_named(self.several)}")
+        return "; ".join(parts)
 
 
 def _has(group: str, names: Sequence[str], given: Mapping[str, str]) -> bool:
@@ -382,6 +483,7 @@ class _Readings:
 
     chosen: Mapping[str, _Candidate]
     rows: Mapping[str, Array]
+    own: Mapping[str, PlannedColumn] = field(default_factory=dict)
     t: Array | None = None
 
     @classmethod
@@ -390,27 +492,48 @@ class _Readings:
         source: Readable,
         clock: Clock | None,
         chosen: Mapping[str, _Candidate],
-        names: Sequence[str],
         given: Mapping[str, str],
+        place: Place,
     ) -> _Readings:
-        """Read them, where a unit has to be found in them."""
+        """Read them and the columns that are known already, where a unit has to be found in them.
+
+        Raises
+        ------
+        InputError
+            The rows are closer together than any sensor samples: its time is asked about before its units.
+        """
         if all(each.unit is not None for each in chosen.values()):
             return cls(chosen, {})
         columns = [column for each in chosen.values() for column in each.columns]
-        own = ("t", *GROUPS["acc"], *GROUPS["ref_q"])
+        own = _known(source.names, given, place)
         own_clock = clock.columns if clock is not None else ()
-        cells = _first_cells(source, [*columns, *own_clock, *(c for c in own if c in names and c not in given)])
+        cells = _first_cells(source, [*columns, *own_clock, *(name for each in own.values() for name in each.names)])
         rows = {column: _numbers(values) for column, values in cells.items()}
-        time = clock.times(cells) if clock is not None else rows.get("t")
-        known = None if time is None else np.isfinite(time)
-        if time is None or known is None:
-            return cls(chosen, rows)
-        return cls(chosen, {name: values[known] for name, values in rows.items()}, time[known])
+        time = clock.times(cells) if clock is not None else _times(own.get("t"), cells)
+        if time is None:
+            return cls(chosen, rows, own)
+        if clock is None:
+            check_rate(time, abs(own["t"].conversion.factor), own["t"].origin, place)
+        elif clock.unit is not None:
+            tick = 1.0 if clock.unit in ORDERS else conversion("t", clock.unit).factor
+            check_rate(time, tick, clock.source, place)
+        known = np.isfinite(time)
+        return cls(chosen, {name: values[known] for name, values in rows.items()}, own, time[known])
+
+    def check_clock(self, place: Place) -> None:
+        """Refuse a time given by the user whose steps are so long that no turning shows the gyroscope's unit."""
+        if self.t is not None and "t" in self.own:
+            column = self.own["t"]
+            check_steps(self.t, abs(column.conversion.factor), column.origin, place, stated=True)
 
     def _stacked(self, group: str) -> Array | None:
-        wanted = self.chosen[group].columns if group in self.chosen else GROUPS[group]
-        there = all(column in self.rows for column in wanted)
-        return np.stack([self.rows[column] for column in wanted], axis=1) if there else None
+        """Stack the readings of a sensor: as they stand in the file, or in SI where their unit is known already."""
+        if group in self.chosen:
+            return np.stack([self.rows[column] for column in self.chosen[group].columns], axis=1)
+        known = [self.own[column] for column in GROUPS[group] if column in self.own]
+        if len(known) < len(GROUPS[group]) or any(each.name is None for each in known):
+            return None
+        return np.stack([each.conversion.apply(self.rows[each.name]) for each in known if each.name], axis=1)
 
     def units(self) -> dict[str, str | None]:
         """Find the unit of each group: as its names state, else as the readings show."""
@@ -433,13 +556,37 @@ class _Readings:
     def likely(self, group: str, units: Mapping[str, str | None]) -> str:
         """Propose a unit where nothing shows it."""
         if group == "gyr":
-            return _LIKELY_GYR.get(units.get("acc") or "m/s^2", COUNTS)
+            rates = self._stacked("gyr") if units.get("acc") is None and self.rows else None
+            by_size = None if rates is None else rate_unit_by_size(rates)[1]
+            return by_size[2] if by_size is not None else _LIKELY_GYR.get(units.get("acc") or "m/s^2", COUNTS)
         if group == "mag":
             field = self._stacked("mag")
             size = np.empty(0) if field is None else np.linalg.norm(field, axis=1)
             size = size[np.isfinite(size) & (size > 0.0)]
             return f"*{_USUAL_FIELD / float(np.median(size)):.3g}" if size.size else "uT"
         return "g"
+
+
+def _known(names: Sequence[str], given: Mapping[str, str], place: Place) -> dict[str, PlannedColumn]:
+    """Find the time, the sensors and the reference that a mapping names, or that bear a log's own names."""
+    wanted = {"t", *(column for group in (*SENSORS, "ref_q") for column in GROUPS[group])}
+    known = {name: PlannedColumn(name, name, Conversion()) for name in names if name in wanted}
+    for target in wanted & given.keys():
+        try:
+            known[target] = resolve(target, given[target], names, place)
+        except InputError:
+            known.pop(target, None)  # said once all columns are planned
+    return known
+
+
+def _times(column: PlannedColumn | None, cells: Mapping[str, NDArray[Any]]) -> Array | None:
+    """Read the times of the first rows by a column that is known to be the time, s; None without it."""
+    if column is None:
+        return None
+    if not isinstance(column.source, str):
+        return column.conversion.apply(column.source.numbers(0, max(map(len, cells.values()), default=0)))
+    clock = Clock(column.source, column.order or None, "s", column.day, np.empty(0))
+    return column.conversion.apply(clock.times(cells))
 
 
 def _first_cells(source: Readable, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
@@ -485,15 +632,6 @@ def _mapping(chosen: Mapping[str, _Candidate], units: Mapping[str, str | None], 
     }
 
 
-def _question(asked: Sequence[str], several: Sequence[str], timeless: bool) -> str:
-    parts = ["column t is missing"] if timeless else []
-    if asked:
-        parts.append(f"the file does not state the unit of {_named(asked)}, and the readings do not show it")
-    if several:
-        parts.append(f"several columns may be {_named(several)}")
-    return "; ".join(parts)
-
-
 def _named(groups: Sequence[str]) -> str:
     return " and ".join("the time" if group == "t" else f"the {SENSOR_NAMES[group]}" for group in groups)
 
@@ -504,9 +642,11 @@ def _notes(
     timed: Mapping[str, str],
     chosen: Mapping[str, _Candidate],
     units: Mapping[str, str | None],
+    warm: Mapping[str, str],
 ) -> tuple[str, ...]:
     parts = [f"t from {text[:-1].replace('[', ' in ')}" for text in timed.values()]
     parts += [f"{group} from {' '.join(each.columns)} in {units[group]}" for group, each in chosen.items()]
+    parts += [f"temp from {text[:-1].replace('[', ' in ')}" for text in warm.values()]
     taken = ", ".join(parts)
     if not taken:
         return ()

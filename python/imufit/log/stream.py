@@ -11,6 +11,7 @@ from typing import Any, Self
 
 from numpy.typing import NDArray
 
+from imufit.errors import InputError
 from imufit.log.assemble import check_truth_values, fields_of, time_of
 from imufit.log.columns import CONTRACT, EULER, GROUPS
 from imufit.log.completed import completed
@@ -30,7 +31,7 @@ from imufit.log.unit_check import HEAD, Clock, check_units
 from imufit.log.unmeasured import Unmeasured
 from imufit.log.writer import write_rows
 from imufit.printable import NAME, printable
-from imufit.remedy import Remedy
+from imufit.remedy import MAP, REFERENCE_MAP, Remedy
 
 
 class LogStream:
@@ -62,6 +63,8 @@ class LogStream:
         drop: str | Sequence[str] = (),
     ) -> None:
         file = Path(path)
+        if not file.name:
+            file = file.resolve()  # "." has no name to be called by
         source = open_source(file)
         # a source that states that it is a log may have rows as far apart as stated
         is_log = bool(source.embedded) or sidecar_path(file).is_file()
@@ -102,22 +105,27 @@ class LogStream:
         bare: bool,
     ) -> None:
         self._path, self._source, self._metadata = path, source, reading.metadata(metadata)
-        self._place = Place(path, source.line_of)
+        # A file that needs no sensor is the REFERENCE of a join, which has an option of its own.
+        self._place = Place(path, source.line_of, REFERENCE_MAP if bare else MAP)
         names = source.names
         dropped = reading.dropped(names, [*CONTRACT, *EULER, *(reading.mapping or {})], self._place)
         left = _Left(source, dropped) if dropped else source
-        found = recognise(left, completed(reading.mapping, left, self._place), self._place)
-        dropped = reading.dropped(names, found.mapping, self._place)
         several = isinstance(self._source, TablesSource) and self._source.several
-        self._plan = plan_columns(
-            names,
-            found.mapping,
-            self._place,
-            bare,
-            rest=bare or not several,
-            dropped=dropped,
-            computed=found.computed,
-        )
+        try:
+            found = recognise(left, completed(reading.mapping, left, self._place), self._place, bare)
+            self._plan = plan_columns(
+                names,
+                found.mapping,
+                self._place,
+                bare,
+                rest=bare or not several,
+                dropped=reading.dropped(names, found.mapping, self._place),
+                computed=found.computed,
+            )
+        except InputError:
+            if next(iter(source.scan([])), None) is None:
+                raise self._no_rows() from None  # which columns the rows would need is a later question
+            raise
         if isinstance(self._source, TablesSource):
             self._source.choose(self._plan.sources)
         self._repair = self._scan()
@@ -125,7 +133,8 @@ class LogStream:
         head = self._head()
         clock = "stated" if "t" in found.mapping else clock
         read = {**head.sensors(), "temp": head.temp}
-        odd = check_units(head.t, read, self._metadata, self._place, self._plan.origin, clock)
+        tick = abs(self._plan.time.conversion.factor)
+        odd = check_units(head.t, read, self._metadata, self._place, self._plan.origin, clock, tick)
         self._columns = head.columns
         told = reading.notes(stated, self._place)
         notes = (*self._source.notes, *found.notes, *told, *self._plan.notes, self._repair.note, *odd)
@@ -143,7 +152,7 @@ class LogStream:
             scan.add(time_of(self._plan, block, start, rows, self._place), written)
         check_truth_values(self._plan, self._source.truths, self._place)
         if self._source.n == 0:
-            raise self._place.error("the file has a header but no rows", remedy="Record or copy it again.")
+            raise self._no_rows()
         repair = scan.finish()
         if repair.often:
             copies = Copies(repair)
@@ -153,6 +162,9 @@ class LogStream:
             if copies.many:
                 raise scan.repeated()
         return repair
+
+    def _no_rows(self) -> InputError:
+        return self._place.error("the file has a header but no rows", remedy="Record or copy it again.")
 
     def _head(self) -> Log:
         pieces: list[Log] = []

@@ -19,10 +19,13 @@ from imufit.log.columns import GROUPS
 from imufit.log.metadata import Metadata
 from imufit.log.place import Place
 from imufit.log.time_unit import time_unit
+from imufit.log.units import conversion
 from imufit.remedy import Remedy, mapped
 
-LEAST_STEP: Final = 1e-6
-"""Mean time from row to row, s, below which no sensor samples: the fastest accelerometers give 1e5 samples a second."""
+FASTEST: Final = 32e3
+"""Largest output rate of a gyroscope of this class, Hz (TDK InvenSense, ICM-42688-P data sheet DS-000347: 32 kHz)."""
+_CLOCK_OFF: Final = 0.05
+"""Relative error of a sensor's own clock (the same data sheet: 5 % at most)."""
 SLOWEST_STEP: Final = 2.0
 """Median time from row to row, s, from which a clock that was not stated is taken for one of another unit: at 0.5 Hz a
 hand turns a sensor over between two samples. A log of rests may be as slow, and then has metadata."""
@@ -128,6 +131,7 @@ def check_units(
     place: Place,
     origin: Mapping[str, str] | None = None,
     clock: Clock = "open",
+    tick: float = 1.0,
 ) -> list[str]:
     """Refuse a log whose readings are unmistakably in another unit.
 
@@ -146,6 +150,8 @@ def check_units(
     clock : {"stated", "a log's", "open"}
         Whether the unit of the time was stated, or the table has metadata as a log has: rows may then be as far apart
         as they are. Where it was not stated, a gyroscope a thousand times too fast shows a clock in ms.
+    tick : float
+        Unit in which the time stands in the file, s.
 
     Returns
     -------
@@ -160,7 +166,9 @@ def check_units(
     acc, gyr, mag, ref_q = (sensors.get(name) for name in ("acc", "gyr", "mag", "ref_q"))
     notes: list[str] = []
     origin = origin or {}
-    _check_time(t, place, origin, clock != "open")
+    check_rate(t, tick, origin.get("t", "t"), place)
+    if clock == "open":
+        check_steps(t, tick, origin.get("t", "t"), place)
     if acc is not None and gyr is not None:
         _check_exchange(acc, gyr, metadata.gravity, place, origin)
     checks: list[Callable[[], list[str]]] = []
@@ -216,23 +224,68 @@ def _check_temp(temp: Array, place: Place, origin: Mapping[str, str]) -> list[st
     ]
 
 
-def _check_time(t: Array, place: Place, origin: Mapping[str, str], stated: bool) -> None:
-    """Refuse rows closer or farther apart than any sensor samples."""
+def check_rate(t: Array, tick: float, column: str, place: Place) -> None:
+    """Refuse rows closer together than any sensor samples: the unit of the time is another one.
+
+    Parameters
+    ----------
+    t : (n,) array
+        Time by the unit that was stated or found, s.
+    tick : float
+        That unit, s.
+    column : str
+        Column of the file that holds the time.
+    place : Place
+        To name the file.
+
+    Raises
+    ------
+    InputError
+        Names the rate, and the unit that the steps look like.
+    """
+    t = t[np.isfinite(t)]
+    step = float(t[-1] - t[0]) / (t.size - 1) if t.size >= _ROWS_OF_A_CLOCK else 0.0
+    if step <= 0.0 or step * FASTEST * (1.0 + _CLOCK_OFF) >= 1.0:
+        return
+    likely = time_unit(t / tick)
+    slower = likely is not None and conversion("t", likely).factor > tick
+    source = f"{column}[{likely}]" if slower else f"{column}[*3600]"
+    remedy = "Use " if slower else "Say how many s one of its units has, such as "
+    raise place.error(
+        f"steps of {step:.3g} s mean {1.0 / step:.3g} Hz, faster than any such sensor samples ({FASTEST:g} Hz)"
+        + (f": the time looks like {likely}" if slower else ": the time is in another unit"),
+        column=column,
+        remedy=remedy + place.mapped({"t": source}) + ("" if slower else " for hours."),
+    )
+
+
+def check_steps(t: Array, tick: float, column: str, place: Place, stated: bool = False) -> None:
+    """Refuse rows so far apart that no turning can be followed.
+
+    Parameters
+    ----------
+    t, tick, column, place
+        As for `check_rate`.
+    stated : bool
+        Whether the user stated that unit: the remedy does not propose it again.
+
+    Raises
+    ------
+    InputError
+        Names the step, and the unit that it looks like.
+    """
+    t = t[np.isfinite(t)]
     if t.size < _ROWS_OF_A_CLOCK:
         return
-    mean = float(t[-1] - t[0]) / (t.size - 1)
-    column = origin.get("t", "t")
-    if mean < LEAST_STEP:
-        raise place.error(
-            f"{t.size} rows lie within {t[-1] - t[0]:.3g} s, more than any sensor samples: t is not in s",
-            column="t",
-            remedy="Say how many s one of its units has, such as "
-            + place.mapped({"t": f"{column}[*3600]"})
-            + " for hours.",
-        )
     dt = float(np.median(np.diff(t)))
-    if dt >= SLOWEST_STEP and not stated:
-        raise _other_clock(f"the time steps are around {dt:g}", time_unit(t) or "ms", place, column)
+    if dt >= SLOWEST_STEP:
+        unit = time_unit(t / tick) or "ms"
+        source = f"{column}[{unit}]"
+        raise place.error(
+            f"the time steps are around {dt:g}, which looks like {unit}, not s",
+            column="t",
+            remedy="Use " + place.mapped({"t": source}) if stated else _time_from(source, column, place),
+        )
 
 
 def _slow_clock(t: Array, place: Place, column: str) -> list[str]:
@@ -245,14 +298,6 @@ def _slow_clock(t: Array, place: Place, column: str) -> list[str]:
         f"{place.name}: rows are {step:.4g} s apart, and nothing turns that would show whether t is in s: if it is in "
         f"{unit}, use {place.mapped({'t': f'{column}[{unit}]'})}"
     ]
-
-
-def _other_clock(seen: str, unit: str, place: Place, column: str) -> InputError:
-    return place.error(
-        f"{seen}, which looks like {unit}, not s",
-        column="t",
-        remedy=_time_from(f"{column}[{unit}]", column, place),
-    )
 
 
 def _time_from(source: str, column: str, place: Place) -> Remedy:
@@ -428,11 +473,8 @@ def _check_gyr(
                 place,
                 origin,
             )
-    norm = np.linalg.norm(gyr, axis=1)
-    norm = norm[np.isfinite(norm)]
-    high = float(np.quantile(norm, 0.99)) if norm.size else 0.0
-    if high > 100.0:
-        likely = GYR_UNITS[0] if high < 4500.0 else GYR_UNITS[2]
+    high, likely = rate_unit_by_size(gyr)
+    if likely is not None:
         words, unit, axes = _by_turns(t, gyr, ref_q, vectors, likely)
         name = "gyr" if axes == "xyz" else f"gyr_{axes}"
         raise OtherUnitError(
@@ -442,6 +484,22 @@ def _check_gyr(
             origin,
         )
     return _slow_clock(t, place, origin.get("t", "t")) if clock == "a log's" else []
+
+
+def rate_unit_by_size(gyr: Array) -> tuple[float, tuple[float, str, str] | None]:
+    """Find how high rates reach, and the likely unit of rates that are higher than any sensor's in rad/s.
+
+    Parameters
+    ----------
+    gyr : (n, 3) array
+        Readings as they stand.
+    """
+    norm = np.linalg.norm(gyr, axis=1)
+    norm = norm[np.isfinite(norm)]
+    high = float(np.quantile(norm, 0.99)) if norm.size else 0.0
+    if high <= 100.0:
+        return high, None
+    return high, GYR_UNITS[0] if high < 4500.0 else GYR_UNITS[2]
 
 
 def _by_turns(

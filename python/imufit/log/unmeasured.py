@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -36,6 +36,10 @@ class _Column:
         Rows counted, and of these the samples, and the samples that cannot be.
     first : list of (int, float)
         Row and value of the first ones that cannot be, SI units.
+    lone : int
+        Rows without a value in which another column of the same sensor has one.
+    first_lone : int
+        The first of them.
     """
 
     name: str
@@ -43,6 +47,8 @@ class _Column:
     samples: int = 0
     bad: int = 0
     first: list[tuple[int, float]] = field(default_factory=list)
+    lone: int = 0
+    first_lone: int = 0
 
 
 class Unmeasured:
@@ -75,10 +81,11 @@ class Unmeasured:
         """
         found = dict(values)
         bad: dict[str, NDArray[np.bool_]] = {}
+        lone = _lone(values)
         for target, column in values.items():
             size = np.abs(column)
             beyond = size > LARGEST.get(target, LARGEST_COVARIATE)
-            self._count(target, names[target], column, beyond, start)
+            self._count(target, names[target], column, beyond, lone.get(target), start)
             if beyond.any():
                 bad[target] = beyond
             tiny = (size < SMALLEST) & (size > 0.0) if target in _SENSOR_COLUMNS else np.False_
@@ -91,7 +98,9 @@ class Unmeasured:
                     found[member] = np.where(beyond, np.nan, found[member])
         return found
 
-    def _count(self, target: str, name: str, values: Array, bad: NDArray[np.bool_], start: int) -> None:
+    def _count(
+        self, target: str, name: str, values: Array, bad: NDArray[np.bool_], lone: NDArray[np.bool_] | None, start: int
+    ) -> None:
         seen = self._columns.setdefault(target, _Column(name))
         new = max(0, seen.rows - start)
         if new >= values.size:
@@ -100,6 +109,10 @@ class Unmeasured:
         places = np.flatnonzero(bad[new:]) + new
         seen.bad += places.size
         seen.first += [(start + int(k), float(values[k])) for k in places[: TOLD - len(seen.first)]]
+        if lone is not None and lone[new:].any():
+            alone = np.flatnonzero(lone[new:]) + new
+            seen.first_lone = seen.first_lone if seen.lone else start + int(alone[0])
+            seen.lone += alone.size
         seen.rows = start + values.size
 
     def check(self) -> None:
@@ -121,14 +134,14 @@ class Unmeasured:
             problem = f"{value} is not a reading"
         elif target in LARGEST:
             problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that {target} can measure"
-            remedy += " Or is it another unit? " + when_read(Remedy("mapping=", "--map")) + " takes it."
+            remedy += " Or is it another unit? " + when_read(Remedy("mapping=", self._place.option)) + " takes it."
         else:
             problem = f"{value:.4g} is more than {largest:.0e}, beyond anything that is measured"
         raise self._place.error(problem, row=row, column=seen.name, remedy=remedy)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Readings left out of the rows read so far."""
+        """Readings left out of the rows read so far, and cells without a reading beside the sensor's other axes."""
         told = [(row, target, value) for target, seen in self._columns.items() for row, value in seen.first]
         notes = []
         for row, target, value in sorted(told)[:TOLD]:
@@ -138,4 +151,22 @@ class Unmeasured:
         count = sum(seen.bad for seen in self._columns.values())
         if count > len(notes):
             notes.append(f"{self._place.name}: {count - len(notes)} more readings cannot be measured; left out")
-        return tuple(notes)
+        return (*notes, *self._lone_notes())
+
+    def _lone_notes(self) -> Iterator[str]:
+        for seen in self._columns.values():
+            if seen.lone:
+                place = self._place.error("", row=seen.first_lone, column=seen.name).where
+                more = f"; the column has {seen.lone} such cells" if seen.lone > 1 else ""
+                yield f"{self._place.name}: {place}: the cell is empty beside readings of other axes{more}"
+
+
+def _lone(values: Mapping[str, Array]) -> dict[str, NDArray[np.bool_]]:
+    """Find the rows in which a column of a sensor has no value although another one of that sensor has one."""
+    found: dict[str, NDArray[np.bool_]] = {}
+    for sensor in SENSORS:
+        empty = {column: np.isnan(values[column]) for column in GROUPS[sensor] if column in values}
+        if empty:
+            whole = np.logical_and.reduce(list(empty.values()))
+            found |= {column: gaps & ~whole for column, gaps in empty.items()}
+    return found

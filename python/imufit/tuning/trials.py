@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.errors import InputError
 from imufit.log import Log
+from imufit.log.attitude_columns import attitude_offered
 from imufit.replaying.replay import Surroundings, counted_rows, surroundings
 
 Array = NDArray[np.float64]
@@ -153,7 +154,7 @@ def trials(
         raise InputError(
             "the log has no reference attitude for the error",
             file=log.path or "log",
-            remedy="Tune by prediction.",
+            remedy="Tune by prediction." + attitude_offered(log),
         )
     if chosen == "prediction" and (around.sensors["gyr"] is None or around.sensors["acc"] is None):
         raise InputError("predictions need acc and gyr", file=log.path or "log")
