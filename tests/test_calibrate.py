@@ -607,3 +607,16 @@ def test_a_calibration_that_lowers_nothing_is_said_to():
     helped = calibrate(six())
     assert perfect.sensors["acc"].sentence().endswith("The calibration does not lower this error.")
     assert "does not lower" not in helped.sensors["acc"].sentence()
+
+
+def test_the_gyro_misses_before_by_the_readings_as_they_are():
+    rate, time = np.radians(2.0), 1.0
+    missed = []
+    for bias in (0.0, rate, 2.0 * rate):
+        sensor = Sensor(gyr_noise=1e-4, gyr_bias=np.array([0.0, 0.0, bias]))
+        gyr = calibrate(log_of(sensor, course([*SIDES, *spread(4)], move=time), names="acc gyr")).sensors["gyr"]
+        missed.append(gyr.before)
+        assert ("does not lower" in gyr.sentence()) == (bias == 0.0), gyr.sentence()
+    # A bias turns the integral by its rate times the time at most; the edges of the rests belong to the turn.
+    assert 0.3 * rate * time < missed[1] < 1.2 * rate * time
+    assert missed[2] == pytest.approx(2.0 * missed[1], rel=0.05)
