@@ -49,3 +49,12 @@ def test_the_figure_has_a_panel_for_each_angle_and_a_line_for_each_filter(log):
     lines = figure.axes[0].get_lines()
     assert [line.get_label() for line in lines] == ["accel", "kalman"]
     assert np.nanmax(lines[0].get_ydata()) == pytest.approx(np.degrees(ROLL), abs=0.01)
+
+
+def test_the_command_says_that_the_written_angles_are_in_rad(capsys, log, tmp_path):
+    written = tmp_path / "angles.csv"
+    code, out, _ = run(capsys, "replay", log, "--filter", "accel", "-o", written)
+    assert code == 0
+    assert "roll, pitch and yaw of each filter in rad" in " ".join(out.split())
+    table = np.genfromtxt(written, delimiter=",", names=True)
+    assert np.nanmax(table["accel_roll"]) == pytest.approx(ROLL, abs=1e-4)

@@ -25,7 +25,11 @@ if TYPE_CHECKING:
 )
 @json_option
 def apply(model: Path, log: Path, *, reading: Reading, output: Path, json_file: Path | None) -> None:
-    """Remove the effects of MODEL from the readings of LOG; rows and all other columns stay unchanged."""
+    """Remove the effects of MODEL from the readings of LOG.
+
+    OUT has the columns of imufit's logs in their units: t in s, acc in m/s^2, gyr in rad/s, mag in uT. It has every row
+    of LOG and, as they are, the columns that imufit does not know.
+    """
     from imufit.figures import quantity  # noqa: PLC0415
     from imufit.results import Table  # noqa: PLC0415
 
@@ -48,5 +52,5 @@ def apply(model: Path, log: Path, *, reading: Reading, output: Path, json_file: 
     out.table(Table("Change of the readings", ("sensor", ">samples", ">RMS", ">largest"), rows))
     out.say(*(f"Note: {note}." for note in corrected.notes))
     engine.write_log(corrected, output)
-    out.wrote(output)
+    out.wrote_log(output, corrected.columns)
     out.json({"n": corrected.n, "model": list(stack.effects), "change": changes, "notes": list(corrected.notes)})

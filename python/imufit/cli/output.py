@@ -231,3 +231,27 @@ class Output:
     def wrote(self, path: Path) -> None:
         """Say which file was written."""
         self.say(f"wrote {path}")
+
+    def wrote_log(self, path: Path, columns: Iterable[str], angles: str = "") -> None:
+        """Say which log was written, and in which units: they need not be those of the file that was read.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        columns : iterable of str
+            Its columns of fixed meaning.
+        angles : str
+            Words for further columns that hold angles, rad.
+        """
+        from imufit.log.columns import GROUPS, UNITS  # noqa: PLC0415
+
+        group = {member: name for name, members in GROUPS.items() for member in members}
+        of_unit: dict[str, dict[str, None]] = {}
+        for column in columns:
+            if UNITS.get(column, "1") != "1":
+                of_unit.setdefault(UNITS[column], {})[group.get(column, column)] = None
+        if angles:
+            of_unit.setdefault("rad", {})[angles] = None
+        listed = "; ".join(f"{' and '.join(names)} in {unit}" for unit, names in of_unit.items())
+        self.say(f"wrote {path}: {listed}")

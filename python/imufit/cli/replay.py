@@ -71,7 +71,7 @@ _MADE = 100
     help="Memory that a long log and its attitudes may take.",
 )
 @click.option(
-    "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="OUT", help="Write the log with the attitudes added."
+    "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="OUT", help="Write the log with the attitudes added: quaternions, and roll, pitch, yaw in rad."
 )
 @json_option
 @plot_option
@@ -122,8 +122,9 @@ def replay(
         out.tables(compared.tables())
         out.say(*compared.notes)
     if output is not None:
-        engine.write_log(result.to_log(), output)
-        out.wrote(output)
+        replayed = result.to_log()
+        engine.write_log(replayed, output)
+        out.wrote_log(output, replayed.columns, "roll, pitch and yaw of each filter")
     out.json(value)
     if plot_file is not None:
         out.plot(plot_file, result.plot())
