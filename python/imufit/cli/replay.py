@@ -115,6 +115,7 @@ def replay(
     out.say(f"{value['n']} rows replayed.", bold=True)
     out.say(*(f"{count} rows skipped: {reason}." for reason, count in value.get("skipped", {}).items() if count))
     if all(errors is None for errors in value["filters"].values()):
+        out.say(result.frame_words())
         out.table(result.angle_table())
     elif compared is None or compared.axis is None:
         out.table(_attitude_table(value))
