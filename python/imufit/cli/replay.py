@@ -71,7 +71,11 @@ _MADE = 100
     help="Memory that a long log and its attitudes may take.",
 )
 @click.option(
-    "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="OUT", help="Write the log with the attitudes added: quaternions, and roll, pitch, yaw in rad."
+    "-o",
+    "--output",
+    type=OutputFile(LOG_ENDINGS),
+    metavar="OUT",
+    help="Write the log with the attitudes added: quaternions, and roll, pitch, yaw in rad.",
 )
 @json_option
 @plot_option

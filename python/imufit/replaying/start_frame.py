@@ -13,8 +13,8 @@ from imufit.remedy import option
 Array = NDArray[np.float64]
 
 UPSIDE_DOWN = -float(np.sqrt(0.5))
-"""Cosine of the angle between the body's z and the frame's: 135 deg, from which the axis of the frame that is nearest to
-the body's z is the opposite one."""
+"""Cosine of 135 deg between the body's z and the frame's: beyond it the opposite of the frame's z is the nearest axis of
+the frame to the body's z."""
 
 
 def frame_words(frame: Frame, start: Array | None) -> str:
@@ -31,10 +31,10 @@ def frame_words(frame: Frame, start: Array | None) -> str:
     words = f"The angles are against the frame {frame}, in which z points {'up' if up > 0.0 else 'down'}."
     if start is None or Rotation.from_quat(start, scalar_first=True).as_matrix()[2, 2] > UPSIDE_DOWN:
         return words
-    level = level_frame(frame)
+    seen = "down" if up > 0.0 else "up"
     return (
-        f"{words} The sensor starts upside down in it: by the first readings its z points {'down' if up > 0.0 else 'up'}. "
-        f"For angles that start near level use {option('frame', level)}."
+        f"{words} The sensor starts upside down in it: by the first readings its z points {seen}. "
+        f"For angles that start near level use {option('frame', level_frame(frame))}."
     )
 
 
