@@ -337,3 +337,16 @@ def test_mount_of_the_sensor_is_turned_back_into_the_axes_of_the_body():
     for sensor in ("acc", "gyr", "mag"):
         np.testing.assert_allclose(getattr(corrected, sensor), getattr(straight, sensor), atol=1e-9)
     assert any("ref.alignment" in note for note in corrected.notes)
+
+
+def test_the_command_says_that_the_model_comes_first(tmp_path, capsys):
+    SensorModel(["acc.bias"], {"acc.bias": XYZ}).save(tmp_path / "m.toml")
+    (tmp_path / "log.csv").write_text("t,acc_x\n0,1\n1,2\n")
+    swapped = ["apply", str(tmp_path / "log.csv"), str(tmp_path / "m.toml"), "-o", str(tmp_path / "o.csv")]
+    assert main(swapped) == 2
+    said = capsys.readouterr().err
+    assert "log.csv" in said
+    assert "The first argument must be the model" in said
+    (tmp_path / "cut.toml").write_text("a = ")
+    assert main(["apply", str(tmp_path / "cut.toml"), str(tmp_path / "log.csv"), "-o", str(tmp_path / "o.csv")]) == 2
+    assert "copy or save it again" in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -63,6 +64,13 @@ def diagnose(
         comparison = engine.compared(fit, progress) if shown else None
         rows = engine.rows_of_fit(fit, candidate=diagnosis.best, progress=progress) if shown else None
     output.result(diagnosis, verbose)
+    if diagnosis.verdict == "missing" and diagnosis.best is not None:
+        named = shlex.join([*map(str, logs), *([] if model is None else ["--model", str(model)])])
+        given = reading.mapping or reading.frame or reading.noise or reading.drop
+        output.say(
+            f"Next: `imufit add {diagnosis.best} {named}` adds it, `imufit ladder {named}` goes on until nothing is "
+            f"missing{', with the options as here' if given else ''}."
+        )
     output.json(diagnosis.to_dict())
     if plot_file is not None:
         output.plot(plot_file, diagnosis.plot())

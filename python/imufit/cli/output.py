@@ -16,6 +16,7 @@ import click
 
 from imufit.printable import printable
 from imufit.whole_file import whole_file, write_text
+from imufit.wrapping import lines_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -126,7 +127,8 @@ class Output:
         """Print sentences, one paragraph each."""
         for sentence in sentences:
             if sentence and not self._closed:
-                self._console.print(_harmless(sentence), style="bold" if bold else None)
+                for line in lines_of(_harmless(sentence), self._console.width):
+                    self._console.print(line, style="bold" if bold else None, soft_wrap=True)
 
     def lines(self, lines: Iterable[str]) -> None:
         """Print lines as they are, however long."""

@@ -13,8 +13,8 @@ from imufit.remedy import option
 Array = NDArray[np.float64]
 
 UPSIDE_DOWN = -float(np.sqrt(0.5))
-"""Cosine of 135 deg between the body's z and the frame's: beyond it the opposite of the frame's z is the nearest axis of
-the frame to the body's z."""
+"""Cosine of 135 deg between the z of the body and of the frame: beyond it the opposite of the frame's z is the axis of
+the frame that is nearest to the body's z."""
 
 
 def frame_words(frame: Frame, start: Array | None) -> str:
