@@ -122,13 +122,13 @@ class Unshown:
 
     Attributes
     ----------
-    angles : tuple of str
-        Pairs of axes, such as ``xy``, whose angle does not show.
+    angles : tuple of (str, str)
+        Pairs of axes whose angle does not show.
     axes : tuple of str
         Axes whose scale and bias do not show.
     """
 
-    angles: tuple[str, ...]
+    angles: tuple[tuple[str, str], ...]
     axes: tuple[str, ...]
 
     def __bool__(self) -> bool:
@@ -157,12 +157,12 @@ def unshown(directions: NDArray[np.float64]) -> Unshown:
     """
     # The length of a corrected reading changes with the scales as u_i^2, with the bias as u_i, with the angle between
     # two axes as 2 u_i u_j.
-    pairs = [(i, j) for i in range(3) for j in range(i)]
+    pairs = [(0, 1), (0, 2), (1, 2)]
     mixed = np.stack([2.0 * directions[:, i] * directions[:, j] for i, j in pairs], axis=1)
     design = np.hstack([directions**2, directions, mixed])
     information, combinations = np.linalg.eigh(design.T @ design / len(directions))
     largest = [int(np.abs(combinations[:, k]).argmax()) for k in np.flatnonzero(information <= SEEN)]
-    angles = {"".join(sorted(AXES[axis] for axis in pairs[place - 6])) for place in largest if place >= 6}
+    angles = {(AXES[i], AXES[j]) for i, j in (pairs[place - 6] for place in largest if place >= 6)}
     axes = {AXES[place % 3] for place in largest if place < 6}
     return Unshown(tuple(sorted(angles)), tuple(sorted(axes)))
 

@@ -140,7 +140,9 @@ def _joined(turns: Sequence[Turns]) -> tuple[Array, Array, list[_Span]]:
 def _missed_as_read(t: Array, gyr: Array, spans: Sequence[_Span]) -> Array:
     """Return the angle that each turn misses by the readings as they are, their bias included, (n,), rad."""
     still = [0.0, 0.0, 0.0]
-    unweighed = [(first, last, still, still, *ups, UNKNOWN) for first, last, _, _, *ups, _ in spans]
+    unweighed = [
+        (first, last, still, still, up_before, up_after, UNKNOWN) for first, last, _, _, up_before, up_after, _ in spans
+    ]
     return np.asarray(_imufit.turn_calibration(t, gyr, unweighed, still)["before"])
 
 

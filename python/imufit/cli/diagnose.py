@@ -67,10 +67,9 @@ def diagnose(
     if diagnosis.verdict == "missing" and diagnosis.best is not None:
         named = shlex.join([*map(str, logs), *([] if model is None else ["--model", str(model)])])
         given = reading.mapping or reading.frame or reading.noise or reading.drop
-        output.say(
-            f"Next: `imufit add {diagnosis.best} {named}` adds it, `imufit ladder {named}` goes on until nothing is "
-            f"missing{', with the options as here' if given else ''}."
-        )
+        options = ", with the options as here" if given else ""
+        output.say(f"Next, to add the effect, or to go on until nothing is missing{options}:")
+        output.lines([f"  imufit add {diagnosis.best} {named}", f"  imufit ladder {named}"])
     output.json(diagnosis.to_dict())
     if plot_file is not None:
         output.plot(plot_file, diagnosis.plot())

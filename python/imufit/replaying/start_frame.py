@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from imufit import _imufit
-from imufit.log.metadata import FRAMES, Frame
+from imufit.log.metadata import FRAMES
 from imufit.remedy import option
 
 Array = NDArray[np.float64]
@@ -17,7 +17,7 @@ UPSIDE_DOWN = -float(np.sqrt(0.5))
 the frame that is nearest to the body's z."""
 
 
-def frame_words(frame: Frame, start: Array | None) -> str:
+def frame_words(frame: str, start: Array | None) -> str:
     """Name the frame, and where the sensor starts upside down in it the frame in which it starts level.
 
     Parameters
@@ -38,7 +38,7 @@ def frame_words(frame: Frame, start: Array | None) -> str:
     )
 
 
-def level_frame(frame: Frame) -> Frame:
+def level_frame(frame: str) -> str:
     """Return the frame with the opposite z, and the same x if there is one.
 
     Parameters
@@ -51,6 +51,6 @@ def level_frame(frame: Frame) -> Frame:
     return max(opposite, key=lambda other: float(north @ _imufit.frame_vectors(other)["north"]))
 
 
-def _up(frame: Frame) -> float:
+def _up(frame: str) -> float:
     """Return the vertical component of up in a frame, 1 or -1."""
     return float(_imufit.frame_vectors(frame)["up"][2])
