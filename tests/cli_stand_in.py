@@ -77,7 +77,7 @@ class Replay:
         return new_figure(2.0, 1.0)
 
     def to_log(self):
-        return "log"
+        return SimpleNamespace(columns=("t", "acc_x"))
 
 
 def install(monkeypatch):

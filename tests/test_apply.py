@@ -297,6 +297,22 @@ def test_the_command_corrects_a_log_and_says_what_it_left_alone(tmp_path, capsys
     assert answer["change"]["acc"]["rms"] == pytest.approx(np.linalg.norm(list(XYZ.values())) / np.sqrt(3.0), rel=1e-6)
 
 
+def test_the_command_says_the_units_of_what_it_wrote(tmp_path, capsys):
+    (tmp_path / "g.csv").write_text(
+        "millis,ax,ay,az,gx,gy,gz\n" + "".join(f"{10 * k},0,0,1,{k % 3},0,90\n" for k in range(200))
+    )
+    SensorModel(["acc.bias"], {"acc.bias": {"x": 0.1, "y": 0.0, "z": 0.0}}).save(tmp_path / "m.toml")
+    out = tmp_path / "o.csv"
+    mapped = "t=millis[ms],acc_x=ax[g],acc_y=ay[g],acc_z=az[g],gyr_x=gx[deg/s],gyr_y=gy[deg/s],gyr_z=gz[deg/s]"
+    assert main(["apply", str(tmp_path / "m.toml"), str(tmp_path / "g.csv"), "--map", mapped, "-o", str(out)]) == 0
+    told = capsys.readouterr().out.replace("\n", "").partition("wrote ")[2]
+    assert all(words in told for words in ("t in s", "acc in m/s^2", "gyr in rad/s"))
+    written = np.genfromtxt(out, delimiter=",", names=True)
+    assert written["t"][100] == pytest.approx(1.0)
+    assert written["acc_z"][0] == pytest.approx(9.80665)
+    assert written["gyr_z"][0] == pytest.approx(np.pi / 2.0)
+
+
 def test_the_command_refuses_in_one_line(tmp_path, capsys):
     SensorModel(["acc.lever_arm"], {"acc.lever_arm": {"x": 0.1}}).save(tmp_path / "m.toml")
     without(simulated({}), "gyr").write(tmp_path / "in.parquet")
@@ -321,3 +337,16 @@ def test_mount_of_the_sensor_is_turned_back_into_the_axes_of_the_body():
     for sensor in ("acc", "gyr", "mag"):
         np.testing.assert_allclose(getattr(corrected, sensor), getattr(straight, sensor), atol=1e-9)
     assert any("ref.alignment" in note for note in corrected.notes)
+
+
+def test_the_command_says_that_the_model_comes_first(tmp_path, capsys):
+    SensorModel(["acc.bias"], {"acc.bias": XYZ}).save(tmp_path / "m.toml")
+    (tmp_path / "log.csv").write_text("t,acc_x\n0,1\n1,2\n")
+    swapped = ["apply", str(tmp_path / "log.csv"), str(tmp_path / "m.toml"), "-o", str(tmp_path / "o.csv")]
+    assert main(swapped) == 2
+    said = capsys.readouterr().err
+    assert "log.csv" in said
+    assert "The first argument must be the model" in said
+    (tmp_path / "cut.toml").write_text("a = ")
+    assert main(["apply", str(tmp_path / "cut.toml"), str(tmp_path / "log.csv"), "-o", str(tmp_path / "o.csv")]) == 2
+    assert "copy or save it again" in capsys.readouterr().err

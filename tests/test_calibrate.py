@@ -607,3 +607,38 @@ def test_a_calibration_that_lowers_nothing_is_said_to():
     helped = calibrate(six())
     assert perfect.sensors["acc"].sentence().endswith("The calibration does not lower this error.")
     assert "does not lower" not in helped.sensors["acc"].sentence()
+
+
+def test_the_gyro_misses_before_by_the_readings_as_they_are():
+    rate, time = np.radians(2.0), 1.0
+    missed = []
+    for bias in (0.0, rate, 2.0 * rate):
+        sensor = Sensor(gyr_noise=1e-4, gyr_bias=np.array([0.0, 0.0, bias]))
+        gyr = calibrate(log_of(sensor, course([*SIDES, *spread(4)], move=time), names="acc gyr")).sensors["gyr"]
+        missed.append(gyr.before)
+        assert ("does not lower" in gyr.sentence()) == (bias == 0.0), gyr.sentence()
+    # A bias turns the integral by its rate times the time at most; the edges of the rests belong to the turn.
+    assert 0.3 * rate * time < missed[1] < 1.2 * rate * time
+    assert missed[2] == pytest.approx(2.0 * missed[1], rel=0.05)
+
+
+def between_sides(*pairs):
+    """Return the attitudes half way between two axes, both of which point up there."""
+    return [(UP[f"+{a}"] + UP[f"+{b}"]) / np.sqrt(2.0) for a, b in pairs]
+
+
+@pytest.mark.parametrize("pair", ["xy", "xz", "yz"])
+def test_poses_that_leave_the_angle_of_two_axes_open_say_which_and_its_remedy_works(pair):
+    others = [other for other in ("xy", "xz", "yz") if other != pair]
+    # The edges of the other two pairs, and those opposite: ten attitudes, but none that shows this angle.
+    mirrored = [-edge for edge in between_sides(*others)]
+    poses = [*SIDES, *between_sides(*others), *mirrored]
+    words = refused(
+        log_of(Sensor(), course(poses), names="acc"), f"the angle between the axes {pair[0]} and {pair[1]}", "magnitude"
+    )
+    assert f"one with {pair[0]} and {pair[1]} both about 45 deg" in words
+    assert not any(f"axes {a} and {b}" in words for a, b in others)
+    unasked = calibrate(log_of(Sensor(), course(poses), names="acc")).notes
+    assert any(f"the angle between the axes {pair[0]} and {pair[1]}" in note for note in unasked)
+    mended = calibrate(log_of(Sensor(), course([*poses, *between_sides(pair)]), names="acc"), "magnitude")
+    assert "acc.misalignment" in mended.sensors["acc"].effects

@@ -49,7 +49,7 @@ def fails(capsys, *arguments, code=2):
         (["compare", "LOG", "--plot", "figure.txt"], ".png"),
         (["add", "gyr.gsensitivity", "LOG"], "did you mean gyr.g_sensitivity?"),
         (["fit", "LOG", "--effects", "gyr.bais"], "did you mean gyr.bias"),
-        (["fit", "LOG", "--effects", ","], "names no effect"),
+        (["fit", "LOG", "--effects", ","], "--effects acc.bias,gyr.bias"),
         (["fit", "LOG", "--effects", "gyr.bias,gyr.bias"], "twice"),
         (["fit", "LOG", "--effects", "gyr.column:"], "unknown effect"),
         (["fit", "LOG", "--effects", "gyr.bias", "--fix", "gyr.bias.x"], "EFFECT.PARAM=VALUE"),

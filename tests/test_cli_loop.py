@@ -1,6 +1,7 @@
 """The commands one after another, as a person would type them, on a simulated log with a known effect."""
 
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -63,6 +64,9 @@ def test_loop_finds_an_effect_that_was_put_in(capsys, tmp_path):
     code, out, err = run(capsys, "diagnose", log, "--json", answer)
     assert (code, err) == (0, [])
     assert strict_json(answer.read_text())["best"] == "gyr.bias"
+    commands = [shlex.split(line) for line in out.splitlines() if line.startswith("  imufit ")]
+    assert commands == [["imufit", "add", "gyr.bias", str(log)], ["imufit", "ladder", str(log)]]
+    assert all(run(capsys, *command)[0] == 0 for _, *command in commands)
 
     code, out, err = run(capsys, "add", "gyr.bias", log, "-o", model, "--json", "-")
     assert (code, err) == (0, [])

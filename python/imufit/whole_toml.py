@@ -89,7 +89,7 @@ def read_toml(path: str | Path, what: str) -> tuple[dict[str, Any], bool]:
     """
     file = Path(path)
     try:
-        document = table_from_toml(file, f"If it is cut off: {AGAIN.lower()}")
+        document = table_from_toml(file, f"Name {what} here, a TOML file. If it is cut off: {AGAIN.lower()}")
         text = file.read_bytes().decode("utf-8")
     except OSError as error:
         raise InputError(f"{what} cannot be read ({error.strerror})", file=file, remedy="Check the name.") from None

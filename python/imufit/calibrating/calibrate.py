@@ -153,7 +153,9 @@ class _Session:
         try:
             return self._accelerometer(cost)
         except InputError as error:
-            raise error if error.file is not None else checks.too_few_positions(self.used, error, self.file) from None
+            raise (
+                error if error.file is not None else checks.too_few_positions(self.used, error, self.file, cost)
+            ) from None
 
     def _accelerometer(self, cost: str | None) -> tuple[SensorCalibration, Temperature | None]:
         self.poses, flips = checks.check_labels(self.poses, self.file)
@@ -176,9 +178,10 @@ class _Session:
         strewn = result.excess > accelerometer.ASTRAY * self.gravity
         if cost is None and not self.labelled and strewn and len(usable) >= 7:
             result = accelerometer.fit_magnitude(usable, self.gravity, temperature, misalignment=False)
+            lacking = checks.unshown(np.array([pose.direction for pose in usable]))
             self.notes.append(
-                "The poses lie along the axes, but were not laid on a table: lengths determine scale and bias; "
-                "misalignment needs nine attitudes, some of them oblique."
+                "The poses were not laid on a table: lengths determine scale and bias alone."
+                + (f" The poses do not show {lacking.problem()}: record also {lacking.remedy()}." if lacking else "")
             )
         self._say_of_poses(flips)
         return result, temperature

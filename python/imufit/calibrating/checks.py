@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imufit.calibrating.calibration import AXES
 from imufit.errors import InputError
@@ -12,6 +14,8 @@ from imufit.remedy import mapped, option, when_read
 from imufit.rests.poses import SIDES, Pose, distinct, repeated
 
 UNKNOWNS = {"vector": 12, "magnitude": 9}
+SEEN = 5e-4
+"""Information per pose (squares of unit vectors) that a combination of unknowns must have, as the fit asks for it."""
 
 
 def check_labels(poses: Sequence[Pose], file: object) -> tuple[list[Pose], list[str]]:
@@ -112,7 +116,58 @@ def check_poses(poses: Sequence[Pose], cost: str, file: object) -> None:
         )
 
 
-def too_few_positions(poses: Sequence[Pose], error: InputError, file: object) -> InputError:
+@dataclass(frozen=True)
+class Unshown:
+    """Unknowns of the magnitude cost that do not show in the directions of the poses.
+
+    Attributes
+    ----------
+    angles : tuple of (str, str)
+        Pairs of axes whose angle does not show.
+    axes : tuple of str
+        Axes whose scale and bias do not show.
+    """
+
+    angles: tuple[tuple[str, str], ...]
+    axes: tuple[str, ...]
+
+    def __bool__(self) -> bool:
+        return bool(self.angles or self.axes)
+
+    def problem(self) -> str:
+        """Name the unknowns, as the end of a sentence."""
+        parts = [f"the angle between the axes {a} and {b}" for a, b in self.angles]
+        parts += [f"scale and bias of {axis}" for axis in self.axes]
+        return " and ".join(parts)
+
+    def remedy(self) -> str:
+        """Name the poses to record, as the end of a sentence."""
+        parts = [f"one with {a} and {b} both about 45 deg from the vertical" for a, b in self.angles]
+        parts += [f"+{axis} up and -{axis} up" for axis in self.axes]
+        return " and ".join(parts)
+
+
+def unshown(directions: NDArray[np.float64]) -> Unshown:
+    """Find the unknowns of the magnitude cost that poses do not show, each by its share in what they leave open.
+
+    Parameters
+    ----------
+    directions : (n, 3) array
+        Unit vectors of the poses.
+    """
+    # The length of a corrected reading changes with the scales as u_i^2, with the bias as u_i, with the angle between
+    # two axes as 2 u_i u_j.
+    pairs = [(0, 1), (0, 2), (1, 2)]
+    mixed = np.stack([2.0 * directions[:, i] * directions[:, j] for i, j in pairs], axis=1)
+    design = np.hstack([directions**2, directions, mixed])
+    information, combinations = np.linalg.eigh(design.T @ design / len(directions))
+    largest = [int(np.abs(combinations[:, k]).argmax()) for k in np.flatnonzero(information <= SEEN)]
+    angles = {(AXES[i], AXES[j]) for i, j in (pairs[place - 6] for place in largest if place >= 6)}
+    axes = {AXES[place % 3] for place in largest if place < 6}
+    return Unshown(tuple(sorted(angles)), tuple(sorted(axes)))
+
+
+def too_few_positions(poses: Sequence[Pose], error: InputError, file: object, cost: str | None = None) -> InputError:
     """Make the error for poses whose equations do not determine the unknowns.
 
     Parameters
@@ -123,12 +178,23 @@ def too_few_positions(poses: Sequence[Pose], error: InputError, file: object) ->
         What the fit said: unknowns and equations.
     file : object
         To name in the error.
+    cost : str, optional
+        ``vector`` or ``magnitude``, if it was asked for.
     """
-    count = distinct(np.array([pose.direction for pose in poses]))
+    directions = np.array([pose.direction for pose in poses])
+    count = distinct(directions)
     sides = {pose.name for pose in poses}
     seen, missing = ([side for side in SIDES if (side in sides) == there] for there in (True, False))
     never = f"; {' '.join(missing)} never pointed up" if missing else ""
     positions = f"{count} different position{'' if count == 1 else 's'}"
+    lacking = unshown(directions)
+    if cost == "magnitude" and lacking and not missing:
+        return InputError(
+            f"the {len(poses)} poses show {positions}, but not {lacking.problem()}: nine unknowns need nine poses "
+            "that are independent",
+            file=str(file),
+            remedy=f"Record also {lacking.remedy()}, for 3 s.",
+        )
     remedy = f"Record also {' '.join(missing)} up" if missing else "Record each of the six sides up"
     return InputError(
         f"{error.problem}: the {len(poses)} poses show {positions} (nearest sides {' '.join(seen)} up{never})",

@@ -24,6 +24,9 @@ LEAST_WAY = np.radians(20.0)
 TOLD = 0.03
 """Standard error of A's elements beyond which the turns did not determine them."""
 
+UNKNOWN = 1e12
+"""Variance (rad^2) of a turn that says nothing of the gyro: no angle is larger than pi, so that its weight is zero."""
+
 
 def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibration | None:
     """Calibrate the gyro: bias from the rests, scale and misalignment from the turns where they determine both.
@@ -85,8 +88,8 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
         remarks.append(f"The turns do not determine the gyro's misalignment {' '.join(loose)}.")
     remarks += [f"Negative scale: gyro axis {AXES[i]} is flipped." for i in range(3) if scale[i] < 0.0]
     held_out = rms(told["held_out"][:, 0])
-    before, after = rms(told["before"]), rms(told["residuals"][:, 0])
-    worse = held_out > before
+    bias_alone, after = rms(told["before"]), rms(told["residuals"][:, 0])
+    worse = held_out > bias_alone
     if told["freedom"] < 1.0:
         remarks.append(f"{len(told['before'])} turns are just enough: the gyro's calibration cannot be checked.")
     if worse:
@@ -106,9 +109,9 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
         scale_error=np.zeros(3) if worse else scale_error,
         bias_error=bias_error,
         unit="rad/s",
-        before=before,
-        after=before if worse else after,
-        held_out=before if worse else held_out,
+        before=rms(_missed_as_read(t, gyr, far)),
+        after=bias_alone if worse else after,
+        held_out=bias_alone if worse else held_out,
         error_unit="rad",
         residuals=told["before"] if worse else told["residuals"][:, 0],
         condition=told["condition"],
@@ -132,6 +135,15 @@ def _joined(turns: Sequence[Turns]) -> tuple[Array, Array, list[_Span]]:
     t = np.concatenate([turn.log.t for turn in turns]) if turns else np.zeros(0)
     gyr = np.concatenate([turn.log.gyr for turn in turns if turn.log.gyr is not None]) if turns else np.zeros((0, 3))
     return np.ascontiguousarray(t), np.ascontiguousarray(gyr), spans
+
+
+def _missed_as_read(t: Array, gyr: Array, spans: Sequence[_Span]) -> Array:
+    """Return the angle that each turn misses by the readings as they are, their bias included, (n,), rad."""
+    still = [0.0, 0.0, 0.0]
+    unweighed = [
+        (first, last, still, still, up_before, up_after, UNKNOWN) for first, last, _, _, up_before, up_after, _ in spans
+    ]
+    return np.asarray(_imufit.turn_calibration(t, gyr, unweighed, still)["before"])
 
 
 def _bias(rests: Sequence[Pose]) -> tuple[Array, Array, tuple[Array, Array] | None]:

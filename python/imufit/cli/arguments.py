@@ -16,6 +16,7 @@ from imufit.whole_file import identity
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 LOG_ENDINGS = (".parquet", ".csv", ".npz")
+MODEL_ENDINGS = (".toml",)
 PLOT_ENDINGS = (".png", ".svg", ".pdf")
 
 
@@ -227,7 +228,7 @@ def verbose_option(command: Command) -> Command:
 def model_output(command: Command) -> Command:
     """Add -o for a model file."""
     return click.option(
-        "-o", "--output", type=OutputFile((".toml",)), metavar="MODEL.toml", help="Write the fitted model."
+        "-o", "--output", type=OutputFile(MODEL_ENDINGS), metavar="MODEL.toml", help="Write the fitted model."
     )(command)
 
 

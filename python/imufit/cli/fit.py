@@ -63,7 +63,10 @@ def fit(
     keep_inputs([*logs, model], [output, json_file, plot_file])
     names = [name.strip() for text in effects for name in text.split(",") if name.strip()]
     if not names and model is None:
-        raise click.UsageError("--effects names no effect, and no --model has any")
+        raise click.UsageError(
+            "name the effects to fit, such as --effects acc.bias,gyr.bias, or a --model that has some; "
+            "`imufit diagnose` finds out which effect is missing"
+        )
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
         raise click.UsageError(f"--effects names {repeated[0]} twice")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable, Mapping
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +16,7 @@ import click
 
 from imufit.printable import printable
 from imufit.whole_file import whole_file, write_text
+from imufit.wrapping import lines_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,15 +35,54 @@ _PROSE = 28
 """Least characters of a column that wraps: the longest id of an effect has 27, and prose can be read in it."""
 
 
-def _least_width(table: Table) -> int:
-    """Characters that a table needs at least: numbers and first cells do not wrap, other cells down to `_PROSE`."""
-    from rich.cells import cell_len  # noqa: PLC0415
+_GAPS = (3, 2)
+"""Blanks between two columns, the wider one where it fits."""
 
-    least = 2
-    for place, (name, right, *cells) in enumerate(zip(table.names, table.right, *table.rows, strict=True)):
-        widest = max(cell_len(_harmless(cell)) for cell in (name, *cells))
-        least += (widest if place == 0 or right else min(widest, _PROSE)) + (3 if place else 0)
-    return least
+
+@dataclass(frozen=True)
+class _Layout:
+    """A table as it is printed: one of its forms, whether long column names are broken, and the gap of its columns."""
+
+    table: Table
+    broken: bool = False
+    gap: int = _GAPS[0]
+
+    def narrow(self, place: int) -> bool:
+        """Whether the cells of a column never wrap: first cells and numbers."""
+        return place == 0 or self.table.right[place]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Column names, those of columns that never wrap broken at blanks down to the width of the cells."""
+        if not self.broken:
+            return self.table.names
+        cells = [max((len(cell) for cell in column), default=0) for column in zip(*self.table.rows, strict=True)]
+        widths = [max([width, *map(len, name.split(" "))]) for width, name in zip(cells, self.table.names, strict=True)]
+        return tuple(
+            "\n".join(textwrap.wrap(name, max(width, 1))) if self.narrow(place) else name
+            for place, (name, width) in enumerate(zip(self.table.names, widths, strict=True))
+        )
+
+    def least_width(self) -> int:
+        """Characters that it needs at least: numbers and first cells do not wrap, other cells down to `_PROSE`."""
+        from rich.cells import cell_len  # noqa: PLC0415
+
+        least = 2
+        for place, (name, *cells) in enumerate(zip(self.names, *self.table.rows, strict=True)):
+            widest = max(cell_len(_harmless(line)) for text in (name, *cells) for line in text.split("\n"))
+            least += (widest if self.narrow(place) else min(widest, _PROSE)) + (self.gap if place else 0)
+        return least
+
+
+def _layouts(table: Table) -> Iterator[_Layout]:
+    """Forms of a table from the best to the narrowest."""
+    yield _Layout(table)
+    full = table.without_empty_columns()
+    yield from (_Layout(full, broken, gap) for gap in _GAPS for broken in (False, True))
+    first = [row[0] for row in full.rows]
+    short = all(len(cell) <= _PROSE for row in full.rows for cell in row)
+    if short and all(first) and len(set(first)) == len(first):
+        yield from (_Layout(full.transposed(), broken=True, gap=gap) for gap in _GAPS)
 
 
 def _harmless(text: str) -> str:
@@ -85,7 +127,8 @@ class Output:
         """Print sentences, one paragraph each."""
         for sentence in sentences:
             if sentence and not self._closed:
-                self._console.print(_harmless(sentence), style="bold" if bold else None)
+                for line in lines_of(_harmless(sentence), self._console.width):
+                    self._console.print(line, style="bold" if bold else None, soft_wrap=True)
 
     def lines(self, lines: Iterable[str]) -> None:
         """Print lines as they are, however long."""
@@ -120,7 +163,7 @@ class Output:
             self.say(f"With -v also: {'; '.join(title[0].lower() + title[1:] for title in more)}.")
 
     def table(self, table: Table, limit: int | None = None) -> None:
-        """Print a table, if it has rows: as blocks, one a row, where it is too wide for the screen."""
+        """Print a table, if it has rows: as blocks, one a row, where each of its forms is too wide for the screen."""
         if not table.rows:
             return
         from rich import box  # noqa: PLC0415
@@ -129,30 +172,34 @@ class Output:
 
         if table.title:
             self._console.print(Text(_harmless(table.title)), style="italic")
-        if table.blocks or _least_width(table) > self._console.width:
-            self._blocks(table, limit)
+        shown = replace(table, rows=table.rows[:limit])
+        layout = next((form for form in _layouts(shown) if form.least_width() <= self._console.width), None)
+        if table.blocks or layout is None:
+            self._blocks(shown)
             return
-        headed = any(table.names)
+        headed = any(layout.names)
         rich_table = RichTable(box=box.SIMPLE_HEAD if headed else None, pad_edge=False, show_header=headed)
-        rich_table.padding = (0, 1) if headed else (0, 3, 0, 0)
-        for place, (name, right) in enumerate(zip(table.names, table.right, strict=True)):
+        # A box has a blank of its own between two columns.
+        rich_table.padding = (0, 1, 0, layout.gap - 2) if headed else (0, layout.gap, 0, 0)
+        for place, (name, right) in enumerate(zip(layout.names, layout.table.right, strict=True)):
             rich_table.add_column(
                 Text(_harmless(name)),
                 justify="right" if right else "left",
-                no_wrap=place == 0 or right,
+                no_wrap=layout.narrow(place),
                 overflow="fold",
             )
-        for row in table.rows[:limit]:
+        for row in layout.table.rows:
             rich_table.add_row(*(Text(_harmless(cell)) for cell in row))
         self._console.print(rich_table)
 
-    def _blocks(self, table: Table, limit: int | None) -> None:
-        """Print each row as a block: its first cell, then a line for each other non-empty cell."""
+    def _blocks(self, table: Table) -> None:
+        """Print each row as a block: its first cell, a number with its name, then a line for each non-empty cell."""
         from rich.table import Table as RichTable  # noqa: PLC0415
         from rich.text import Text  # noqa: PLC0415
 
-        for row in table.rows[:limit]:
-            self._console.print(Text(_harmless(row[0]), style="bold"), soft_wrap=True)
+        for row in table.rows:
+            head = f"{table.names[0]} {row[0]}" if table.right[0] else row[0]
+            self._console.print(Text(_harmless(head), style="bold"), soft_wrap=True)
             block = RichTable.grid(padding=(0, 3, 0, 0))
             block.add_column(no_wrap=True)
             block.add_column(overflow="fold")
@@ -231,3 +278,27 @@ class Output:
     def wrote(self, path: Path) -> None:
         """Say which file was written."""
         self.say(f"wrote {path}")
+
+    def wrote_log(self, path: Path, columns: Iterable[str], angles: str = "") -> None:
+        """Say which log was written, and in which units: they need not be those of the file that was read.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        columns : iterable of str
+            Its columns of fixed meaning.
+        angles : str
+            Words for further columns that hold angles, rad.
+        """
+        from imufit.log.columns import GROUPS, UNITS  # noqa: PLC0415
+
+        group = {member: name for name, members in GROUPS.items() for member in members}
+        of_unit: dict[str, dict[str, None]] = {}
+        for column in columns:
+            if UNITS.get(column, "1") != "1":
+                of_unit.setdefault(UNITS[column], {})[group.get(column, column)] = None
+        if angles:
+            of_unit.setdefault("rad", {})[angles] = None
+        listed = "; ".join(f"{' and '.join(names)} in {unit}" for unit, names in of_unit.items())
+        self.say(f"wrote {path}: {listed}")

@@ -71,7 +71,11 @@ _MADE = 100
     help="Memory that a long log and its attitudes may take.",
 )
 @click.option(
-    "-o", "--output", type=OutputFile(LOG_ENDINGS), metavar="OUT", help="Write the log with the attitudes added."
+    "-o",
+    "--output",
+    type=OutputFile(LOG_ENDINGS),
+    metavar="OUT",
+    help="Write the log with the attitudes added: quaternions, and roll, pitch, yaw in rad.",
 )
 @json_option
 @plot_option
@@ -115,6 +119,7 @@ def replay(
     out.say(f"{value['n']} rows replayed.", bold=True)
     out.say(*(f"{count} rows skipped: {reason}." for reason, count in value.get("skipped", {}).items() if count))
     if all(errors is None for errors in value["filters"].values()):
+        out.say(result.frame_words())
         out.table(result.angle_table())
     elif compared is None or compared.axis is None:
         out.table(_attitude_table(value))
@@ -122,8 +127,9 @@ def replay(
         out.tables(compared.tables())
         out.say(*compared.notes)
     if output is not None:
-        engine.write_log(result.to_log(), output)
-        out.wrote(output)
+        replayed = result.to_log()
+        engine.write_log(replayed, output)
+        out.wrote_log(output, replayed.columns, "roll, pitch and yaw of each filter")
     out.json(value)
     if plot_file is not None:
         out.plot(plot_file, result.plot())

@@ -42,5 +42,6 @@ def angle_panels(t: Array, angles: Mapping[str, Array], ax: place.Place | None =
             panels[k].plot(t[thin], degrees, color=COLOURS[number % len(COLOURS)], linewidth=1.0, label=label)
         panels[k].set_ylabel(f"{name}, deg")
     panels[-1].set_xlabel("time, s")
-    panels[0].legend(loc="upper right", ncols=min(len(angles), 5))
+    handles, labels = panels[0].get_legend_handles_labels()
+    drawing.legend(handles, labels, loc="outside lower center", ncols=2 if drawing.narrow else 7)
     return drawing

@@ -6,7 +6,6 @@ Deviations are drawn larger than they are, by a factor that the title states.
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,6 +17,7 @@ from imufit.errors import InputError
 from imufit.figures import quantity, style
 from imufit.figures.place import Drawing
 from imufit.log.columns import SENSOR_NAMES
+from imufit.wrapping import lines_of
 
 if TYPE_CHECKING:
     from imufit.figures.place import Place
@@ -187,7 +187,7 @@ def _cube(axes: Any, low: float, high: float, zoom: float = 1.0) -> None:
 
 def _headed(axes: Any, sentence: str) -> None:
     """Put a sentence above the axes, broken to the width of the figure."""
-    style.title(axes, textwrap.fill(sentence, _LETTERS), 10.0)
+    style.title(axes, "\n".join(lines_of(sentence, _LETTERS)), 10.0)
 
 
 def _from_origin(end: Array) -> Array:

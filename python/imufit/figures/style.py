@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import textwrap
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,6 +11,8 @@ from matplotlib.category import StrCategoryFormatter
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FixedFormatter, FuncFormatter, LogLocator
+
+from imufit.wrapping import lines_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -201,5 +202,5 @@ def title(axes: Axes, sentence: str, size: float = 11.0, **options: Any) -> None
     figure = axes.get_figure(root=True)
     assert figure is not None
     width = 72.0 * axes.get_window_extent().width / figure.dpi
-    broken = textwrap.fill(sentence, max(20, int(width / (LETTER * size))))
+    broken = "\n".join(lines_of(sentence, max(20, int(width / (LETTER * size)))))
     axes.set_title(broken, fontsize=min(size, 10.0), color=INK)

@@ -12,10 +12,14 @@ from imufit.results.table import Table
 Array = NDArray[np.float64]
 
 ANGLES = ("roll", "pitch", "yaw")
+HALF_TURN = 180.0
+"""Step (deg) between two rows beyond which the shorter way goes across +-180 deg."""
 
 
 def angle_table(t: Array, angles: Mapping[str, Array]) -> Table:
     """Roll, pitch and yaw of every filter at its first and last attitude and at the extremes of roll and pitch.
+
+    The extremes of a roll that passes 180 deg are left out: they are not those of the motion.
 
     Parameters
     ----------
@@ -33,6 +37,9 @@ def angle_table(t: Array, angles: Mapping[str, Array]) -> Table:
         degrees = np.degrees(three[known])
         places = [("start", 0), ("end", known.size - 1)]
         for k, what in enumerate(ANGLES[:2]):
+            # An angle that comes round from 180 to -180 deg has neither a least value nor a largest one.
+            if np.any(np.abs(np.diff(degrees[:, k])) > HALF_TURN):
+                continue
             places += [(f"least {what}", int(degrees[:, k].argmin())), (f"most {what}", int(degrees[:, k].argmax()))]
         for place, (when, row) in enumerate(places):
             cells = (f"{value:.2f}" for value in degrees[row])

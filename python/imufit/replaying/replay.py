@@ -33,6 +33,7 @@ from imufit.log.words import one_of
 from imufit.progress import Progress, silent
 from imufit.replaying.angle_table import angle_table
 from imufit.replaying.clipped import ranges
+from imufit.replaying.start_frame import frame_words
 from imufit.replaying.tilt_comparison import compare_tilt, tilt_errors
 from imufit.results.plotted import Plotted
 from imufit.results.result import Result
@@ -118,7 +119,7 @@ class Replay(Plotted, Result):
         ran = f"{self.log.n} rows by {', '.join(self.attitude)}"
         total = {name: errors["total_deg"] for name, errors in self.errors.items() if errors is not None}
         if not total:
-            return [f"{ran}; the log has no reference attitude to hold them against."]
+            return [f"{ran}; the log has no reference attitude to hold them against.", self.frame_words()]
         best = min(total, key=lambda name: total[name])
         return [f"{ran}: {best} comes nearest to the reference, {total[best]:.2f} deg RMS."]
 
@@ -132,6 +133,11 @@ class Replay(Plotted, Result):
             if errors is not None
         )
         return (Table("Error, deg RMS", ("filter", ">total", ">heading", ">inclination"), rows),)
+
+    def frame_words(self) -> str:
+        """Name the frame of the angles; where the sensor starts upside down in it, the remedy."""
+        known = [q[np.isfinite(q).all(axis=1)] for q in self.attitude.values()]
+        return frame_words(self.log.metadata.frame, next((q[0] for q in known if len(q)), None))
 
     def angle_table(self) -> Table:
         """Roll, pitch and yaw of every filter at the start, at the end and at the extremes of roll and pitch."""

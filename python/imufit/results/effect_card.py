@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ from imufit.figures import quantity
 from imufit.results.json_value import json_value
 from imufit.results.result import Result
 from imufit.results.table import Table
+from imufit.wrapping import lines_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -99,8 +99,9 @@ class EffectCard(Result):
         return [self.table()]
 
     def __str__(self) -> str:
-        paragraphs = (
-            textwrap.fill(text, 100, initial_indent=f"  {heading:<14}", subsequent_indent=" " * 16)
+        lines = (
+            line
             for heading, text in self.lines()
+            for line in lines_of(text, 100, first=f"  {heading:<14}", later=" " * 16)
         )
-        return "\n".join([f"{self.id}: {self.name}", *paragraphs])
+        return "\n".join([f"{self.id}: {self.name}", *lines])

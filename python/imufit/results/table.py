@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 
 
@@ -37,6 +37,19 @@ class Table:
     def right(self) -> tuple[bool, ...]:
         """Which columns are aligned right."""
         return tuple(name.startswith(">") for name in self.header)
+
+    def without_empty_columns(self) -> Table:
+        """Return the table without the columns of which every cell is empty."""
+        kept = [k for k in range(len(self.header)) if any(row[k] for row in self.rows)]
+        rows = tuple(tuple(row[k] for k in kept) for row in self.rows)
+        return replace(self, header=tuple(self.header[k] for k in kept), rows=rows)
+
+    def transposed(self) -> Table:
+        """Return the table with a column for each row: the first cells are its header, as numbers where some are."""
+        mark = ">" if any(self.right[1:]) else ""
+        header = (self.names[0], *(f"{mark}{row[0]}" for row in self.rows))
+        columns = list(zip(self.names, *self.rows, strict=True))[1:]
+        return replace(self, header=header, rows=tuple(columns))
 
     def __str__(self) -> str:
         widths = [max(len(cell) for cell in column) for column in zip(self.names, *self.rows, strict=True)]
