@@ -149,7 +149,7 @@ class Joined(Plotted, Result):
         return (*self._on_the_mount(), "The lag includes a delay of the gyroscope: two clocks do not show it apart.")
 
     def _on_the_mount(self) -> tuple[str, ...]:
-        """Notes on how the sensor is turned."""
+        """Return notes on how the sensor is turned."""
         angle = np.rad2deg(self.left)
         if self.mount is None:
             return ("The reference has positions alone: the log has no attitude.",)
