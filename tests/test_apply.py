@@ -305,7 +305,7 @@ def test_the_command_says_the_units_of_what_it_wrote(tmp_path, capsys):
     out = tmp_path / "o.csv"
     mapped = "t=millis[ms],acc_x=ax[g],acc_y=ay[g],acc_z=az[g],gyr_x=gx[deg/s],gyr_y=gy[deg/s],gyr_z=gz[deg/s]"
     assert main(["apply", str(tmp_path / "m.toml"), str(tmp_path / "g.csv"), "--map", mapped, "-o", str(out)]) == 0
-    told = capsys.readouterr().out.replace("\n", "").partition("wrote ")[2]
+    told = " ".join(capsys.readouterr().out.split()).partition("wrote ")[2]
     assert all(words in told for words in ("t in s", "acc in m/s^2", "gyr in rad/s"))
     written = np.genfromtxt(out, delimiter=",", names=True)
     assert written["t"][100] == pytest.approx(1.0)
