@@ -188,7 +188,13 @@ def test_time_in_which_no_sensor_could_sample_is_refused(tmp_path: Path) -> None
     path = tmp_path / "a.csv"
     pd.DataFrame({**COLUMNS, "t": np.arange(N) * 1e-9}).to_csv(path, index=False)
     assert "faster than any such sensor samples" in message(path)
+    pd.DataFrame({**COLUMNS, "t": np.arange(N) * 1e-5}).to_csv(path, index=False)
+    assert "faster than any such sensor samples (32000 Hz)" in message(path)
     pd.DataFrame({**COLUMNS, "t": np.arange(N) * 4e-5}).to_csv(path, index=False)
+    assert read(path).n == N
+    # A converter reads an analog accelerometer at any rate.
+    alone = {name: values for name, values in COLUMNS.items() if not name.startswith("gyr")}
+    pd.DataFrame({**alone, "t": np.arange(N) * 1e-5}).to_csv(path, index=False)
     assert read(path).n == N
 
 

@@ -500,7 +500,7 @@ class _Readings:
         Raises
         ------
         InputError
-            The rows are closer together than any sensor samples: its time is asked about before its units.
+            The rows are closer together than any such sensor samples: the time is asked about before the units.
         """
         if all(each.unit is not None for each in chosen.values()):
             return cls(chosen, {})
@@ -512,11 +512,12 @@ class _Readings:
         time = clock.times(cells) if clock is not None else _times(own.get("t"), cells)
         if time is None:
             return cls(chosen, rows, own)
+        turns = "gyr" in chosen or GROUPS["gyr"][0] in own
         if clock is None:
-            check_rate(time, abs(own["t"].conversion.factor), own["t"].origin, place)
+            check_rate(time, abs(own["t"].conversion.factor), own["t"].origin, place, turns)
         elif clock.unit is not None:
             tick = 1.0 if clock.unit in ORDERS else conversion("t", clock.unit).factor
-            check_rate(time, tick, clock.source, place)
+            check_rate(time, tick, clock.source, place, turns)
         known = np.isfinite(time)
         return cls(chosen, {name: values[known] for name, values in rows.items()}, own, time[known])
 

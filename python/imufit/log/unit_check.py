@@ -22,8 +22,10 @@ from imufit.log.time_unit import time_unit
 from imufit.log.units import conversion
 from imufit.remedy import Remedy, mapped
 
-FASTEST: Final = 32e3
+FASTEST_GYR: Final = 32e3
 """Largest output rate of a gyroscope of this class, Hz (TDK InvenSense, ICM-42688-P data sheet DS-000347: 32 kHz)."""
+FASTEST: Final = 1e6
+"""Rate that no log without a gyroscope reaches, Hz: the fastest accelerometers give 1e5 samples a second."""
 _CLOCK_OFF: Final = 0.05
 """Relative error of a sensor's own clock (the same data sheet: 5 % at most)."""
 SLOWEST_STEP: Final = 2.0
@@ -166,7 +168,7 @@ def check_units(
     acc, gyr, mag, ref_q = (sensors.get(name) for name in ("acc", "gyr", "mag", "ref_q"))
     notes: list[str] = []
     origin = origin or {}
-    check_rate(t, tick, origin.get("t", "t"), place)
+    check_rate(t, tick, origin.get("t", "t"), place, gyr is not None)
     if clock == "open":
         check_steps(t, tick, origin.get("t", "t"), place)
     if acc is not None and gyr is not None:
@@ -224,8 +226,8 @@ def _check_temp(temp: Array, place: Place, origin: Mapping[str, str]) -> list[st
     ]
 
 
-def check_rate(t: Array, tick: float, column: str, place: Place) -> None:
-    """Refuse rows closer together than any sensor samples: the unit of the time is another one.
+def check_rate(t: Array, tick: float, column: str, place: Place, turns: bool) -> None:
+    """Refuse rows closer together than any such sensor samples: the unit of the time is another one.
 
     Parameters
     ----------
@@ -237,22 +239,25 @@ def check_rate(t: Array, tick: float, column: str, place: Place) -> None:
         Column of the file that holds the time.
     place : Place
         To name the file.
+    turns : bool
+        Whether the log has a gyroscope: an analog accelerometer alone may be sampled faster.
 
     Raises
     ------
     InputError
         Names the rate, and the unit that the steps look like.
     """
+    fastest = FASTEST_GYR if turns else FASTEST
     t = t[np.isfinite(t)]
     step = float(t[-1] - t[0]) / (t.size - 1) if t.size >= _ROWS_OF_A_CLOCK else 0.0
-    if step <= 0.0 or step * FASTEST * (1.0 + _CLOCK_OFF) >= 1.0:
+    if step <= 0.0 or step * fastest * (1.0 + _CLOCK_OFF) >= 1.0:
         return
     likely = time_unit(t / tick)
     slower = likely is not None and conversion("t", likely).factor > tick
     source = f"{column}[{likely}]" if slower else f"{column}[*3600]"
     remedy = "Use " if slower else "Say how many s one of its units has, such as "
     raise place.error(
-        f"steps of {step:.3g} s mean {1.0 / step:.3g} Hz, faster than any such sensor samples ({FASTEST:g} Hz)"
+        f"steps of {step:.3g} s mean {1.0 / step:.3g} Hz, faster than any such sensor samples ({fastest:g} Hz)"
         + (f": the time looks like {likely}" if slower else ": the time is in another unit"),
         column=column,
         remedy=remedy + place.mapped({"t": source}) + ("" if slower else " for hours."),
