@@ -54,8 +54,10 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
             text += f" (typically {quantity.quantity(top.typical, top.unit)})"
         text += "."
     before, after = candidate.held_out_before, candidate.held_out_after
-    if candidate.status == PASSED:
+    if candidate.status == PASSED and after < before:
         text += f" Adding it should cut the held-out error {cut(before, after)}."
+    elif candidate.status == PASSED:
+        text += " Alone it does not lower the held-out error; beside the other effects it may."
     elif candidate.status == "negative delay":
         text += (
             " It would have to read what is yet to come: that is not the sensor, but rows that are stamped too late,"
