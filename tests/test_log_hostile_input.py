@@ -176,6 +176,21 @@ def test_clock_of_a_transcript_counts_on_past_midnight(tmp_path: Path) -> None:
     assert log.t[0] == pytest.approx(86399.0)
 
 
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("array", ["pose", "metadata"])
+def test_text_of_an_archive_beyond_unicode_is_refused(tmp_path: Path, array: str, order: str) -> None:
+    damaged = np.full(N, 0x110000, f"{order}u4").view(f"{order}U1")
+    path = npz(tmp_path / "a.npz", *COLUMNS.items(), (array, damaged if array == "pose" else damaged[0:1].reshape(())))
+    assert "a.npz" in message(path)
+
+
+def test_text_of_a_structured_array_beyond_unicode_is_refused(tmp_path: Path) -> None:
+    rows = np.zeros(N, [("t", "f8"), ("acc_x", "f8"), ("label", "<u4")])
+    rows["label"] = 0x110000
+    np.save(tmp_path / "a.npy", rows.view([("t", "f8"), ("acc_x", "f8"), ("label", "<U1")]))
+    assert "a.npy" in message(tmp_path / "a.npy")
+
+
 def test_time_of_day_of_a_table_is_not_told_to_be_sorted(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     pd.DataFrame({**COLUMNS, "t": (86399.8 + COLUMNS["t"]) % 86400.0}).to_csv(path, index=False)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from imufit.formats.limits import LIST, check_values
 from imufit.formats.recording import Table
 from imufit.formats.rows import left_out_note, number, time_name
+from imufit.formats.unicode_text import unicode_only
 
 _RATES: Final = re.compile(
     r"(sampl(e|ing)_?)?(rate|freq(uency)?)(_?hz)?|frame_?rate|f_?s|samplerate|samplingrate|odr|hz", re.IGNORECASE
@@ -56,7 +57,7 @@ class Named:
             array = np.char.decode(array, "utf-8", "replace")
         if array.dtype.kind == "U" or (array.dtype == object and array.size and _texts(array)):
             if array.size > 1:
-                self.arrays[name] = array.astype(object)
+                self.arrays[name] = unicode_only(array).astype(object)
         elif array.dtype.kind in "biuf":
             if array.size == 1:
                 self.settings[name] = number(array.reshape(-1)[0])

@@ -21,6 +21,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
+from imufit.formats.unicode_text import unicode_only
 from imufit.log.columns import GROUPS
 from imufit.log.metadata import Metadata, mapping_from_json
 from imufit.log.size import BLOCK, LONGEST_TEXT, NUMBER, TEXT_CELL, rows_at_once, size_in_words
@@ -124,7 +125,7 @@ class NpzSource:
             )
         if shape == ():
             if name == _METADATA:
-                text = str(np.frombuffer(file.read(dtype.itemsize), dtype)[0])
+                text = str(_values(file.read(dtype.itemsize), dtype)[0])
                 self.embedded = mapping_from_json(text, self._path)
             return
         columns = GROUPS.get(name, ())
@@ -213,7 +214,11 @@ def _read(file: IO[bytes], member: _Member, rows: int) -> NDArray[Any]:
     data = file.read(size)
     if len(data) != size:
         raise EOFError
-    return np.frombuffer(data, member.dtype).reshape(rows, member.width)
+    return _values(data, member.dtype).reshape(rows, member.width)
+
+
+def _values(data: bytes, dtype: np.dtype[Any]) -> NDArray[Any]:
+    return unicode_only(np.frombuffer(data, dtype))
 
 
 def _array(column: NDArray[Any]) -> NDArray[Any]:
