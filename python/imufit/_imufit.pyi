@@ -11,6 +11,7 @@ _Numbers = Sequence[float] | _Array
 _Chunk = dict[str, Any]
 
 __all__ = [
+    "NORM_SEEN",
     "Autocovariance",
     "Candidate",
     "Disagreement",
@@ -78,6 +79,7 @@ __all__ = [
 ]
 
 __version__: str
+NORM_SEEN: float
 
 # --- attitude: quaternions (n, 4) scalar first, angles rad; rows that are no attitude give NaN
 
@@ -697,6 +699,7 @@ class _Solution(TypedDict):
 
 class _TurnSolution(_Solution):
     before: _Array
+    as_read: _Array
     way: _Array
 
 _Vector = Sequence[float]

@@ -27,7 +27,7 @@ def lines_of(text: str, width: int, first: str = "", later: str = "") -> list[st
     width : int
         Characters of a line.
     first, later : str
-        What stands before the first line of a paragraph and before the others.
+        Indentation of the first line of a paragraph, and of its other lines.
 
     Returns
     -------

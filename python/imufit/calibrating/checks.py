@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from imufit import _imufit
 from imufit.calibrating.calibration import AXES
 from imufit.errors import InputError
 from imufit.remedy import mapped, option, when_read
 from imufit.rests.poses import SIDES, Pose, distinct, repeated
 
 UNKNOWNS = {"vector": 12, "magnitude": 9}
-SEEN = 5e-4
-"""Information per pose (squares of unit vectors) that a combination of unknowns must have, as the fit asks for it."""
 
 
 def check_labels(poses: Sequence[Pose], file: object) -> tuple[list[Pose], list[str]]:
@@ -161,7 +160,7 @@ def unshown(directions: NDArray[np.float64]) -> Unshown:
     mixed = np.stack([2.0 * directions[:, i] * directions[:, j] for i, j in pairs], axis=1)
     design = np.hstack([directions**2, directions, mixed])
     information, combinations = np.linalg.eigh(design.T @ design / len(directions))
-    largest = [int(np.abs(combinations[:, k]).argmax()) for k in np.flatnonzero(information <= SEEN)]
+    largest = [int(np.abs(combinations[:, k]).argmax()) for k in np.flatnonzero(information <= _imufit.NORM_SEEN)]
     angles = {(AXES[i], AXES[j]) for i, j in (pairs[place - 6] for place in largest if place >= 6)}
     axes = {AXES[place % 3] for place in largest if place < 6}
     return Unshown(tuple(sorted(angles)), tuple(sorted(axes)))

@@ -24,9 +24,6 @@ LEAST_WAY = np.radians(20.0)
 TOLD = 0.03
 """Standard error of A's elements beyond which the turns did not determine them."""
 
-UNKNOWN = 1e12
-"""Variance (rad^2) of a turn that says nothing of the gyro: no angle is larger than pi, so that its weight is zero."""
-
 
 def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibration | None:
     """Calibrate the gyro: bias from the rests, scale and misalignment from the turns where they determine both.
@@ -109,7 +106,7 @@ def fit_gyroscope(turns: Sequence[Turns], poses: Sequence[Pose]) -> SensorCalibr
         scale_error=np.zeros(3) if worse else scale_error,
         bias_error=bias_error,
         unit="rad/s",
-        before=rms(_missed_as_read(t, gyr, far)),
+        before=rms(told["as_read"]),
         after=bias_alone if worse else after,
         held_out=bias_alone if worse else held_out,
         error_unit="rad",
@@ -135,15 +132,6 @@ def _joined(turns: Sequence[Turns]) -> tuple[Array, Array, list[_Span]]:
     t = np.concatenate([turn.log.t for turn in turns]) if turns else np.zeros(0)
     gyr = np.concatenate([turn.log.gyr for turn in turns if turn.log.gyr is not None]) if turns else np.zeros((0, 3))
     return np.ascontiguousarray(t), np.ascontiguousarray(gyr), spans
-
-
-def _missed_as_read(t: Array, gyr: Array, spans: Sequence[_Span]) -> Array:
-    """Return the angle that each turn misses by the readings as they are, their bias included, (n,), rad."""
-    still = [0.0, 0.0, 0.0]
-    unweighed = [
-        (first, last, still, still, up_before, up_after, UNKNOWN) for first, last, _, _, up_before, up_after, _ in spans
-    ]
-    return np.asarray(_imufit.turn_calibration(t, gyr, unweighed, still)["before"])
 
 
 def _bias(rests: Sequence[Pose]) -> tuple[Array, Array, tuple[Array, Array] | None]:

@@ -8,9 +8,10 @@ from imufit.comparing import attitude_comparison, comparison
 from imufit.diagnosing.add import add
 from imufit.diagnosing.diagnose import diagnose
 from imufit.diagnosing.revise import revise, settled
+from imufit.figures import quantity
 from imufit.fitting import FittedStack
 from imufit.progress import Progress, silent
-from imufit.results import Addition, Diagnosis, Ladder, Revision, Step, sentences
+from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
 from imufit.results.diagnosis import PASSED
 
 MAX_STEPS = 12
@@ -206,4 +207,4 @@ def _sentence(start: float, end: float, steps: list[Step], diagnosis: Diagnosis)
     if not steps:
         return diagnosis.sentence
     names = ", ".join(step.effect for step in steps)
-    return f"Adding {names} cut the held-out error {sentences.cut(start, end)}. {diagnosis.sentence}"
+    return f"Adding {names} cut the held-out error {quantity.fall(start, end)}. {diagnosis.sentence}"

@@ -97,7 +97,4 @@ def _promise(effect: str, before: float, after: float, status: str) -> str:
     """Say what the best candidate would bring."""
     if status != "passed":
         return "No effect lowers the held-out error beyond chance"
-    return (
-        f"Adding {effect} should cut the held-out error "
-        f"from {quantity.ratio(before)} to {quantity.ratio(after)} times the noise floor"
-    )
+    return f"Adding {effect} should cut the held-out error {quantity.fall(before, after)}"

@@ -110,6 +110,17 @@ def ratio(value: float | None) -> str:
     return f"{value:.2f}" if abs(value) < 10.0 else f"{value:.1f}" if abs(value) < 100.0 else f"{value:.0f}"
 
 
+def fall(before: float | None, after: float | None) -> str:
+    """Return from where to where an error falls, both over the noise floor, such as ``from 2.17 to 1.01 times ...``.
+
+    Parameters
+    ----------
+    before, after : float or None
+        The ratios; None where they are not known.
+    """
+    return f"from {ratio(before)} to {ratio(after)} times the noise floor"
+
+
 def share(value: float | None) -> str:
     """Fraction as per cent, e.g. ``63 %``."""
     if value is None or not math.isfinite(value):

@@ -121,10 +121,7 @@ def waterfall(
     drawing.legend(loc="outside lower center", ncols=1 if drawing.narrow else 3)
     if count:
         effect_word = "effect takes" if count == 1 else "effects take"
-        sentence = (
-            f"{count} {effect_word} the held-out error from {quantity.ratio(start)} to {quantity.ratio(end)} "
-            "times the noise floor"
-        )
+        sentence = f"{count} {effect_word} the held-out error {quantity.fall(start, end)}"
     else:
         sentence = f"No effect was added: the held-out error stays at {quantity.ratio(start)} times the noise floor"
     style.title(axes, sentence, 12.0)

@@ -73,8 +73,8 @@ class Addition(Plotted, Result):
         """The step in a sentence."""
         kind = "held-out error" if self.held_out else "error on the fitted data"
         return (
-            f"{self.effect} added: the {kind} went from {quantity.ratio(self.before)} to {quantity.ratio(self.after)} "
-            f"times the noise floor (expected {quantity.ratio(self.expected)})."
+            f"{self.effect} added: the {kind} went {quantity.fall(self.before, self.after)} "
+            f"(expected {quantity.ratio(self.expected)})."
         )
 
     @property

@@ -30,17 +30,6 @@ DOUBTS = {
 """Why a candidate that would explain much is not the answer, by its status."""
 
 
-def cut(before: float, after: float) -> str:
-    """Say from where to where a held-out error falls, both in multiples of the noise floor.
-
-    Parameters
-    ----------
-    before, after : float
-        Held-out error over the noise floor.
-    """
-    return f"from {quantity.ratio(before)} to {quantity.ratio(after)} times the noise floor"
-
-
 def explanation(card: EffectCard, candidate: Candidate) -> str:
     """One candidate in a sentence: the physics, its size, what adding it should bring."""
     if candidate.status == NOT_TESTABLE:
@@ -55,7 +44,7 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
         text += "."
     before, after = candidate.held_out_before, candidate.held_out_after
     if candidate.status == PASSED and after < before:
-        text += f" Adding it should cut the held-out error {cut(before, after)}."
+        text += f" Adding it should cut the held-out error {quantity.fall(before, after)}."
     elif candidate.status == PASSED:
         text += " Alone it does not lower the held-out error; beside the other effects it may."
     elif candidate.status == "negative delay":

@@ -40,7 +40,7 @@ pub enum Weighing {
 /// Huber's limit: readings beyond this many standard deviations count less.
 const FAR: f64 = 1.345;
 /// Smallest share of the largest information per item that a parameter combination must have.
-const SEEN: f64 = 5e-4;
+pub const SEEN: f64 = 5e-4;
 const ITERATIONS: usize = 60;
 
 struct Problem<'a> {

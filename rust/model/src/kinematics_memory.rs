@@ -45,7 +45,6 @@ struct Read {
     place: (usize, usize),
     fingerprint: u64,
     widths: (Widths, Option<Widths>),
-    numbers: usize,
     reference: Arc<WindowReference>,
 }
 
@@ -56,7 +55,13 @@ struct Kept {
     kinds: Vec<(Differentiation, Stretches)>,
     /// In the order in which they were made.
     read: VecDeque<Read>,
-    read_numbers: usize,
+}
+
+impl Kept {
+    /// Numbers that lie around the knots of what was read.
+    fn numbers(&self) -> usize {
+        self.read.iter().map(|r| r.reference.numbers()).sum()
+    }
 }
 
 /// Kinematics of a log, shared by all copies of its facts.
@@ -125,17 +130,13 @@ impl KinematicsMemory {
         if let Ok(mut kept) = self.0.lock()
             && numbers <= MOST_NUMBERS
         {
-            while kept.read_numbers + numbers > MOST_NUMBERS
-                && let Some(gone) = kept.read.pop_front()
-            {
-                kept.read_numbers -= gone.numbers;
+            while kept.numbers() + numbers > MOST_NUMBERS {
+                kept.read.pop_front();
             }
-            kept.read_numbers += numbers;
             kept.read.push_back(Read {
                 place,
                 fingerprint: now,
                 widths,
-                numbers,
                 reference: reference.clone(),
             });
         }
@@ -234,7 +235,7 @@ mod tests {
             let attitude = Widths::alike(Smoothing::uniform(2, 1 + k as usize));
             memory.of(&window(&t, &q), n, Differentiation { attitude, ..HOW }, None);
             let kept = memory.0.lock().expect("free");
-            assert!(kept.rows <= MOST_ROWS && kept.read_numbers <= MOST_NUMBERS && !kept.read.is_empty());
+            assert!(kept.rows <= MOST_ROWS && kept.numbers() <= MOST_NUMBERS && !kept.read.is_empty());
         }
     }
 }

@@ -373,7 +373,8 @@ fn turns_of(t: &[f64], gyr: &[f64], spans: &[Span]) -> PyResult<Vec<turns::Turn>
     spans.iter().map(one).collect()
 }
 
-/// Gyro against gravity: turns from rest to rest, `t` (n,) s and `gyr` (n, 3) rad/s. `bias` is that of the readings.
+/// Gyro against gravity: turns from rest to rest, `t` (n,) s and `gyr` (n, 3) rad/s. `bias` is that of the readings. The angles that the
+/// turns miss are given with the bias taken out (`before`) and by the readings `as_read`.
 #[pyfunction]
 fn turn_calibration<'py>(
     py: Python<'py>,
@@ -388,8 +389,15 @@ fn turn_calibration<'py>(
     let turns = turns_of(t.values()?, gyr.values()?, &spans)?;
     let solution = compute(py, || turns::fit(&turns))?.map_err(|error| from_calibration(py, error))?;
     let dict = solution_dict(py, &solution, &turns::affine(&solution, &bias))?;
-    let before: Vec<f64> = turns.iter().map(|turn| turn.angle(&Matrix3::identity())).collect();
-    dict.set_item("before", PyArray1::from_vec(py, before))?;
+    let as_read: Vec<Span> = spans
+        .iter()
+        .map(|&(a, b, _, _, up, then, v)| (a, b, [0.0; 3], [0.0; 3], up, then, v))
+        .collect();
+    let as_read = turns_of(t.values()?, gyr.values()?, &as_read)?;
+    for (name, turns) in [("before", &turns), ("as_read", &as_read)] {
+        let missed: Vec<f64> = turns.iter().map(|turn| turn.angle(&Matrix3::identity())).collect();
+        dict.set_item(name, PyArray1::from_vec(py, missed))?;
+    }
     let way: Vec<f64> = turns.iter().map(turns::Turn::way).collect();
     dict.set_item("way", PyArray1::from_vec(py, way))?;
     Ok(dict)

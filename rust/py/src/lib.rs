@@ -28,6 +28,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _imufit(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add("NORM_SEEN", imufit_calibration::norm_cost::SEEN)?;
     allan::register(m)?;
     attitude::register(m)?;
     calibration::register(m)?;
