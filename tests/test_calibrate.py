@@ -352,6 +352,10 @@ def bad_poses():
     clipped.acc_range = 10.1
     yield "saturated", log_of(clipped, where), 4, "acc_y stands at the end of its range"
 
+    readings = sensor.read(where, 0, names="acc gyr pose")
+    readings["acc"] = np.where(inside[:, None] > 0.0, 0.0, readings["acc"])
+    yield "zeros", Log.from_arrays(**readings), 4, "every axis reads zero"
+
 
 @pytest.mark.parametrize(("log", "number", "words"), [pytest.param(*rest, id=name) for name, *rest in bad_poses()])
 def test_bad_pose_is_named_with_its_reason_and_not_used(log, number, words):

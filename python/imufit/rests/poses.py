@@ -243,6 +243,8 @@ def _pose(found: Any, log: Log, labels: Array | None, *, index: int, number: int
         label=label,
         attitude=_attitude(log, rows),
     )
+    if not np.any(pose.mean):
+        return pose.without("every axis reads zero: a sensor at rest reads gravity")
     if found["flaw"] is None:
         return pose
     kind, value = found["flaw"]
