@@ -220,7 +220,7 @@ def _instead(
 
 
 def _shown(candidates: Iterable[_Candidate]) -> str:
-    return ", ".join(printable(" ".join(each.columns), NAME) for each in candidates)
+    return ", ".join(" ".join(printable(column, NAME) for column in each.columns) for each in candidates)
 
 
 def _ask_time_and_units(source: Readable, place: Place) -> None:
@@ -440,7 +440,7 @@ class _Open:
             column = "t" if self.timeless else at[(self.asked or self.several)[0]]
             remedy = _remedy(mapping, place)
         if mapping and self.others:
-            remedy = Remedy.of(remedy) + f". So {_also(self.others)}: to take them instead, write them in its place."
+            remedy = Remedy.of(remedy) + f". So {_also(self.others)}: to take them instead, write them in the mapping."
         return place.error(self._question(), column=column, remedy=remedy)
 
     def _without(self, mapping: Mapping[str, str], place: Place) -> Remedy:
