@@ -213,7 +213,7 @@ def test_faults_are_the_same_in_a_log_read_in_pieces() -> None:
     class Pieces:
         """The same log in small chunks."""
 
-        n, metadata, columns, path, notes = log.n, log.metadata, log.columns, None, ()
+        n, metadata, columns, path, notes, origin = log.n, log.metadata, log.columns, None, (), log.origin
 
         def chunks(self, rows: int, margin: int = 0):
             return log.chunks(500, margin)

@@ -199,6 +199,21 @@ def test_time_of_day_of_a_table_is_not_told_to_be_sorted(tmp_path: Path) -> None
     assert "add 86400 s to t from this row on" in said
 
 
+@pytest.mark.parametrize("at", [1, 10, 19])
+def test_a_pause_does_not_hide_a_time_in_another_unit(at: int, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    t = np.arange(N) * 1e-8 + np.where(np.arange(N) < at, 0.0, 60.0)
+    pd.DataFrame({**COLUMNS, "t": t}).to_csv(path, index=False)
+    assert "faster than any such sensor samples" in message(path)
+
+
+def test_rows_that_arrive_in_packets_are_not_taken_for_a_time_in_another_unit(tmp_path: Path) -> None:
+    path, rows = tmp_path / "a.csv", np.arange(100 * N)
+    log = {name: np.tile(values, 100) for name, values in COLUMNS.items()}
+    pd.DataFrame({**log, "t": 0.08 * (rows // 8) + 1e-5 * (rows % 8)}).to_csv(path, index=False)
+    assert read(path).n == rows.size
+
+
 def test_time_in_which_no_sensor_could_sample_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     pd.DataFrame({**COLUMNS, "t": np.arange(N) * 1e-9}).to_csv(path, index=False)

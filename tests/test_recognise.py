@@ -12,7 +12,7 @@ import pytest
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
 from imufit.log import Log, LogStream, parse_mapping, read
-from pasted import shell_mappings
+from pasted import python_mappings, shell_mappings
 from recording import recording
 
 STANDARD_GRAVITY = 9.80665
@@ -187,6 +187,40 @@ def test_a_log_without_names_and_time_is_asked_once(tmp_path: Path, sound: Log) 
     same(
         read(tmp_path / "a.txt", parse_mapping(shell_mappings(str(caught.value.shell_remedy))[0])), sound, "acc", "gyr"
     )
+
+
+def folder_of_two(path: Path, sound: Log, second: str) -> Path:
+    """A folder with two accelerometers, of which the second reads something else."""
+    header = ["time (s)", "x (m/s^2)", "y (m/s^2)", "z (m/s^2)"]
+    table(path / "Accelerometer.csv", header, sound.t, sound.acc)
+    table(path / f"{second}.csv", header, sound.t, -sound.acc)
+    table(path / "Gyroscope.csv", ["time (s)", "x (rad/s)", "y (rad/s)", "z (rad/s)"], sound.t, sound.gyr)
+    return path
+
+
+def test_a_second_file_of_a_sensor_is_named_with_the_mapping_that_takes_it(tmp_path: Path, sound: Log) -> None:
+    path = folder_of_two(tmp_path / "two", sound, "Accelerometer Left")
+    log = read(path)
+    same(log, sound, "acc", "gyr")
+    (note,) = [note for note in log.notes if "left out" in note]
+    assert "Accelerometer Left.x" in note
+    (mapping,) = python_mappings(note)
+    other = read(path, mapping)
+    np.testing.assert_allclose(other.acc, -sound.acc, atol=1e-9)
+    np.testing.assert_allclose(other.gyr, sound.gyr, atol=1e-9)
+
+
+def test_two_files_of_one_sensor_are_asked_about_once_with_both_named(tmp_path: Path, sound: Log) -> None:
+    header = ["time (s)", "ax", "ay", "az"]
+    for name, sign in (("first", 1.0), ("second", -1.0)):
+        table(tmp_path / "runs" / f"{name}.csv", header, sound.t, sign * sound.acc)
+    with pytest.raises(InputError, match="several columns may be the accelerometer") as caught:
+        read(tmp_path / "runs")
+    assert "second.ax second.ay second.az are left out" in str(caught.value)
+    (mapping,) = python_mappings(str(caught.value))
+    same(read(tmp_path / "runs", mapping), sound, "acc")
+    instead = {target: source.replace("first.", "second.") for target, source in mapping.items()}
+    np.testing.assert_allclose(read(tmp_path / "runs", instead).acc, -sound.acc, atol=1e-9)
 
 
 def test_two_sensors_of_a_kind_are_not_chosen_between(tmp_path: Path, sound: Log) -> None:

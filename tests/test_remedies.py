@@ -211,6 +211,40 @@ def test_a_fault_of_the_data_has_both_remedies_and_both_cure(name: str, tmp_path
     assert '"data_faults": []' in json.read_text()
 
 
+NAMED = {
+    "t": "Time (s)",
+    **{f"acc_{axis}": f"Acc{axis.upper()} (g)" for axis in "xyz"},
+    **{f"gyr_{axis}": f"Gyro{axis.upper()} (deg/s)" for axis in "xyz"},
+}
+"""What the columns of `foreign` are."""
+NAMELESS = {name: f"c {k}" for k, name in enumerate(NAMED.values())}
+"""Other names for them, which say nothing."""
+
+
+@pytest.mark.parametrize("stated", [{}, {target: NAMELESS[name] for target, name in NAMED.items()}])
+def test_turned_axes_are_put_right_by_the_names_of_the_file(stated: dict[str, str], tmp_path: Path) -> None:
+    table = foreign()
+    if stated:
+        table = table.rename(columns=NAMELESS)
+        stated = {
+            target: source + {"acc": "[g]", "gyr": "[deg/s]"}.get(target[:3], "") for target, source in stated.items()
+        }
+    path = written(table, tmp_path / "a.csv")
+    found = {}
+    for kind in (True, False):
+        (fault,) = imufit.diagnose(imufit.open_log(path, mapping=stated or None, stream=kind)).data_faults
+        (found[kind],) = python_mappings(fault.remedy)
+    mapping = found[True]
+    assert found[False] == mapping
+    assert not any(target in source for source in mapping.values() for target in NAMED if target != "t")
+    assert all(source.rpartition("[")[0] in table.columns for source in mapping.values() if source.endswith("]"))
+    right = imufit.read(path, mapping=mapping)
+    for sensor in ("acc", "gyr"):
+        wanted = imufit.Log.from_dataframe(fresh()).sensors()[sensor]
+        np.testing.assert_allclose(right.sensors()[sensor], wanted, rtol=1e-6, atol=1e-9)
+    assert imufit.diagnose(right).data_faults == ()
+
+
 @pytest.mark.parametrize("mistake", MAPPED, ids=lambda row: row.id)
 def test_no_mistake_is_answered_with_an_option_in_python(mistake: Mistake, motion: Sound, tmp_path: Path) -> None:
     spoilt = mistake.spoil(motion.log.rows(slice(0, 1200)), np.random.default_rng(7))

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cli_stand_in import run, strict_json
-from imufit import Log, SensorModel, effect, ladder
+from imufit import Log, SensorModel, compare, effect, ladder, open_log
 from imufit.errors import InputError
 from imufit.lab import simulate
 from imufit.model.effect import forget
+from pasted import python_mappings
 
 
 def bare(made) -> Log:
@@ -141,6 +142,31 @@ def test_too_few_rests_are_refused_with_a_remedy(capsys, tmp_path):
     code, out, err = run(capsys, "diagnose", path)
     assert (code, out) == (2, "")
     assert len(err) == 1
+
+
+@pytest.mark.parametrize("stream", [True, False])
+def test_a_quaternion_beside_the_readings_is_offered_as_the_reference(stream, tmp_path):
+    made = simulate.simulate("poses", {}, 9, 120.0).to_log()
+    known = dict(zip(("qw", "qx", "qy", "qz"), made.ref_q.T, strict=True))
+    path = tmp_path / "a.csv"
+    made.with_fields(ref_q=None, ref_p=None, covariates=known).write(path)
+    with pytest.raises(InputError, match="If qw, qx, qy, qz were measured, not computed") as caught:
+        compare(open_log(path, stream=stream))
+    (mapping,) = python_mappings(str(caught.value))
+    log = open_log(path, mapping, stream=stream)
+    assert compare(log).n == made.n
+    # what the file cannot be read without stands in the mapping too
+    other = tmp_path / "b.csv"
+    path.write_text(path.read_text().replace("acc_", "first_").replace("gyr_", "second_"))
+    path.rename(other)
+    stated = {
+        f"{sensor}_{axis}": f"{name}_{axis}" for sensor, name in (("acc", "first"), ("gyr", "second")) for axis in "xyz"
+    }
+    with pytest.raises(InputError, match="If qw, qx, qy, qz") as caught:
+        compare(open_log(other, stated, stream=stream))
+    (mapping,) = python_mappings(str(caught.value))
+    assert mapping.items() >= stated.items()
+    assert compare(open_log(other, mapping, stream=stream)).n == made.n
 
 
 def test_field_alone_is_judged_where_rests_are_too_few():

@@ -23,6 +23,7 @@ from imufit.faults.byte_order import bytes_swapped
 from imufit.faults.samples import SENSORS, Samples, samples
 from imufit.faults.units import KNOWN, POSSIBLE, USUAL, WrongUnit, units_of_field, wrong_units
 from imufit.log.metadata import STANDARD_GRAVITY, Metadata
+from imufit.log.origin import Origin
 from imufit.results import column_words, fault_words
 from imufit.results.data_fault import DataFault
 
@@ -205,7 +206,7 @@ class Reading:
         return float(sum(self.matches[s].share for s in sensors))
 
 
-def frame_faults(parts: Sequence[Part], facts: _imufit.Facts, metadata: Metadata) -> list[DataFault]:
+def frame_faults(parts: Sequence[Part], facts: _imufit.Facts, metadata: Metadata, origin: Origin) -> list[DataFault]:
     """Name wrong units, turned axes and wrong frames.
 
     Parameters
@@ -216,6 +217,8 @@ def frame_faults(parts: Sequence[Part], facts: _imufit.Facts, metadata: Metadata
         Of the log as declared.
     metadata : Metadata
         Of the log.
+    origin : Origin
+        Columns of the file, which the remedies name.
 
     Returns
     -------
@@ -225,22 +228,24 @@ def frame_faults(parts: Sequence[Part], facts: _imufit.Facts, metadata: Metadata
     if not parts:
         return []
     rows = samples(parts, facts)
-    found = _changed(parts, rows, facts, metadata)
+    found = _changed(parts, rows, facts, metadata, origin)
     if not any(fault.sensor in ("acc", None) for fault in found):
         found += _without_gravity(rows, facts, metadata)
     if not any(fault.sensor in ("mag", None) for fault in found):
-        found += _field_of_another_size(rows, facts)
+        found += _field_of_another_size(rows, facts, origin)
     return found
 
 
-def _changed(parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> list[DataFault]:
+def _changed(
+    parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, metadata: Metadata, origin: Origin
+) -> list[DataFault]:
     declared = declared_shares(rows, facts.sensors)
     missed = [sensor for sensor, share in declared.items() if share > MISSED]
     if not missed:
         return []
     changes = (
-        *_changes(parts, rows, facts, metadata, declared),
-        *_columns(parts, rows, facts, missed),
+        *_changes(parts, rows, facts, metadata, declared, origin),
+        *_columns(parts, rows, facts, missed, origin),
         *_metadata(rows, facts, metadata),
     )
     readings = [Reading.of(change, declared, field_estimated=facts.field_estimated) for change in changes]
@@ -258,7 +263,7 @@ def _changed(parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, metadat
     ]
     best = min(alike, key=lambda r: (KINDS.index(r.change.kind), r.left(r.good)))
     alike.remove(best)
-    return _worded(best, [s for s in best.good if s in missed], alike, declared, facts, metadata)
+    return _worded(best, [s for s in best.good if s in missed], alike, declared, facts, origin)
 
 
 def declared_shares(rows: Samples, sensors: Sequence[str]) -> dict[str, float]:
@@ -281,14 +286,19 @@ def explains(share: float, declared: float) -> bool:
 
 
 def _changes(
-    parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, metadata: Metadata, declared: Mapping[str, float]
+    parts: Sequence[Part],
+    rows: Samples,
+    facts: _imufit.Facts,
+    metadata: Metadata,
+    declared: Mapping[str, float],
+    origin: Origin,
 ) -> Iterator[Change]:
     """Go through the table of changes that are tried."""
     sensors = list(declared)
     yield Change("axes", rows, PERMUTATIONS)
     for matrix in PERMUTATIONS[1:] if len(sensors) > 1 else ():
         if np.linalg.det(matrix) > 0.0:
-            words = fault_words.mount([s for s in SENSORS if s in facts.sensors], matrix, sensors[0])
+            words = fault_words.mount([s for s in SENSORS if s in facts.sensors], matrix, sensors[0], origin)
             yield Change("mount", rows, matrix[None], words)
     up = {frame: np.array(_imufit.frame_vectors(frame)["up"]) for frame in (*FRAMES, metadata.frame)}
     for frame in FRAMES:
@@ -303,13 +313,15 @@ def _changes(
         if places == PLACES[0] and signs == SIGNS[0]:
             continue
         other = ({**part, "ref_q": np.ascontiguousarray(part["ref_q"][:, places] * signs)} for part in parts)
-        yield Change("reference", samples(other, facts), OWN, fault_words.quaternion(places, signs))
+        yield Change("reference", samples(other, facts), OWN, fault_words.quaternion(places, signs, origin))
     resting = samples(({**part, "ref_p": None} for part in parts), facts) if "acc" in facts.sensors else rows
     for factor in CLOCKS:
-        yield Change("clock", rows.on_clock(factor, resting), OWN, fault_words.clock(factor))
+        yield Change("clock", rows.on_clock(factor, resting), OWN, fault_words.clock(factor, origin))
 
 
-def _columns(parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, missed: Sequence[str]) -> Iterator[Change]:
+def _columns(
+    parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, missed: Sequence[str], origin: Origin
+) -> Iterator[Change]:
     """Columns that hold something else: another sensor's readings, swapped bytes, positions in another unit."""
     for one, other in itertools.combinations(facts.sensors, 2):
         if not {one, other} & set(missed):
@@ -317,7 +329,7 @@ def _columns(parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, missed:
         names = [[f"{sensor}_{axis}" for axis in "xyz"] for sensor in (one, other)]
         single = [[pair] for pair in itertools.product(*names)]
         for pairs in (*single, list(zip(*names, strict=True))):
-            yield Change("exchange", rows.exchanged(pairs), OWN, column_words.exchanged(pairs))
+            yield Change("exchange", rows.exchanged(pairs), OWN, column_words.exchanged(pairs, origin))
     for sensor in missed:
         swapped = bytes_swapped(rows.readings[sensor])
         if swapped is not None:
@@ -326,7 +338,9 @@ def _columns(parts: Sequence[Part], rows: Samples, facts: _imufit.Facts, missed:
     if "acc" in missed and any(part["ref_p"] is not None for part in parts):
         still = samples(({**part, "ref_p": None} for part in parts), facts)
         for unit, factor in LENGTHS.items():
-            yield Change("position", rows.with_position(still, factor), OWN, column_words.positions(unit), "ref")
+            yield Change(
+                "position", rows.with_position(still, factor), OWN, column_words.positions(unit, origin), "ref"
+            )
 
 
 def _metadata(rows: Samples, facts: _imufit.Facts, metadata: Metadata) -> Iterator[Change]:
@@ -373,7 +387,7 @@ def _without_gravity(rows: Samples, facts: _imufit.Facts, metadata: Metadata) ->
     return [DataFault("removed", "acc", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
 
 
-def _field_of_another_size(rows: Samples, facts: _imufit.Facts) -> list[DataFault]:
+def _field_of_another_size(rows: Samples, facts: _imufit.Facts, origin: Origin) -> list[DataFault]:
     """Name a magnetometer that turns in a field of impossible size, where the field is not stated."""
     if "mag" not in facts.sensors or not facts.field_estimated or _view("mag", rows) is None:
         return []
@@ -381,7 +395,7 @@ def _field_of_another_size(rows: Samples, facts: _imufit.Facts) -> list[DataFaul
     units = units_of_field(size)
     if not units:
         return []
-    words = column_words.field_in_another_unit(size, _named(units))
+    words = column_words.field_in_another_unit(size, _named(units), origin)
     return [DataFault("units", "mag", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
 
 
@@ -449,7 +463,7 @@ def _fits(view: tuple[Array, Array] | None, matrices: Array) -> Array:
     return np.stack([1.0 - np.maximum(inner, 0.0) ** 2 / np.maximum(power * total, 1e-300), inner / power])
 
 
-def _words(reading: Reading, good: Sequence[str]) -> fault_words.Words | None:
+def _words(reading: Reading, good: Sequence[str], origin: Origin) -> fault_words.Words | None:
     """Say what a reading means that fits as well as another one."""
     if reading.change.words is not None:
         return reading.change.words
@@ -457,7 +471,7 @@ def _words(reading: Reading, good: Sequence[str]) -> fault_words.Words | None:
         match = reading.matches[sensor]
         units = _named(wrong_units(sensor, match.ratio, match.share))
         if not (match.usual or match.turned) and units:
-            return column_words.wrong_unit(sensor, "xyz", match.ratio, units)
+            return column_words.wrong_unit(sensor, "xyz", match.ratio, units, origin)
     return None
 
 
@@ -467,7 +481,7 @@ def _worded(
     alike: Sequence[Reading],
     declared: Mapping[str, float],
     facts: _imufit.Facts,
-    metadata: Metadata,
+    origin: Origin,
 ) -> list[DataFault]:
     found: list[DataFault] = []
 
@@ -477,7 +491,7 @@ def _worded(
     change = best.change
     left = {s: fault_words.falls(s, declared[s], best.matches[s].share) for s in good}
     if change.words is not None:
-        others = (_words(r, good) for r in alike if r.change.kind != change.kind)
+        others = (_words(r, good, origin) for r in alike if r.change.kind != change.kind)
         other = next((words for words in others if words), None)
         sensor = None if change.kind in ("mount", "exchange", "clock") else change.sensor or "ref"
         add(SHOWN.get(change.kind, change.kind), sensor, fault_words.changed(change.words, list(left.values()), other))
@@ -487,7 +501,7 @@ def _worded(
         if match.column is not None:
             factor = match.ratio * match.matrix[match.column, match.column]
             words = column_words.wrong_unit(
-                sensor, "xyz"[match.column], factor, _named(wrong_units(sensor, factor, match.share))
+                sensor, "xyz"[match.column], factor, _named(wrong_units(sensor, factor, match.share)), origin
             )
             found.append(
                 DataFault(
@@ -503,8 +517,8 @@ def _worded(
             )
         elif change.words is None and match.turned:
             kind = "frame" if sensor == "acc" and np.array_equal(match.matrix, -np.eye(3)) else "axes"
-            add(kind, sensor, fault_words.axes(sensor, match.matrix, left[sensor], frame))
+            add(kind, sensor, fault_words.axes(sensor, match.matrix, left[sensor], frame, origin))
         if not match.usual:
             units = _named(wrong_units(sensor, match.ratio, match.share))
-            add("units", sensor, column_words.wrong_unit(sensor, "xyz", match.ratio, units))
+            add("units", sensor, column_words.wrong_unit(sensor, "xyz", match.ratio, units, origin))
     return found

@@ -62,7 +62,7 @@ def rig_angle_faults(log: LogSource, facts: _imufit.Facts) -> list[DataFault]:
     found = []
     if abs(abs(factor) * math.pi / 180.0 - 1.0) < NEAR:
         sign = -1 if factor < 0.0 else 1
-        found.append(("units", column_words.angle_in_degrees(abs(factor), sign, _zero(log, sign))))
+        found.append(("units", column_words.angle_in_degrees(abs(factor), sign, _zero(log, sign), log.origin)))
     if "xyz"[axis] != told and rms[axis] > 3.0 * rms["xyz".index(told)]:
         found.append(("rig_axis", column_words.other_rig_axis(told, "xyz"[axis])))
     return [

@@ -46,7 +46,7 @@ def data_faults(passes: Passes, facts: _imufit.Facts, ends: Mapping[str, float])
         rows = samples(parts, facts)
         faults = own_length_faults(rows, facts) + copied_faults(rows, facts)
     if not faults:
-        faults = frame_faults(parts, facts, passes.log.metadata)
+        faults = frame_faults(parts, facts, passes.log.metadata, passes.log.origin)
     if not faults:
         faults = wrapped_faults(parts, facts)
     if not any(fault.sensor in ("gyr", "ref", None) for fault in faults):

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from imufit.log.columns import GROUPS
-from imufit.log.log import Log, LogSource
+from imufit.log.log import LogSource
 from imufit.remedy import Remedy, mapped, reading
 
 _NAMED: Final = re.compile(r"(?P<base>.*?)[._ ]?q?[._ ]?(?P<part>[wxyz])", re.IGNORECASE)
@@ -39,10 +39,11 @@ def attitude_offered(log: LogSource) -> str | Remedy:
     Parameters
     ----------
     log : LogSource
-        Without a reference attitude.
+        Without a reference attitude; one row of it is read.
     """
-    found = next(quaternions_named(log.covariates), None) if isinstance(log, Log) else None
+    row = next(iter(log.chunks(1))).core
+    found = next(quaternions_named(row.covariates), None)
     if found is None:
         return ""
-    how = reading(log.path, mapped(dict(zip(GROUPS["ref_q"], found, strict=True))))
+    how = reading(log.path, mapped(log.origin.mapping(dict(zip(GROUPS["ref_q"], found, strict=True)))))
     return f" If {', '.join(found)} were measured, not computed from these readings, use " + how

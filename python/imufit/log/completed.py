@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from imufit.errors import InputError
 from imufit.log.columns import CONTRACT, GROUPS
 from imufit.log.foreign import bracket, signed
+from imufit.log.origin import in_the_file
 from imufit.log.place import Place
 from imufit.log.recognise import Readable, recognise
-from imufit.log.units import conversion
 
 
 def completed(mapping: Mapping[str, str] | None, source: Readable, place: Place) -> Mapping[str, str] | None:
@@ -40,7 +40,7 @@ def completed(mapping: Mapping[str, str] | None, source: Readable, place: Place)
         own = recognise(source, None, place).mapping
     except InputError:
         return mapping  # what is asked there, the mapping may answer
-    words = {target: _in_the_file(target, text, own) if target in strange else text for target, text in mapping.items()}
+    words = {target: in_the_file(target, text, own) if target in strange else text for target, text in mapping.items()}
     return {**words, **{column: own[column] for column in CONTRACT if column in left and column in own}}
 
 
@@ -48,27 +48,3 @@ def _of_the_log(text: str) -> frozenset[str]:
     """Column of a log that a source text names, if it names one."""
     name = signed(bracket(text)[0])[-1][1]
     return frozenset({name} & set(CONTRACT))
-
-
-def _in_the_file(target: str, text: str, own: Mapping[str, str]) -> str:
-    """Write a source in terms of the file; as it was, where that cannot be said."""
-    named, unit = bracket(text)
-    turned, column = signed(named)[-1]
-    if column not in own:
-        return text
-    source, own_unit = bracket(own[column])
-    if not unit:
-        return own[column] if turned > 0.0 else _opposite(own[column])
-    try:
-        first, then = conversion(column, own_unit), conversion(target, unit)
-    except InputError:
-        return text  # dates have no factor
-    if first.offset or then.offset:
-        return text
-    words = f"{source}[{unit}]" if first.factor == 1.0 else f"{source}[*{first.factor * then.factor!r}]"
-    return words if turned > 0.0 else _opposite(words)
-
-
-def _opposite(text: str) -> str:
-    """Write the source of the opposite sign."""
-    return text[1:].lstrip() if text.startswith("-") else f"-{text}"

@@ -15,6 +15,7 @@ from imufit.errors import InputError
 from imufit.log.arrays import check_keywords, contiguous, fields_from_arrays
 from imufit.log.columns import GROUPS, present
 from imufit.log.metadata import Frame, Metadata
+from imufit.log.origin import Origin
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.scalar_first import quaternions_from_rotation, rotation_from_quaternions
 from imufit.log.size import BLOCK_ROWS
@@ -45,7 +46,7 @@ LINE: Final = 200
 """Characters of the columns that are named in one line of a shell."""
 """Rows that a notebook shows of a log: as many as pandas shows of a table by ``head``."""
 _SINGLE = ("temp", "ref_angle")
-_EMPTY: dict[str, Any] = {"covariates": {}, "labels": {}, "metadata": Metadata(), "notes": ()}
+_EMPTY: dict[str, Any] = {"covariates": {}, "labels": {}, "metadata": Metadata(), "notes": (), "origin": Origin()}
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -83,6 +84,8 @@ class Log:
         Findings and changes of the reader.
     ref_q : (n, 4) array, optional
         `attitude` under the name of its columns.
+    origin : Origin, optional
+        Columns of the file that those of the log were made of, as the reader states them.
     **more
         Entries of the metadata: ``Log(t, gyr=gyr, frame="ENU")``.
 
@@ -106,6 +109,7 @@ class Log:
     metadata: Metadata = field(default_factory=Metadata)
     path: Path | None = None
     notes: tuple[str, ...] = ()
+    origin: Origin = field(default_factory=Origin)
 
     def __init__(
         self,
@@ -125,6 +129,7 @@ class Log:
         path: Path | None = None,
         notes: Sequence[str] = (),
         ref_q: ArrayLike | None = None,
+        origin: Origin | None = None,
         **more: Any,
     ) -> None:
         if attitude is not None and ref_q is not None:
@@ -139,7 +144,7 @@ class Log:
             stated = metadata.to_mapping() if isinstance(metadata, Metadata) else dict(metadata or {})
             metadata = Metadata.from_mapping({**stated, **more}, "log")
         checked = fields_from_arrays(t, given, covariates or {}, text, metadata)
-        self._fill({**checked, "path": path, "notes": (*notes, *checked["notes"])})
+        self._fill({**checked, "path": path, "notes": (*notes, *checked["notes"]), "origin": origin or Origin()})
 
     @classmethod
     def of_fields(cls, **values: Any) -> Self:
@@ -580,6 +585,11 @@ class LogSource(Protocol):
     @property
     def notes(self) -> tuple[str, ...]:
         """Findings and changes of the reader."""
+        ...
+
+    @property
+    def origin(self) -> Origin:
+        """Columns of the file that those of the log were made of."""
         ...
 
     def chunks(self, rows: int, margin: int = 0) -> Iterator[Chunk]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Protocol
 
@@ -33,6 +33,7 @@ from imufit.log.unit_check import (
 )
 from imufit.log.units import Conversion, conversion, lookup
 from imufit.log.words import Words, meant, sensor_of, strange, time_columns, unit_of, words_of
+from imufit.printable import NAME, printable
 from imufit.remedy import Remedy, mapped, option, reading
 
 Array = NDArray[np.float64]
@@ -50,6 +51,8 @@ _USUAL_FIELD: Final = 50.0
 _TEMPERATURES: Final = (-40.0, 55.0)
 """Median of a temperature in degC whose unit is not stated: the cold end of these sensors' range of operation (TDK
 InvenSense, ICM-42688-P data sheet DS-000347), and the heat of a warm board, below 13 degC in degF."""
+_SHOWN: Final = 6
+"""Sensors that are left out of which a message names the columns: two lines of a terminal."""
 _NUMBERED: Final = re.compile(r"(?:(?P<table>.*)\.)?c(?P<number>\d+)")
 """Name of a column of a table without a header."""
 
@@ -124,13 +127,10 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place,
     names = source.names
     angles = _angles(source, names, mapping or {})
     given = {**angles, **(mapping or {})}
-    told: tuple[str, ...] = ()
-    if angles:
-        told = (f"{place.name}: reference attitude from {', '.join(angles.values())}",)
-    taken = set(given.values())
+    told = (f"{place.name}: reference attitude from {', '.join(angles.values())}",) if angles else ()
     wanted = [group for group in ("t", *SENSORS) if not _has(group, names, given)]
     maker = maker_of(source.clues)
-    parsed = [_parsed(name, names) for name in names if name not in CONTRACT and name not in taken]
+    parsed = [_parsed(name, names) for name in names if name not in CONTRACT and name not in given.values()]
     stem = place.file.stem if place.file is not None else ""
     warm = _temperature(source, parsed, given)
     if maker is not None:
@@ -157,30 +157,70 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place,
     clock = clocks[0] if clocks else None
     found, computed = _with_gravity(source, found)
     chosen = {group: candidates[0] for group, candidates in found.items()}
-    several = [group for group, candidates in found.items() if len(candidates) > 1 and _alike(candidates)]
+    several = ["t"] if len(clocks) > 1 else []
+    several += [group for group, candidates in found.items() if len(candidates) > 1 and _alike(candidates)]
     readings = _Readings.of(source, clock, chosen, given, place)
     units = readings.units()
-    asked = [group for group in chosen if units[group] is None]
+    asked = ["t"] if clock is not None and clock.unit is None else []
+    asked += [group for group in chosen if units[group] is None]
     if "gyr" in asked:
         readings.check_clock(place)
-    if clock is not None:
-        asked = ["t", *asked] if clock.unit is None else asked
-        several = ["t", *several] if len(clocks) > 1 else several
-    told += tuple(
-        f"{place.name}: {' '.join(each.columns)} not taken for the accelerometer: at rest hardly anything is left of "
-        "gravity, so that it was taken off"
-        for each in computed
-    )
-    left = tuple(column for each in computed for column in each.columns)
+    told = (*told, *_without_gravity(computed, place))
     timed = {"t": f"{clock.source}[{clock.unit or clock.likely}]"} if clock is not None else {}
-    proposed = {group: units[group] or readings.likely(group, units) for group in chosen}
-    complete = {**given, **timed, **warm, **_mapping(chosen, proposed, maker)}
+    complete = {**given, **timed, **warm, **_mapping(chosen, readings.proposed(units), maker)}
+    others = _left_out(found, several, stem)
     timeless = "t" in wanted and clock is None and not counted
-    left_open = _Open(lacking, tuple(asked), tuple(several), timeless)
+    left_open = _Open(lacking, tuple(asked), tuple(several), timeless, others)
     if left_open:
         at = {group: each.columns[0] for group, each in chosen.items()} | ({"t": clock.column} if clock else {})
         raise left_open.error(complete, at, bool(chosen) or _has_any(names, given), place)
-    return Recognised(complete, (*told, *_notes(place, maker, timed or counted, chosen, units, warm)), left)
+    second = {group: candidates[0] for group, candidates in others.items()}
+    if second:
+        theirs = _Readings.of(source, clock, {**chosen, **second}, given, place)
+        told = (*told, _instead(others, _mapping(second, theirs.proposed(theirs.units()), maker), mapping, place))
+    notes = (*told, *_notes(place, maker, timed or counted, chosen, units, warm))
+    return Recognised(complete, notes, tuple(column for each in computed for column in each.columns))
+
+
+def _without_gravity(computed: Sequence[_Candidate], place: Place) -> Iterator[str]:
+    """Note what was not taken for the accelerometer."""
+    for each in computed:
+        yield (
+            f"{place.name}: {' '.join(each.columns)} not taken for the accelerometer: at rest hardly anything is left "
+            "of gravity, so that it was taken off"
+        )
+
+
+def _left_out(found: Mapping[str, list[_Candidate]], several: Sequence[str], stem: str) -> dict[str, list[_Candidate]]:
+    """Candidates beside the first that are as likely as it, or that stand in another table, whose rows are not read."""
+    left = {
+        group: [
+            each
+            for each in others
+            if group in several or _table(each.columns[0], stem) != _table(first.columns[0], stem)
+        ]
+        for group, (first, *others) in found.items()
+    }
+    return {group: candidates for group, candidates in left.items() if candidates}
+
+
+def _also(others: Mapping[str, Sequence[_Candidate]]) -> str:
+    """Say which columns are left out that may be a sensor as well as those that are taken."""
+    columns = [each for candidates in others.values() for each in candidates]
+    more = f" and {len(columns) - _SHOWN} more" if len(columns) > _SHOWN else ""
+    return f"{_shown(columns[:_SHOWN])}{more} are left out, which may be {_named(list(others))} too"
+
+
+def _instead(
+    others: Mapping[str, Sequence[_Candidate]], theirs: Mapping[str, str], given: Mapping[str, str] | None, place: Place
+) -> str:
+    """Note which columns are left out, and the mapping that takes the first of them for each sensor."""
+    first = _shown(candidates[0] for candidates in others.values())
+    return f"{place.name}: {_also(others)}; to take {first} instead, use {place.mapped({**(given or {}), **theirs})}"
+
+
+def _shown(candidates: Iterable[_Candidate]) -> str:
+    return ", ".join(" ".join(printable(column, NAME) for column in each.columns) for each in candidates)
 
 
 def _ask_time_and_units(source: Readable, place: Place) -> None:
@@ -360,12 +400,15 @@ class _Open:
         Groups that several columns may be.
     timeless : bool
         Whether the time is missing.
+    others : dict
+        What else may be each group, where that would be left out.
     """
 
     lacking: dict[str, dict[str, str]]
     asked: tuple[str, ...]
     several: tuple[str, ...]
     timeless: bool
+    others: dict[str, list[_Candidate]]
 
     def __bool__(self) -> bool:
         return bool(self.lacking) or self._mappable
@@ -396,6 +439,8 @@ class _Open:
         else:
             column = "t" if self.timeless else at[(self.asked or self.several)[0]]
             remedy = _remedy(mapping, place)
+        if mapping and self.others:
+            remedy = Remedy.of(remedy) + f". So {_also(self.others)}: to take them instead, write them in the mapping."
         return place.error(self._question(), column=column, remedy=remedy)
 
     def _without(self, mapping: Mapping[str, str], place: Place) -> Remedy:
@@ -553,6 +598,10 @@ class _Readings:
             moves = t is not None and gyr is not None and rate is not None
             units["mag"] = mag_unit(mag, moves and turned(t, gyr * conversion("gyr_x", rate).factor))  # type: ignore
         return units
+
+    def proposed(self, units: Mapping[str, str | None]) -> dict[str, str]:
+        """Propose a unit for each group: the one that was found, or the likeliest where nothing shows it."""
+        return {group: unit or self.likely(group, units) for group, unit in units.items()}
 
     def likely(self, group: str, units: Mapping[str, str | None]) -> str:
         """Propose a unit where nothing shows it."""

@@ -9,6 +9,7 @@ from imufit.errors import InputError
 from imufit.log.cut import cut
 from imufit.log.log import Chunk, Log, LogSource, gathered
 from imufit.log.metadata import Metadata
+from imufit.log.origin import Origin
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.size import BLOCK_ROWS
 from imufit.log.writer import write_rows
@@ -68,6 +69,11 @@ class SomeRows:
     def notes(self) -> tuple[str, ...]:
         """Findings and changes of the reader, and the rows."""
         return (*self._log.notes, *([self._note] if self._note else []))
+
+    @property
+    def origin(self) -> Origin:
+        """Columns of the file that those of the log were made of."""
+        return self._log.origin
 
     def pieces(self) -> Iterator[Log]:
         """Give the rows in order, some at a time."""

@@ -19,6 +19,7 @@ from imufit.log.cut import cut
 from imufit.log.foreign import Plan, plan_columns
 from imufit.log.log import HEAD_ROWS, LINE, Chunk, Log, concatenate, gathered
 from imufit.log.metadata import Frame, Metadata, read_metadata, read_sidecar, sidecar_path
+from imufit.log.origin import Origin
 from imufit.log.parquet import ROW_GROUP
 from imufit.log.place import Place
 from imufit.log.reading import Reading
@@ -126,6 +127,7 @@ class LogStream:
             if next(iter(source.scan([])), None) is None:
                 raise self._no_rows() from None  # which columns the rows would need is a later question
             raise
+        self._origin = Origin(found.mapping, {target: found.mapping[target] for target in reading.mapping or {}})
         if isinstance(self._source, TablesSource):
             self._source.choose(self._plan.sources)
         self._repair = self._scan()
@@ -201,6 +203,11 @@ class LogStream:
         """Findings and changes of the reader, in the rows read so far."""
         return (*self._notes, *self._unmeasured.notes)
 
+    @property
+    def origin(self) -> Origin:
+        """Columns of the file that those of the log were made of."""
+        return self._origin
+
     def pieces(self) -> Iterator[Log]:
         """Give the checked rows in blocks of whatever size the file offers."""
         for start, rows, block in self._source.blocks(self._plan.sources):
@@ -220,7 +227,7 @@ class LogStream:
             place=self._place,
             unmeasured=unmeasured,
         )
-        return Log.of_fields(**fields, metadata=self._metadata, path=self._path)
+        return Log.of_fields(**fields, metadata=self._metadata, path=self._path, origin=self._origin)
 
     @property
     def seeks(self) -> bool:

@@ -249,7 +249,7 @@ def check_rate(t: Array, tick: float, column: str, place: Place, turns: bool) ->
     """
     fastest = FASTEST_GYR if turns else FASTEST
     t = t[np.isfinite(t)]
-    step = float(t[-1] - t[0]) / (t.size - 1) if t.size >= _ROWS_OF_A_CLOCK else 0.0
+    step = _sampled_every(t) if t.size >= _ROWS_OF_A_CLOCK else 0.0
     if step <= 0.0 or step * fastest * (1.0 + _CLOCK_OFF) >= 1.0:
         return
     likely = time_unit(t / tick)
@@ -262,6 +262,17 @@ def check_rate(t: Array, tick: float, column: str, place: Place, turns: bool) ->
         column=column,
         remedy=remedy + place.mapped({"t": source}) + ("" if slower else " for hours."),
     )
+
+
+def _sampled_every(t: Array) -> float:
+    """Usual time from sample to sample of an (n,) time, s: the median of the mean steps in its parts.
+
+    A pause lengthens the mean step of one part alone. A single step shows less than the mean of a part: rows that
+    arrive in packets are stamped nearly at once, though nothing was sampled so fast. There are as many parts as there
+    are rows at least; so many rows have one step in each.
+    """
+    edges = np.linspace(0, t.size - 1, _ROWS_OF_A_CLOCK).astype(int)
+    return float(np.median(np.diff(t[edges]) / np.diff(edges)))
 
 
 def check_steps(t: Array, tick: float, column: str, place: Place, stated: bool = False) -> None:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.figures import quantity
+from imufit.log.origin import Origin
 from imufit.remedy import Remedy, mapped, when_read
-from imufit.results.fault_words import AXES, UNITS, Words
+from imufit.results.fault_words import AXES, UNITS, Words, read_anew
 
 Array = NDArray[np.float64]
 
@@ -18,13 +19,14 @@ Unit = tuple[str, str]
 """The name of a unit, and its form in a mapping."""
 
 
-def _declare(columns: Sequence[str], units: Sequence[str]) -> Remedy:
+def _declare(columns: Sequence[str], units: Sequence[str], origin: Origin) -> Remedy:
     """Name the mapping that declares the unit of columns: the first one, or else another."""
-    first, *others = (mapped({column: f"{column}[{unit}]" for column in columns}) for unit in units)
+    declared = ({column: f"{column}[{unit}]" for column in columns} for unit in units)
+    first, *others = (mapped(origin.mapping(each)) for each in declared)
     return sum(("; or " + other for other in others), when_read(first))
 
 
-def wrong_unit(sensor: str, axes: str, ratio: float, units: Sequence[Unit]) -> Words:
+def wrong_unit(sensor: str, axes: str, ratio: float, units: Sequence[Unit], origin: Origin) -> Words:
     """Say in which unit some axes of a sensor seem to read; without any unit, that the size cannot be.
 
     Parameters
@@ -35,6 +37,8 @@ def wrong_unit(sensor: str, axes: str, ratio: float, units: Sequence[Unit]) -> W
         Reading over ideal reading.
     units : sequence of (str, str)
         Those that it may be, the likeliest first.
+    origin : Origin
+        Columns of the file, which the remedy names.
     """
     size = f"{ratio:.4g} times what it should" if ratio < 1.0 else f"{ratio:.4g} times too much"
     name = sensor if axes == AXES else f"{sensor}_{axes}"
@@ -43,38 +47,38 @@ def wrong_unit(sensor: str, axes: str, ratio: float, units: Sequence[Unit]) -> W
     if not units:
         return (
             f"{name} reads {size}{where}: no sensor is wrong by so much, and no known unit gives this factor.",
-            "Find the unit. Until then: " + _declare(columns, [f"*{1.0 / ratio:.6g}"]) + ".",
+            "Find the unit. Until then: " + _declare(columns, [f"*{1.0 / ratio:.6g}"], origin) + ".",
         )
     kinds = ", or ".join(words for words, _ in units)
-    remedy = "Declare the unit: " + _declare(columns, [unit for _, unit in units]) + "."
+    remedy = "Declare the unit: " + _declare(columns, [unit for _, unit in units], origin) + "."
     return f"{name} reads {size}{where}, which looks like {kinds}.", remedy
 
 
-def field_in_another_unit(size: float, units: Sequence[Unit]) -> Words:
+def field_in_another_unit(size: float, units: Sequence[Unit], origin: Origin) -> Words:
     """Say that the field which the magnetometer shows is of a size that is not on earth."""
     kinds = ", or ".join(words for words, _ in units)
     return (
         f"The field that turns in mag has a magnitude of {size:.4g}, and no such field in uT is on earth: it looks "
         f"like {kinds}.",
-        "Declare the unit: " + _declare([f"mag_{axis}" for axis in AXES], [unit for _, unit in units]) + ".",
+        "Declare the unit: " + _declare([f"mag_{axis}" for axis in AXES], [unit for _, unit in units], origin) + ".",
     )
 
 
-def exchanged(pairs: Sequence[tuple[str, str]]) -> Words:
+def exchanged(pairs: Sequence[tuple[str, str]], origin: Origin) -> Words:
     """Say that columns of two sensors are exchanged."""
     names = " and ".join(f"{one} with {other}" for one, other in pairs)
     mapping = {target: source for one, other in pairs for target, source in ((one, other), (other, one))}
     return (
         f"Columns are exchanged between sensors: {names}.",
-        "Exchange them back: " + when_read(mapped(mapping)) + ".",
+        "Exchange them back: " + read_anew(mapping, origin) + ".",
     )
 
 
-def positions(unit: str) -> Words:
+def positions(unit: str, origin: Origin) -> Words:
     """Say that the reference's positions are in another unit of length."""
     return (
         f"The accelerations along the path of ref_p fit acc only if the positions are in {unit}, not m.",
-        "Declare the unit: " + _declare([f"ref_p{axis}" for axis in AXES], [unit]) + ".",
+        "Declare the unit: " + _declare([f"ref_p{axis}" for axis in AXES], [unit], origin) + ".",
     )
 
 
@@ -143,7 +147,7 @@ def outliers(channel: str, rows: int, span: tuple[float, float], values: tuple[f
     )
 
 
-def angle_in_degrees(factor: float, sign: int, zero: int) -> Words:
+def angle_in_degrees(factor: float, sign: int, zero: int, origin: Origin) -> Words:
     """Say that the commanded angle of a rig is in degrees, by the gyroscope.
 
     Parameters
@@ -154,13 +158,15 @@ def angle_in_degrees(factor: float, sign: int, zero: int) -> Words:
         -1 where the angle counts the other way.
     zero : int
         Angle, deg, at which the body stands upright.
+    origin : Origin
+        Columns of the file, which the remedy names.
     """
     way = ", and counts the other way" if sign < 0 else ""
     where = f", and the body stands upright at {zero} deg" if zero else ""
     unit = "deg" if not zero else f"deg - {zero}" if zero > 0 else f"deg + {-zero}"
     return (
         f"ref_angle turns {factor:.4g} times as far as the gyroscope: it is in degrees{way}{where}.",
-        "Declare the unit: " + when_read(mapped({"ref_angle": f"{'-' if sign < 0 else ''}ref_angle[{unit}]"})) + ".",
+        "Declare the unit: " + read_anew({"ref_angle": f"{'-' if sign < 0 else ''}ref_angle[{unit}]"}, origin) + ".",
     )
 
 

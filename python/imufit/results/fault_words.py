@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from imufit.figures import quantity
 from imufit.log.columns import SENSOR_NAMES
+from imufit.log.origin import Origin
 from imufit.remedy import Remedy, mapped, option, when_read
 
 Array = NDArray[np.float64]
@@ -25,6 +26,19 @@ UNKNOWN: Final = "S"
 
 Words = tuple[str, str | Remedy]
 """Evidence and remedy."""
+
+
+def read_anew(columns: Mapping[str, str], origin: Origin) -> Remedy:
+    """Name the mapping that makes columns of a log anew, in the file's own names.
+
+    Parameters
+    ----------
+    columns : mapping
+        Source text for each column that changes, in terms of the log.
+    origin : Origin
+        How the log was read.
+    """
+    return when_read(mapped(origin.mapping(columns)))
 
 
 def falls(sensor: str, before: float, after: float) -> str:
@@ -41,14 +55,14 @@ def changed(change: Words, left: Sequence[str], alike: Words | None) -> Words:
     return text, change[1]
 
 
-def mount(sensors: Sequence[str], matrix: Array, excited: str) -> Words:
+def mount(sensors: Sequence[str], matrix: Array, excited: str, origin: Origin) -> Words:
     """Say that all sensors are turned alike; one that is excited stands for the others."""
     turned_back = {target: source for sensor in sensors for target, source in mapping(sensor, matrix).items()}
     return (
         "The axes of every sensor are turned against the body that the reference describes: "
         f"{_shown(excited, matrix)}, and so on.",
         "Turn them back with "
-        + when_read(mapped(turned_back))
+        + read_anew(turned_back, origin)
         + f", or multiply the reference from the right by a turn of {_turn(matrix.T)}.",
     )
 
@@ -59,7 +73,7 @@ def frame(name: str, declared: str) -> Words:
     return text, "Declare the frame: " + when_read(option("frame", name)) + "."
 
 
-def quaternion(places: Sequence[int], signs: Sequence[float]) -> Words:
+def quaternion(places: Sequence[int], signs: Sequence[float], origin: Origin) -> Words:
     """Say how the four numbers of the reference have to be read.
 
     Parameters
@@ -68,6 +82,8 @@ def quaternion(places: Sequence[int], signs: Sequence[float]) -> Words:
         Column, counted from ``ref_qw``, in which each of the true w x y z stands.
     signs : sequence of float
         Sign of each.
+    origin : Origin
+        Columns of the file, which the remedy names.
     """
     last = "has its scalar last" if places[0] == 3 else ""
     turned = [f"ref_q{PARTS[place]}" for place, sign in zip(places, signs, strict=True) if sign < 0.0]
@@ -90,20 +106,20 @@ def quaternion(places: Sequence[int], signs: Sequence[float]) -> Words:
     remedy = " and ".join(to_do)
     return (
         f"The reference attitude {', and '.join(each for each in (last, other) if each)}.",
-        f"{remedy[0].upper()}{remedy[1:]}: " + when_read(mapped(said)) + ".",
+        f"{remedy[0].upper()}{remedy[1:]}: " + read_anew(said, origin) + ".",
     )
 
 
-def clock(factor: float) -> Words:
+def clock(factor: float, origin: Origin) -> Words:
     """Say that the true time is a multiple of `t`."""
     size = f"{factor:g} times as long as" if factor > 1.0 else f"1/{1.0 / factor:g} as long as"
     return (
         f"The clock is at another rate: by the turns of the reference, the steps between rows are {size} in t.",
-        "Put t right: " + when_read(mapped({"t": f"t[*{factor:g}]"})) + ".",
+        "Put t right: " + read_anew({"t": f"t[*{factor:g}]"}, origin) + ".",
     )
 
 
-def axes(sensor: str, matrix: Array, left: str, other: str | Remedy | None) -> Words:
+def axes(sensor: str, matrix: Array, left: str, other: str | Remedy | None, origin: Origin) -> Words:
     """Say which axes of a sensor are exchanged or turned round; `other` is another remedy."""
     if np.array_equal(matrix, -np.eye(3)):
         what = f"{sensor} has the opposite sign on every axis"
@@ -113,7 +129,7 @@ def axes(sensor: str, matrix: Array, left: str, other: str | Remedy | None) -> W
         handed = "" if np.linalg.det(matrix) > 0.0 else " (a left-handed set of axes)"
         name = SENSOR_NAMES[sensor]
         what = f"The axes of the {name} are exchanged or turned round{handed}: {_shown(sensor, matrix)}"
-    remedy = "Put them right with " + when_read(mapped(mapping(sensor, matrix)))
+    remedy = "Put them right with " + read_anew(mapping(sensor, matrix), origin)
     remedy += "." if other is None else ", or: " + other
     return f"{what}. Read so, the residual falls {left}.", remedy
 
