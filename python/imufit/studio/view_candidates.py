@@ -34,10 +34,10 @@ def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
     """Return in words why a candidate is not there; empty where it is."""
     if item.status == PASSED:
         return ""
-    outdone = item.status == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
+    outdone = item.outcome == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
     if outdone and diagnosis.best is not None:
-        return f", needless beside {printable(diagnosis.best, NAME)}"
-    return f", {item.status}"
+        return f"; needless beside {printable(diagnosis.best, NAME)}"
+    return f"; {item.outcome}"
 
 
 class CandidateView:
