@@ -49,7 +49,7 @@ def candidate_bars(
     """
     before, after, error = (np.asarray(values, dtype=float) for values in (before, after, error))
     lowers = after < before
-    # A rise is no reason to add an effect, and a large one would dwarf the falls.
+    # A rise is not a promise, and a large one would dwarf the falls.
     reached, error = np.where(lowers, after, before), np.where(lowers, error, np.nan)
     drawn = [index for index in range(len(effects)) if np.isfinite(before[index]) and np.isfinite(after[index])][:limit]
     if not drawn:
