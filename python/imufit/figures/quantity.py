@@ -122,14 +122,15 @@ def fall(before: float | None, after: float | None) -> str:
 
 
 def change(before: float, after: float) -> str:
-    """Return an error without and with an effect alone, such as ``2.17 → 1.31``; some lower it beside others only.
+    """Return an error without and with an effect alone, such as ``2.17 → 1.31``, or ``stays at 2.17``.
 
     Parameters
     ----------
     before, after : float
         The ratios.
     """
-    return f"{ratio(before)} → {ratio(after)}" if after < before else f"stays at {ratio(before)}"
+    falls = after < before and ratio(after) != ratio(before)
+    return f"{ratio(before)} → {ratio(after)}" if falls else f"stays at {ratio(before)}"
 
 
 def promise(effect: str, before: float, after: float) -> str:

@@ -184,7 +184,9 @@ class Player:
             for name in self.tracks:
                 self._legend(name)
             with ui.row().classes("w-full items-center no-wrap gap-2"):
-                self._button = ui.button(icon="play_arrow", on_click=self.toggle).props('flat dense aria-label="play"')
+                self._button = ui.button(icon="play_arrow", on_click=self.toggle).props(
+                    'flat dense aria-label="play" title="play"'
+                )
                 self._slider = ui.slider(
                     min=self.begin, max=self.end, step=max((self.end - self.begin) / 2000.0, 1e-3), value=self.time
                 ).props('aria-label="time of the attitude"')
@@ -214,7 +216,8 @@ class Player:
         if self.playing and self.time >= self.end:
             self.time = self.begin
         self._timer.active = self.playing
-        self._button.props(f"icon={'pause' if self.playing else 'play_arrow'}")
+        word = "pause" if self.playing else "play"
+        self._button.props(f"icon={'pause' if self.playing else 'play_arrow'} aria-label={word} title={word}")
 
     def go(self, time: float) -> None:
         """Show the attitudes of one time.

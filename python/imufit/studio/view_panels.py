@@ -15,6 +15,7 @@ from imufit.results import Comparison, Spectrum, Unexplained
 from imufit.results.comparison import Panel
 from imufit.studio import charts
 from imufit.studio.desk import Desk
+from imufit.studio.explained import Explained
 from imufit.studio.session import Session, worst_channel
 from imufit.studio.stack import Stack
 
@@ -24,7 +25,7 @@ FAILS: Final = 1.05
 """Residual over noise floor from which on a channel fails: below, the excess is a tenth of the noise's variance."""
 FAILS_WHERE: Final = "Where it fails"
 TIME: Final = "t"
-RISES: Final = " Where {cause} is what is missing, the residual rises along the dotted line."
+RISES: Final = " If {cause} is missing, the residual follows the dotted line."
 UNDER_WAY: Final = "The fit is under way: spectrum and trace are those of the model before."
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
@@ -53,7 +54,7 @@ class PanelView:
             self._channel.classes("min-w-28").props("data-mark=channel")
             self._covariate = ui.select([], label="against", on_change=self._chosen).props("dense outlined")
             self._covariate.classes("min-w-36").props("data-mark=covariate")
-        self._note = ui.label("").classes("studio-muted")
+        self._note = Explained().classes("studio-muted")
         with ui.element("div").classes("studio-charts"):
             # The element around both is hidden: Plotly cannot resize a figure that is hidden itself.
             with ui.element("div").classes("studio-pair") as self._pair:
@@ -257,7 +258,7 @@ class PanelView:
             else charts.spectrum(spectrum, both)
         )
         level = next(item for item in found.channels if item.channel == channel)
-        rises = "" if panel is not None or covariate is None else RISES.format(cause=printable(covariate, NAME))
+        rises = "" if panel is not None or covariate is None else RISES.format(cause=covariate)
         self._note.set_text(f"{channel} stands at {quantity.ratio(level.ratio)} times its noise floor.{rises}")
         ui.timer(0, lambda: self._draw_trace(channel), once=True)
 
