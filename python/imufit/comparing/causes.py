@@ -1,4 +1,4 @@
-"""The residual against causes that a finding can name and that are no covariate: derivatives, products, the heading.
+"""The residual against causes that a finding names beside the covariates: derivatives, products, the heading.
 
 Such a cause acts through several columns, so the residual stands against the part that their best fit explains.
 """

@@ -185,7 +185,7 @@ class Player:
                 self._legend(name)
             with ui.row().classes("w-full items-center no-wrap gap-2"):
                 self._button = ui.button(icon="play_arrow", on_click=self.toggle).props(
-                    'flat dense aria-label="play" title="play"'
+                    'flat dense aria-label="play" title="play or pause"'
                 )
                 self._slider = ui.slider(
                     min=self.begin, max=self.end, step=max((self.end - self.begin) / 2000.0, 1e-3), value=self.time
@@ -216,8 +216,7 @@ class Player:
         if self.playing and self.time >= self.end:
             self.time = self.begin
         self._timer.active = self.playing
-        word = "pause" if self.playing else "play"
-        self._button.props(f"icon={'pause' if self.playing else 'play_arrow'} aria-label={word} title={word}")
+        self._button.props(f"icon={'pause' if self.playing else 'play_arrow'}")
 
     def go(self, time: float) -> None:
         """Show the attitudes of one time.
