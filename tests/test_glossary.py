@@ -2,13 +2,14 @@
 
 import re
 import runpy
+from itertools import pairwise
 from pathlib import Path
 
 import imufit
 import numpy as np
 import pytest
 from imufit import _imufit
-from imufit.glossary import explained, terms, used_in
+from imufit.glossary import explained, places_in, terms, used_in
 from imufit.lab.simulate.scenarios import SCENARIOS
 from imufit.report import page
 from imufit.results.diagnosis import VERDICTS
@@ -56,6 +57,14 @@ def test_a_word_has_one_explanation_of_one_to_three_sentences():
         sentences = re.findall(r"[.!?](?= [A-Z`]|$)", term.means)
         assert 1 <= len(sentences) <= 3, term.word
         assert term.origin.endswith("."), term.word
+
+
+def test_a_text_marks_the_first_place_of_a_term_and_the_longer_of_two():
+    text = "acc_x stands at 2.1 times its noise floor, gyr_x at its floor; the noise floor is white."
+    places = places_in(text)
+    assert "times its noise floor" in [text[begin:end] for begin, end, _ in places]
+    assert all(end <= begin for (_, end, _), (begin, _, _) in pairwise(places))
+    assert len({term.word for _, _, term in places}) == len(places)
 
 
 def test_covariates_are_explained(log, fit):

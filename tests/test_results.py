@@ -10,6 +10,7 @@ from imufit.figures import quantity
 from imufit.figures.waterfall import waterfall
 from imufit.results import Addition, Parameter, Table
 from imufit.results.parameter import parameter_table
+from imufit.results.sentences import explanation
 from loop_results import G_SENSITIVITY, addition, card, comparison, diagnosis, ladder
 from matplotlib.figure import Figure
 
@@ -164,6 +165,30 @@ def test_error_of_the_drop_does_not_depend_on_the_unit_of_the_gain():
     assert scaled.drop_error == pytest.approx(best.drop_error)
     assert best.drop_error == pytest.approx(0.49 * 0.02 / 0.41)
     assert math.isnan(dataclasses.replace(best, gain=0.0).drop_error)
+
+
+def test_a_figure_says_of_a_candidate_that_raises_the_error_alone_what_the_tables_say():
+    found = diagnosis()
+    raising = dataclasses.replace(found.candidates[0], held_out_before=133.0, held_out_after=204.0)
+    drawn = dataclasses.replace(found, candidates=(raising, *found.candidates[1:]))
+    axes = drawn.plot().axes[0]
+    assert raising.error_change == "stays at 133"
+    assert axes.texts[0].get_text() == "stays at 133"
+    assert (
+        axes.get_title(loc="left").replace("\n", " ").startswith("Alone gyr.g_sensitivity does not lower the held-out")
+    )
+    assert axes.get_xlim()[1] < 140.0
+
+
+def test_a_probable_candidate_is_not_called_insignificant():
+    found = diagnosis()
+    likely = dataclasses.replace(found.candidates[2], probability=0.81)
+    unlikely = dataclasses.replace(likely, probability=0.2)
+    rows = dataclasses.replace(found, candidates=(likely, unlikely)).candidate_table().rows
+    assert [row[1] for row in rows] == ["likely, not established", "not significant"]
+    assert likely.to_dict()["status"] == "not significant"
+    assert "more probable than not" in explanation(card(), likely)
+    assert "more probable than not" not in explanation(card(), unlikely)
 
 
 def test_waterfall_is_logarithmic_only_where_the_fall_is_large():

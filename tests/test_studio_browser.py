@@ -39,6 +39,10 @@ def folder(tmp_path_factory):
     table = np.column_stack([log.t, log.acc / 9.80665, np.degrees(log.gyr), log.ref_q])
     np.savetxt(path / "odd.csv", table, delimiter=",", header="t,U,V,W,P,Q,R,ref_qw,ref_qx,ref_qy,ref_qz", comments="")
     (path / "broken.csv").write_text("t,acc_x,acc_y,acc_z\n0,1,2,9\n1,1,no,9\n")
+    quiet = simulate("handheld", {}, duration=60.0, rate=50.0, seed=4).to_log()
+    acc = quiet.acc.copy()
+    acc[:, 0] = np.interp(quiet.t - 0.004, quiet.t, acc[:, 0])
+    quiet.with_fields(acc=acc).write(path / "late.parquet")
     log.with_fields(covariates=dict.fromkeys(HOSTILE, log.t % 1.0)).write(path / "hostile.parquet")
     return path
 
@@ -200,6 +204,25 @@ def test_the_fall_stands_in_sight_beside_the_candidates(page, folder):
     assert add["y"] < 900
 
 
+def test_a_finding_has_its_figure_and_its_words_their_definitions(page, folder):
+    drop(page, folder / "late.parquet")
+    title = "document.querySelector('[data-mark=panel] .xtitle')"
+    page.wait_for_function(f"() => {title} && {title}.textContent.includes('df/dt explains')")
+    assert "acc_x still depends on df/dt" in marked(page, "verdict").inner_text()
+    word = marked(page, "verdict").get_by_text("df/dt", exact=True)
+    shown = "element => getComputedStyle(element, '::after').content"
+    assert word.evaluate(shown) == "none"
+    for point in (word.focus, word.hover):
+        point()
+        assert "how fast an ideal reading changes" in word.evaluate(shown)
+        word.blur()
+    page.set_viewport_size({"width": 390, "height": 800})
+    page.wait_for_function("() => document.documentElement.scrollWidth === 390")
+    for button in page.locator(".studio-head button").all():
+        assert button.inner_text().strip()
+        assert button.get_attribute("title") == button.get_attribute("aria-label")
+
+
 def test_a_session_asks_for_its_log(page, folder, tmp_path):
     session = tmp_path / "lost-session.toml"
     session.write_text(
@@ -243,7 +266,7 @@ def test_names_from_a_file_are_text(page, folder):
         assert page.get_by_text(f"acc.column:{name}").count() > 0
     page.get_by_text(f"acc.column:{HOSTILE[0]}", exact=True).first.click()
     marked(page, "covariate").click()
-    page.get_by_role("option", name=HOSTILE[0]).click()
+    page.get_by_role("option", name=HOSTILE[0], exact=True).click()
     # The legend has the name of the effect that is looked at, too.
     title = "document.querySelector('[data-mark=panel] .xtitle')"
     page.wait_for_function(f"() => {title} && {title}.textContent.includes('<script>')")

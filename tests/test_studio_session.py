@@ -32,6 +32,17 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def late(tmp_path_factory):
+    """A log in which one axis of the accelerometer is late: no effect of the catalogue is."""
+    log = simulate("handheld", {}, duration=60.0, rate=50.0, seed=4).to_log()
+    acc = log.acc.copy()
+    acc[:, 0] = np.interp(log.t - 0.004, log.t, acc[:, 0])
+    path = tmp_path_factory.mktemp("late") / "late.parquet"
+    log.with_fields(acc=acc).write(path)
+    return path
+
+
+@pytest.fixture(scope="module")
 def begun(folder):
     session = Session([imufit.open_log(folder / "walk.parquet")])
     session.begin()
@@ -176,6 +187,24 @@ def test_what_a_candidate_would_explain_needs_no_pass(session):
     left = {(p.channel, p.covariate): float(abs(p.mean).mean()) for p in after}
     assert left.keys() == mean.keys()
     assert left[worst, "temp"] < 0.3 * mean[worst, "temp"]
+
+
+def test_the_residual_stands_against_every_cause_that_a_finding_names(late):
+    session = Session([imufit.open_log(late)])
+    session.begin()
+    found = session.diagnose().unexplained
+    named = {(item.channel, item.covariate) for item in found}
+    assert ("acc_x", "df/dt") in named
+    panels = session.compare().panels
+    shown = {(panel.channel, panel.covariate) for panel in panels}
+    assert all(key in shown or key[1] in session.causes(key[0]) for key in named)
+    panel, after, second = session.against_cause("acc_x", "df/dt", "acc.bias")
+    # One axis alone is late: its changes explain what is left, which rises as their part does.
+    assert np.polyfit(panel.centre, panel.mean, 1)[0] == pytest.approx(1.0, abs=0.05)
+    assert panel.share > max(item.share for item in panels if item.channel == "acc_x")
+    assert after is not None
+    assert second is None
+    assert session.against_cause("acc_x", "dm/dt") == (None, None, None)
 
 
 def test_few_fits_keep_their_evidence(session):

@@ -93,6 +93,22 @@ def used_in(texts: Sequence[str]) -> tuple[Term, ...]:
     return tuple(term for term in terms() if _anywhere(term).search(together) or first.intersection(term.spellings))
 
 
+def places_in(text: str) -> tuple[tuple[int, int, Term], ...]:
+    """Return where each term first stands in a text, from left to right; of terms that overlap the longer one.
+
+    Parameters
+    ----------
+    text : str
+        A paragraph.
+    """
+    hits = ((found, term) for term in terms() for found in [_anywhere(term).search(text)] if found)
+    found: list[tuple[int, int, Term]] = []
+    for hit, term in sorted(hits, key=lambda item: item[0].start() - item[0].end()):
+        if all(hit.end() <= begin or hit.start() >= end for begin, end, _ in found):
+            found.append((hit.start(), hit.end(), term))
+    return tuple(sorted(found, key=lambda place: place[0]))
+
+
 def _pattern(spelling: str) -> str:
     """Return a spelling as a regular expression."""
     return re.escape(spelling).replace(r"\*", r"\w+") if spelling.count("*") == 1 else re.escape(spelling)

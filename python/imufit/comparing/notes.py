@@ -52,7 +52,10 @@ def _of_rows(evidence: LogEvidence) -> list[str]:
         out.append("The reference is the attitude at ref_angle: ref_q differs from it only by noise.")
     coloured = sorted({CHANNELS[k][:3] for k, taps in enumerate(evidence.filters) if taps})
     if coloured:
-        out.append(f"The residual noise of {', '.join(coloured)} is coloured; the fit whitens it.")
+        out.append(
+            f"The noise of {', '.join(coloured)} carries over from sample to sample; the fit allows for this, so that "
+            "the standard errors hold."
+        )
     return out
 
 

@@ -30,7 +30,7 @@ def candidate_bars(
     effects : sequence of str
         Effect ids, best first.
     before, after : array_like
-        (k,) held-out residual over noise floor now and with the effect.
+        (k,) held-out residual over noise floor now and with the effect. An effect that raises it alone gets no bar.
     error : array_like
         (k,) standard error of the drop; NaN where it is not known.
     status : sequence of str
@@ -48,6 +48,9 @@ def candidate_bars(
         The dashed line is the error now, the solid one the noise floor.
     """
     before, after, error = (np.asarray(values, dtype=float) for values in (before, after, error))
+    lowers = after < before
+    # A rise is not a promise, and a large one would dwarf the falls.
+    reached, error = np.where(lowers, after, before), np.where(lowers, error, np.nan)
     drawn = [index for index in range(len(effects)) if np.isfinite(before[index]) and np.isfinite(after[index])][:limit]
     if not drawn:
         return place.empty("No effect of the catalogue can be tested in this log.", ax)
@@ -58,16 +61,16 @@ def candidate_bars(
         passed = status[index] == "passed"
         axes.barh(
             at,
-            before[index] - after[index],
-            left=after[index],
+            before[index] - reached[index],
+            left=reached[index],
             height=0.62,
             color=_COLOURS.get(status[index], style.GREY),
             zorder=2,
         )
         if np.isfinite(error[index]):
-            axes.errorbar(after[index], at, xerr=error[index], color=style.INK, capsize=2.5, linewidth=1.0, zorder=3)
+            axes.errorbar(reached[index], at, xerr=error[index], color=style.INK, capsize=2.5, linewidth=1.0, zorder=3)
         axes.annotate(
-            f"{quantity.ratio(before[index])} → {quantity.ratio(after[index])}",
+            quantity.change(before[index], after[index]),
             (1.01, at),
             xycoords=axes.get_yaxis_transform(),
             annotation_clip=False,
@@ -82,8 +85,8 @@ def candidate_bars(
     axes.set_yticks(places, [effects[index] for index in drawn])
     axes.invert_yaxis()
     margin = np.nan_to_num(error[drawn])
-    low = min(1.0, float((after[drawn] - margin).min()))
-    high = max(now, float(before[drawn].max()), float((after[drawn] + margin).max()), 1.02)
+    low = min(1.0, float((reached[drawn] - margin).min()))
+    high = max(now, float(before[drawn].max()), float((reached[drawn] + margin).max()), 1.02)
     axes.set_xlim(low - 0.04 * (high - low), high + 0.04 * (high - low))
     between = "\n" if drawing.narrow else " "
     axes.set_xlabel(f"held-out error over noise floor{between}(solid line: noise floor; dashed: now)", fontsize=9)
@@ -97,4 +100,4 @@ def _promise(effect: str, before: float, after: float, status: str) -> str:
     """Say what the best candidate would bring."""
     if status != "passed":
         return "No effect lowers the held-out error beyond chance"
-    return f"Adding {effect} should cut the held-out error {quantity.fall(before, after)}"
+    return quantity.promise(effect, before, after)

@@ -121,6 +121,33 @@ def fall(before: float | None, after: float | None) -> str:
     return f"from {ratio(before)} to {ratio(after)} times the noise floor"
 
 
+def change(before: float, after: float) -> str:
+    """Return an error without and with an effect alone, such as ``2.17 → 1.31``, or ``stays at 2.17``.
+
+    Parameters
+    ----------
+    before, after : float
+        The ratios.
+    """
+    falls = after < before and ratio(after) != ratio(before)
+    return f"{ratio(before)} → {ratio(after)}" if falls else f"stays at {ratio(before)}"
+
+
+def promise(effect: str, before: float, after: float) -> str:
+    """Return what adding an effect that is there brings, without a full stop.
+
+    Parameters
+    ----------
+    effect : str
+        Its id, or ``it``.
+    before, after : float
+        The error without and with it alone, over the noise floor.
+    """
+    if after < before:
+        return f"Adding {effect} should cut the held-out error {fall(before, after)}"
+    return f"Alone {effect} does not lower the held-out error; beside the other effects it may"
+
+
 def share(value: float | None) -> str:
     """Fraction as per cent, e.g. ``63 %``."""
     if value is None or not math.isfinite(value):

@@ -234,7 +234,7 @@ def _candidate_table(candidates: Sequence[Candidate]) -> Table:
     rows = tuple(
         (
             item.effect,
-            item.status,
+            item.outcome,
             item.error_change,
             quantity.p_value(item.p_value),
             ", ".join(in_lines(item.parameters)) if item.status == PASSED else "-",

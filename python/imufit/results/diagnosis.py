@@ -36,6 +36,8 @@ PASSED = "passed"
 """Status of an effect that is there, or explains as much as one that is."""
 NOT_SIGNIFICANT = "not significant"
 """Status of an effect that the log shows not to be there, or does not need beside others."""
+LIKELY = "likely, not established"
+"""In words the status of an effect that is not significant, but more probable than not: a name needs better odds."""
 NEXT = 5
 """Candidates behind those that stand out that are shown with them: the answer stays on a screen of 24 lines."""
 NOT_TESTABLE = "not testable here"
@@ -154,10 +156,14 @@ class Candidate(Part):
         return abs(self.gain_error * (self.held_out_before - self.held_out_after) / self.gain)
 
     @property
+    def outcome(self) -> str:
+        """The status as it is shown beside the probability, which it does not contradict."""
+        return LIKELY if self.status == NOT_SIGNIFICANT and self.probability > 0.5 else self.status
+
+    @property
     def error_change(self) -> str:
         """Held-out error without and with the effect alone, e.g. ``2.17 → 1.31``; some lower it beside others only."""
-        before, after = quantity.ratio(self.held_out_before), quantity.ratio(self.held_out_after)
-        return f"{before} → {after}" if self.held_out_after < self.held_out_before else f"stays at {before}"
+        return quantity.change(self.held_out_before, self.held_out_after)
 
     @property
     def smallest_detectable(self) -> str:
@@ -371,7 +377,7 @@ class Diagnosis(Plotted, Result):
         """One candidate in shown units."""
         return (
             item.effect,
-            item.status,
+            item.outcome,
             item.error_change,
             f"{quantity.probability(item.probability)}{self.shared(item)}",
             in_words(item.parameters) if item.status == PASSED else "-",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from imufit.figures import quantity
 from imufit.results.data_fault import DataFault
-from imufit.results.diagnosis import NOT_TESTABLE, PASSED, Candidate, Diagnosis
+from imufit.results.diagnosis import LIKELY, NOT_TESTABLE, PASSED, Candidate, Diagnosis
 from imufit.results.disagreement import Disagreement
 from imufit.results.effect_card import EffectCard
 from imufit.results.judged import left_out
@@ -42,11 +42,8 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
         if top.typical:
             text += f" (typically {quantity.quantity(top.typical, top.unit)})"
         text += "."
-    before, after = candidate.held_out_before, candidate.held_out_after
-    if candidate.status == PASSED and after < before:
-        text += f" Adding it should cut the held-out error {quantity.fall(before, after)}."
-    elif candidate.status == PASSED:
-        text += " Alone it does not lower the held-out error; beside the other effects it may."
+    if candidate.status == PASSED:
+        text += f" {quantity.promise('it', candidate.held_out_before, candidate.held_out_after)}."
     elif candidate.status == "negative delay":
         text += (
             " It would have to read what is yet to come: that is not the sensor, but rows that are stamped too late,"
@@ -54,6 +51,8 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
         )
     elif candidate.status == "implausible size":
         text += " No sensor of this kind has so much of it: something else looks like it here."
+    elif candidate.outcome == LIKELY:
+        text += " It is more probable than not, but these rows do not establish it: a longer log may."
     else:
         text += " Adding it would not lower the held-out error by more than chance does."
     return text

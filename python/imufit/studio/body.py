@@ -184,7 +184,9 @@ class Player:
             for name in self.tracks:
                 self._legend(name)
             with ui.row().classes("w-full items-center no-wrap gap-2"):
-                self._button = ui.button(icon="play_arrow", on_click=self.toggle).props('flat dense aria-label="play"')
+                self._button = ui.button(icon="play_arrow", on_click=self.toggle).props(
+                    'flat dense aria-label="play" title="play or pause"'
+                )
                 self._slider = ui.slider(
                     min=self.begin, max=self.end, step=max((self.end - self.begin) / 2000.0, 1e-3), value=self.time
                 ).props('aria-label="time of the attitude"')

@@ -82,7 +82,9 @@ def empty(sentence: str) -> Figure:
     return _figure([], "", "", annotations=[note], xaxis=hidden, yaxis=hidden, showlegend=False)
 
 
-def residual_panel(panel: Panel, after: Panel | None = None, effect: str = "", other: Panel | None = None) -> Figure:
+def residual_panel(
+    panel: Panel, after: Panel | None = None, effect: str = "", other: Panel | None = None, *, explained: bool = False
+) -> Figure:
     """Draw the residual of one channel against one covariate.
 
     Parameters
@@ -95,8 +97,12 @@ def residual_panel(panel: Panel, after: Panel | None = None, effect: str = "", o
         That effect.
     other : Panel, optional
         With the second of two models.
+    explained : bool
+        Whether the panel stands against the part of the residual that the covariate explains.
     """
-    x_factor, x_title = quantity.axis(words(panel.covariate), panel.covariate_unit)
+    name = words(panel.covariate)
+    name = f"part of {words(panel.channel)} that {name} explains" if explained else name
+    x_factor, x_title = quantity.axis(name, panel.covariate_unit)
     factor, unit = quantity.shown_unit(panel.channel_unit)
     x, mean = x_factor * panel.centre, factor * panel.mean
     band = factor * np.nan_to_num(panel.band)
@@ -109,6 +115,8 @@ def residual_panel(panel: Panel, after: Panel | None = None, effect: str = "", o
         _area(x[known], (mean - band)[known], (mean + band)[known], SKY, 0.4, "95 % band"),
         _line(x, mean, BLUE, "now", mode="lines+markers"),
     ]
+    if explained:
+        traces.append(_line(x[[0, -1]], x[[0, -1]], GREY, "if it were all", dash="dot"))
     if other is not None:
         traces.append(_line(x_factor * other.centre, factor * other.mean, GREEN, "kept model", dash="dashdot"))
     if after is not None:

@@ -16,10 +16,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.comparing import comparison, panels
+from imufit.comparing import cause_names, cause_panels, comparison, panels
 from imufit.comparing.two_models import ln_bayes_factor
 from imufit.errors import InputError
-from imufit.fitting.analysis import pooled
+from imufit.fitting.analysis import Analysis, pooled
 from imufit.log import LogSource
 from imufit.loop import Fit, SensorModel
 from imufit.model.catalogue import each_log_has_its_own, find_effect
@@ -488,16 +488,64 @@ class Session:
         list of Panel
             Empty where the evidence around the present model is not at hand, or has no such candidate.
         """
-        made = self.made()
-        # A fit does not change; the thread at work may only put another one in its place.
-        fit = None if made is None else made.fit
-        if fit is None or not fit.has_evidence or not self.has_reference:
+        fit = self._at_hand(self.stack)
+        if fit is None:
             return []
         analysis = fit.analysis
         if effect not in analysis.candidates:
             return []
         solved = analysis.problem.estimate([*analysis.fitted_slots, analysis.slots.index(effect)])
         return panels(analysis, solved["full_step"], self.shown)
+
+    def causes(self, channel: str) -> tuple[str, ...]:
+        """Return the causes without a name that a finding on a channel can name; empty without the evidence.
+
+        Parameters
+        ----------
+        channel : str
+            For instance ``acc_x``.
+        """
+        fit = self._at_hand(self.stack)
+        return () if fit is None else cause_names(fit.analysis, self.shown, channel)
+
+    def against_cause(self, channel: str, cause: str, effect: str = "") -> tuple[Panel | None, ...]:
+        """Return the residual against the part of it that a cause without a name explains; takes a pass: from a thread.
+
+        Parameters
+        ----------
+        channel : str
+            For instance ``acc_x``.
+        cause : str
+            One of `causes`.
+        effect : str
+            Id of an effect that could be added.
+
+        Returns
+        -------
+        tuple of Panel or None
+            With the present model, with `effect` besides to first order, and with the second of two models.
+        """
+        fit = self._at_hand(self.stack)
+        if fit is None or cause not in cause_names(fit.analysis, self.shown, channel):
+            return None, None, None
+        analysis = fit.analysis
+        others: dict[int, tuple[Analysis, Array]] = {}
+        if effect in analysis.candidates:
+            solved = analysis.problem.estimate([*analysis.fitted_slots, analysis.slots.index(effect)])
+            others[1] = analysis, solved["full_step"]
+        second = None if self.second is None else self._at_hand(self.second)
+        if second is not None:
+            others[2] = second.analysis, second.estimate.step
+        found = cause_panels(analysis, fit.estimate.step, self.shown, channel, cause, list(others.values()))
+        by_place = dict(zip(others, found[1:], strict=True))
+        return found[0], by_place.get(1), by_place.get(2)
+
+    def _at_hand(self, stack: Stack) -> Fit | None:
+        """Return the fit of a stack if it was made, has its evidence, and a reference judges every row."""
+        made = self.made(stack)
+        # A fit does not change; the thread at work may only put another one in its place.
+        fit = None if made is None else made.fit
+        return fit if fit is not None and fit.has_evidence and self.has_reference else None
 
     def _nearest(self, target: Stack) -> Made:
         """Return the fit of the last step before a stack that was made."""

@@ -13,6 +13,7 @@ from imufit.results import Candidate, Diagnosis
 from imufit.results.diagnosis import NOT_SIGNIFICANT, NOT_TESTABLE, PASSED
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
+from imufit.studio.explained import Explained
 from imufit.studio.view_panels import PanelView
 
 FIRST: Final = 5
@@ -34,10 +35,10 @@ def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
     """Return in words why a candidate is not there; empty where it is."""
     if item.status == PASSED:
         return ""
-    outdone = item.status == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
+    outdone = item.outcome == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
     if outdone and diagnosis.best is not None:
-        return f", needless beside {printable(diagnosis.best, NAME)}"
-    return f", {item.status}"
+        return f"; needless beside {printable(diagnosis.best, NAME)}"
+    return f"; {item.outcome}"
 
 
 class CandidateView:
@@ -55,6 +56,7 @@ class CandidateView:
         self._desk, self._panels = desk, panels
         self._looked_at = self._pinned = ""
         self._drawn: tuple[object, bool] | None = None
+        self._seen: set[str] = set()
         ui.html("Candidates", tag="h2", sanitize=False)
         self._list = ui.column().classes("w-full gap-0")
         self._card = ui.column().classes("w-full gap-1 studio-item studio-card").props("data-mark=card")
@@ -67,6 +69,7 @@ class CandidateView:
         if state == self._drawn:
             return
         self._drawn = state
+        self._seen = set()
         self._pin("")
         self._list.clear()
         self._list.classes(**({"add": "studio-long"} if self._desk.guessing else {"remove": "studio-long"}))
@@ -129,13 +132,12 @@ class CandidateView:
                 )
             if diagnosis is None:
                 return
-            words = (
-                f"{quantity.probability(item.probability)} probable{diagnosis.shared(item)}, error {item.error_change}"
-            )
-            ui.label(words + _why_not(item, diagnosis)).classes("studio-muted")
+            likely = f"{quantity.probability(item.probability)} probable{diagnosis.shared(item)}"
+            words = f"{likely}, held-out error {item.error_change}{_why_not(item, diagnosis)}"
+            Explained(words, self._seen).classes("studio-muted")
             if named and item.confounded_with:
                 rivals = ", ".join(str(rival) for rival in item.confounded_with[:2])
-                ui.label(f"Rivals, with correlation: {printable(rivals)}").classes("studio-muted")
+                Explained(f"Rivals, with correlation: {rivals}", self._seen).classes("studio-muted")
 
     def _pin(self, effect: str) -> None:
         """Keep the card of an effect until another one is kept; a finger has no place to rest."""

@@ -12,6 +12,7 @@ from imufit.figures.noise_parts import BEYOND
 from imufit.results.noise_part import NoisePart
 from imufit.studio import charts
 from imufit.studio.desk import Desk
+from imufit.studio.explained import Explained
 from imufit.studio.session import Session, worst_channel
 
 SMALL: Final = 0.005
@@ -42,7 +43,7 @@ class FallView:
         self._keep.props("flat dense size=sm").props("data-mark=second")
         self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
-        self._floor = ui.label("").classes("studio-muted").props("data-mark=floor")
+        self._floor = Explained().classes("studio-muted").props("data-mark=floor")
 
     def refresh(self) -> None:
         """Show the steps up to the present one, those that were undone paler."""

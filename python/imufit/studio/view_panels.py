@@ -15,6 +15,7 @@ from imufit.results import Comparison, Spectrum, Unexplained
 from imufit.results.comparison import Panel
 from imufit.studio import charts
 from imufit.studio.desk import Desk
+from imufit.studio.explained import Explained
 from imufit.studio.session import Session, worst_channel
 from imufit.studio.stack import Stack
 
@@ -24,6 +25,7 @@ FAILS: Final = 1.05
 """Residual over noise floor from which on a channel fails: below, the excess is a tenth of the noise's variance."""
 FAILS_WHERE: Final = "Where it fails"
 TIME: Final = "t"
+RISES: Final = " If {cause} is missing, the residual follows the dotted line."
 UNDER_WAY: Final = "The fit is under way: spectrum and trace are those of the model before."
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
@@ -52,7 +54,7 @@ class PanelView:
             self._channel.classes("min-w-28").props("data-mark=channel")
             self._covariate = ui.select([], label="against", on_change=self._chosen).props("dense outlined")
             self._covariate.classes("min-w-36").props("data-mark=covariate")
-        self._note = ui.label("").classes("studio-muted")
+        self._note = Explained().classes("studio-muted")
         with ui.element("div").classes("studio-charts"):
             # The element around both is hidden: Plotly cannot resize a figure that is hidden itself.
             with ui.element("div").classes("studio-pair") as self._pair:
@@ -133,8 +135,13 @@ class PanelView:
         """Return the dependence that the sentence over the page names, where a panel shows it."""
         made = None if self._session is None or self._desk.guessing else self._session.made()
         left = () if made is None or made.diagnosis is None else made.diagnosis.unexplained[:1]
-        shown = {(panel.channel, panel.covariate) for panel in found.panels}
-        return next((item for item in left if (item.channel, item.covariate) in shown), None)
+        return next((item for item in left if item.covariate in self._names(found, item.channel)), None)
+
+    def _names(self, found: Comparison, channel: str) -> list[str]:
+        """Return what a channel's residual can stand against: covariates, the worst first, then causes of findings."""
+        names = [panel.covariate for panel in found.panels if panel.channel == channel]
+        causes = () if self._session is None or not names else self._session.causes(channel)
+        return list(dict.fromkeys((*names, *causes)))
 
     def _at_start(self) -> Comparison | None:
         """Return where the ideal sensor fails."""
@@ -174,14 +181,13 @@ class PanelView:
     def _offer(self, found: Comparison, channel: str) -> None:
         """Fill the two lists, the worst first."""
         ratios = sorted(found.channels, key=lambda item: -item.ratio if np.isfinite(item.ratio) else np.inf)
-        panels = [panel for panel in found.panels if panel.channel == channel]
         covariate = self._present_covariate(found, channel)
         self._setting = True
         self._channel.set_options(
             {item.channel: f"{item.channel} ({quantity.ratio(item.ratio)})" for item in ratios}, value=channel
         )
         self._covariate.set_options(
-            {panel.covariate: printable(panel.covariate, NAME) for panel in panels}, value=covariate
+            {name: printable(name, NAME) for name in self._names(found, channel)}, value=covariate
         )
         self._setting = False
 
@@ -190,7 +196,7 @@ class PanelView:
 
         Where the channel does not fail any more, this is the covariate of the start: the panel shows the residual gone.
         """
-        names = [panel.covariate for panel in found.panels if panel.channel == channel]
+        names = self._names(found, channel)
         if self._desk.covariate in names:
             return self._desk.covariate
         left = self._left(found)
@@ -238,10 +244,12 @@ class PanelView:
             explained = self._desk.session.explained(self._proposed)
             after = _panel_of(explained, channel, covariate)
         other = None if second is None else _panel_of(second.panels, channel, covariate)
-        figure = charts.empty("No covariate is seen in this channel.")
         if panel is not None:
-            figure = charts.residual_panel(panel, after, self._proposed, other)
-        self._panel.update_figure(figure)
+            self._panel.update_figure(charts.residual_panel(panel, after, self._proposed, other))
+        elif covariate is None:
+            self._panel.update_figure(charts.empty("No covariate is seen in this channel."))
+        else:
+            ui.timer(0, lambda: self._draw_cause(channel, covariate), once=True)
         spectrum = _spectrum_of(found, channel)
         both = None if second is None else _spectrum_of(second, channel)
         self._spectrum.update_figure(
@@ -250,8 +258,24 @@ class PanelView:
             else charts.spectrum(spectrum, both)
         )
         level = next(item for item in found.channels if item.channel == channel)
-        self._note.set_text(f"{channel} stands at {quantity.ratio(level.ratio)} times its noise floor.")
+        rises = "" if panel is not None or covariate is None else RISES.format(cause=covariate)
+        self._note.set_text(f"{channel} stands at {quantity.ratio(level.ratio)} times its noise floor.{rises}")
         ui.timer(0, lambda: self._draw_trace(channel), once=True)
+
+    async def _draw_cause(self, channel: str, cause: str) -> None:
+        """Draw the residual against the part of it that a cause without a name explains."""
+        session, state, proposed = self._session, self._state, self._proposed
+        if session is None:
+            return
+        found = await run.io_bound(lambda: session.against_cause(channel, cause, proposed))
+        if found is None or state is not self._state:
+            return
+        panel, after, other = found
+        self._panel.update_figure(
+            charts.empty("Too few rows show this cause.")
+            if panel is None
+            else charts.residual_panel(panel, after, proposed, other, explained=True)
+        )
 
     async def _draw_trace(self, channel: str) -> None:
         """Draw the visible points of the window."""

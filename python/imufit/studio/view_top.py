@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import secrets
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -18,6 +17,7 @@ from imufit.results import Diagnosis
 from imufit.studio import server
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
+from imufit.studio.explained import Explained
 from imufit.studio.log_file import LogFile, option_words, remedies
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING
 from imufit.studio.recipe import as_python, as_shell
@@ -27,8 +27,6 @@ SEEDS: Final = 1_000_000
 """Logs of the game: none is met twice."""
 MOST_BYTES: Final = 4 * 2**30
 """Largest file that the browser may send: 20 million rows of 14 columns take 2.2 GB."""
-_APART: Final = re.compile(r"(?<=\d) (?=±|%|°|deg|m/s|µT|s\b|Hz)|(?<=±) ")
-"""Blanks between a number and its error or unit."""
 NOTES: Final = 2
 """Notes that stand open: as many lines as the sentence over them has; the others fold away."""
 PART_JUDGED: Final = "rule"
@@ -241,31 +239,34 @@ class Top:
         ui.button("Cancel", on_click=self._desk.forget_wanted).props("flat").props("data-mark=wanted-cancel")
 
     def _verdict(self, diagnosis: Diagnosis) -> None:
+        seen: set[str] = set()
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
-            ui.icon(_icon_of(diagnosis), size="sm").props(f'aria-label="{diagnosis.verdict}"')
-            ui.label(unbroken(printable(diagnosis.sentence or diagnosis.verdict))).classes("studio-sentence").props(
+            ui.icon(_icon_of(diagnosis), size="sm").props(
+                f'role=img aria-label="{diagnosis.verdict}" title="{diagnosis.verdict}"'
+            )
+            Explained(diagnosis.sentence or diagnosis.verdict, seen).classes("studio-sentence").props(
                 "data-mark=verdict"
             )
         if diagnosis.experiment:
-            ui.label(printable(f"Next: {diagnosis.experiment}")).classes("studio-muted")
+            Explained(f"Next: {diagnosis.experiment}", seen).classes("studio-muted")
         for fault in diagnosis.data_faults:
             number = _number_of(self._desk, fault.file)
             with ui.element("div").classes("studio-error"):
                 # The sentence on top holds the words of a fault that spoils the log.
                 words = f"Data fault ({fault.fault})." if fault.spoils else str(fault)
-                ui.label(printable(words)).classes("studio-muted").props("data-mark=fault")
+                Explained(words, seen).classes("studio-muted").props("data-mark=fault")
                 for option in remedies(fault.advice):
                     self._cure(option, number, "mend")
         for words in self._desk.joined:
             ui.label(printable(words)).classes("studio-muted").props("data-mark=joined")
         shown, folded = diagnosis.notes[:NOTES], diagnosis.notes[NOTES:]
         for note in shown:
-            ui.label(printable(note)).classes("studio-muted")
+            Explained(note, seen).classes("studio-muted")
         if folded:
             words = f"{quantity.counted(len(folded), 'more note')} on these data"
             with ui.expansion(words).classes("w-full").props("dense"):
                 for note in folded:
-                    ui.label(printable(note)).classes("studio-muted")
+                    Explained(note, seen).classes("studio-muted")
 
     def _cure(self, option: Option, number: int, mark: str) -> None:
         """Offer an option of a remedy."""
@@ -362,17 +363,6 @@ ADDED: Final = "The bars show what the effect took off the error. Reveal the tru
 """Task of the demonstration once an effect is added."""
 
 
-def unbroken(sentence: str) -> str:
-    """Return a sentence whose numbers stay on one line with their errors and units.
-
-    Parameters
-    ----------
-    sentence : str
-        Any text.
-    """
-    return _APART.sub("\N{NO-BREAK SPACE}", sentence)
-
-
 def _icon_of(diagnosis: Diagnosis) -> str:
     whole = all(item.judged for item in diagnosis.judged)
     return ICONS[diagnosis.verdict] if whole or diagnosis.verdict != "adequate" else PART_JUDGED
@@ -426,7 +416,9 @@ def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
 
 
 def _icon(icon: str, words: str, action: Callable[[], object] | None) -> ui.button:
-    with ui.button(icon=icon, on_click=action).props(f'flat dense aria-label="{words}"') as button:
+    with ui.button(icon=icon, on_click=action).props(
+        f'flat dense stack aria-label="{words}" title="{words}"'
+    ) as button:
         ui.label(words).classes("studio-words")
     return button
 

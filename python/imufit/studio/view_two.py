@@ -11,6 +11,7 @@ from imufit.figures import quantity
 from imufit.printable import NAME, printable
 from imufit.results.model_comparison import preferred
 from imufit.studio.desk import Desk
+from imufit.studio.explained import Explained
 from imufit.studio.session import Made
 
 CHANGED: Final = 0.005
@@ -69,13 +70,13 @@ class TwoView:
 def _two_models(second: Made, present: Made, factor: float | None) -> None:
     """Lay out two models: held-out error, evidence, residual of each channel that changes, parameters."""
     lower = "kept" if second.numbers.ratio < present.numbers.ratio else "present"
-    ui.label(
+    Explained(
         f"Held-out error: {quantity.ratio(second.numbers.ratio)} times the noise floor with the kept model, "
         f"{quantity.ratio(present.numbers.ratio)} with the present one. The {lower} model stands lower."
     ).classes("studio-sentence").props("data-mark=two-sentence")
     if factor is not None:
         choice = {"first": "the kept model", "second": "the present model", "neither": "neither model"}
-        ui.label(
+        Explained(
             f"The log prefers {choice[preferred(factor)]} (ln Bayes factor {factor:+.1f} for the present one)."
         ).classes("studio-sentence").props("data-mark=two-evidence")
     rows: list[tuple[str, ...]] = [

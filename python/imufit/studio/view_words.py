@@ -31,7 +31,10 @@ class WordsView:
     def refresh(self) -> None:
         """List the words of the present answer."""
         diagnosis = None if self._desk.guessing else self._desk.diagnosis
-        said = () if diagnosis is None else ("probability", diagnosis.sentence, *diagnosis.notes)
+        said: tuple[str | None, ...] = ()
+        if diagnosis is not None:
+            outcomes = dict.fromkeys(item.outcome for item in diagnosis.candidates)
+            said = ("probability", diagnosis.sentence, diagnosis.experiment, *diagnosis.notes, *outcomes)
         texts = (*ALWAYS, *(text for text in said if text))
         if texts == self._texts:
             return

@@ -186,7 +186,7 @@ class _LivePage:
         with ui.column().classes("studio-region gap-2"):
             with ui.row().classes("w-full items-center no-wrap gap-3"):
                 self._red = ui.button(icon="fiber_manual_record", on_click=self._record_or_stop)
-                self._red.props('round color=red-8 aria-label="record" data-testid="record"')
+                self._red.props('round color=red-8 aria-label="record" title="record" data-testid="record"')
                 self._file = ui.input("log to record", value=str(free_name(Path.cwd(), "recording").name))
                 self._file.classes("grow").props('data-testid="file"')
             self._recorded = ui.label(RECORDS).classes("text-sm")
@@ -353,7 +353,8 @@ class _LivePage:
 
     def _show_recording(self, recorded: Recorded) -> None:
         self._red.props(f"icon={'stop' if recorded.running else 'fiber_manual_record'}")
-        self._red.props(f'aria-label="{"stop" if recorded.running else "record"}"')
+        word = "stop" if recorded.running else "record"
+        self._red.props(f'aria-label="{word}" title="{word}"')
         self._file.set_enabled(not recorded.running)
         if recorded.path is None:
             return

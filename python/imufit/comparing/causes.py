@@ -1,0 +1,151 @@
+"""The residual against causes that a finding names beside the covariates: derivatives, products, the heading.
+
+Such a cause acts through several columns, so the residual stands against the part that their best fit explains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imufit import _imufit
+from imufit.fitting.analysis import Analysis
+from imufit.fitting.passes import CHANNELS, CHUNK_ROWS, UNITS
+from imufit.results import Panel
+
+Array = NDArray[np.float64]
+
+BINS: Final = 12
+"""Bins of a panel, as many as a covariate has."""
+BLOCKS: Final = 48
+"""Stretches of time whose scatter gives the band."""
+MOST_CHUNKS: Final = 8
+"""Chunks of rows that are evaluated, spread over the log: some 130 000 rows, in a second."""
+OF: Final = ":"
+"""Stands between a product and the axis that it acts on, in the name of a parameter of a cause."""
+VECTORS: Final = ("f", "omega", "m")
+
+
+def cause_names(analysis: Analysis, log: int, channel: str) -> tuple[str, ...]:
+    """Return the causes that a finding can name for a channel, as a finding calls them.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        The evidence, with the columns of the causes.
+    log : int
+        Number of the log.
+    channel : str
+        For instance ``acc_x``.
+    """
+    return tuple(_causes(analysis, log, channel))
+
+
+def cause_panels(
+    analysis: Analysis, step: Array, log: int, channel: str, cause: str, others: Sequence[tuple[Analysis, Array]] = ()
+) -> tuple[Panel | None, ...]:
+    """Return the residual of a channel against the part of it that a cause explains, after a step of all parameters.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        The evidence.
+    step : ndarray
+        (p,) step of every parameter, SI units.
+    log : int
+        Number of the log.
+    channel : str
+        For instance ``acc_x``.
+    cause : str
+        One of `cause_names`.
+    others : sequence of (Analysis, ndarray)
+        Evidence and step of other models of the same log, whose residuals are drawn against the same part.
+
+    Returns
+    -------
+    tuple of Panel or None
+        One for the model, then one for each of the others; None where too few rows are known.
+    """
+    slot, places = _causes(analysis, log, channel)[cause]
+    evidence = analysis.logs[log]
+    along = len(analysis.problem.estimate(analysis.fitted_slots)["parameters"])
+    solved = analysis.problem.estimate([*analysis.fitted_slots, slot])
+    chosen = [solved["parameters"][along:][k] for k in places]
+    moved = step.copy()
+    moved[chosen] += solved["full_step"][chosen]
+    index = CHANNELS.index(channel)
+    asked = [(analysis, step), (analysis, moved), *others]
+    sources = [(each.logs[log].raw, each.own_step(log, at)) for each, at in asked]
+    every = -(-evidence.surveyed.log.n // (CHUNK_ROWS * MOST_CHUNKS))
+    pieces: list[list[Array]] = []
+    for number, arrays in enumerate(evidence.passes.chunks(evidence.passes.margin(evidence.facts), "comparing")):
+        if number % every:
+            continue
+        residuals = [_imufit.evaluate(raw, arrays, at)[index] for raw, at in sources]
+        size = arrays["end"] - arrays["begin"]
+        pieces.append([np.full(size, np.nan) if found is None else found for found in residuals])
+    rows = [np.concatenate(part) for part in zip(*pieces, strict=True)]
+    if not rows:
+        return (None,) * (1 + len(others))
+    part = rows[0] - rows[1]
+    floor = evidence.floors[index]
+    return tuple(_panel(part, residual, channel, cause, floor) for residual in (rows[0], *rows[2:]))
+
+
+def _causes(analysis: Analysis, log: int, channel: str) -> dict[str, tuple[int, list[int]]]:
+    """Return the slot of every cause of a channel, and which of the slot's parameters are the cause's, by its name."""
+    evidence = analysis.logs[log]
+    sensor, axis = channel.split("_")
+    found: dict[str, tuple[int, list[int]]] = {}
+    for slot in analysis.probe_slots:
+        key = analysis.slots[slot]
+        probe = evidence.surveyed.probes.get(key)
+        if probe is None or key not in evidence.slots or probe.reference_part or probe.sensors != [sensor]:
+            continue
+        name = probe.words["name"]
+        for k, (parameter, _, _) in enumerate(probe.parameters):
+            product, between, acts_on = parameter.partition(OF)
+            if between and acts_on != axis:
+                continue
+            own = f"{name}_{axis}" if name in VECTORS else name
+            of, places = found.setdefault(product if between else own, (slot, []))
+            # A second cause of the same name says the same in other words.
+            if of == slot:
+                places.append(k)
+    return found
+
+
+def _panel(part: Array, residual: Array, channel: str, cause: str, floor: float) -> Panel | None:
+    """Average a residual in bins of equal count."""
+    known = np.isfinite(part) & np.isfinite(residual)
+    x, y = part[known], residual[known]
+    inner = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)[1:-1])) if x.size > BINS else np.empty(0)
+    if not inner.size or inner[0] == inner[-1]:
+        return None
+    bins, shape = inner.size + 1, (BLOCKS, inner.size + 1)
+    at = np.searchsorted(inner, x, side="right")
+    cell = (np.arange(x.size) * BLOCKS // x.size) * bins + at
+    count = np.bincount(cell, minlength=BLOCKS * bins).reshape(shape)
+    sums = np.bincount(cell, y, minlength=BLOCKS * bins).reshape(shape)
+    of_bin = np.maximum(count.sum(axis=0), 1)
+    mean = sums.sum(axis=0) / of_bin
+    parts = (count > 0).sum(axis=0)
+    scatter = ((sums - mean * count) ** 2).sum(axis=0)
+    band = np.where(parts > 1, 1.96 * np.sqrt(scatter * parts / np.maximum(parts - 1, 1)) / of_bin, np.nan)
+    between = float((of_bin * mean**2).sum() - y.sum() ** 2 / y.size)
+    square = float((y**2).sum())
+    excess = max(square - y.size * floor**2, 0.05 * square)
+    return Panel(
+        channel=channel,
+        covariate=cause,
+        channel_unit=UNITS[channel[:3]],
+        covariate_unit=UNITS[channel[:3]],
+        centre=np.bincount(at, x, minlength=bins) / of_bin,
+        mean=mean,
+        band=band,
+        noise_floor=floor,
+        share=float(np.clip((between - (bins - 1) * floor**2) / excess, 0.0, 1.0)) if excess > 0.0 else 0.0,
+    )
