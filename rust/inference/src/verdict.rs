@@ -264,17 +264,20 @@ pub fn decide(
     let mut rivals = best.map_or_else(|| Some(Vec::new()), |best| rivals_of(search, &members, best, known))?;
     if let Some(first) = best.filter(|best| fitted.iter().any(|(slot, _)| slot == best)) {
         let can = |slot: usize| weighed.iter().any(|w| w.slot == slot && w.plausible == Plausible::Yes);
-        let possible = fitted.iter().filter(|(slot, _)| can(*slot) || *slot == first);
-        let most = possible.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let possible = (fitted.iter()).filter(|(slot, ln)| ln.is_finite() && (can(*slot) || *slot == first));
         rivals.retain(|r| !fitted.iter().any(|(slot, _)| slot == r));
-        rivals.extend(
-            (fitted.iter())
-                .filter(|(slot, ln)| *slot != most.0 && *ln >= most.1 - search.threshold)
-                .map(|(slot, _)| *slot),
-        );
-        members.iter_mut().filter(|m| **m == first).for_each(|m| *m = most.0);
-        best = Some(most.0);
-        unclear = self::unclear(&inquiry, &members, &instead, &left, Some(*most));
+        // Where a fit confirms none that sensors can have, what it confirms has another cause.
+        best = None;
+        if let Some(most) = possible.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            rivals.extend(
+                (fitted.iter())
+                    .filter(|(slot, ln)| *slot != most.0 && *ln >= most.1 - search.threshold)
+                    .map(|(slot, _)| *slot),
+            );
+            members.iter_mut().filter(|m| **m == first).for_each(|m| *m = most.0);
+            best = Some(most.0);
+            unclear = self::unclear(&inquiry, &members, &instead, &left, Some(*most));
+        }
     }
     let impossible = too_large
         || (search.weigh_all(&stack, &members).iter())
@@ -329,14 +332,17 @@ fn unclear(
 ) -> Vec<Sensor> {
     let search = &inquiry.search;
     let problem = search.criterion.problem;
+    let all = search.evidence(members);
     let of = |sensor: &&Sensor| {
         let acts = |slot: &usize| problem.slots[*slot].effect.sensors().contains(sensor);
-        let own: Vec<usize> = members.iter().copied().filter(acts).collect();
-        let columns = search.evidence(&own);
+        let (own, others): (Vec<usize>, Vec<usize>) = members.iter().partition(|slot| acts(slot));
+        // Effects of several sensors may need one another: what is lost without those of this sensor.
+        let rest = search.evidence(&others);
+        let columns = all - rest;
         let curved = |slot: usize| problem.slots[slot].effect.strongly_curved();
         let named = match fitted.filter(|(slot, _)| own.contains(slot) && curved(*slot)) {
             // A fit may show that columns taken at one point promise too little; what it explains is less where others have explained a part.
-            Some((slot, ln)) => columns.max(search.evidence(&search::without(&own, slot)) + ln),
+            Some((slot, ln)) => columns.max(search.evidence(&search::without(members, slot)) + ln - rest),
             None => columns,
         };
         let most = |causes: &[Shown]| {
