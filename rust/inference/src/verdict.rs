@@ -90,8 +90,6 @@ pub struct Named {
     before: Vec<f64>,
     /// Unnamed causes beside these effects, be they the same all the time or not, the likeliest first.
     unexplained: Vec<Unexplained>,
-    /// Log Bayes factor from which on they are there.
-    least: f64,
     /// Effects of the model, of these or of the catalogue whose coefficient drifts or switches, by slot, and the log Bayes factors of that.
     varying: Vec<(usize, f64)>,
     /// True if what explains most cannot be so large.
@@ -145,8 +143,7 @@ const NAMED_SHARE: f64 = 0.8;
 
 /// Two columns may differ by this many times their noise (in variance) and still count as the same.
 const NOISE: f64 = 2.0;
-/// Log odds by which a cause without a name is less likely than one of the catalogue, before the log is seen. Once an effect of the catalogue
-/// has evidence, something is there, and the log alone decides between its name and none.
+/// Log odds by which a cause without a name is less likely than one of the catalogue, before the log is seen.
 const UNNAMED: f64 = 5.0;
 
 /// Everything that is asked of one problem.
@@ -157,14 +154,9 @@ struct Inquiry<'a> {
 }
 
 impl Inquiry<'_> {
-    /// Log Bayes factor from which on an unnamed cause takes the place of an effect.
-    fn rival(&self) -> f64 {
-        self.threshold - UNNAMED
-    }
-
     /// Unnamed causes beside a stack: log Bayes factor of each of those with columns of their own.
     fn beside(&self, stack: &Stack) -> Vec<f64> {
-        self.exceeding(stack, self.rival(), &Sensor::ALL)
+        self.exceeding(stack, self.threshold, &Sensor::ALL)
     }
 
     /// The same, worked out in full only where they may exceed some value, and not at all where none of some sensors shows them.
@@ -232,7 +224,6 @@ pub fn decide(
         mut members,
         before,
         unexplained,
-        least,
         varying,
         too_large,
     } = named.clone();
@@ -244,7 +235,7 @@ pub fn decide(
         .map(|(unnamed, ln)| cause(unnamed, *ln))
         .collect();
     let of_slot = |(slot, ln): &(usize, f64)| (problem.slots[*slot].effect.sensors().to_vec(), *ln);
-    let there = unexplained.iter().filter(|left| left.steady >= least);
+    let there = unexplained.iter().filter(|left| left.steady >= inquiry.threshold);
     let left: Vec<Shown> = (there.map(|left| cause(&left.unnamed, left.steady)))
         .chain(varying.iter().map(of_slot))
         .collect();
@@ -369,38 +360,36 @@ fn named(inquiry: &Inquiry, alone: &Stack, weighed: &[Weighed]) -> Option<Named>
     let before = inquiry.beside(alone);
     // What explains most, and cannot be so large, has a cause that nobody knows: a lesser effect in its place would be a wrong name.
     let too_large = outdone(weighed);
-    let (members, left, replaced) = if too_large {
-        (Vec::new(), before.clone(), false)
+    let (members, left) = if too_large {
+        (Vec::new(), before.clone())
     } else {
         beside_unnamed(inquiry)?
     };
     let stack = inquiry.search.stack(&members)?;
-    let least = if replaced { inquiry.rival() } else { inquiry.threshold };
-    let unexplained = unexplained(inquiry, &members, &stack, &left, least);
-    let definite = unexplained.iter().any(|left| left.steady >= least);
+    let unexplained = unexplained(inquiry, &members, &stack, &left);
+    let definite = unexplained.iter().any(|left| left.steady >= inquiry.threshold);
     let varying = varying(inquiry, &members, &stack, !definite);
     Some(Named {
         members,
         before,
         unexplained,
-        least,
         varying,
         too_large,
     })
 }
 
-/// Causes without a name beside members with a log Bayes factor of at least `least`, by evidence; `left` has those with columns of their own.
-fn unexplained(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64], least: f64) -> Vec<Unexplained> {
+/// Causes without a name beside members, by evidence; `left` are the log Bayes factors of those with columns of their own.
+fn unexplained(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) -> Vec<Unexplained> {
     let fixed = |(unnamed, ln_bayes): (&Arc<Unnamed>, &f64)| {
         let steady = || dictionary::varying(&inquiry.search, stack, members, unnamed);
-        (*ln_bayes >= least).then(|| Unexplained {
+        (*ln_bayes >= inquiry.threshold).then(|| Unexplained {
             unnamed: unnamed.clone(),
             ln_bayes: *ln_bayes,
             steady: ln_bayes.min(steady()),
         })
     };
     let fixed: Vec<Unexplained> = inquiry.unnamed.par_iter().zip(left).filter_map(fixed).collect();
-    let courses = inquiry.courses(stack, least, &Sensor::ALL);
+    let courses = inquiry.courses(stack, inquiry.threshold, &Sensor::ALL);
     let courses = courses.into_iter().map(|(course, ln_bayes)| Unexplained {
         unnamed: Arc::new(course),
         ln_bayes,
@@ -429,9 +418,8 @@ fn varying(inquiry: &Inquiry, members: &[usize], stack: &Stack, all: bool) -> Ve
         .collect()
 }
 
-/// Effects that are there beside one another and beside unnamed causes, the log Bayes factors of these, and whether any has taken the place of
-/// an effect.
-fn beside_unnamed(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>, bool)> {
+/// Effects that are there beside one another and beside unnamed causes, and the log Bayes factors of these.
+fn beside_unnamed(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>)> {
     let search = &inquiry.search;
     let (mut members, mut stack) = search.find()?;
     let found = members.len();
@@ -452,14 +440,12 @@ fn beside_unnamed(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>, bool)> {
         stack = search.stack(&members)?;
     }
     // A named effect must be there beside the likeliest unnamed cause too, not only in its place.
-    let mut any = false;
     loop {
         let left = inquiry.beside(&stack);
         match stands_in(inquiry, &members, &stack, &left) {
             Some(unneeded) => members.retain(|m| *m != unneeded),
-            None => return Some((members, left, any)),
+            None => return Some((members, left)),
         }
-        any = true;
         stack = search.stack(&members)?;
     }
 }
@@ -489,11 +475,11 @@ fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) 
         };
         let own = search.weigh(&without, *member).map_or(0.0, |w| w.ln_bayes);
         let replaced = |instead: f64, beside: f64| {
-            let likelier = instead - inquiry.rival() > own - search.threshold;
-            instead >= inquiry.rival() && likelier && beside + own - instead < search.threshold
+            let likelier = instead - inquiry.threshold > own - search.threshold;
+            instead >= inquiry.threshold && likelier && beside + own - instead < search.threshold
         };
         // What has less evidence than the member takes no place.
-        let least = (own - search.threshold).max(0.0) + inquiry.rival();
+        let least = (own - search.threshold).max(0.0) + inquiry.threshold;
         let sensors = search.criterion.problem.slots[*member].effect.sensors();
         let instead = inquiry.exceeding(&without, least, sensors);
         let fixed = (0..left.len()).any(|k| {
