@@ -233,3 +233,16 @@ def test_readings_that_no_instrument_resolves_are_zero_and_the_rest_is_as_it_was
     log = Log.from_arrays([0.0, 0.5], acc=rows, covariates={"vbat": [1e-308, 3.7]})
     np.testing.assert_array_equal(log.acc, [[9.8, 1e-29, 0.0], [0.0, np.nan, -9.8]])
     np.testing.assert_array_equal(log.covariates["vbat"], [1e-308, 3.7])
+
+
+def test_a_file_that_lost_its_line_ends_is_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(",".join(["t", "acc_x", "acc_y", "acc_z", *["0.01"] * 6000]))
+    assert "6004 columns, more than 1024: this is not a table of rows" in message(path)
+
+
+def test_parquet_text_that_is_not_utf8_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    words = pa.array([b"still \xdf"] * N).view(pa.string())
+    pq.write_table(pa.table({**COLUMNS, "note": words}), path)
+    assert "the file is damaged" in message(path)

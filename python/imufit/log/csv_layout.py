@@ -12,7 +12,7 @@ from typing import IO, Final
 
 from imufit.errors import InputError
 from imufit.log.check import number_from_text
-from imufit.log.size import LONGEST_LINE, size_in_words
+from imufit.log.size import LONGEST_LINE, MOST_COLUMNS, size_in_words
 from imufit.log.units import lookup
 
 _SAMPLE: Final = 1 << 16
@@ -133,6 +133,13 @@ def read_layout(path: Path) -> Layout:
     if decimal == ",":
         lines = [line.replace(",", ".") for line in lines]
     header, names, notes = _header(lines, table, separator, width, path)
+    if len(names) > MOST_COLUMNS:
+        raise InputError(
+            f"a line has {len(names)} columns, more than {MOST_COLUMNS}: this is not a table of rows",
+            file=path,
+            line=(table[0] if header is None else header) + 1,
+            remedy="Export it with a line for each sample.",
+        )
     first = 0 if header is None else header + 1
     if not _holds_numbers([split_line(lines[i], separator) for i in table if i >= first]):
         raise InputError(

@@ -148,6 +148,9 @@ class ParquetSource:
                 wanted = list(columns) or None
                 groups = range(group, len(self._groups))
                 for batch in file.iter_batches(rows, groups, columns=wanted, use_threads=False):
+                    # Its reader does not check whether text is UTF-8.
+                    for name in self.text.intersection(columns):
+                        batch.column(name).validate(full=True)
                     yield start, batch
                     start += batch.num_rows
         except _BROKEN as error:

@@ -21,6 +21,9 @@ LONGEST_TEXT: Final = 4096
 """Bytes of a cell of text: labels are words. A longer one would take memory for nothing."""
 LONGEST_LINE: Final = 1 << 20
 """Bytes of a line of text: a thousand columns take a fiftieth of it."""
+MOST_COLUMNS: Final = 1024
+"""Columns of a text table: an optical system with 300 markers has 900. What lost its line ends has thousands, and the
+time to recognise them grows with their square (5720 took 13 s)."""
 TEXT_GROUP: Final = 64 << 20
 """Bytes of a column of text in one row group of Parquet, as it stands when it is unpacked: that is done at once."""
 

@@ -55,8 +55,7 @@ impl Block {
 /// Deviation factors of a channel's zeros: L with R = L L^T (blocks x modes), in units of the noise of a sample.
 fn factor(modes: &Modes, strength: Strength, count: &DVector<f64>) -> DMatrix<f64> {
     // of_blocks = Q^T D^1/2, so that D^-1/2 Q = (of_blocks D^-1)^T.
-    let blocks = count.len();
-    DMatrix::from_fn(blocks, blocks, |b, k| {
+    DMatrix::from_fn(count.len(), modes.walk.len(), |b, k| {
         let variance = strength.walk * modes.walk[k] + strength.scatter;
         if count[b] > 0.0 {
             modes.of_blocks[(k, b)] / count[b] * variance.sqrt()

@@ -75,25 +75,30 @@ impl Modes {
     /// Of the block sums of a channel.
     pub fn new(sums: &ChannelSums) -> Self {
         let blocks = sums.count.len();
-        let filled = sums.count.iter().filter(|n| **n > 0.0).count().max(1);
-        let mean = sums.count.sum() / filled as f64;
-        let root = sums.count.map(|n| n.max(0.0).sqrt());
+        // Blocks without samples have no mean: the eigenvectors of a matrix with rows of zeros may not be found.
+        let filled: Vec<usize> = (0..blocks).filter(|b| sums.count[*b] > 0.0).collect();
+        let mean = sums.count.sum() / filled.len().max(1) as f64;
+        let root = DVector::from_iterator(filled.len(), filled.iter().map(|b| sums.count[*b].sqrt()));
         let walk = sums.walk.covariance(blocks);
-        let scaled = DMatrix::from_fn(blocks, blocks, |i, j| {
-            root[i] * walk[(i, j)] * root[j] / mean.max(f64::MIN_POSITIVE)
+        let scaled = DMatrix::from_fn(filled.len(), filled.len(), |i, j| {
+            root[i] * walk[(filled[i], filled[j])] * root[j] / mean
         });
         let eigen = scaled.symmetric_eigen();
         let turned = eigen.eigenvectors.transpose();
-        let inverse = root.map(|r| if r > 0.0 { 1.0 / r } else { 0.0 });
         let weight = sums.weight.sqrt();
-        let rotation = DMatrix::from_fn(blocks, blocks, |k, b| turned[(k, b)] * inverse[b] * weight);
+        let mut rotation = DMatrix::zeros(filled.len(), blocks);
+        let mut of_blocks = rotation.clone();
+        for (place, block) in filled.iter().enumerate() {
+            rotation.set_column(*block, &(turned.column(place) * (weight / root[place])));
+            of_blocks.set_column(*block, &(turned.column(place) * root[place]));
+        }
         Self {
             log: sums.log,
             channel: sums.channel,
             sums: &rotation * &sums.sums,
             right: &rotation * &sums.right,
             walk: eigen.eigenvalues.map(|l| l.max(0.0)),
-            of_blocks: DMatrix::from_fn(blocks, blocks, |k, b| turned[(k, b)] * root[b]),
+            of_blocks,
             rotation,
             most: sums.most * mean,
         }
@@ -181,5 +186,27 @@ mod tests {
         assert!(dense.is_some_and(|dense| (dense - taken).norm() < 1e-6 * root.norm_squared()));
         let whole = DMatrix::identity(blocks, blocks) + covariance * DMatrix::from_diagonal(&count);
         assert!((modes.log_determinant(strength) - 0.5 * whole.determinant().ln()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn blocks_without_samples_leave_the_others_as_they_are() {
+        let (filled, blocks) = (5, 11);
+        let count = |size: usize| DVector::from_fn(size, |b, _| if b < filled { 30.0 + b as f64 } else { 0.0 });
+        let of = |size: usize| {
+            Modes::new(&ChannelSums {
+                log: 0,
+                channel: 2,
+                weight: 1.0,
+                sums: DMatrix::from_fn(size, 1, |b, _| if b < filled { b as f64 } else { 0.0 }),
+                right: count(size).map(|n| n.sqrt()),
+                count: count(size),
+                walk: Walk::Zero,
+                most: f64::INFINITY,
+            })
+        };
+        let (whole, part) = (of(blocks), of(filled));
+        assert_eq!(whole.walk, part.walk);
+        assert_eq!(whole.right, part.right);
+        assert_eq!(whole.sums, part.sums);
     }
 }
