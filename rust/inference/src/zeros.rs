@@ -198,7 +198,7 @@ mod tests {
                 channel: 2,
                 weight: 1.0,
                 sums: DMatrix::from_fn(size, 1, |b, _| if b < filled { b as f64 } else { 0.0 }),
-                right: count(size).map(|n| n.sqrt()),
+                right: count(size).map(f64::sqrt),
                 count: count(size),
                 walk: Walk::Zero,
                 most: f64::INFINITY,
