@@ -46,8 +46,8 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
     alike = {second for _, second, _ in result.correlations}
     near = {slot for slot in alike if items[slot].ln_bayes >= Problem.NEAR * items[best].ln_bayes}
     named = {best, *result.rivals}
-    beside = {slot for slot, item in items.items() if item.status == Status.PASSED and slot not in named}
-    in_its_place = {*named, *near, *(slot for slot in items if ids[slot] in analysis.found)} - beside
+    beside = [slot for slot, item in items.items() if item.status == Status.PASSED and slot not in named]
+    in_its_place = {*named, *near, *(slot for slot in items if ids[slot] in analysis.found)}.difference(beside)
     close = [
         slot
         for slot, item in items.items()
@@ -57,9 +57,8 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
         return []
     # Another missing effect would be charged to the effect that replaces it best.
     others = fit.model
-    for slot in items:
-        if slot in beside:
-            others = others.with_effect(ids[slot])
+    for slot in beside:
+        others = others.with_effect(ids[slot])
     without = tried(fit, others)
     evidence = _guarded(without, {slot: tried(fit, others.with_effect(ids[slot])) for slot in close})
     most = max(evidence.values())

@@ -29,7 +29,7 @@ def seen_in_rows(analysis: Analysis) -> list[Seen]:
     analysis : Analysis
         Evidence of the logs.
     """
-    # That states how much is left and not on what it depends: causes with any evidence come before it.
+    # Noise above the stated one names no cause: causes with any evidence come before it.
     found = [
         (log, index, 0.0, f"it stands at {ratio:.1f} times its stated noise")
         for log, evidence in enumerate(() if is_shaken(analysis) else analysis.logs)

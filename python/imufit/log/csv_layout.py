@@ -83,10 +83,13 @@ def lines_in(file: IO[bytes], path: Path) -> Iterator[bytes]:
 
 def too_long(path: Path) -> InputError:
     """Return the error for a line that no log has."""
+    return _no_rows(f"a line is longer than {size_in_words(LONGEST_LINE)}", path)
+
+
+def _no_rows(fault: str, path: Path, line: int | None = None) -> InputError:
+    """Return the error for a line that holds more than one row of a log."""
     return InputError(
-        f"a line is longer than {size_in_words(LONGEST_LINE)}: this is not a table of rows",
-        file=path,
-        remedy="Export it with a line for each sample.",
+        f"{fault}: this is not a table of rows", file=path, line=line, remedy="Export it with a line for each sample."
     )
 
 
@@ -134,12 +137,8 @@ def read_layout(path: Path) -> Layout:
         lines = [line.replace(",", ".") for line in lines]
     header, names, notes = _header(lines, table, separator, width, path)
     if len(names) > MOST_COLUMNS:
-        raise InputError(
-            f"a line has {len(names)} columns, more than {MOST_COLUMNS}: this is not a table of rows",
-            file=path,
-            line=(table[0] if header is None else header) + 1,
-            remedy="Export it with a line for each sample.",
-        )
+        line = (table[0] if header is None else header) + 1
+        raise _no_rows(f"a line has {len(names)} columns, more than {MOST_COLUMNS}", path, line)
     first = 0 if header is None else header + 1
     if not _holds_numbers([split_line(lines[i], separator) for i in table if i >= first]):
         raise InputError(

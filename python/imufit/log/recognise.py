@@ -401,7 +401,7 @@ class _Open:
     timeless : bool
         Whether the time is missing.
     others : dict
-        What else may be each group, where that would be left out.
+        Other candidates for each group, which the proposed mapping leaves out.
     """
 
     lacking: dict[str, dict[str, str]]

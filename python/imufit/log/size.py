@@ -22,8 +22,8 @@ LONGEST_TEXT: Final = 4096
 LONGEST_LINE: Final = 1 << 20
 """Bytes of a line of text: a thousand columns take a fiftieth of it."""
 MOST_COLUMNS: Final = 1024
-"""Columns of a text table: an optical system with 300 markers has 900. What lost its line ends has thousands, and the
-time to recognise them grows with their square (5720 took 13 s)."""
+"""Columns of a text table. An optical system with 300 markers has 900; a file without its line ends has thousands. The
+time to recognise columns grows with the square of their number: 5720 took 13 s."""
 TEXT_GROUP: Final = 64 << 20
 """Bytes of a column of text in one row group of Parquet, as it stands when it is unpacked: that is done at once."""
 
