@@ -24,9 +24,6 @@ BLOCKS: Final = 48
 """Stretches of time whose scatter gives the band."""
 MOST_CHUNKS: Final = 8
 """Chunks of rows that are evaluated, spread over the log: some 130 000 rows, in a second."""
-OF: Final = ":"
-"""Stands between a product and the axis that it acts on, in the name of a parameter of a cause."""
-VECTORS: Final = ("f", "omega", "m")
 
 
 def cause_names(analysis: Analysis, log: int, channel: str) -> tuple[str, ...]:
@@ -105,13 +102,11 @@ def _causes(analysis: Analysis, log: int, channel: str) -> dict[str, tuple[int, 
         probe = evidence.surveyed.probes.get(key)
         if probe is None or key not in evidence.slots or probe.reference_part or probe.sensors != [sensor]:
             continue
-        name = probe.words["name"]
-        for k, (parameter, _, _) in enumerate(probe.parameters):
-            product, between, acts_on = parameter.partition(OF)
-            if between and acts_on != axis:
+        for k in range(len(probe.parameters)):
+            name = probe.cause(k, "xyz".index(axis))
+            if name is None:
                 continue
-            own = f"{name}_{axis}" if name in VECTORS else name
-            of, places = found.setdefault(product if between else own, (slot, []))
+            of, places = found.setdefault(name, (slot, []))
             # A second cause of the same name says the same in other words.
             if of == slot:
                 places.append(k)

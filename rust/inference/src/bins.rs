@@ -2,8 +2,7 @@
 
 use imufit_fit::block_equations::Form;
 use imufit_fit::evidence::ChannelBlock;
-use imufit_model::probes::OF;
-use imufit_model::sensor::AXES;
+use imufit_model::probes;
 use imufit_model::sensor_model::Slot;
 use nalgebra::{DMatrix, DVector};
 
@@ -204,16 +203,9 @@ pub(crate) fn of_probe(slot: &Slot, certainties: &[f64]) -> OfProbe {
         0
     };
     let card = slot.effect.card();
-    // What the axis itself causes is called as its own bins are.
-    let own = matches!(card.name.as_str(), "f" | "omega" | "m");
-    let covariate = match card.parameters.get(largest).and_then(|p| p.name.split_once(OF)) {
-        Some((product, _)) => product.to_string(),
-        None if own => format!("{}_{}", card.name, AXES[axis]),
-        None => card.name.clone(),
-    };
     OfProbe {
         channel: 3 * sensor + axis,
-        covariate,
+        covariate: probes::cause(card, largest, axis),
         shape: card.signature.clone(),
     }
 }

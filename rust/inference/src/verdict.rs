@@ -154,6 +154,11 @@ struct Inquiry<'a> {
 }
 
 impl Inquiry<'_> {
+    /// True if an unnamed cause is there.
+    fn holds(&self, left: &Unexplained) -> bool {
+        left.steady >= self.threshold
+    }
+
     /// Unnamed causes beside a stack: log Bayes factor of each of those with columns of their own.
     fn beside(&self, stack: &Stack) -> Vec<f64> {
         self.exceeding(stack, self.threshold, &Sensor::ALL)
@@ -235,7 +240,7 @@ pub fn decide(
         .map(|(unnamed, ln)| cause(unnamed, *ln))
         .collect();
     let of_slot = |(slot, ln): &(usize, f64)| (problem.slots[*slot].effect.sensors().to_vec(), *ln);
-    let there = unexplained.iter().filter(|left| left.steady >= inquiry.threshold);
+    let there = unexplained.iter().filter(|left| inquiry.holds(left));
     let left: Vec<Shown> = (there.map(|left| cause(&left.unnamed, left.steady)))
         .chain(varying.iter().map(of_slot))
         .collect();
@@ -257,17 +262,14 @@ pub fn decide(
         let can = |slot: usize| weighed.iter().any(|w| w.slot == slot && w.plausible == Plausible::Yes);
         let possible = (fitted.iter()).filter(|(slot, ln)| ln.is_finite() && (can(*slot) || *slot == first));
         rivals.retain(|r| !fitted.iter().any(|(slot, _)| slot == r));
+        let most = possible.max_by(|a, b| a.1.total_cmp(&b.1)).copied();
         // Where a fit confirms none that sensors can have, what it confirms has another cause.
-        best = None;
-        if let Some(most) = possible.max_by(|a, b| a.1.total_cmp(&b.1)) {
-            rivals.extend(
-                (fitted.iter())
-                    .filter(|(slot, ln)| *slot != most.0 && *ln >= most.1 - search.threshold)
-                    .map(|(slot, _)| *slot),
-            );
-            members.iter_mut().filter(|m| **m == first).for_each(|m| *m = most.0);
-            best = Some(most.0);
-            unclear = self::unclear(&inquiry, &members, &instead, &left, Some(*most));
+        best = most.map(|(slot, _)| slot);
+        if let Some((slot, ln)) = most {
+            let as_likely = |f: &&(usize, f64)| f.0 != slot && f.1 >= ln - search.threshold;
+            rivals.extend(fitted.iter().filter(as_likely).map(|f| f.0));
+            members.iter_mut().filter(|m| **m == first).for_each(|m| *m = slot);
+            unclear = self::unclear(&inquiry, &members, &instead, &left, most);
         }
     }
     let impossible = too_large
@@ -288,10 +290,8 @@ pub fn decide(
     let candidates = shown(search, &weighed, &members, best, &rivals);
     let correlations = correlations(problem, model, best, &candidates);
     // Where something is left, the cause that describes it best is stated first, whichever has shown that it is there.
-    let stated = if left.is_empty() { &[][..] } else { &unexplained[..] };
-    let found = stated
-        .iter()
-        .flat_map(|left| finding::told(problem, &stack, &left.unnamed, left.ln_bayes));
+    let stated = unexplained.iter().filter(|_| !left.is_empty());
+    let found = stated.flat_map(|cause| finding::told(problem, &stack, &cause.unnamed, cause.ln_bayes));
     let differing = varying.iter().map(|(slot, ln)| finding::differs(problem, *slot, *ln));
     let mut findings: Vec<Finding> = known.seen.iter().cloned().chain(found).chain(differing).collect();
     findings.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
@@ -367,7 +367,7 @@ fn named(inquiry: &Inquiry, alone: &Stack, weighed: &[Weighed]) -> Option<Named>
     };
     let stack = inquiry.search.stack(&members)?;
     let unexplained = unexplained(inquiry, &members, &stack, &left);
-    let definite = unexplained.iter().any(|left| left.steady >= inquiry.threshold);
+    let definite = unexplained.iter().any(|left| inquiry.holds(left));
     let varying = varying(inquiry, &members, &stack, !definite);
     Some(Named {
         members,

@@ -8,7 +8,9 @@ use imufit_model::catalogue;
 use imufit_model::contract;
 use imufit_model::effect::Effect;
 use imufit_model::facts::LogFacts;
-use imufit_model::sensor::Sensor;
+use imufit_model::probes::{acts_on, cause};
+use imufit_model::sensor::{AXES, Sensor};
+use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -204,6 +206,15 @@ impl PyEffect {
             out.set_item(key, value)?;
         }
         Ok(out)
+    }
+
+    /// What a parameter of a probe says that an axis depends on, as a finding calls it; None if it acts on another axis.
+    fn cause(&self, parameter: usize, axis: usize) -> PyResult<Option<String>> {
+        if axis >= AXES.len() {
+            return Err(PyIndexError::new_err("an axis is 0, 1 or 2"));
+        }
+        let card = self.0.card();
+        Ok(acts_on(card, parameter, axis).then(|| cause(card, parameter, axis)))
     }
 
     /// Why it cannot be offered for a log; None if it can.

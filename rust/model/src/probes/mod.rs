@@ -81,6 +81,23 @@ const CANCELLED: f64 = 3.0;
 /// Stands between a product of two quantities and the axis that it acts on, in the name of a parameter.
 pub const OF: char = ':';
 
+/// What a parameter of a probe says that an axis depends on, as a finding calls it.
+pub fn cause(card: &Card, parameter: usize, axis: usize) -> String {
+    // What the axis itself causes is called as its own bins are.
+    let own = matches!(card.name.as_str(), "f" | "omega" | "m");
+    match card.parameters.get(parameter).and_then(|p| p.name.split_once(OF)) {
+        Some((product, _)) => product.to_string(),
+        None if own => format!("{}_{}", card.name, AXES[axis]),
+        None => card.name.clone(),
+    }
+}
+
+/// True if a parameter of a probe acts on an axis: that of a product acts on one alone.
+pub fn acts_on(card: &Card, parameter: usize, axis: usize) -> bool {
+    let product = card.parameters.get(parameter).and_then(|p| p.name.split_once(OF));
+    product.is_none_or(|(_, own)| own == AXES[axis])
+}
+
 /// A vector of the body frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Motion {
