@@ -50,7 +50,7 @@ def test_model_plot_and_json_are_written(capsys, tmp_path, logs):
     )  # fmt: skip
     assert (code, err) == (0, [])
     for path in (model, figure, result):
-        assert f"wrote {path}" in out.replace("\n", "")
+        assert f"wrote {path}" in " ".join(out.split())
     assert figure.read_bytes()[1:4] == b"PNG"
     assert strict_json(result.read_text())["unit"] == "m/s^2"
     found = SensorModel.load(model).parameters["acc.bias"]

@@ -69,7 +69,7 @@ def test_files_that_are_asked_for_are_written(capsys, tmp_path, log):
         assert (code, err) == (0, [])
         assert page.read_text().startswith("\n<!doctype html>") or "<!doctype html>" in page.read_text()[:20]
         assert figure.read_bytes()[1:4] == b"PNG"
-        assert f"wrote {figure}" in out.replace("\n", "")
+        assert f"wrote {figure}" in " ".join(out.split())
         page.unlink()
         figure.unlink()
 

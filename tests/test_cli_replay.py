@@ -89,7 +89,7 @@ def test_plot_writes_the_figure(capsys, tmp_path, log, ending):
     path = tmp_path / f"tilt.{ending}"
     code, out, err = run(capsys, "replay", log, "--filter", ",".join(METHODS), "--plot", path)
     assert (code, err) == (0, [])
-    assert f"wrote {path}" in out.replace("\n", "")
+    assert f"wrote {path}" in " ".join(out.split())
     start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[ending]
     assert path.read_bytes().startswith(start)
 
