@@ -295,21 +295,39 @@ def test_a_late_reference_is_moved_by_either(tmp_path: Path, monkeypatch: pytest
     assert imufit.diagnose("joined.parquet").data_faults == ()
 
 
-def test_swapped_axes_of_a_calibration(tmp_path: Path) -> None:
+TURNS = [{"acc_x": "acc_y", "acc_y": "acc_x"}, {"acc_x": "acc_y", "acc_y": "acc_z", "acc_z": "acc_x"}]
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_swapped_axes_of_a_calibration(tmp_path: Path, turn: dict[str, str]) -> None:
     recorded = imufit.simulate("six_sides", {}, seed=5).to_log()
     assert imufit.calibrate(recorded, sensors=["acc"]).sensors["acc"]
-    turned = imufit.Log.from_dataframe(recorded, mapping={"acc_x": "acc_y", "acc_y": "acc_x"})
+    turned = imufit.Log.from_dataframe(recorded, mapping=turn)
     with pytest.raises(InputError, match="the labels name other axes") as caught:
         imufit.calibrate(turned, sensors=["acc"])
     assert not OPTION.search(str(caught.value))
     (mapping,) = python_mappings(str(caught.value))
-    restored = imufit.Log.from_dataframe(turned, mapping=mapping)
+    # As the user reads the recording, with this mapping in the place of the own one.
+    restored = imufit.Log.from_dataframe(recorded, mapping=mapping)
     np.testing.assert_array_equal(restored.acc, recorded.acc)
     turned.write(tmp_path / "a.parquet")
     code, _, err = program("calibrate", str(tmp_path / "a.parquet"), "--sensor", "acc")
     assert code == 2
     (shell,) = shell_mappings(err)
     assert program("calibrate", str(tmp_path / "a.parquet"), "--sensor", "acc", "--map", shell)[0] == 0
+
+
+def test_a_calibration_names_the_columns_of_the_file(tmp_path: Path) -> None:
+    recorded = imufit.simulate("six_sides", {}, seed=5).to_log()
+    path = tmp_path / "bench.csv"
+    names = {f"acc_{axis}": f"Accel{axis.upper()}" for axis in "xyz"}
+    recorded.to_pandas().rename(columns=names).to_csv(path, index=False)
+    swapped = {"acc_x": "AccelY", "acc_y": "AccelX", "acc_z": "AccelZ"}
+    with pytest.raises(InputError, match="the labels name other axes") as caught:
+        imufit.calibrate(imufit.read(path, mapping=swapped), sensors=["acc"])
+    (mapping,) = python_mappings(str(caught.value))
+    assert set(mapping.values()) == set(names.values())
+    assert imufit.calibrate(imufit.read(path, mapping=mapping), sensors=["acc"]).sensors["acc"]
 
 
 def test_a_refused_join_names_lag_and_attitude_in_both(tmp_path: Path) -> None:

@@ -17,6 +17,17 @@ _WITHIN: Final = re.compile(
 )
 
 
+def unbroken(text: str) -> str:
+    """Return a text whose quantities hold no blank at which a line may end.
+
+    Parameters
+    ----------
+    text : str
+        Prose.
+    """
+    return _WITHIN.sub(NO_BREAK, text)
+
+
 def lines_of(text: str, width: int, first: str = "", later: str = "") -> list[str]:
     """Break each line of a text at blanks, none of them within a quantity.
 
@@ -37,7 +48,7 @@ def lines_of(text: str, width: int, first: str = "", later: str = "") -> list[st
     lines: list[str] = []
     for paragraph in text.split("\n"):
         broken = textwrap.wrap(
-            _WITHIN.sub(NO_BREAK, paragraph),
+            unbroken(paragraph),
             max(width, 1),
             initial_indent=first,
             subsequent_indent=later,

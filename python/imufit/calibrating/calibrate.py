@@ -112,7 +112,7 @@ class _Session:
         failures: list[InputError] = []
         temperature: Temperature | None = None
         if self.poses and ("acc" in wanted or "gyr" in wanted):
-            check_unit(self.used or self.poses, self.gravity, self.file)
+            check_unit(self.used or self.poses, self.logs[0])
         for name in wanted:
             mean = np.nan if temperature is None or temperature.mean is None else temperature.mean
             try:
@@ -158,7 +158,7 @@ class _Session:
             ) from None
 
     def _accelerometer(self, cost: str | None) -> tuple[SensorCalibration, Temperature | None]:
-        self.poses, flips = checks.check_labels(self.poses, self.file)
+        self.poses, flips = checks.check_labels(self.poses, self.logs[0])
         if not self.used:
             return self._from_motion(cost), None
         usable = self.used

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +12,16 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.calibrating.calibration import AXES
 from imufit.errors import InputError
-from imufit.remedy import mapped, option, when_read
+from imufit.remedy import Remedy, mapped, option, when_read
 from imufit.rests.poses import SIDES, Pose, distinct, repeated
+
+if TYPE_CHECKING:
+    from imufit.log import Log
 
 UNKNOWNS = {"vector": 12, "magnitude": 9}
 
 
-def check_labels(poses: Sequence[Pose], file: object) -> tuple[list[Pose], list[str]]:
+def check_labels(poses: Sequence[Pose], log: Log) -> tuple[list[Pose], list[str]]:
     """Compare labels with the side that is up by the readings.
 
     An axis of which both sides read the wrong way round is flipped: that is kept, and calibrated as a negative scale.
@@ -26,8 +30,8 @@ def check_labels(poses: Sequence[Pose], file: object) -> tuple[list[Pose], list[
     ----------
     poses : sequence of Pose
         All of them.
-    file : object
-        To name in the error.
+    log : Log
+        The remedy names the columns of its file.
 
     Returns
     -------
@@ -55,13 +59,18 @@ def check_labels(poses: Sequence[Pose], file: object) -> tuple[list[Pose], list[
     swapped = [axis for axis in AXES if turned[axis] and not any(f"{s}{axis}" in seen[f"{s}{axis}"] for s in "+-")]
     if len(swapped) >= 2:
         pairs = ", ".join(f"{axis} up reads on {' and '.join(sorted(turned[axis]))}" for axis in swapped)
+        remedy: str | Remedy = "The axes are swapped: correct the labels."
+        reads = {axis: min(turned[axis]) for axis in swapped}
+        if set(reads.values()) == set(swapped):
+            columns = {f"acc_{axis}": f"acc_{other}" for axis, other in reads.items()}
+            remedy = "The axes are swapped: correct the labels, or map the columns with " + when_read(
+                mapped(log.origin.mapping(columns))
+            )
         raise InputError(
             f"the labels name other axes than the readings: {pairs}",
-            file=str(file),
+            file=str(log.path or "log"),
             column="pose",
-            remedy="The axes are swapped: correct the labels, or map the columns, e.g. "
-            + when_read(mapped({"acc_x": "acc_y", "acc_y": "acc_x"}))
-            + ".",
+            remedy=remedy,
         )
     judged = []
     for pose in poses:

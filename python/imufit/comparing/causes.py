@@ -18,10 +18,6 @@ from imufit.results import Panel
 
 Array = NDArray[np.float64]
 
-BINS: Final = 12
-"""Bins of a panel, as many as a covariate has."""
-BLOCKS: Final = 48
-"""Stretches of time whose scatter gives the band."""
 MOST_CHUNKS: Final = 8
 """Chunks of rows that are evaluated, spread over the log: some 130 000 rows, in a second."""
 
@@ -115,32 +111,9 @@ def _causes(analysis: Analysis, log: int, channel: str) -> dict[str, tuple[int, 
 
 def _panel(part: Array, residual: Array, channel: str, cause: str, floor: float) -> Panel | None:
     """Average a residual in bins of equal count."""
-    known = np.isfinite(part) & np.isfinite(residual)
-    x, y = part[known], residual[known]
-    inner = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)[1:-1])) if x.size > BINS else np.empty(0)
-    if not inner.size or inner[0] == inner[-1]:
+    found = _imufit.residual_against(part, residual, floor)
+    if found is None:
         return None
-    bins, shape = inner.size + 1, (BLOCKS, inner.size + 1)
-    at = np.searchsorted(inner, x, side="right")
-    cell = (np.arange(x.size) * BLOCKS // x.size) * bins + at
-    count = np.bincount(cell, minlength=BLOCKS * bins).reshape(shape)
-    sums = np.bincount(cell, y, minlength=BLOCKS * bins).reshape(shape)
-    of_bin = np.maximum(count.sum(axis=0), 1)
-    mean = sums.sum(axis=0) / of_bin
-    parts = (count > 0).sum(axis=0)
-    scatter = ((sums - mean * count) ** 2).sum(axis=0)
-    band = np.where(parts > 1, 1.96 * np.sqrt(scatter * parts / np.maximum(parts - 1, 1)) / of_bin, np.nan)
-    between = float((of_bin * mean**2).sum() - y.sum() ** 2 / y.size)
-    square = float((y**2).sum())
-    excess = max(square - y.size * floor**2, 0.05 * square)
-    return Panel(
-        channel=channel,
-        covariate=cause,
-        channel_unit=UNITS[channel[:3]],
-        covariate_unit=UNITS[channel[:3]],
-        centre=np.bincount(at, x, minlength=bins) / of_bin,
-        mean=mean,
-        band=band,
-        noise_floor=floor,
-        share=float(np.clip((between - (bins - 1) * floor**2) / excess, 0.0, 1.0)) if excess > 0.0 else 0.0,
-    )
+    centre, mean, band, share = found
+    unit = UNITS[channel[:3]]
+    return Panel(channel, cause, unit, unit, centre=centre, mean=mean, band=band, noise_floor=floor, share=share)

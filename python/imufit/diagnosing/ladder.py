@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 from imufit.comparing import attitude_comparison, comparison
 from imufit.diagnosing.add import add
@@ -45,9 +46,7 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
         revisions += way
         climb = climb.again([(revision.removed, revision.by) for revision in way])
         climb.up()
-    if unsettled := climb.unsettled():
-        climb = climb.again([(effect, None) for effect in unsettled])
-    fit, diagnosis, worst = climb.fit, climb.diagnosis, start.worst
+    fit, diagnosis, worst = climb.fit, climb.answer(), start.worst
     whole = start.analysis.judged_by == "reference"
     return Ladder(
         steps=tuple(climb.steps),
@@ -120,9 +119,19 @@ class Climb:
             self._take(addition)
             self.diagnosis = self._diagnose()
 
-    def unsettled(self) -> list[str]:
-        """List the effects of the model that others may still stand for."""
-        return [effect for effect, rivals in self.tied.items() if not settled(self.fit, effect, rivals)]
+    def answer(self) -> Diagnosis:
+        """Return what is missing, or which effects of the model others explain as well."""
+        unsettled = [effect for effect, rivals in self.tied.items() if not settled(self.fit, effect, rivals)]
+        if not unsettled:
+            return self.diagnosis
+        # Whichever of them is there, the error is lower with one in the model.
+        without = self.again([(effect, None) for effect in unsettled]).diagnosis
+        held = [effect for effect in unsettled if effect in without.named]
+        if without.verdict != "ambiguous" or not held:
+            return self.diagnosis if without.verdict == "missing" else without
+        alike = " and ".join((*held, *(effect for effect in without.named if effect not in held)))
+        kept = " and ".join(held)
+        return replace(without, sentence=f"{alike} explain this log equally well, and the model holds {kept}.")
 
     def again(self, changes: Sequence[tuple[str, str | None]]) -> Climb:
         """Return the same way from the same start with effects replaced by others, or left out (None)."""

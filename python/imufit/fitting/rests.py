@@ -261,7 +261,7 @@ def _poses(log: Log, notes: list[str]) -> tuple[list[Pose], float]:
         found = find_poses(log, labelled_only=False)
         poses, noise = [pose for pose in found.poses if pose.used], found.gyr_noise
         if poses:
-            check_unit(poses, float(log.metadata.gravity), log.path or "log")
+            check_unit(poses, log)
     poses = labelled(log, poses)
     if len(poses) >= FEWEST_RESTS or all_sides(poses):
         return poses, noise

@@ -269,7 +269,7 @@ def _next_steps(diagnosis: Diagnosis | None, ladder: Ladder | None) -> list[str]
     if diagnosis is None:
         return [f"Ask which effect is missing: `{command('diagnose')}`."]
     found = "; ".join(str(item) for item in diagnosis.unexplained)
-    rivals = " and ".join(diagnosis.ambiguous_with)
+    rivals = " and ".join(diagnosis.named)
     add = command("add", "Fit.add")
     steps = {
         "missing": f"Add {diagnosis.best} with `{add}`, or let `{command('ladder')}` go on until nothing is missing.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,24 +11,26 @@ from imufit.errors import InputError
 from imufit.remedy import mapped, template, when_read
 from imufit.rests.poses import Pose
 
+if TYPE_CHECKING:
+    from imufit.log import Log
 
-def check_unit(poses: Sequence[Pose], gravity: float, file: object) -> None:
+
+def check_unit(poses: Sequence[Pose], log: Log) -> None:
     """Refuse readings that cannot be m/s^2.
 
     Parameters
     ----------
     poses : sequence of Pose
         At least one.
-    gravity : float
-        m/s^2.
-    file : object
-        To name in the error.
+    log : Log
+        Its gravity holds, and the remedy names the columns of its file.
 
     Raises
     ------
     InputError
         The length at rest is far from gravity's.
     """
+    gravity = float(log.metadata.gravity)
     length = float(np.median([np.linalg.norm(pose.mean) for pose in poses]))
     if 0.5 * gravity < length < 2.0 * gravity:
         return
@@ -37,13 +40,13 @@ def check_unit(poses: Sequence[Pose], gravity: float, file: object) -> None:
     if counts is not None:
         looks = f"{unit} or raw counts of {counts}LSB/g" if unit else f"raw counts of {counts}LSB/g"
         unit = unit or f"{counts}LSB/g"
-    remedy = "Give the unit in the mapping, e.g. " + when_read(template("acc")) + "."
+    remedy = "Give the unit in the mapping, such as " + when_read(template("acc")) + "."
     if unit:
         columns = {f"acc_{axis}": f"acc_{axis}[{unit}]" for axis in "xyz"}
-        remedy = f"It looks like {looks}: map it, e.g. " + when_read(mapped(columns)) + "."
+        remedy = f"It looks like {looks}: map it with " + when_read(mapped(log.origin.mapping(columns))) + "."
     raise InputError(
         f"the accelerometer reads {length:.4g} at rest where gravity is {gravity:.4g} m/s²",
-        file=str(file),
+        file=str(log.path or "log"),
         column="acc_x",
         remedy=remedy,
     )

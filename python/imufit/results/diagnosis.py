@@ -332,7 +332,7 @@ class Diagnosis(Plotted, Result):
         from imufit.figures.candidates import candidate_bars  # noqa: PLC0415
 
         titles = {
-            "ambiguous": f"{' and '.join(self.ambiguous_with)} explain this log equally well",
+            "ambiguous": f"{' and '.join(self.named)} explain this log equally well",
             "unknown": "No effect takes away enough of the held-out error to be the cause",
         }
         return candidate_bars(

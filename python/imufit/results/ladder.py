@@ -103,7 +103,7 @@ class Ladder(Plotted, Result):
     attitude : AttitudeComparison or None
         How far an attitude filter is off without and with the final model, where the log determines this.
     diagnosis : Diagnosis
-        After the last step.
+        After the last step; where other causes explain the log as well as effects of the model, without these.
     comparison_start, comparison_end : Comparison or None
         First and last model against the log; None where rests stand in for a reference.
     first : Diagnosis or None
@@ -143,7 +143,9 @@ class Ladder(Plotted, Result):
             "ratio_end": json_value(self.ratio_end),
             "attitude": None if self.attitude is None else self.attitude.to_dict(),
             "revisions": [revision.to_dict() for revision in self.revisions],
-            "ambiguous_with": list(self.diagnosis.ambiguous_with),
+            "ambiguous_with": [effect for effect in self.diagnosis.named if effect not in self.model]
+            if self.verdict == "ambiguous"
+            else [],
             "unexplained": [item.to_dict() for item in self.diagnosis.unexplained],
             "experiment": self.diagnosis.experiment,
             "data_faults": [fault.to_dict() for fault in self.diagnosis.data_faults],

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import html
-import re
-from typing import Final
 
 from nicegui import ui
 
 from imufit.glossary import places_in
 from imufit.printable import printable
-
-_APART: Final = re.compile(r"(?<=\d) (?=±|%|°|deg|m/s|µT|s\b|Hz)|(?<=±) ")
-"""Blanks between a number and its error or unit, which stay on one line."""
+from imufit.wrapping import unbroken
 
 
 class Explained(ui.html):
@@ -52,7 +48,7 @@ def marked(text: str, seen: set[str] | None = None) -> str:
         Words that are marked elsewhere already; those of this text are added.
     """
     seen = set() if seen is None else seen
-    shown = _APART.sub("\N{NO-BREAK SPACE}", printable(text))
+    shown = unbroken(printable(text))
     out: list[str] = []
     at = 0
     for begin, end, term in places_in(shown):

@@ -127,6 +127,10 @@ pub struct Beside {
     pub score: DVector<f64>,
 }
 
+/// Part of the information about a parameter that rounding may leave when noise takes all of it, some fifty times the precision of a number.
+/// Of rests that read the same value in every row a part below 1e-15 was left, and negative.
+const ROUNDING: f64 = 1e-14;
+
 impl<'a> Stack<'a> {
     /// Of the parameters given, each with its prior deviation.
     pub fn new(criterion: &'a Criterion<'a>, parameters: &[(usize, f64)]) -> Option<Self> {
@@ -196,7 +200,8 @@ impl<'a> Stack<'a> {
             for i in 0..p {
                 gram[(i, j)] *= deviation[i] * deviation[j];
             }
-            gram[(j, j)] += 1.0;
+            let total = self.criterion.total.gram[(self.columns[j], self.columns[j])];
+            gram[(j, j)] += 1.0 + ROUNDING * total * deviation[j].powi(2);
         }
         right.component_mul_assign(&deviation);
         let factor = Cholesky::new(gram)?;

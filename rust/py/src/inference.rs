@@ -10,7 +10,7 @@ use imufit_inference::{estimate, held_out, revision, verdict};
 use imufit_model::rest_channels;
 use imufit_model::sensor::CHANNELS;
 use nalgebra::{DMatrix, DVector};
-use numpy::{PyArray1, PyArray2};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -327,9 +327,9 @@ impl PyProblem {
                     }
                 }
                 item.set_item("edges", PyArray1::from_vec(py, edges))?;
-                item.set_item("mean", PyArray1::from_slice(py, &p.mean))?;
-                item.set_item("band", PyArray1::from_slice(py, &p.band))?;
-                item.set_item("share", p.share)?;
+                item.set_item("mean", PyArray1::from_slice(py, &p.binned.mean))?;
+                item.set_item("band", PyArray1::from_slice(py, &p.binned.band))?;
+                item.set_item("share", p.binned.share)?;
                 panels.append(item)?;
             }
         }
@@ -371,9 +371,36 @@ fn training(problem: &Problem, step: &DVector<f64>) -> (f64, f64) {
     (square, count)
 }
 
+/// Mean value, mean residual and half width of its 95 % band in each bin, and the share of variance.
+type Binned<'py> = (Values<'py>, Values<'py>, Values<'py>, f64);
+type Values<'py> = Bound<'py, PyArray1<f64>>;
+
+/// Residual (n,) against a value (n,) of the same rows, in bins of equal count: mean value, mean residual and half width of its 95 % band in
+/// each bin, and the share of the residual's variance above the noise `floor` that the bins explain. None where the value does not vary.
+#[pyfunction]
+#[pyo3(signature = (value, residual, floor))]
+fn residual_against<'py>(
+    py: Python<'py>,
+    value: PyReadonlyArray1<'py, f64>,
+    residual: PyReadonlyArray1<'py, f64>,
+    floor: f64,
+) -> PyResult<Option<Binned<'py>>> {
+    let (value, residual) = (value.as_slice()?, residual.as_slice()?);
+    if value.len() != residual.len() {
+        return Err(value_error("value and residual must have the same length"));
+    }
+    let found = compute(py, || residual::against(value, residual, floor))?;
+    let arrays = |(centre, binned): (Vec<f64>, residual::Binned)| {
+        let array = |values| PyArray1::from_vec(py, values);
+        (array(centre), array(binned.mean), array(binned.band), binned.share)
+    };
+    Ok(found.map(arrays))
+}
+
 /// Registers this file's part of the module.
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<PyProblem>()?;
     m.add_function(wrap_pyfunction!(saturate, m)?)?;
+    m.add_function(wrap_pyfunction!(residual_against, m)?)?;
     Ok(())
 }
