@@ -92,6 +92,26 @@ def test_of_two_things_that_cannot_be_told_apart_none_is_added():
     assert answer.verdict == "ambiguous"
 
 
+@pytest.mark.parametrize("effect", ["acc.delay", "acc.lowpass"])
+def test_of_a_delay_and_a_lowpass_that_are_alike_one_stays_and_the_answer_names_the_other(effect):
+    alike = {"acc.delay", "acc.lowpass"}
+    sim = simulate.simulate("handheld", {effect: None, "gyr.bias": None}, 3, 60.0, size=0.3)
+    answer = ladder(sim.to_log())
+    (held,) = alike & set(answer.model)
+    (other,) = alike - {held}
+    assert set(answer.model) == {"gyr.bias", held}
+    assert answer.verdict == "ambiguous"
+    value = answer.to_dict()
+    assert value["ambiguous_with"] == [other]
+    assert value["experiment"]
+    assert f"{held} and {other}" in answer.sentence
+    assert "adequate" not in answer.sentence
+    # The error is down to the noise, and the delay that the model holds is the one that is there.
+    assert answer.ratio_end == pytest.approx(1.0, abs=0.02)
+    (tau,) = (p for p in answer.fit.parameters if p.effect == held)
+    assert abs(tau.value - sim.truth.effects[effect]["tau"]) < 5.0 * tau.standard_error
+
+
 def test_a_second_pose_tells_them_apart():
     parts = [
         static(0.1, v, seed=k) for k, v in enumerate([(0.6, 0.5, 0.2), (-0.5, 0.9, 0.0), (0.1, -0.8, 1.0), (2.5, 0, 0)])

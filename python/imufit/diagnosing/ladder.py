@@ -8,9 +8,10 @@ from dataclasses import replace
 from imufit.comparing import attitude_comparison, comparison
 from imufit.diagnosing.add import add
 from imufit.diagnosing.diagnose import diagnose
-from imufit.diagnosing.revise import revise, settled
+from imufit.diagnosing.revise import revise, unsettled_rivals
 from imufit.figures import quantity
 from imufit.fitting import FittedStack
+from imufit.model.catalogue import find_effect
 from imufit.progress import Progress, silent
 from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
 from imufit.results.diagnosis import PASSED
@@ -46,7 +47,8 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
         revisions += way
         climb = climb.again([(revision.removed, revision.by) for revision in way])
         climb.up()
-    fit, diagnosis, worst = climb.fit, climb.answer(), start.worst
+    climb, diagnosis = climb.end()
+    fit, worst = climb.fit, start.worst
     whole = start.analysis.judged_by == "reference"
     return Ladder(
         steps=tuple(climb.steps),
@@ -119,19 +121,29 @@ class Climb:
             self._take(addition)
             self.diagnosis = self._diagnose()
 
-    def answer(self) -> Diagnosis:
-        """Return what is missing, or which effects of the model others explain as well."""
-        unsettled = [effect for effect, rivals in self.tied.items() if not settled(self.fit, effect, rivals)]
-        if not unsettled:
-            return self.diagnosis
-        # Whichever of them is there, the error is lower with one in the model.
-        without = self.again([(effect, None) for effect in unsettled]).diagnosis
-        held = [effect for effect in unsettled if effect in without.named]
-        if without.verdict != "ambiguous" or not held:
-            return self.diagnosis if without.verdict == "missing" else without
-        alike = " and ".join((*held, *(effect for effect in without.named if effect not in held)))
-        kept = " and ".join(held)
-        return replace(without, sentence=f"{alike} explain this log equally well, and the model holds {kept}.")
+    def end(self) -> tuple[Climb, Diagnosis]:
+        """Return the way without what the log does not determine, and what is missing there.
+
+        Of an effect that rivals explain as well nothing is known but that one of them is there: in another log each has
+        other consequences. Rivals of the same column, such as a delay and a low-pass, lower the error everywhere: one
+        stays in the model, and the answer is that of the model without it.
+        """
+        unsettled = {effect: unsettled_rivals(self.fit, effect, rivals) for effect, rivals in self.tied.items()}
+        unsettled = {effect: rivals for effect, rivals in unsettled.items() if rivals}
+        held = {e: rivals for e, rivals in unsettled.items() if all(_same_column(e, other) for other in rivals)}
+        lost = [effect for effect in unsettled if effect not in held]
+        climb = self.again([(effect, None) for effect in lost]) if lost else self
+        answer = climb.diagnosis
+        if held and answer.verdict == "adequate":
+            without = climb.again([(effect, None) for effect in held]).diagnosis
+            if without.verdict != "ambiguous":
+                return climb, answer
+            answer = replace(without, sentence="")
+        alike = (
+            f"{' and '.join((effect, *rivals))} explain this log equally well, and the model holds {effect}."
+            for effect, rivals in held.items()
+        )
+        return climb, replace(answer, sentence=" ".join(filter(None, (answer.sentence, *alike))))
 
     def again(self, changes: Sequence[tuple[str, str | None]]) -> Climb:
         """Return the same way from the same start with effects replaced by others, or left out (None)."""
@@ -165,6 +177,13 @@ class Climb:
         self.fit = addition.fit
         step = Step(addition.effect, addition.before, addition.expected, addition.after, self.fit.training_ratio)
         self.steps.append(step)
+
+
+def _same_column(effect: str, other: str) -> bool:
+    """Return whether two effects act alike in any log, but for what is small of second order."""
+    first, second = find_effect(effect), find_effect(other)
+    curved = first.strongly_curved and second.strongly_curved
+    return curved and (first.stage, first.sensors) == (second.stage, second.sensors)
 
 
 def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] = ()) -> str | None:

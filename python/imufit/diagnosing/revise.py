@@ -47,8 +47,8 @@ def revise(fit: FittedStack, added: Sequence[str], start: float, seen: set[froze
     return search.way
 
 
-def settled(fit: FittedStack, effect: str, rivals: Sequence[str]) -> bool:
-    """Return whether an effect of a model is likelier than each of its rivals in its place, by a fit of each.
+def unsettled_rivals(fit: FittedStack, effect: str, rivals: Sequence[str]) -> list[str]:
+    """Return the rivals of an effect of a model that are nearly as likely in its place, by a fit of each.
 
     Parameters
     ----------
@@ -59,10 +59,12 @@ def settled(fit: FittedStack, effect: str, rivals: Sequence[str]) -> bool:
     rivals : sequence of str
         Its rivals when it was added.
     """
-    own = _likelihood(fit, fit.model, tried(fit, fit.model))
     others = fit.model.without_effect(effect)
-    models = (others.with_effect(rival) for rival in rivals if rival not in fit.model.effects)
-    return all(_likelihood(fit, model, tried(fit, model)) <= own - SETTLED for model in models)
+    models = {rival: others.with_effect(rival) for rival in rivals if rival not in fit.model.effects}
+    if not models:
+        return []
+    least = _likelihood(fit, fit.model, tried(fit, fit.model)) - SETTLED
+    return [rival for rival, model in models.items() if _likelihood(fit, model, tried(fit, model)) > least]
 
 
 def _likelihood(fit: FittedStack, model: EffectStack, found: Tried) -> float:
