@@ -135,8 +135,8 @@ def comparison():
 def diagnosis(verdict="missing"):
     """Diagnosis with a clear winner, or an ambiguous, unknown or adequate one."""
     rows = (
-        ("gyr.g_sensitivity", 3e-9, 1.03, 0.41, G_SENSITIVITY, (Rival("gyr.misalignment", 0.31),), "passed"),
-        ("gyr.misalignment", 0.004, 1.41, 0.09, (), (Rival("gyr.g_sensitivity", 0.31),), "passed"),
+        ("gyr.g_sensitivity", 3e-9, 1.03, 0.41, G_SENSITIVITY, (Rival("gyr.misalignment", 0.31),), "significant"),
+        ("gyr.misalignment", 0.004, 1.41, 0.09, (), (Rival("gyr.g_sensitivity", 0.31),), "significant"),
         ("gyr.bias_temperature", 0.31, 1.519, 0.01, (), (), "not significant"),
         ("acc.cubic", 1.0, 1.523, -0.01, (), (), "not significant"),
         ("mag.soft_iron", math.nan, math.nan, math.nan, (), (), "not testable here"),
@@ -147,7 +147,7 @@ def diagnosis(verdict="missing"):
             status,
             1.52,
             after,
-            "Acceleration bends the sensing structure." if status == "passed" else "",
+            "Acceleration bends the sensing structure." if status == "significant" else "",
             1.0 - p,
             -math.log(p),
             gain,

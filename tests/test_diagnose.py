@@ -133,7 +133,7 @@ def test_an_effect_in_the_model_is_no_candidate():
 def test_candidates_are_listed_best_first():
     log = simulate.simulate("arm", {"gyr.scale": None}, 1, 60.0, size="medium").to_log()
     answer = SensorModel().fit(log).diagnose()
-    order = {"passed": 0, "not testable here": 2}
+    order = {"significant": 0, "not testable here": 2}
     ranks = [(order.get(c.status, 1), -c.ln_bayes) for c in answer.candidates]
     assert ranks == sorted(ranks)
 

@@ -495,7 +495,7 @@ class Kind:
 
 @final
 class Status:
-    PASSED: ClassVar[Status]
+    SIGNIFICANT: ClassVar[Status]
     NOT_SIGNIFICANT: ClassVar[Status]
     NOT_TESTABLE: ClassVar[Status]
     TOO_LARGE: ClassVar[Status]

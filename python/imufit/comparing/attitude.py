@@ -283,7 +283,7 @@ def _limit(
     if after is not None:
         text += f", {after['total']:.2f} deg with the model applied"
         now = after
-    text += f" (heading {now['heading']:.2f}, inclination {now['inclination']:.2f})."
+    text += f" (heading {now['heading']:.2f} deg, inclination {now['inclination']:.2f} deg)."
     larger = "heading" if now["heading"] >= now["inclination"] else "inclination"
     causes = [d for d in dependences if d.part == larger and d.share >= LIMITS]
     if not causes:

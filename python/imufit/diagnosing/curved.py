@@ -46,7 +46,7 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
     alike = {second for _, second, _ in result.correlations}
     near = {slot for slot in alike if items[slot].ln_bayes >= Problem.NEAR * items[best].ln_bayes}
     named = {best, *result.rivals}
-    beside = [slot for slot, item in items.items() if item.status == Status.PASSED and slot not in named]
+    beside = [slot for slot, item in items.items() if item.status == Status.SIGNIFICANT and slot not in named]
     in_its_place = {*named, *near, *(slot for slot in items if ids[slot] in analysis.found)}.difference(beside)
     close = [
         slot

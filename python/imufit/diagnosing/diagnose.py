@@ -23,7 +23,7 @@ from imufit.fitting.rest_passes import NEEDS_REFERENCE
 from imufit.log.several import name_of
 from imufit.model.catalogue import card_of, each_log_has_its_own, effects
 from imufit.results import Candidate, DataFault, Diagnosis, LogParameters, Parameter, Rival, sentences
-from imufit.results.diagnosis import NOT_TESTABLE, PASSED
+from imufit.results.diagnosis import NOT_TESTABLE, SIGNIFICANT
 
 if TYPE_CHECKING:
     from imufit.fitting import FittedStack
@@ -63,7 +63,7 @@ def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
         _candidate(item, analysis.candidates[ids[item.slot]], confounded.get(ids[item.slot], []), analysis)
         for item in result.candidates
     ]
-    largest = max((c.gain for c in candidates if c.status == PASSED), default=0.0)
+    largest = max((c.gain for c in candidates if c.status == SIGNIFICANT), default=0.0)
     # A fault is one log's, an effect explains something in all of them.
     largest /= len(analysis.logs)
     faults = tuple(replace(fault, spoils=fault.gain * BESIDE > largest) for fault in analysis.faults)

@@ -14,7 +14,7 @@ from imufit.fitting import FittedStack
 from imufit.model.catalogue import find_effect
 from imufit.progress import Progress, silent
 from imufit.results import Addition, Diagnosis, Ladder, Revision, Step
-from imufit.results.diagnosis import PASSED
+from imufit.results.diagnosis import SIGNIFICANT
 
 MAX_STEPS = 12
 
@@ -205,7 +205,7 @@ def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] 
     if diagnosis.verdict == "ambiguous":
         offered = (_beside_the_unsure(fit), diagnosis.best, *diagnosis.ambiguous_with)
         return next((effect for effect in offered if effect is not None and effect not in futile), None)
-    passed = [c for c in diagnosis.candidates if c.status == PASSED and c.effect not in futile]
+    passed = [c for c in diagnosis.candidates if c.status == SIGNIFICANT and c.effect not in futile]
     return passed[0].effect if passed else None
 
 

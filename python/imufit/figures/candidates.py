@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from imufit.figures import place, quantity, style
 
-_COLOURS = {"passed": style.BLUE, "not significant": style.GREY, "not testable here": style.PALE}
+_COLOURS = {"significant": style.BLUE, "not significant": style.GREY, "not testable here": style.PALE}
 
 
 def candidate_bars(
@@ -58,7 +58,7 @@ def candidate_bars(
     axes = drawing.axes[0]
     places = np.arange(len(drawn))
     for at, index in zip(places, drawn, strict=True):
-        passed = status[index] == "passed"
+        passed = status[index] == "significant"
         axes.barh(
             at,
             before[index] - reached[index],
@@ -98,6 +98,6 @@ def candidate_bars(
 
 def _promise(effect: str, before: float, after: float, status: str) -> str:
     """Say what the best candidate would bring."""
-    if status != "passed":
+    if status != "significant":
         return "No effect lowers the held-out error beyond chance"
     return quantity.promise(effect, before, after)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,11 @@ from imufit.figures import place, quantity, style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+VISIBLE: Final = 0.05
+"""Part of a channel's excess over its noise floor from which on a covariate is said to explain it: less does not stand
+out from the scatter of twelve bins."""
 
 
 class PanelLike(Protocol):
@@ -97,7 +102,7 @@ def residual_panels(
     for axes, panel in zip(drawing.axes, chosen, strict=True):
         _panel(axes, panel)
     worst = chosen[0]
-    if np.isfinite(worst.share) and worst.share >= 0.05:
+    if np.isfinite(worst.share) and worst.share >= VISIBLE:
         sentence = (
             f"{worst.channel} depends most on {worst.covariate}: "
             f"{quantity.share(worst.share)} of its excess over the noise floor"
@@ -113,6 +118,8 @@ def _claim(panel: PanelLike) -> str:
     """Say what the panel shows."""
     if not np.isfinite(panel.share):
         return f"{panel.channel} against {panel.covariate}"
+    if panel.share < VISIBLE:
+        return f"{panel.covariate} explains no visible part of {panel.channel}"
     return f"{panel.covariate} explains {quantity.share(panel.share)} of {panel.channel}"
 
 

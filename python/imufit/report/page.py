@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from imufit.comparing.traces import STRETCHES
 from imufit.figures import quantity
+from imufit.figures.residuals import VISIBLE
 from imufit.remedy import command
 from imufit.report.inline_svg import inline_svg, untitled
 from imufit.report.interactive import hash_of, interactive, policy
@@ -27,7 +28,7 @@ from imufit.report.pictures import (
 )
 from imufit.report.turned import script, turned
 from imufit.report.words import shown, with_words
-from imufit.results.diagnosis import PASSED, VERDICTS
+from imufit.results.diagnosis import SIGNIFICANT, VERDICTS
 from imufit.results.noise_part import noise_table
 from imufit.results.parameter import in_lines, parameter_table
 from imufit.results.table import Table
@@ -208,7 +209,7 @@ def _shares(comparison: Comparison | None) -> dict[str, str]:
     """Return in words what each channel's residual depends on."""
     found: dict[str, str] = {}
     for panel in comparison.panels if comparison is not None else ():
-        if math.isfinite(panel.share) and panel.channel not in found:
+        if math.isfinite(panel.share) and panel.share >= VISIBLE and panel.channel not in found:
             found[panel.channel] = f"{panel.covariate} {quantity.share(panel.share)}"
     return found
 
@@ -225,7 +226,7 @@ def _is_named(candidate: Candidate, diagnosis: Diagnosis) -> bool:
 
 def _stands_out(candidate: Candidate, diagnosis: Diagnosis | None) -> bool:
     """Return whether a candidate belongs to the answer: the best, its rivals, and what else is there."""
-    return diagnosis is not None and (_is_named(candidate, diagnosis) or candidate.status == PASSED)
+    return diagnosis is not None and (_is_named(candidate, diagnosis) or candidate.status == SIGNIFICANT)
 
 
 def _candidate_table(candidates: Sequence[Candidate]) -> Table:
@@ -237,7 +238,7 @@ def _candidate_table(candidates: Sequence[Candidate]) -> Table:
             item.outcome,
             item.error_change,
             quantity.p_value(item.p_value),
-            ", ".join(in_lines(item.parameters)) if item.status == PASSED else "-",
+            ", ".join(in_lines(item.parameters)) if item.status == SIGNIFICANT else "-",
             _typical(item),
             item.smallest_detectable,
             ", ".join(str(rival) for rival in item.confounded_with) or "-",

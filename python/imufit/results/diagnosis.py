@@ -32,7 +32,7 @@ VERDICTS = {
 }
 
 
-PASSED = "passed"
+SIGNIFICANT = "significant"
 """Status of an effect that is there, or explains as much as one that is."""
 NOT_SIGNIFICANT = "not significant"
 """Status of an effect that the log shows not to be there, or does not need beside others."""
@@ -380,7 +380,7 @@ class Diagnosis(Plotted, Result):
             item.outcome,
             item.error_change,
             f"{quantity.probability(item.probability)}{self.shared(item)}",
-            in_words(item.parameters) if item.status == PASSED else "-",
+            in_words(item.parameters) if item.status == SIGNIFICANT else "-",
             item.smallest_detectable,
             ", ".join(str(rival) for rival in item.confounded_with[:2]) or "-",
         )
@@ -398,7 +398,7 @@ class Diagnosis(Plotted, Result):
         return f", shared with {' and '.join(rivals)}" if item.effect in alike and rivals else ""
 
     def _stands_out(self, item: Candidate) -> bool:
-        return item.status == PASSED or item.effect in self.named
+        return item.status == SIGNIFICANT or item.effect in self.named
 
     def unexplained_table(self) -> Table:
         """Dependences without a named cause."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from imufit.figures import quantity
 from imufit.results.data_fault import DataFault
-from imufit.results.diagnosis import LIKELY, NOT_TESTABLE, PASSED, Candidate, Diagnosis
+from imufit.results.diagnosis import LIKELY, NOT_TESTABLE, SIGNIFICANT, Candidate, Diagnosis
 from imufit.results.disagreement import Disagreement
 from imufit.results.effect_card import EffectCard
 from imufit.results.judged import left_out
@@ -41,8 +41,8 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
         text += f" Here {top.name} = {quantity.with_error(top.value, top.standard_error, top.unit)}"
         if top.typical:
             text += f" (typically {quantity.quantity(top.typical, top.unit)})"
-        text += "."
-    if candidate.status == PASSED:
+        text += ", the clearest of its values." if len(candidate.parameters) > 1 else "."
+    if candidate.status == SIGNIFICANT:
         text += f" {quantity.promise('it', candidate.held_out_before, candidate.held_out_after)}."
     elif candidate.status == "negative delay":
         text += (
@@ -133,7 +133,7 @@ def _nearest(found: Diagnosis) -> str:
     doubtful = next((candidate for candidate in found.candidates if candidate.status in DOUBTS), None)
     if doubtful is not None:
         return f" {doubtful.effect} comes nearest, but {DOUBTS[doubtful.status]}."
-    seen = next((candidate for candidate in found.candidates if candidate.status == PASSED), None)
+    seen = next((candidate for candidate in found.candidates if candidate.status == SIGNIFICANT), None)
     if seen is None:
         return ""
     return f" {seen.effect} has evidence, but does not lower the held-out error: the noise may be another one."

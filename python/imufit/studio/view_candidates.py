@@ -10,7 +10,7 @@ from imufit.figures import quantity
 from imufit.model.catalogue import card_of, find_effect
 from imufit.printable import NAME, printable
 from imufit.results import Candidate, Diagnosis
-from imufit.results.diagnosis import NOT_SIGNIFICANT, NOT_TESTABLE, PASSED
+from imufit.results.diagnosis import NOT_SIGNIFICANT, NOT_TESTABLE, SIGNIFICANT
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
@@ -28,12 +28,12 @@ LOWERS: Final = 0.99
 
 def _rank(item: Candidate, diagnosis: Diagnosis) -> tuple[bool, bool, float]:
     """Return what candidates are sorted by: those that are named, then by the probability that stands beside them."""
-    return item.effect not in diagnosis.named, item.status != PASSED, -item.probability
+    return item.effect not in diagnosis.named, item.status != SIGNIFICANT, -item.probability
 
 
 def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
     """Return in words why a candidate is not there; empty where it is."""
-    if item.status == PASSED:
+    if item.status == SIGNIFICANT:
         return ""
     outdone = item.outcome == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
     if outdone and diagnosis.best is not None:

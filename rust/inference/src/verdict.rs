@@ -33,7 +33,7 @@ pub enum Kind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// It is there, or explains as much as one that is.
-    Passed,
+    Significant,
     /// The log shows that it is not there, or does not determine it.
     NotSignificant,
     /// The log cannot show it.
@@ -574,7 +574,7 @@ fn shown(
             let with = held_out_of(search, Some(w.slot));
             let there = members.contains(&w.slot);
             let status = if there || (rivals.contains(&w.slot) && w.plausible == Plausible::Yes) {
-                Status::Passed
+                Status::Significant
             } else if !w.testable {
                 Status::NotTestable
             } else if w.ln_bayes < search.threshold {
@@ -610,7 +610,7 @@ fn shown(
     let rank = |c: &Candidate| {
         (
             Some(c.slot) != best,
-            c.status != Status::Passed,
+            c.status != Status::Significant,
             c.status == Status::NotTestable,
         )
     };

@@ -43,8 +43,8 @@ impl PyKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PyStatus {
     /// It is there, or explains as much as one that is.
-    #[pyo3(name = "PASSED")]
-    Passed,
+    #[pyo3(name = "SIGNIFICANT")]
+    Significant,
     /// The log shows that it is not there, or does not determine it.
     #[pyo3(name = "NOT_SIGNIFICANT")]
     NotSignificant,
@@ -66,7 +66,7 @@ impl PyStatus {
     #[allow(clippy::trivially_copy_pass_by_ref)] // pyo3 hands objects over by reference
     const fn words(&self) -> &'static str {
         match self {
-            Self::Passed => "passed",
+            Self::Significant => "significant",
             Self::NotSignificant => "not significant",
             Self::NotTestable => "not testable here",
             Self::TooLarge => "implausible size",
@@ -184,7 +184,7 @@ impl PyVerdict {
         let candidates = found.candidates.into_iter().map(|c| PyCandidate {
             slot: c.slot,
             status: match c.status {
-                Status::Passed => PyStatus::Passed,
+                Status::Significant => PyStatus::Significant,
                 Status::NotSignificant => PyStatus::NotSignificant,
                 Status::NotTestable => PyStatus::NotTestable,
                 Status::TooLarge => PyStatus::TooLarge,
