@@ -40,7 +40,7 @@ class FallView:
             )
         # In a row of its own: its other words must not move Undo beneath the pointer.
         self._keep = ui.button("Keep to compare", icon="splitscreen", on_click=self._keep_second)
-        self._keep.props("flat dense size=sm").props("data-mark=second")
+        self._keep.props("flat dense size=12px").props("data-mark=second")
         self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
         self._floor = Explained().classes("studio-muted").props("data-mark=floor")

@@ -191,7 +191,7 @@ class _LivePage:
                 self._file.classes("grow").props('data-testid="file"')
             self._recorded = ui.label(RECORDS).classes("text-sm")
             self._recorded.props('data-testid="recorded"')
-            self._look = ui.button("Open in the studio", on_click=self._look_at).props("outline size=sm")
+            self._look = ui.button("Open in the studio", on_click=self._look_at).props("outline size=12px")
             self._look.props('data-testid="look"').visible = False
 
     def _guide(self) -> None:
