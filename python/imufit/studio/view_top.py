@@ -18,6 +18,7 @@ from imufit.studio import server
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
+from imufit.studio.icons import light_or_dark, with_words
 from imufit.studio.log_file import LogFile, option_words, remedies
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING, SEEDS
 from imufit.studio.recipe import as_python, as_shell
@@ -43,16 +44,15 @@ class Head:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        dark = ui.dark_mode(value=None)
         with ui.element("header").classes("studio-head"):
             ui.label("imufit").classes("studio-title")
             self._logs = ui.label("").classes("studio-log").props("data-mark=logs")
-            _icon("folder_open", "Open a log", lambda: _upload(desk)).props("data-mark=open")
-            self._save = _icon("save", "Save the session", self._download).props("data-mark=save")
-            with _icon("content_copy", "Copy the model", None).props("data-mark=copy") as self._copy, ui.menu():
+            with_words("folder_open", "Open a log", lambda: _upload(desk)).props("data-mark=open")
+            self._save = with_words("save", "Save the session", self._download).props("data-mark=save")
+            with with_words("content_copy", "Copy the model", None).props("data-mark=copy") as self._copy, ui.menu():
                 ui.menu_item("Copy as Python", lambda: self._show("Python")).props("data-mark=copy-python")
                 ui.menu_item("Copy as shell", lambda: self._show("shell")).props("data-mark=copy-shell")
-            with _icon("psychology_alt", "Mystery log", None).props("data-mark=mystery"), ui.menu():
+            with with_words("psychology_alt", "Mystery log", None).props("data-mark=mystery"), ui.menu():
                 for number, level in LEVELS.items():
                     if number == DEMONSTRATION:
                         continue
@@ -61,7 +61,7 @@ class Head:
                     )
             for path, title in server.other_pages():
                 ui.link(title.removeprefix("imufit ").capitalize(), path).classes("studio-link")
-            _icon("dark_mode", "Light or dark", lambda: _turn(dark)).props("data-mark=dark")
+            light_or_dark().props("data-mark=dark")
 
     def refresh(self) -> None:
         """Show the names of the logs."""
@@ -421,16 +421,3 @@ def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
     ui.upload(
         label="Drop files or press +", multiple=True, auto_upload=True, on_multi_upload=take, max_total_size=MOST_BYTES
     ).props("flat bordered").props("data-mark=upload")
-
-
-def _icon(icon: str, words: str, action: Callable[[], object] | None) -> ui.button:
-    with ui.button(icon=icon, on_click=action).props(
-        f'flat dense stack aria-label="{words}" title="{words}"'
-    ) as button:
-        ui.label(words).classes("studio-words")
-    return button
-
-
-def _turn(dark: ui.dark_mode) -> None:
-    """Go from the computer's own choice to dark, then to light and back."""
-    dark.value = True if dark.value is None else not dark.value

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.calibrating import Stage, Wizard, calibrate
+from imufit.calibrating import Calibration, SensorCalibration, Stage, Wizard, calibrate
 from imufit.devices.emulate import Emulator
 from imufit.devices.monitor import Monitor, MonitorState
 from imufit.devices.record import Recorder
@@ -349,9 +349,21 @@ class Listening:
         except InputError as error:
             self.calibrated = (str(error),)
         else:
-            sentences = [sensor.sentence() for sensor in result.sensors.values()]
-            self.calibrated = (*sentences, f"Saved as {model.name}.")
+            self.calibrated = (*_sentences(result), f"Saved as {model.name}.")
         self._wizard = self.stage = None
+
+
+def _sentences(result: Calibration) -> tuple[str, ...]:
+    """Say what a calibration did, sensor by sensor, or once that none of them needs it."""
+    if any(_lowers(sensor) for sensor in result.sensors.values()):
+        return tuple(sensor.sentence() for sensor in result.sensors.values())
+    return ("The sensor was right within the noise already: the model need not be used.",)
+
+
+def _lowers(sensor: SensorCalibration) -> bool:
+    """Return whether the error is lower with the calibration, on what the fit did not see where there is such."""
+    unseen = sensor.held_out if np.isfinite(sensor.held_out) else sensor.after
+    return not np.isfinite(sensor.before) or unseen < sensor.before
 
 
 def in_words(recording: Recording) -> str:
