@@ -33,7 +33,7 @@ TICK: Final = 24
 FALL_HEIGHT: Final = 270
 """Height of the fall of the error, px: the labels under the bars and the legend leave a third of it to the bars."""
 SMALL: Final = 11
-"""Size of the words of the fall of the error, px: the legend has two rows at most over a column of 320 px."""
+"""Size of the words of the fall of the error, px: the axis' title is no longer than the plot, beneath the legend."""
 SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
 DECADES: Final = 6

@@ -349,12 +349,18 @@ class Listening:
         except InputError as error:
             self.calibrated = (str(error),)
         else:
-            self.calibrated = (*_sentences(result), f"Saved as {model.name}.")
+            self.calibrated = (*in_sentences(result), f"Saved as {model.name}.")
         self._wizard = self.stage = None
 
 
-def _sentences(result: Calibration) -> tuple[str, ...]:
-    """Say what a calibration did, sensor by sensor, or once that none of them needs it."""
+def in_sentences(result: Calibration) -> tuple[str, ...]:
+    """Say what a calibration did, sensor by sensor, or once that none of them needs it.
+
+    Parameters
+    ----------
+    result : Calibration
+        The calibration.
+    """
     if any(_lowers(sensor) for sensor in result.sensors.values()):
         return tuple(sensor.sentence() for sensor in result.sensors.values())
     return ("The sensor was right within the noise already: the model need not be used.",)
