@@ -26,7 +26,7 @@ from imufit.devices.record.attitude import sensors_in
 from imufit.devices.record.reception import Reception
 from imufit.errors import InputError
 from imufit.log import read
-from imufit.log.columns import GROUPS
+from imufit.log.columns import GROUPS, SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.results import Recording
 from imufit.studio.live.rolling import Rolling
@@ -363,7 +363,8 @@ def in_sentences(result: Calibration) -> tuple[str, ...]:
     """
     if any(_lowers(sensor) for sensor in result.sensors.values()):
         return tuple(sensor.sentence() for sensor in result.sensors.values())
-    return ("The sensor was right within the noise already: the model need not be used.",)
+    names = ", ".join(SENSOR_NAMES[name] for name in result.sensors)
+    return (f"The model need not be used: the readings of {names} were right within the noise already.",)
 
 
 def _lowers(sensor: SensorCalibration) -> bool:
