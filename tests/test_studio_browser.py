@@ -223,6 +223,91 @@ def test_a_finding_has_its_figure_and_its_words_their_definitions(page, folder):
         assert button.get_attribute("title") == button.get_attribute("aria-label")
 
 
+READABLE = """() => {
+    const numbers = (colour) => colour.match(/[0-9.]+/g).map(Number);
+    const light = (colour) => {
+        const part = (value) => value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4;
+        const [red, green, blue] = numbers(colour).map((value) => part(value / 255));
+        return 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+    };
+    const beneath = (item) => {
+        const colour = getComputedStyle(item).backgroundColor;
+        return numbers(colour)[3] === 0 ? beneath(item.parentElement) : colour;
+    };
+    return [...document.querySelectorAll('button:not([disabled]), a')].filter((item) => item.offsetParent)
+        .map((item) => {
+            const both = [light(getComputedStyle(item).color), light(beneath(item))];
+            const ratio = (Math.max(...both) + 0.05) / (Math.min(...both) + 0.05);
+            return [item.textContent, ratio, parseFloat(getComputedStyle(item).fontSize), beneath(item)];
+        });
+}"""
+"""Words, contrast by the formula of the accessibility guidelines (WCAG 2.1), size and ground of all buttons."""
+
+
+def test_buttons_can_be_read_in_light_and_dark_and_icons_show_their_words(page, folder):
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    grounds = set()
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        page.wait_for_function(
+            f"() => document.body.classList.contains('body--dark') === {str(scheme == 'dark').lower()}"
+        )
+        page.wait_for_timeout(800)
+        found = page.evaluate(READABLE)
+        assert {"Add", "residual"} <= {words for words, *_ in found}
+        assert [item for item in found if item[1] < 4.5] == []
+        assert [item for item in found if item[0].strip() and item[2] < 12.0] == []
+        grounds |= {ground for *_, ground in found}
+    assert len(grounds) >= 6  # page, card and button of both
+    marked(page, "add-acc.bias").click()
+    wait_for_bars(page, 2)
+    shown = "element => getComputedStyle(element, '::after').content"
+    for words in ("Undo", "Remove acc.bias", "Edit acc.bias.x", "Fix at this value: acc.bias.x"):
+        button = page.get_by_label(words, exact=True)
+        button.hover()
+        assert button.evaluate(shown) == f'"{words}"'
+        page.mouse.move(0, 0)
+        page.keyboard.press("Tab")
+        button.focus()
+        assert button.evaluate(shown) == f'"{words}"'
+        button.blur()
+
+
+def test_a_mouse_click_on_a_candidate_leaves_the_page_where_it_is(page, folder):
+    page.set_viewport_size({"width": 1280, "height": 500})
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    row = page.locator('[data-mark^="candidate-"]').nth(1)
+    effect = row.get_attribute("data-mark").removeprefix("candidate-")
+    assert row.locator(".studio-term").count() == 0
+    row.locator(".studio-id").scroll_into_view_if_needed()
+    before = page.evaluate("window.scrollY")
+    row.locator(".studio-id").click()
+    marked(page, "card").get_by_text(f"{effect}:").wait_for()
+    page.wait_for_timeout(800)
+    assert page.evaluate("window.scrollY") == before
+    assert marked(page, "card").inner_text().startswith(f"{effect}:")
+
+
+def test_a_typed_answer_counts(page):
+    marked(page, "mystery").click()
+    marked(page, "level-1").click()
+    marked(page, "reveal").wait_for()
+    idle(page)
+    assert marked(page, "reveal").is_disabled()
+    assert marked(page, "unanswered").is_visible()
+    answer = page.get_by_label("Your answer")
+    for key, name in (("Enter", "gyr.scale"), ("Tab", "acc.bias")):
+        answer.fill(name)
+        answer.press(key)
+        page.wait_for_timeout(800)
+        assert answer.input_value() == name
+    assert not marked(page, "unanswered").is_visible()
+    marked(page, "reveal").click()
+    assert "you named acc.bias" in marked(page, "truth").inner_text()
+
+
 def test_a_session_asks_for_its_log(page, folder, tmp_path):
     session = tmp_path / "lost-session.toml"
     session.write_text(
@@ -367,7 +452,7 @@ def test_the_demonstration_leads_to_a_named_effect_and_a_fallen_error(chromium, 
         assert after < 1.1 < start
         marked(page, "reveal").click()
         marked(page, "truth").wait_for()
-        assert marked(page, "truth").inner_text().startswith("Right")
+        assert marked(page, "truth").inner_text() == "acc.scale was hidden."
         run_what_is_copied(page, folder, after)
         page.close()
 

@@ -1,14 +1,17 @@
 """A device followed for the studio: rolling rows, rests, recordings of a running stream, the guide."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from imufit.calibrating import calibrate
 from imufit.devices.emulate import Emulator
 from imufit.devices.record import LiveRows, Recorder, recover
 from imufit.errors import InputError
+from imufit.lab.simulate import simulate
 from imufit.log import read
-from imufit.studio.live.listening import Listening, Source, free_name, shown_state
+from imufit.studio.live.listening import Listening, Source, free_name, in_sentences, shown_state
 from imufit.studio.live.panels import groups, panel
 from imufit.studio.live.rolling import Rolling
 
@@ -130,6 +133,15 @@ def test_guide_leads_through_six_sides_to_a_saved_model(followed, tmp_path):
     assert path.exists()
     assert (tmp_path / "sides.toml").exists()
     assert listening.stage is None
+
+
+def test_a_calibration_that_lowers_no_error_says_so_once():
+    result = calibrate(simulate("six_sides", {"acc.bias": None}, 1, duration=60.0, rate=50.0).to_log())
+    assert len(in_sentences(result)) == len(result.sensors) > 1
+    needless = {name: replace(sensor, held_out=2.0 * sensor.before) for name, sensor in result.sensors.items()}
+    (said,) = in_sentences(replace(result, sensors=needless))
+    assert said.startswith("The model need not be used: the readings of accelerometer, ")
+    assert said.endswith(" were right within the noise already.")
 
 
 def test_port_that_cannot_be_opened_is_refused_in_words():

@@ -45,6 +45,16 @@ def connect(page, scenario):
     wait_until(page, lambda: number(page, "rows") > 50)
 
 
+def part_from_the_device(page):
+    """Disconnect: the last numbers stay beside the last readings."""
+    wait_until(page, lambda: max(page.evaluate(DRAWN), default=0) > 50)
+    page.get_by_role("button", name="Disconnect").click()
+    page.get_by_text("Not connected").wait_for(timeout=PATIENCE)
+    assert number(page, "rows") > 50
+    page.get_by_role("button", name="Light or dark").click()
+    page.wait_for_function("() => document.body.classList.contains('body--dark')")
+
+
 def test_unusable_port_and_hostile_names_are_text(served):
     folder, address, browser = served
     page = browser.new_page(viewport={"width": 380, "height": 800})
@@ -118,8 +128,7 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     page.wait_for_function("() => document.querySelector('[data-mark=logs]')?.textContent === 'calibration-1.parquet'")
     wait_until(page, lambda: max(page.evaluate(DRAWN), default=0) > 50)
     page.goto(f"{address}live")
-    page.get_by_role("button", name="Disconnect").click()
-    page.get_by_text("Not connected").wait_for(timeout=PATIENCE)
+    part_from_the_device(page)
 
     # so does it after the device has gone, on a page that is loaded again, too
     page.reload()

@@ -3,10 +3,10 @@
 import pytest
 from imufit.errors import InputError
 from imufit.figures import quantity
-from imufit.lab.simulate import unseal
+from imufit.lab.simulate import hidden, unseal
 from imufit.model.catalogue import find_effect
 from imufit.studio.log_file import LogFile
-from imufit.studio.mystery import LEVELS, NOTHING, Mystery
+from imufit.studio.mystery import ALIKE, DEMO_SEED, DEMONSTRATION, DURATION, LEVELS, NOTHING, RATE, Mystery
 from imufit.studio.session import Session
 
 
@@ -35,6 +35,21 @@ def test_a_large_effect_is_named_by_the_evidence(tmp_path):
     wrong = game.reveal(NOTHING, first)
     assert not wrong.right
     assert wrong.sentences[0].startswith("Not right")
+
+
+def test_the_demonstration_states_the_truth_and_judges_no_answer(tmp_path):
+    game, first = played(DEMONSTRATION, DEMO_SEED, tmp_path)
+    (truth,) = unseal(game.log).effects
+    assert game.reveal(None, first).sentences[0] == f"{truth} was hidden."
+
+
+def test_level_1_hides_no_effect_that_another_one_resembles(tmp_path):
+    """The log of this number alone would hide a late reference, which looks like a late gyroscope."""
+    assert list(hidden("handheld", 1, size="large", duration=DURATION, rate=RATE)[1].effects) == ["ref.delay"]
+    game, first = played(1, 1, tmp_path)
+    assert list(unseal(game.log).effects) == [first.best]
+    found = first.best_candidate
+    assert all(abs(rival.correlation) < ALIKE for rival in found.confounded_with)
 
 
 def test_nothing_may_be_hidden(tmp_path):

@@ -28,12 +28,20 @@ Array = NDArray[np.float64]
 
 HEIGHT: Final = 240
 """Height of a figure, px: two of them and the sentence fit on a laptop's screen."""
+TICK: Final = 24
+"""Characters under a bar, as many as most effects' names have: pointing at the bar shows the step in full."""
+FALL_HEIGHT: Final = 270
+"""Height of the fall of the error, px: the labels under the bars and the legend leave a third of it to the bars."""
+SMALL: Final = 11
+"""Size of the words of the fall of the error, px: the axis' title is no longer than the plot, beneath the legend."""
 SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
 DECADES: Final = 6
 """Numbers that the logarithmic axis of the fall has room for."""
 ROOM: Final = 1.45
 """Height of the fall's axis over its highest bar: the bar's number has 13 px over a plot of some 80 px on a phone."""
+UNDONE: Final = 0.35
+"""Opacity of the bar of a step that was undone: far paler than the others, and still seen."""
 LINE: Final = 1.6
 """Width of a line, px."""
 LOGARITHMIC_ABOVE: Final = 8.0
@@ -245,12 +253,16 @@ def fall(
             "x": places,
             "y": _numbers(np.array(ratios, dtype=float)),
             "width": 0.62,
-            "marker": {"color": colours, "opacity": [1.0 if k <= position else 0.35 for k in places]},
+            "marker": {"color": colours, "opacity": [1.0 if k <= position else UNDONE for k in places]},
             "hovertemplate": "%{customdata}<br>%{y:.3f} times the noise floor<extra></extra>",
             "customdata": names,
             "showlegend": False,
         }
     ]
+    if position < len(ratios) - 1:
+        # The bars are one trace: their paleness has an entry of the legend of its own.
+        mark = {"symbol": "square", "size": 11, "color": BLUE, "opacity": UNDONE}
+        bars.append({"type": "scatter", "mode": "markers", "name": "undone", "x": [None], "y": [None], "marker": mark})
     known = [(k, value) for k, value in enumerate(expected) if value is not None]
     if known:
         bars.append(
@@ -267,7 +279,7 @@ def fall(
     if best is not None:
         effect, value = best
         places.append(len(places))
-        names.append(f"+ {words(effect)}?")
+        labels = [*labels, f"+ {effect}?"]
         bars.append(
             {
                 "type": "bar",
@@ -303,10 +315,13 @@ def fall(
     # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
     edge = [-0.6, max(len(places), SLOTS) - 0.4]
     floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
-    ticks = {"tickvals": places, "ticktext": names, "range": edge, "fixedrange": True, "tickangle": -35}
+    ticks = {"tickvals": places, "ticktext": [words(printable(label, TICK)) for label in labels], "range": edge}
+    ticks |= {"fixedrange": True, "tickangle": -35, "tickfont": {"size": SMALL}}
     figure = _figure([*bars, *floor], "", "error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
+    figure["layout"]["height"] = FALL_HEIGHT
+    figure["layout"]["legend"]["font"] = figure["layout"]["yaxis"]["title"]["font"] = {"size": SMALL}
     return figure
 
 

@@ -159,13 +159,13 @@ class Desk:
         made = None if session is None or not session.begun else session.made()
         return None if made is None else made.diagnosis
 
-    def reveal(self, answer: str) -> None:
+    def reveal(self, answer: str | None) -> None:
         """End the game with an answer.
 
         Parameters
         ----------
-        answer : str
-            Id of an effect; empty answers that nothing is missing.
+        answer : str or None
+            Id of an effect; empty answers that nothing is missing, and None where no answer was asked for.
         """
         session, game = self.session, self.mystery
         first = None if session is None else session.made(Stack())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,12 +12,15 @@ from typing import TYPE_CHECKING, Final
 from imufit.errors import InputError
 from imufit.figures import quantity
 from imufit.lab.simulate import hidden, simulate, unseal
+from imufit.lab.simulate.hidden import COLUMNS
+from imufit.lab.simulate.separation import Separation
+from imufit.lab.simulate.study import Study
 from imufit.lab.simulated_log import save_simulation
 from imufit.model.catalogue import units_of
 from imufit.results import Diagnosis
 
 if TYPE_CHECKING:
-    from imufit.lab.simulate import Truth
+    from imufit.lab.simulate import Simulation, Truth
 
 
 @dataclass(frozen=True)
@@ -54,8 +58,9 @@ LEVELS: Final[dict[int, Level]] = {
         "The loop on your own log is the same: compare, name, add, and stop where the error stands at the noise floor.",
     ),
     1: Level(
-        "A large effect",
-        "One large effect is hidden in one minute of a hand-held sensor. Name the effect.",
+        "An effect that stands out",
+        "One effect is hidden in one minute of a hand-held sensor. The effect stands far above the noise, and no other "
+        "effect looks like it. Name the effect.",
         "An effect is named by the shape of the residual: the covariate that the residual follows points to the cause.",
     ),
     2: Level(
@@ -81,7 +86,12 @@ RATE: Final = 50.0
 SURE: Final = 0.95
 """Probability from which on the evidence names one effect: odds of about 20 to 1."""
 
-_ALIKE: Final = (("tilt", "mag.hard_iron"), ("arm", "gyr.delay"), ("arm", "gyr.lowpass"))
+ALIKE: Final = 0.95
+"""Correlation of two effects from which on they look alike: the second leaves a tenth of the first one's square."""
+SEEDS: Final = 1_000_000
+"""Logs of the game: none is met twice."""
+
+_RIVALS: Final = (("tilt", "mag.hard_iron"), ("arm", "gyr.delay"), ("arm", "gyr.lowpass"))
 """Scenarios and effects that have a rival there: of 24 logs of these three, all were `ambiguous`."""
 
 
@@ -151,22 +161,22 @@ class Mystery:
             raise InputError(f"the level {level} is unknown", remedy="Choose 1, 2 or 3.")
         path = folder / f"mystery-{level}-{seed}.parquet"
         if level in (DEMONSTRATION, 1):
-            simulation, _ = hidden("handheld", seed, size="large", duration=DURATION, rate=RATE)
+            simulation = _standing_out(seed)
         elif level == 2:
             simulation, _ = hidden("handheld", seed, size="small", allow_nothing=True, duration=DURATION, rate=RATE)
         else:
-            scenario, effect = _ALIKE[seed % len(_ALIKE)]
+            scenario, effect = _RIVALS[seed % len(_RIVALS)]
             simulation = simulate(scenario, {effect: None}, seed, duration=DURATION, rate=RATE, size="large")
         save_simulation(simulation, path)
         return cls(level, seed, path)
 
-    def reveal(self, answer: str, first: Diagnosis) -> Verdict:
+    def reveal(self, answer: str | None, first: Diagnosis) -> Verdict:
         """Open the truth and judge an answer.
 
         Parameters
         ----------
-        answer : str
-            Id of an effect; empty answers that nothing is missing.
+        answer : str or None
+            Id of an effect; empty answers that nothing is missing, and None where no answer was asked for.
         first : Diagnosis
             The diagnosis of the ideal sensor on this log.
         """
@@ -189,12 +199,26 @@ class Mystery:
         return self.verdict
 
 
+def _standing_out(seed: int) -> Simulation:
+    """Simulate the log of a number, or of the next one whose effect no other effect resembles."""
+    for number in itertools.count(seed, SEEDS):
+        simulation, truth = hidden("handheld", number, size="large", duration=DURATION, rate=RATE)
+        ((effect, parameters),) = truth.effects.items()
+        study = Study("handheld", [effect], number, DURATION, RATE, covariates=COLUMNS)
+        distances = Separation(study, COLUMNS).distances(effect, parameters)
+        if min(distances.values()) >= (1.0 - ALIKE**2) * distances[""]:
+            break
+    return simulation
+
+
 def _lesson(level: Level, truth: Sequence[str]) -> str:
     return level.lesson if truth or not level.nothing else level.absence
 
 
-def _said(truth: Sequence[str], answer: str, right: bool, rival: bool) -> str:
+def _said(truth: Sequence[str], answer: str | None, right: bool, rival: bool) -> str:
     hid = f"{' and '.join(truth)} was hidden" if truth else "Nothing was hidden"
+    if answer is None:
+        return f"{hid}."
     named = f"you named {answer}" if answer else "you answered that nothing is missing"
     mark = "Right" if right else "Allowed, as the log separates the two no better" if rival else "Not right"
     return f"{mark}: {hid}, and {named}."

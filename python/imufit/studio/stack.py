@@ -6,9 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from imufit.figures import quantity
-from imufit.model.catalogue import units_of
-
 
 @dataclass(frozen=True)
 class Entry:
@@ -170,14 +167,7 @@ class Step:
             Action.REMOVE: f"− {self.effect}",
             Action.ON: f"{self.effect} on",
             Action.OFF: f"{self.effect} off",
-            Action.HOLD: f"{key} {self._value()} fixed",
+            Action.HOLD: f"{key} fixed",
             Action.FREE: f"{key} fitted",
         }
         return words[self.action]
-
-    def _value(self) -> str:
-        """Return the value at which the parameter was fixed, in the shown unit; empty for other steps."""
-        value = dict(self.stack.entry(self.effect).held).get(self.parameter) if self.parameter else None
-        if value is None:
-            return ""
-        return quantity.quantity(value, units_of(self.effect)[self.parameter])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from nicegui import ui
+from nicegui import events, ui
 
 from imufit.figures import quantity
 from imufit.model.catalogue import card_of, find_effect
@@ -13,7 +13,6 @@ from imufit.results import Candidate, Diagnosis
 from imufit.results.diagnosis import NOT_SIGNIFICANT, NOT_TESTABLE, SIGNIFICANT
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
-from imufit.studio.explained import Explained
 from imufit.studio.view_panels import PanelView
 
 FIRST: Final = 5
@@ -21,6 +20,9 @@ FIRST: Final = 5
 
 INTO_SIGHT: Final = "document.querySelector('{}').scrollIntoView({{block: 'nearest', behavior: 'smooth'}})"
 """Script that brings an element into sight, where it is not: on a phone the candidates fill the screen."""
+
+TOUCH: Final = "touch"
+"""Kind of pointer, in the browser's words, with which nothing can be pointed at: a finger."""
 
 LOWERS: Final = 0.99
 """Held-out error with a candidate over that without from which on the candidate lowers it for the eye."""
@@ -56,7 +58,6 @@ class CandidateView:
         self._desk, self._panels = desk, panels
         self._looked_at = self._pinned = ""
         self._drawn: tuple[object, bool] | None = None
-        self._seen: set[str] = set()
         ui.html("Candidates", tag="h2", sanitize=False)
         self._list = ui.column().classes("w-full gap-0")
         self._card = ui.column().classes("w-full gap-1 studio-item studio-card").props("data-mark=card")
@@ -69,7 +70,6 @@ class CandidateView:
         if state == self._drawn:
             return
         self._drawn = state
-        self._seen = set()
         self._pin("")
         self._list.clear()
         self._list.classes(**({"add": "studio-long"} if self._desk.guessing else {"remove": "studio-long"}))
@@ -111,8 +111,15 @@ class CandidateView:
             with ui.element("div").classes("studio-row"):
                 name = ui.label(printable(effect, NAME)).classes("studio-id cursor-pointer")
                 name.props("tabindex=0 role=button")
+
+                def pin(event: events.GenericEventArguments) -> None:
+                    self._pin("" if self._pinned == effect else effect)
+                    # On a phone the card lies beneath the list. Beneath a mouse's pointer, no row may move.
+                    if self._pinned and event.args.get("pointerType") == TOUCH:
+                        ui.run_javascript(INTO_SIGHT.format(".studio-card"))
+
                 for event in ("click", "keydown.enter"):
-                    name.on(event, lambda: self._pin("" if self._pinned == effect else effect))
+                    name.on(event, pin, ["pointerType"])
 
                 async def add() -> None:
                     session = desk.session
@@ -127,25 +134,22 @@ class CandidateView:
                     # The sentence on top has another height by now, and the effect's card is gone.
                     client.run_javascript(INTO_SIGHT.format(".studio-fall"))
 
-                ui.button("Add", on_click=add).props("dense size=sm" + ("" if named else " outline")).props(
+                ui.button("Add", on_click=add).props("dense size=12px" + ("" if named else " outline")).props(
                     attribute("data-mark", f"add-{effect}")
                 )
             if diagnosis is None:
                 return
             likely = f"{quantity.probability(item.probability)} probable{diagnosis.shared(item)}"
             words = f"{likely}, held-out error {item.error_change}{_why_not(item, diagnosis)}"
-            Explained(words, self._seen).classes("studio-muted")
+            ui.label(printable(words)).classes("studio-muted")
             if named and item.confounded_with:
                 rivals = ", ".join(str(rival) for rival in item.confounded_with[:2])
-                Explained(f"Rivals, with correlation: {rivals}", self._seen).classes("studio-muted")
+                ui.label(printable(f"Rivals, with correlation: {rivals}")).classes("studio-muted")
 
     def _pin(self, effect: str) -> None:
         """Keep the card of an effect until another one is kept; a finger has no place to rest."""
         self._pinned = effect
         self.look_at(effect)
-        if effect:
-            # On a phone the card lies beneath the list.
-            ui.run_javascript(INTO_SIGHT.format(".studio-card"))
 
     def look_at(self, effect: str) -> None:
         """Show the card of an effect, and what it would explain; empty puts both away.

@@ -13,6 +13,7 @@ from imufit.results.noise_part import NoisePart
 from imufit.studio import charts
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
+from imufit.studio.icons import bare
 from imufit.studio.session import Session, worst_channel
 
 SMALL: Final = 0.005
@@ -32,15 +33,15 @@ class FallView:
         self._desk = desk
         with ui.element("div").classes("studio-row flex-wrap"):
             ui.html("Fall of the error", tag="h2", sanitize=False).style("flex: 1 0 auto; white-space: nowrap")
-            self._undo = _button("undo", "Undo", lambda: desk.attempt(lambda: _session(desk).undo())).props(
+            self._undo = bare("undo", "Undo", lambda: desk.attempt(lambda: _session(desk).undo())).props(
                 "data-mark=undo"
             )
-            self._redo = _button("redo", "Redo", lambda: desk.attempt(lambda: _session(desk).redo())).props(
+            self._redo = bare("redo", "Redo", lambda: desk.attempt(lambda: _session(desk).redo())).props(
                 "data-mark=redo"
             )
         # In a row of its own: its other words must not move Undo beneath the pointer.
         self._keep = ui.button("Keep to compare", icon="splitscreen", on_click=self._keep_second)
-        self._keep.props("flat dense size=sm").props("data-mark=second")
+        self._keep.props("flat dense size=12px").props("data-mark=second")
         self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
         self._floor = Explained().classes("studio-muted").props("data-mark=floor")
@@ -110,8 +111,3 @@ def _floor_words(session: Session, noise: tuple[NoisePart, ...], chosen: str | N
 def _session(desk: Desk) -> Session:
     assert desk.session is not None
     return desk.session
-
-
-def _button(icon: str, words: str, action: object) -> ui.button:
-    button = ui.button(icon=icon, on_click=action).props(f'flat dense round aria-label="{words}"')  # type: ignore[arg-type]
-    return button.tooltip(words)

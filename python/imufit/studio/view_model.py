@@ -9,6 +9,7 @@ from imufit.printable import NAME, printable
 from imufit.results import Parameter
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
+from imufit.studio.icons import bare
 from imufit.studio.session import Numbers, Session
 from imufit.studio.stack import Entry
 
@@ -59,11 +60,11 @@ class ModelView:
                     attribute("data-mark", f"switch-{entry.effect}")
                 )
                 ui.label(name).classes("studio-id")
-                ui.button(
-                    icon="close", on_click=lambda: desk.attempt(lambda: _session(desk).remove(entry.effect))
-                ).props("flat dense round size=sm " + attribute("aria-label", f"Remove {entry.effect}")).tooltip(
-                    "Remove"
-                )
+                bare(
+                    "close",
+                    f"Remove {entry.effect}",
+                    lambda: desk.attempt(lambda: _session(desk).remove(entry.effect)),
+                ).props("size=sm")
             if not entry.on:
                 return
             if numbers is None:
@@ -82,14 +83,14 @@ class ModelView:
                 value.classes("studio-muted").tooltip("to first order, from the evidence")
             elif parameter.typical is not None:
                 value.tooltip(f"typical size {quantity.quantity(parameter.typical, parameter.unit)}")
-            ui.button(icon="edit", on_click=lambda: self._edit(parameter)).props(
-                "flat dense round size=sm " + attribute("aria-label", f"Edit {parameter.key}")
-            ).tooltip("Edit the value").props(attribute("data-mark", f"edit-{parameter.key}"))
+            bare("edit", f"Edit {parameter.key}", lambda: self._edit(parameter)).props("size=sm").props(
+                attribute("data-mark", f"edit-{parameter.key}")
+            )
             pin = "lock" if parameter.fixed else "lock_open"
             words = "Fit this parameter again" if parameter.fixed else "Fix at this value"
-            ui.button(icon=pin, on_click=lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
-                "flat dense round size=sm " + attribute("aria-label", f"{words}: {parameter.key}")
-            ).tooltip(words).props(attribute("data-mark", f"pin-{parameter.key}"))
+            bare(pin, f"{words}: {parameter.key}", lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
+                "size=sm"
+            ).props(attribute("data-mark", f"pin-{parameter.key}"))
 
     def _edit(self, parameter: Parameter) -> None:
         """Ask for a value in the shown unit."""

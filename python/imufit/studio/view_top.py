@@ -18,13 +18,12 @@ from imufit.studio import server
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
+from imufit.studio.icons import light_or_dark, with_words
 from imufit.studio.log_file import LogFile, option_words, remedies
-from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING
+from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING, SEEDS
 from imufit.studio.recipe import as_python, as_shell
 from imufit.studio.session_file import LogsWantedError
 
-SEEDS: Final = 1_000_000
-"""Logs of the game: none is met twice."""
 MOST_BYTES: Final = 4 * 2**30
 """Largest file that the browser may send: 20 million rows of 14 columns take 2.2 GB."""
 NOTES: Final = 2
@@ -45,16 +44,15 @@ class Head:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        dark = ui.dark_mode(value=None)
         with ui.element("header").classes("studio-head"):
             ui.label("imufit").classes("studio-title")
             self._logs = ui.label("").classes("studio-log").props("data-mark=logs")
-            _icon("folder_open", "Open a log", lambda: _upload(desk)).props("data-mark=open")
-            self._save = _icon("save", "Save the session", self._download).props("data-mark=save")
-            with _icon("content_copy", "Copy the model", None).props("data-mark=copy") as self._copy, ui.menu():
+            with_words("folder_open", "Open a log", lambda: _upload(desk)).props("data-mark=open")
+            self._save = with_words("save", "Save the session", self._download).props("data-mark=save")
+            with with_words("content_copy", "Copy the model", None).props("data-mark=copy") as self._copy, ui.menu():
                 ui.menu_item("Copy as Python", lambda: self._show("Python")).props("data-mark=copy-python")
                 ui.menu_item("Copy as shell", lambda: self._show("shell")).props("data-mark=copy-shell")
-            with _icon("psychology_alt", "Mystery log", None).props("data-mark=mystery"), ui.menu():
+            with with_words("psychology_alt", "Mystery log", None).props("data-mark=mystery"), ui.menu():
                 for number, level in LEVELS.items():
                     if number == DEMONSTRATION:
                         continue
@@ -63,7 +61,7 @@ class Head:
                     )
             for path, title in server.other_pages():
                 ui.link(title.removeprefix("imufit ").capitalize(), path).classes("studio-link")
-            _icon("dark_mode", "Light or dark", lambda: _turn(dark)).props("data-mark=dark")
+            light_or_dark().props("data-mark=dark")
 
     def refresh(self) -> None:
         """Show the names of the logs."""
@@ -225,7 +223,7 @@ class Top:
             for number, level in LEVELS.items():
                 words = level.title if number == DEMONSTRATION else f"Level {number}: {level.title}"
                 action = _player(desk, number, DEMO_SEED if number == DEMONSTRATION else None)
-                ui.button(words, on_click=action).props("outline size=sm").props(
+                ui.button(words, on_click=action).props("outline size=12px").props(
                     attribute("data-mark", f"play-{number}")
                 )
 
@@ -274,7 +272,7 @@ class Top:
         async def apply() -> None:
             await self._desk.mend(option, number)
 
-        ui.button(printable(option_words(option)), on_click=apply).props("dense outline size=sm").props(
+        ui.button(printable(option_words(option)), on_click=apply).props("dense outline size=12px").props(
             attribute("data-mark", mark)
         )
 
@@ -288,7 +286,7 @@ class Top:
             with ui.row():
                 for option in desk.cures:
                     self._cure(option, 0, "cure")
-                ui.button("Dismiss", on_click=desk.forget_trouble).props("dense flat size=sm")
+                ui.button("Dismiss", on_click=desk.forget_trouble).props("dense flat size=12px")
 
     def _mapping(self, file: LogFile) -> None:
         """Take names for the columns of a file."""
@@ -337,7 +335,7 @@ class Top:
                 return
             assert desk.session is not None
             if game.level == DEMONSTRATION:
-                reveal = ui.button("Reveal the truth", on_click=lambda: desk.reveal(_named(desk)))
+                reveal = ui.button("Reveal the truth", on_click=lambda: desk.reveal(None))
                 reveal.props("outline").props("data-mark=reveal")
                 return
             names = sorted(desk.session.start.analysis.candidates)
@@ -352,6 +350,16 @@ class Top:
                 answer.on_value_change(lambda event: setattr(game, "answer", event.value))
                 reveal = ui.button("Reveal", on_click=lambda: desk.reveal(answer.value)).props("data-mark=reveal")
                 reveal.bind_enabled_from(answer, "value", lambda chosen: chosen is not None)
+                ids = {words: effect for effect, words in choices.items()}
+
+                def take(event: events.GenericEventArguments) -> None:
+                    answer.value = ids.get(str(event.args).strip(), answer.value)
+
+                # Quasar's field forgets a name that was typed and not picked.
+                for key in ("keydown.enter", "keydown.tab"):
+                    answer.on(key, take, js_handler="(event) => emit(event.target.value)")
+                why = ui.label("Choose an answer, then reveal the truth.").classes("studio-muted")
+                why.props("data-mark=unanswered").bind_visibility_from(answer, "value", lambda chosen: chosen is None)
             return
         for sentence in game.verdict.sentences:
             ui.label(printable(sentence)).classes("studio-sentence").props("data-mark=truth")
@@ -413,16 +421,3 @@ def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
     ui.upload(
         label="Drop files or press +", multiple=True, auto_upload=True, on_multi_upload=take, max_total_size=MOST_BYTES
     ).props("flat bordered").props("data-mark=upload")
-
-
-def _icon(icon: str, words: str, action: Callable[[], object] | None) -> ui.button:
-    with ui.button(icon=icon, on_click=action).props(
-        f'flat dense stack aria-label="{words}" title="{words}"'
-    ) as button:
-        ui.label(words).classes("studio-words")
-    return button
-
-
-def _turn(dark: ui.dark_mode) -> None:
-    """Go from the computer's own choice to dark, then to light and back."""
-    dark.value = True if dark.value is None else not dark.value

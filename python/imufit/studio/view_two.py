@@ -67,12 +67,24 @@ class TwoView:
                 _two_models(second, present, factor)
 
 
+def lower(second: Made, present: Made) -> str:
+    """Say which model stands lower, as the shown digits have it.
+
+    Parameters
+    ----------
+    second, present : Made
+        The kept model and the present one.
+    """
+    if quantity.ratio(second.numbers.ratio) == quantity.ratio(present.numbers.ratio):
+        return "Both stand equally low."
+    return f"The {'kept' if second.numbers.ratio < present.numbers.ratio else 'present'} model stands lower."
+
+
 def _two_models(second: Made, present: Made, factor: float | None) -> None:
     """Lay out two models: held-out error, evidence, residual of each channel that changes, parameters."""
-    lower = "kept" if second.numbers.ratio < present.numbers.ratio else "present"
     Explained(
         f"Held-out error: {quantity.ratio(second.numbers.ratio)} times the noise floor with the kept model, "
-        f"{quantity.ratio(present.numbers.ratio)} with the present one. The {lower} model stands lower."
+        f"{quantity.ratio(present.numbers.ratio)} with the present one. {lower(second, present)}"
     ).classes("studio-sentence").props("data-mark=two-sentence")
     if factor is not None:
         choice = {"first": "the kept model", "second": "the present model", "neither": "neither model"}

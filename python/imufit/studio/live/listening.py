@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.calibrating import Stage, Wizard, calibrate
+from imufit.calibrating import Calibration, SensorCalibration, Stage, Wizard, calibrate
 from imufit.devices.emulate import Emulator
 from imufit.devices.monitor import Monitor, MonitorState
 from imufit.devices.record import Recorder
@@ -26,7 +26,7 @@ from imufit.devices.record.attitude import sensors_in
 from imufit.devices.record.reception import Reception
 from imufit.errors import InputError
 from imufit.log import read
-from imufit.log.columns import GROUPS
+from imufit.log.columns import GROUPS, SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.results import Recording
 from imufit.studio.live.rolling import Rolling
@@ -349,9 +349,28 @@ class Listening:
         except InputError as error:
             self.calibrated = (str(error),)
         else:
-            sentences = [sensor.sentence() for sensor in result.sensors.values()]
-            self.calibrated = (*sentences, f"Saved as {model.name}.")
+            self.calibrated = (*in_sentences(result), f"Saved as {model.name}.")
         self._wizard = self.stage = None
+
+
+def in_sentences(result: Calibration) -> tuple[str, ...]:
+    """Say what a calibration did, sensor by sensor, or once that none of them needs it.
+
+    Parameters
+    ----------
+    result : Calibration
+        The calibration.
+    """
+    if any(_lowers(sensor) for sensor in result.sensors.values()):
+        return tuple(sensor.sentence() for sensor in result.sensors.values())
+    names = ", ".join(SENSOR_NAMES[name] for name in result.sensors)
+    return (f"The model need not be used: the readings of {names} were right within the noise already.",)
+
+
+def _lowers(sensor: SensorCalibration) -> bool:
+    """Return whether the error is lower with the calibration, on what the fit did not see where there is such."""
+    unseen = sensor.held_out if np.isfinite(sensor.held_out) else sensor.after
+    return not np.isfinite(sensor.before) or unseen < sensor.before
 
 
 def in_words(recording: Recording) -> str:

@@ -20,6 +20,7 @@ from imufit.log.metadata import Frame
 from imufit.printable import printable
 from imufit.rests.poses import SIDES
 from imufit.studio.body import Body, angles_in_words, side_rotation
+from imufit.studio.icons import light_or_dark
 from imufit.studio.live.listening import Listening, Recorded, Source, free_name, shown_state
 from imufit.studio.live.panels import groups, panel
 
@@ -128,6 +129,7 @@ class _LivePage:
                 ui.label("Live device").classes("studio-title")
                 ui.space()
                 ui.link("Studio", "./").classes("studio-link text-sm")
+                light_or_dark().props("data-mark=dark")
             self._connection()
             with ui.element("div").classes("studio-live-columns"):
                 with ui.column().classes("gap-3 min-w-0"):
@@ -191,7 +193,7 @@ class _LivePage:
                 self._file.classes("grow").props('data-testid="file"')
             self._recorded = ui.label(RECORDS).classes("text-sm")
             self._recorded.props('data-testid="recorded"')
-            self._look = ui.button("Open in the studio", on_click=self._look_at).props("outline size=sm")
+            self._look = ui.button("Open in the studio", on_click=self._look_at).props("outline size=12px")
             self._look.props('data-testid="look"').visible = False
 
     def _guide(self) -> None:
@@ -303,8 +305,10 @@ class _LivePage:
         for element in (self._choice, self._frame, self._baud, self._header):
             element.set_enabled(listening is None)
         state = None if listening is None else listening.state
-        for key, words in shown_state(state).items():
-            self._figures[key].text = words
+        # The last numbers stay beside the last readings.
+        if listening is not None or not self._plots:
+            for key, words in shown_state(state).items():
+                self._figures[key].text = words
         self._show_recording(_device.recorded)
         self._show_guide(listening)
         if listening is None:

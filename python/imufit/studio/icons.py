@@ -1,0 +1,50 @@
+"""Buttons that show an icon: with its words beneath, or with the words beside it while it is pointed at or focused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nicegui import ui
+
+from imufit.studio.attribute import attribute
+
+
+def with_words(icon: str, words: str, action: Callable[[], object] | None) -> ui.button:
+    """Return a button of a page's head: the words stand on it.
+
+    Parameters
+    ----------
+    icon, words : str
+        Icon and words.
+    action : callable, optional
+        The action; None for the button of a menu.
+    """
+    with ui.button(icon=icon, on_click=action).props(
+        f'flat dense stack aria-label="{words}" title="{words}"'
+    ) as button:
+        ui.label(words).classes("studio-words")
+    return button
+
+
+def bare(icon: str, words: str, action: Callable[[], object]) -> ui.button:
+    """Return a small button that shows its words while it is pointed at or focused.
+
+    Parameters
+    ----------
+    icon, words : str
+        Icon and words; the words may hold names from files.
+    action : callable
+        The action.
+    """
+    button = ui.button(icon=icon, on_click=action).props("flat dense round " + attribute("aria-label", words))
+    return button.classes("studio-bare")
+
+
+def light_or_dark() -> ui.button:
+    """Return the button that changes between light and dark; before the first press the computer's choice stands."""
+    dark = ui.dark_mode(value=None)
+
+    def turn() -> None:
+        dark.value = True if dark.value is None else not dark.value
+
+    return with_words("dark_mode", "Light or dark", turn)

@@ -1,0 +1,20 @@
+"""Figures of the studio: what the bars of the fall of the error say."""
+
+from imufit.studio import charts
+
+
+def test_steps_that_were_undone_stand_in_the_legend():
+    names = ["ideal sensor", "+ acc.bias", "acc.bias.x fixed"]
+    ratios, expected = [15.8, 15.7, 15.7], [None, 15.7, None]
+    there = charts.fall(names, ratios, expected, 2)
+    undone = charts.fall(names, ratios, expected, 1)
+    assert "undone" not in [trace["name"] for trace in there["data"] if "name" in trace]
+    assert "undone" in [trace["name"] for trace in undone["data"] if "name" in trace]
+    assert undone["data"][0]["marker"]["opacity"] == [1.0, 1.0, charts.UNDONE]
+
+
+def test_a_long_step_takes_no_room_from_the_bars():
+    name = "acc.column:temperature_of_the_left_motor.x fixed"
+    figure = charts.fall(["ideal sensor", name], [2.0, 1.0], [None, None], 1)
+    assert max(len(label) for label in figure["layout"]["xaxis"]["ticktext"]) <= charts.TICK
+    assert figure["data"][0]["customdata"][1] == name
