@@ -54,10 +54,10 @@ def test_message_says_what_to_do_next():
     first, second = (advice[rest] for rest in where.rests)
     assert "+x up: hold still, " in first[120].message
     # A quarter turn is nearer than a half one.
-    assert first[-1].message == "+x up: done. Turn +y up."
+    assert first[-1].message == "+x up: held. Now turn +y up."
     assert "+y up: hold still, " in second[120].message
     assert second[120].missing == ("+y", "-x", "+z", "-z", "-y")
-    assert second[-1].message == "+y up: done. Turn -x up."
+    assert second[-1].message == "+y up: held. Now turn -x up."
 
 
 def test_every_line_of_advice_is_one_line():

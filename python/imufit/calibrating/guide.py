@@ -153,6 +153,6 @@ class PoseGuide:
             return f"{side} up: hold still." if side in self.missing and unrest < NEARLY else f"Turn {wanted} up."
         if side in self.missing:
             if state == "held":
-                return f"{side} up: done. " + (f"Turn {wanted} up." if wanted else "Pick it up.")
+                return f"{side} up: held. " + (f"Now turn {wanted} up." if wanted else "Pick it up.")
             return f"{side} up: hold still, {100 * progress:.0f} %."
         return f"Turn {wanted} up."

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from imufit.calibrating.free_turning import ENOUGH, FreeTurning
 from imufit.calibrating.guide import PoseGuide
+from imufit.figures import quantity
 from imufit.rests.poses import SIDES
 
 Array = NDArray[np.float64]
@@ -156,7 +157,9 @@ class Wizard:
             return
         self._progress = self._turning.progress
         left = max(0, ENOUGH - self._turning.seen)
-        self._message = f"Turn it slowly through all attitudes, away from iron: {left} directions to go."
+        self._message = (
+            f"Turn it slowly through all attitudes, away from iron: {quantity.counted(left, 'direction')} to go."
+        )
 
     @property
     def stage(self) -> Stage:
