@@ -1,8 +1,12 @@
 """A converter whose steps are larger than the noise: rounding is no effect, and hides none that is larger."""
 
+import json
 from dataclasses import replace
+from io import StringIO
 
+import imufit
 import numpy as np
+import pandas as pd
 import pytest
 from imufit import Log, SensorModel
 from imufit.lab import simulate
@@ -66,3 +70,22 @@ def test_a_sensor_that_stands_on_one_value_is_left_out_and_said_so():
 def test_steps_of_a_table_that_are_fine_are_no_steps():
     log = rounded({}, steps={"acc": 0.002, "gyr": 1e-4, "mag": 0.05})
     assert np.array_equal(SensorModel().fit(log).analysis.logs[0].facts.steps, np.zeros((3, 3)))
+
+
+NOISELESS = """
+acc_x acc_y acc_z gyr_x gyr_y gyr_z mag_x mag_y mag_z temp ref_qw ref_qx ref_qy ref_qz motor_current vbat
+-0.02 -0.02 9.794 -0.001 0.001 0 -9.502 -17.798 -43.907 25.746 0 -0.517 0.856 0 0 3.7
+0.009 -0.024 -9.809 -0.001 0 0.001 8.76 -17.641 44.2 23.734 0.856 0 0 0.517 0.909 3.68
+0.022 0.004 9.796 0.001 -0.001 0 -9.016 -17.742 -44.214 29.063 0 0.517 -0.856 0 -0.757 3.66
+-0.001 0.015 -9.755 0 0.001 0.001 -9.336 17.615 43.658 23.315 -0.517 0 0 0.856 -0.279 3.64
+"""
+"""Four sides up: the mean of each, to a thousandth."""
+
+
+def test_rests_whose_readings_never_change_have_an_answer():
+    sides = pd.read_csv(StringIO(NOISELESS), sep=" ")
+    frame = sides.loc[sides.index.repeat(100)].reset_index(drop=True)
+    frame.insert(0, "t", np.arange(400) / 10.0)
+    answer = imufit.diagnose(frame)
+    assert answer.sentence
+    json.dumps(answer.to_dict(), allow_nan=False)
