@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import imufit
@@ -12,6 +13,7 @@ from imufit.cli.app import main
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
 from imufit.log import LogStream, read
+from imufit.report import page
 
 ROW = 1234
 
@@ -121,3 +123,16 @@ def test_a_sample_that_is_missing_as_a_whole_is_not_an_empty_cell(tmp_path: Path
     rows = ["t,acc_x,acc_y,acc_z", *(f"{0.01 * k:.2f},{',,' if k % 2 else '0,0,9.8'}" for k in range(20))]
     (tmp_path / "a.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
     assert not any("empty" in note for note in read(tmp_path / "a.csv").notes)
+
+
+def test_a_sensor_with_too_few_samples_has_no_spectrum() -> None:
+    log = simulate("handheld", {}, 3, 30.0).to_log()
+    assert log.acc is not None
+    acc, odd = log.acc.copy(), np.full(log.n, np.nan)
+    acc[36:, 2], acc[1081:, 1], acc[700:710, 0], odd[700] = np.nan, np.nan, np.nan, 1.0
+    fit = imufit.fit(replace(log, acc=acc, covariates={"odd": odd}))
+    compared, answer = fit.compare(), fit.diagnose()
+    assert set(compared.sensors) == {"gyr", "mag"} == {spectrum.channel[:3] for spectrum in compared.spectra}
+    (judged,) = (item for item in answer.judged if item.sensor == "acc")
+    assert not judged.judged
+    assert "<html" in page(compared, answer)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -178,10 +178,9 @@ def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
     where.sort(key=lambda w: -w.share * (ratios[w.channel] ** 2 - 1.0))
     panels.sort(key=lambda p: -p.share * max(ratios[p.channel] ** 2 - 1.0, 1e-6))
     segments.sort(key=lambda s: -s[3])
-    sensors = {
-        sensor: float(np.sqrt(np.mean([c.ratio**2 for c in channels if c.channel.startswith(sensor)])))
-        for sensor in facts.sensors
-    }
+    squares = {sensor: [c.ratio**2 for c in channels if c.channel.startswith(sensor)] for sensor in facts.sensors}
+    # A sensor with too few samples beside the reference has no channel.
+    sensors = {sensor: float(np.sqrt(np.mean(own))) for sensor, own in squares.items() if own}
     return Comparison(
         n=facts.n,
         duration_s=facts.t_end - facts.t_start,
@@ -191,7 +190,7 @@ def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
         attitude=None,
         where=tuple(where),
         panels=tuple(panels),
-        spectra=_spectra(evidence, analysis.own_step(log, step)),
+        spectra=_spectra(evidence, analysis.own_step(log, step), {item["index"] for item in result["channels"]}),
         segments=tuple(segments[:WORST_SEGMENTS]),
         notes=notes(evidence),
         data_faults=evidence.faults,
@@ -244,8 +243,8 @@ def _panel(item: Mapping[str, Any], floors: list[float], facts: _imufit.Facts) -
     )
 
 
-def _spectra(evidence: LogEvidence, step: Array) -> tuple[Spectrum, ...]:
-    """Density of the residual of each channel, averaged over stretches without a gap (Welch's method).
+def _spectra(evidence: LogEvidence, step: Array, judged: Collection[int]) -> tuple[Spectrum, ...]:
+    """Density of the residual of each channel that is judged, averaged over stretches without a gap (Welch's method).
 
     A channel is sampled at its own rate: rows of other channels may stand between its samples.
     """
@@ -257,7 +256,7 @@ def _spectra(evidence: LogEvidence, step: Array) -> tuple[Spectrum, ...]:
         t = arrays["t"][arrays["begin"] : arrays["end"]]
         for index, residual in enumerate(residuals):
             known = np.empty(0, int) if residual is None else np.flatnonzero(np.isfinite(residual))
-            if residual is None or known.size < SPECTRUM_ROWS:
+            if residual is None or index not in judged or known.size < SPECTRUM_ROWS:
                 continue
             steps = np.diff(t[known])
             rate = rates.setdefault(index, 1.0 / float(np.median(steps)))
