@@ -28,6 +28,14 @@ def test_the_terminal_shows_plain_blanks(monkeypatch, capsys):
     assert not set(out) & {"\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}"}
 
 
+@pytest.mark.parametrize("length", [20, 38, 41, 90])
+def test_the_name_of_a_file_stays_whole_in_the_terminal(monkeypatch, capsys, length):
+    monkeypatch.setenv("COLUMNS", "40")
+    name = "/" + "n" * (length - 5) + ".png"
+    Output().say(f"wrote {name}")
+    assert name in capsys.readouterr().out.split()
+
+
 def test_a_list_of_numbers_is_broken_and_indents_are_kept():
     lines = lines_of("16384 " * 20, 40, first="  a ", later="    ")
     assert [line[:5] for line in lines] == ["  a 1", "    1", "    1", "    1"][: len(lines)]

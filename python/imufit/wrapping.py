@@ -28,7 +28,7 @@ def unbroken(text: str) -> str:
     return _WITHIN.sub(NO_BREAK, text)
 
 
-def lines_of(text: str, width: int, first: str = "", later: str = "") -> list[str]:
+def lines_of(text: str, width: int, first: str = "", later: str = "", *, break_words: bool = True) -> list[str]:
     """Break each line of a text at blanks, none of them within a quantity.
 
     Parameters
@@ -39,6 +39,8 @@ def lines_of(text: str, width: int, first: str = "", later: str = "") -> list[st
         Characters of a line.
     first, later : str
         Indentation of the first line of a paragraph, and of its other lines.
+    break_words : bool
+        Break a word that is longer than a line. The name of a file in a terminal stays whole: it can be copied.
 
     Returns
     -------
@@ -55,6 +57,7 @@ def lines_of(text: str, width: int, first: str = "", later: str = "") -> list[st
             expand_tabs=False,
             replace_whitespace=False,
             break_on_hyphens=False,
+            break_long_words=break_words,
         )
         lines += [line.replace(NO_BREAK, " ") for line in broken or [""]]
     return lines

@@ -127,7 +127,7 @@ class Output:
         """Print sentences, one paragraph each."""
         for sentence in sentences:
             if sentence and not self._closed:
-                for line in lines_of(_harmless(sentence), self._console.width):
+                for line in lines_of(_harmless(sentence), self._console.width, break_words=False):
                     self._console.print(line, style="bold" if bold else None, soft_wrap=True)
 
     def lines(self, lines: Iterable[str]) -> None:
