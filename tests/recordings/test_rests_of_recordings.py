@@ -17,7 +17,7 @@ def test_biases_of_a_sensor_are_named_and_agree_with_its_calibration(name):
     assert first.verdict in ("missing", "ambiguous")
     assert {"acc.bias", "gyr.bias"} & {first.best, *first.ambiguous_with}
     passed = next(c for c in first.candidates if c.effect == "gyr.bias")
-    assert passed.status == "passed"
+    assert passed.status == "significant"
     for parameter in passed.parameters:
         # On top of what else is there, and of a zero that wanders: its own error says how well it is known.
         assert abs(parameter.value - calibrated[parameter.name]) < 2.0 * parameter.standard_error < 0.05
@@ -40,5 +40,5 @@ def test_iron_of_a_board_turned_about_the_vertical_is_named_with_what_looks_like
     path = recording("mpu6050_hmc5883l/set-2_rotate-ccw-around-z-pointing-up.parquet")
     diagnosis = SensorModel().fit(open_log(path)).diagnose()
     assert diagnosis.verdict in ("missing", "ambiguous")
-    assert {c.effect for c in diagnosis.candidates if c.status == "passed"} == {"mag.soft_iron", "mag.hard_iron"}
+    assert {c.effect for c in diagnosis.candidates if c.status == "significant"} == {"mag.soft_iron", "mag.hard_iron"}
     assert "rest" in " ".join(diagnosis.notes)
