@@ -214,8 +214,13 @@ class SensorCalibration(Part):
             f"{shown[2]} on what the fit did not see" if np.isfinite(self.held_out) else "nothing could be left out"
         )
         sentence = f"{name}: {what} {shown[0]} before, {shown[1]} after, {left_out} (RMS)."
+        return sentence if self.lowers_error else f"{sentence} The calibration does not lower this error."
+
+    @property
+    def lowers_error(self) -> bool:
+        """Whether the error is lower with it, where possible on what the fit did not see; true where none is known."""
         unseen = self.held_out if np.isfinite(self.held_out) else self.after
-        return sentence if unseen < self.before else f"{sentence} The calibration does not lower this error."
+        return not np.isfinite(self.before) or unseen < self.before
 
 
 @dataclass(frozen=True, repr=False)

@@ -187,7 +187,7 @@ def _same_column(effect: str, other: str) -> bool:
 
 
 def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] = ()) -> str | None:
-    """Return the effect to add next: the best that passed and that nothing else in the catalogue explains as well.
+    """Return the effect to add next: the best significant one that nothing else in the catalogue explains as well.
 
     Where others do, it is what stands out whichever of them is there; where nothing does, the first of them.
 
@@ -205,8 +205,8 @@ def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] 
     if diagnosis.verdict == "ambiguous":
         offered = (_beside_the_unsure(fit), diagnosis.best, *diagnosis.ambiguous_with)
         return next((effect for effect in offered if effect is not None and effect not in futile), None)
-    passed = [c for c in diagnosis.candidates if c.status == SIGNIFICANT and c.effect not in futile]
-    return passed[0].effect if passed else None
+    significant = (c for c in diagnosis.candidates if c.status == SIGNIFICANT)
+    return next((c.effect for c in significant if c.effect not in futile), None)
 
 
 def _beside_the_unsure(fit: FittedStack) -> str | None:

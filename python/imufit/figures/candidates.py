@@ -34,7 +34,7 @@ def candidate_bars(
     error : array_like
         (k,) standard error of the drop; NaN where it is not known.
     status : sequence of str
-        ``passed``, ``not significant`` or ``not testable here``.
+        ``significant``, ``not significant`` or ``not testable here``.
     sentence : str
         Title; without it what the best candidate promises.
     limit : int
@@ -58,7 +58,7 @@ def candidate_bars(
     axes = drawing.axes[0]
     places = np.arange(len(drawn))
     for at, index in zip(places, drawn, strict=True):
-        passed = status[index] == "significant"
+        significant = status[index] == "significant"
         axes.barh(
             at,
             before[index] - reached[index],
@@ -77,7 +77,7 @@ def candidate_bars(
             va="center",
             fontsize=9,
             color=style.INK,
-            fontweight="bold" if passed else "normal",
+            fontweight="bold" if significant else "normal",
         )
     now = float(np.nanmedian(before[drawn]))
     axes.axvline(1.0, color=style.INK, linewidth=1.2)

@@ -33,7 +33,7 @@ TICK: Final = 24
 FALL_HEIGHT: Final = 270
 """Height of the fall of the error, px: the labels under the bars and the legend leave a third of it to the bars."""
 SMALL: Final = 11
-"""Size of the words of the fall of the error, px: the axis' title is no longer than the plot, beneath the legend."""
+"""Size of the letters in the figure of the falling error, px. At this size the axis' title fits beside the plot."""
 SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
 DECADES: Final = 6

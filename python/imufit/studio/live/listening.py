@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.calibrating import Calibration, SensorCalibration, Stage, Wizard, calibrate
+from imufit.calibrating import Calibration, Stage, Wizard, calibrate
 from imufit.devices.emulate import Emulator
 from imufit.devices.monitor import Monitor, MonitorState
 from imufit.devices.record import Recorder
@@ -361,16 +361,10 @@ def in_sentences(result: Calibration) -> tuple[str, ...]:
     result : Calibration
         The calibration.
     """
-    if any(_lowers(sensor) for sensor in result.sensors.values()):
+    if any(sensor.lowers_error for sensor in result.sensors.values()):
         return tuple(sensor.sentence() for sensor in result.sensors.values())
     names = ", ".join(SENSOR_NAMES[name] for name in result.sensors)
     return (f"The model need not be used: the readings of {names} were right within the noise already.",)
-
-
-def _lowers(sensor: SensorCalibration) -> bool:
-    """Return whether the error is lower with the calibration, on what the fit did not see where there is such."""
-    unseen = sensor.held_out if np.isfinite(sensor.held_out) else sensor.after
-    return not np.isfinite(sensor.before) or unseen < sensor.before
 
 
 def in_words(recording: Recording) -> str:
