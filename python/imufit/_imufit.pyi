@@ -62,6 +62,7 @@ __all__ = [
     "quaternion_from_rotation_vector",
     "quaternion_product",
     "replay_rules",
+    "residual_against",
     "rest_channels",
     "rests_tell",
     "rotate",
