@@ -77,7 +77,8 @@ def jitter(rng: Random, columns: Columns) -> None:
     n = len(t)
     which = rng.randrange(5)
     if which == 0:
-        t = t + np.array([rng.uniform(0, 0.4) for _ in range(n)]) * (t[-1] - t[0]) / n
+        # An earlier mutation may have made the time a matrix.
+        t = t + np.multiply.outer([rng.uniform(0, 0.4) for _ in range(n)], (t[-1] - t[0]) / n)
     elif which == 1:
         t[rng.randrange(n) :] += rng.choice((1.0, 60.0, 86400.0))
     elif which == 2:
