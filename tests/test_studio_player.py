@@ -54,7 +54,7 @@ def test_player_turns_the_bodies_as_the_log_says(tmp_path):
             body = bodies[name]
             angle = np.degrees(np.arccos(np.clip((np.trace(body @ truth.T) - 1.0) / 2.0, -1.0, 1.0)))
             legend = page.locator(".studio-player .row", has_text=name).first.inner_text()
-            assert angle == pytest.approx(float(legend.split("off ")[1].rstrip("°")), abs=0.06)
+            assert angle == pytest.approx(float(legend.split("off ")[1].removesuffix(" deg")), abs=0.06)
         page.get_by_label("show predicted").click()
         page.wait_for_timeout(500)
         assert set(page.evaluate(TURNED)) == {"measured", "reference"}

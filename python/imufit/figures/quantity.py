@@ -212,6 +212,23 @@ def with_error(value: float, standard_error: float, unit: str) -> str:
     return f"{value:.{places}f} ± {standard_error:.{places}f} {shown}"
 
 
+def mean(value: float | None, unit: str, standard_error: float) -> str:
+    """Value in three digits of the shown unit, none of them below its standard error, e.g. ``0.000 m/s²``.
+
+    Parameters
+    ----------
+    value, standard_error : float
+        In `unit`.
+    unit : str
+        SI unit.
+    """
+    if value is None or not math.isfinite(value) or not math.isfinite(standard_error) or abs(value) >= standard_error:
+        return quantity(value, unit)
+    factor, shown = shown_unit(unit, standard_error)
+    places = max(0, -math.floor(math.log10(factor * standard_error))) if standard_error > 0.0 else 0
+    return f"{0.0:.{places}f} {shown}"
+
+
 def quantity(value: float | None, unit: str) -> str:
     """Value in the shown unit, e.g. ``0.573 deg/s``; a dash without a value."""
     if value is None or not math.isfinite(value):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, overload
@@ -102,6 +103,9 @@ class Panel(Plotted, Part):
         return drawn_panels((self,), ax)
 
 
+WHOLE_LOG: Final = "the whole log"
+NEARLY_WHOLE: Final = 0.9
+"""Part of a log: a stretch of so much of it says no more than the whole log does."""
 MOST_PANELS: Final = 12
 """Panels of a figure: three rows of four fill a screen."""
 
@@ -176,8 +180,7 @@ class Where(Part):
 
     def __str__(self) -> str:
         dependence = "is constant" if self.covariate == "constant" else f"depends on {self.covariate}"
-        span = quantity.span(self.t_start, self.t_end)
-        return f"{quantity.share(self.share)} of the excess of {self.channel} {dependence}, most of it at {span}"
+        return f"{quantity.share(self.share)} of the excess of {self.channel} {dependence}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -237,8 +240,14 @@ class Comparison(Plotted, Result):
         if worst.ratio > 1.02:
             causes = [where for where in self.where if where.channel == worst.channel]
             cause = causes[0] if causes else self.where[0] if self.where else None
-            text += f" {cause}." if cause else ""
+            place = self._mostly_at(cause) if cause else WHOLE_LOG
+            text += f" {cause}{'' if place == WHOLE_LOG else f', most of it at {place}'}." if cause else ""
         return text
+
+    def _mostly_at(self, cause: Where) -> str:
+        """Where in time most of a cause lies, in words."""
+        whole = cause.t_end - cause.t_start >= NEARLY_WHOLE * self.duration_s
+        return WHOLE_LOG if whole else quantity.span(cause.t_start, cause.t_end)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of `compare`; worst segments, notes and faults of the data besides."""
@@ -299,7 +308,7 @@ class Comparison(Plotted, Result):
                 item.channel,
                 quantity.ratio(item.ratio),
                 quantity.quantity(item.rms, item.unit),
-                quantity.quantity(item.mean, item.unit),
+                quantity.mean(item.mean, item.unit, item.noise_floor / math.sqrt(item.n)),
                 quantity.quantity(item.noise_floor, item.unit),
                 f"{item.n}",
             )
@@ -317,7 +326,7 @@ class Comparison(Plotted, Result):
             Rows at most.
         """
         rows = tuple(
-            (item.channel, item.covariate, quantity.share(item.share), quantity.span(item.t_start, item.t_end))
+            (item.channel, item.covariate, quantity.share(item.share), self._mostly_at(item))
             for item in self.where[:limit]
         )
         return Table("Dependences of the excess", ("channel", "covariate", ">share", ">mostly at"), rows)

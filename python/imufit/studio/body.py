@@ -233,7 +233,9 @@ class Player:
             track = self.tracks[name]
             self.body.show(name, q, track.frame)
             off = (
-                "" if q is None or reference is None or name == "reference" else f", off {error_deg(q, reference):.1f}°"
+                ""
+                if q is None or reference is None or name == "reference"
+                else f", off {error_deg(q, reference):.1f} deg"
             )
             self._words[name].text = angles_in_words(q) + off
         self._clock.text = f"{self.time:.2f} s of {self.end:.1f} s"
@@ -274,4 +276,4 @@ def angles_in_words(q: Array | None) -> str:
         return "not known"
     euler = np.degrees(_imufit.euler_from_quaternion(np.ascontiguousarray(q.reshape(1, 4)))[0])
     roll, pitch, yaw = np.round(euler, 1) + 0.0  # no minus before a zero
-    return f"roll {roll:.1f}°, pitch {pitch:.1f}°, yaw {yaw:.1f}°"
+    return f"roll {roll:.1f}°, pitch {pitch:.1f}°, yaw {yaw:.1f} deg"

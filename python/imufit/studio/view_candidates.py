@@ -11,6 +11,7 @@ from imufit.model.catalogue import card_of, find_effect
 from imufit.printable import NAME, printable
 from imufit.results import Candidate, Diagnosis
 from imufit.results.diagnosis import NOT_SIGNIFICANT, NOT_TESTABLE, SIGNIFICANT
+from imufit.results.parameter import in_lines
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.view_panels import PanelView
@@ -168,6 +169,14 @@ class CandidateView:
             card = card_of(find_effect(effect))
             with self._card:
                 ui.label(printable(f"{card.id}: {card.name}")).classes("studio-id")
-                for heading, text in card.lines():
+                for heading, text in [*card.lines(), *self._predicted(effect)]:
                     ui.label(printable(f"{heading}: {text}")).classes("studio-muted")
         self._panels.propose(effect)
+
+    def _predicted(self, effect: str) -> list[tuple[str, str]]:
+        """Return what the log says of the size of an effect, unless a person is to guess it."""
+        diagnosis = self._desk.diagnosis
+        if diagnosis is None or self._desk.guessing:
+            return []
+        found = [item for item in diagnosis.candidates if item.effect == effect and item.parameters]
+        return [("predicted here", "; ".join(in_lines(item.parameters))) for item in found]

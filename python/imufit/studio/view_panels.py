@@ -186,8 +186,9 @@ class PanelView:
         self._channel.set_options(
             {item.channel: f"{item.channel} ({quantity.ratio(item.ratio)})" for item in ratios}, value=channel
         )
+        shares = {item.covariate: item.share for item in found.where if item.channel == channel}
         self._covariate.set_options(
-            {name: printable(name, NAME) for name in self._names(found, channel)}, value=covariate
+            {name: _with_share(name, shares.get(name)) for name in self._names(found, channel)}, value=covariate
         )
         self._setting = False
 
@@ -322,6 +323,12 @@ class PanelView:
             self._window = window
             if self._channel.value is not None:
                 await self._draw_trace(self._channel.value)
+
+
+def _with_share(covariate: str, share: float | None) -> str:
+    """Return a covariate, with the share of the excess that it explains where that is worth naming."""
+    name = printable(covariate, NAME)
+    return name if share is None else f"{name} ({quantity.share(share)})"
 
 
 def _panel_of(panels: Any, channel: str, covariate: str | None) -> Panel | None:
