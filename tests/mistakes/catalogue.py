@@ -433,9 +433,9 @@ CLOCK = (
     _clock(
         "t_rows",
         "t counts rows",
-        lambda log, _: log.put(t=np.arange(log.n, dtype=float)),
+        s.clock_counts,
         ("row*", "Hz", "rate"),
-        step=0.02,
+        step=s.EVEN,
     ),
     _clock(
         "t_0_1_hz",

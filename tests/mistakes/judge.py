@@ -85,6 +85,12 @@ class Answer:
         return frozenset(x for x in (self.json["best"], *self.json["ambiguous_with"]) if x)
 
     @property
+    def shown(self) -> frozenset[str]:
+        """Effects said to be there: those blamed, and others that the log shows as well."""
+        seen = self.json["candidates"] if self.json is not None and self.blamed else []
+        return self.blamed | {item["effect"] for item in seen if item["status"] == "significant"}
+
+    @property
     def short(self) -> str:
         """The answer in a line."""
         if self.json is None:
@@ -162,7 +168,7 @@ def kind_of(mistake: Mistake, sound: Sound, spoilt: Log, baseline: Answer, answe
     known = {note.split(": ", 1)[-1] for note in baseline.notes}
     texts = fresh + [note for note in answer.notes if note.split(": ", 1)[-1] not in known]
     told = " ".join(texts).replace(path.stem, "")
-    if names(told, mistake) or answer.blamed & set(mistake.effects):
+    if names(told, mistake) or (answer.blamed | (answer.shown - baseline.shown)) & set(mistake.effects):
         return remedy_of(mistake, sound.log, told, path)
     if MAP.search(told) or (fresh and answer.verdict == "unknown"):
         # The user would follow a remedy for something else, and spoil the log once more.

@@ -32,6 +32,11 @@ UP = {"NED": (0.0, 0.0, -1.0), "ENU": (0.0, 0.0, 1.0), "NWU": (0.0, 0.0, 1.0)}
 """Up in each reference frame."""
 READINGS = tuple(f"{sensor}_{axis}" for sensor in ("acc", "gyr", "mag") for axis in AXES)
 QUATERNION = ("ref_qw", "ref_qx", "ref_qy", "ref_qz")
+MOUNTED = 0.01
+"""Rotation between the sensor and its rig at the angle zero, rad, from which on the sensor is mounted at an angle."""
+
+EVEN = 0.02
+"""Distance of a time from that of even steps, s, up to which the number of a row stands for its time."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +104,15 @@ def times(sensor: str, factor: float, *, offset: float = 0.0, whole: bool = Fals
     return spoil
 
 
-def degrees_of_rig(log: Log, _: np.random.Generator) -> Log:
+def degrees_of_rig(log: Log, _: np.random.Generator) -> Log | None:
     """Leave the rig's angle as the only reference, in degrees."""
+    vector = np.zeros((len(log.table["t"]), 3))
+    vector[:, "xyz".index(log.metadata["rig_axis"])] = log.table["ref_angle"]
+    w, *xyz = (log.table[name] for name in QUATERNION)
+    mount = Rotation.from_quat(np.column_stack([*xyz, w])) * Rotation.from_rotvec(vector).inv()
+    if float(np.median(mount.magnitude())) > MOUNTED:
+        # The quaternion alone holds how the sensor is mounted: without it the angle of the sound log is another one.
+        return None
     return log.without(*QUATERNION).put(ref_angle=log.table["ref_angle"] / DEGREE)
 
 
@@ -274,6 +286,14 @@ def rate(log: Log) -> float:
 def clock(change: Callable[[Array], Array]) -> Spoil:
     """Write the time otherwise."""
     return lambda log, _: log.put(t=change(log.table["t"]))
+
+
+def clock_counts(log: Log, _: np.random.Generator) -> Log | None:
+    """The number of the row in place of its time; of uneven times, which no mapping restores, None."""
+    t = log.table["t"]
+    if np.abs(t - np.linspace(t[0], t[-1], log.n)).max() > EVEN:
+        return None
+    return log.put(t=np.arange(log.n, dtype=float))
 
 
 def clock_by_row(log: Log, _: np.random.Generator) -> Log:

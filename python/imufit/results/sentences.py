@@ -125,7 +125,15 @@ def _missing(found: Diagnosis, best: Candidate | None) -> str:
             f"and {best.effect} adds nothing to what {rivals} explains."
         )
     text = f"{best.effect} is missing. {best.explanation}"
-    return f"{text} Apart from it, {left}." if left else text
+    others = [item.effect for item in found.candidates if item.status == SIGNIFICANT and item.effect != best.effect]
+    if others:
+        text += f" The log shows {_listed(others)} as well."
+    return f"{text} Apart from {'these' if others else 'it'}, {left}." if left else text
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Write names with commas, and the last one with "and"."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def _nearest(found: Diagnosis) -> str:
