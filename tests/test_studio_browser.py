@@ -1,5 +1,6 @@
 """The studio in Debian's Chromium: the loop, undo, two models, dropped files, the game, and what is refused."""
 
+import base64
 import json
 import socket
 import subprocess
@@ -93,6 +94,25 @@ def answer(folder, *arguments):
         check=True,
     )
     return json.loads(done.stdout)
+
+
+def test_a_file_that_is_dropped_anywhere_on_the_page_is_opened(page, folder):
+    content = base64.b64encode((folder / "walk.parquet").read_bytes()).decode()
+    page.evaluate(
+        """content => {
+            const bytes = Uint8Array.from(atob(content), letter => letter.charCodeAt(0));
+            const carried = new DataTransfer();
+            carried.items.add(new File([bytes], 'carried.parquet'));
+            const named = kind => new DragEvent(kind, {dataTransfer: carried, bubbles: true, cancelable: true});
+            const over = named('dragover');
+            document.body.dispatchEvent(over);
+            if (!over.defaultPrevented) throw new Error('the page refuses files');
+            document.querySelector('main').dispatchEvent(named('drop'));
+        }""",
+        content,
+    )
+    wait_for_bars(page, 1)
+    assert marked(page, "logs").inner_text() == "carried.parquet"
 
 
 def test_the_loop_gives_the_numbers_of_the_command_line(page, folder):

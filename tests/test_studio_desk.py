@@ -1,14 +1,18 @@
 """The state of the studio: rows are shown before the evidence, and a bad log leaves what was there."""
 
 import asyncio
+import threading
+import time
 
 import numpy as np
 import pytest
 from imufit.lab.simulate import simulate
 from imufit.lab.simulated_log import save_simulation
 from imufit.log import read
+from imufit.progress import silent
 from imufit.studio.desk import Desk
 from imufit.studio.log_file import LogFile, Way
+from imufit.studio.session import Session
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +53,64 @@ def test_a_log_without_evidence_leaves_the_session_before_it(log, spoilt):
     assert [(desk.session, desk.files, desk.traces, desk.models)] == before
     t, values = desk.traces.window(["acc_x"], *desk.traces.span, 100)["acc_x"].line()
     assert t.size == values.size > 100
+
+
+def test_another_log_does_not_wait_for_the_work_on_the_one_before(log, tmp_path, monkeypatch):
+    """Passes over a long log may take minutes, and nobody waits for their answer once another log is open."""
+    other = tmp_path / "other.csv"
+    save_simulation(simulate("handheld", {}, 2, duration=20.0, rate=50.0), other)
+    judge, ended, begun = Session.diagnose, [], threading.Event()
+
+    def endless(self, stack=None, progress=silent):
+        if self.logs[0].path != log.path:
+            return judge(self, stack, progress)
+        try:
+            while True:
+                begun.set()
+                progress(1, 10, "taking evidence")
+                time.sleep(0.01)
+        except BaseException:
+            ended.append(True)
+            raise
+
+    async def both() -> None:
+        first = asyncio.create_task(desk.open([log]))
+        await asyncio.to_thread(begun.wait)
+        await desk.open([LogFile(other, other.name)])
+        await first
+
+    monkeypatch.setattr(Session, "diagnose", endless)
+    desk = Desk()
+    asyncio.run(asyncio.wait_for(both(), 60.0))
+    assert ended == [True]
+    assert desk.session.logs[0].path == other
+    assert desk.diagnosis is not None
+    assert desk.trouble == ""
+
+
+def test_work_on_a_model_ends_once_another_one_is_asked_about(log, monkeypatch):
+    judge, asked, begun = Session.diagnose, [], threading.Event()
+
+    def endless(self, stack=None, progress=silent):
+        asked.append((stack or self.stack).model)
+        if len(asked) > 1:
+            return judge(self, stack, progress)
+        while True:
+            begun.set()
+            progress(1, 10, "taking evidence")
+            time.sleep(0.01)
+
+    async def both() -> None:
+        first = asyncio.create_task(desk.open([log]))
+        await asyncio.to_thread(begun.wait)
+        await desk.attempt(lambda: desk.session.add("acc.bias"))
+        await first
+
+    monkeypatch.setattr(Session, "diagnose", endless)
+    desk = Desk()
+    asyncio.run(asyncio.wait_for(both(), 60.0))
+    assert desk.diagnosis is not None
+    assert desk.session.stack.model.effects == ("acc.bias",)
 
 
 def test_a_problem_meanwhile_does_not_stop_the_work(log):

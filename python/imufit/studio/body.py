@@ -276,4 +276,4 @@ def angles_in_words(q: Array | None) -> str:
         return "not known"
     euler = np.degrees(_imufit.euler_from_quaternion(np.ascontiguousarray(q.reshape(1, 4)))[0])
     roll, pitch, yaw = np.round(euler, 1) + 0.0  # no minus before a zero
-    return f"roll {roll:.1f}°, pitch {pitch:.1f}°, yaw {yaw:.1f} deg"
+    return f"roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} deg"

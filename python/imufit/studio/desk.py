@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 import tempfile
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar, cast
 
-from nicegui import Event, run
+from nicegui import Event, app, run
 
 from imufit.errors import InputError
 from imufit.log import Reading
@@ -24,11 +25,31 @@ from imufit.studio.stack import Stack
 from imufit.studio.traces import ModelTraces, Traces
 
 Answer = TypeVar("Answer")
-Piece = tuple[str, Callable[[], object], LogFile | None]
-"""Work in words, the work, and the file that a problem of it concerns."""
 
 SESSION_ENDING: Final = ".toml"
 """Ending of the file of a session."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A piece of work.
+
+    Attributes
+    ----------
+    words : str
+        The work in words.
+    work : callable
+        The work.
+    file : LogFile or None
+        The file that a problem of it concerns.
+    judged : Stack or None
+        The model that is asked about, where the answer is of no use for another one.
+    """
+
+    words: str
+    work: Callable[[], object]
+    file: LogFile | None = None
+    judged: Stack | None = None
 
 
 @dataclass(frozen=True)
@@ -71,6 +92,10 @@ class _FailedError(Exception):
     def __init__(self, *, unusable: bool) -> None:
         super().__init__()
         self.unusable = unusable
+
+
+class _SupersededError(Exception):
+    """Work that nobody waits for any more: another log or another model is shown, or the server ends."""
 
 
 class Desk:
@@ -131,6 +156,9 @@ class Desk:
         self.changed: Event[[]] = Event()
         self._folder = tempfile.TemporaryDirectory(prefix="imufit-")
         self._working = False
+        self._closed = False
+        self._passes = 0
+        self._worker = threading.local()
         self.troubled: LogFile | None = None
         self._before: Shown | None = None
 
@@ -192,26 +220,70 @@ class Desk:
     # --- work
 
     def progress(self, done: int, total: int, label: str) -> None:
-        """Note how far the work is; pages look at it a few times a second."""
+        """Note how far the work is, and end work that is superseded; pages look at the share a few times a second.
+
+        Rows are read for figures as well, in threads that are none of the work's: they have nothing to note.
+        """
+        superseded = getattr(self._worker, "superseded", None)
+        if superseded is None:
+            return
+        if self._closed or superseded():
+            raise _SupersededError
         if (done, total) == (0, 1):
-            self.busy, self.share = label, None
+            self.busy, self.share, self._passes = label, None, 0
+        elif done < total:
+            # Nobody knows how many passes a search takes: only the first one's share is that of the work.
+            self.share = done / total if self._passes == 0 else None
         else:
-            self.share = done / total if done < total else None
+            self.share = None
+            self._passes += 1
+
+    @property
+    def passes(self) -> int:
+        """How many passes over the rows the present work has made."""
+        return self._passes
+
+    def close(self) -> None:
+        """End the work at its next step: the server ends."""
+        self._closed = True
 
     async def _tried(self, words: str, work: Callable[[], Answer], file: LogFile | None = None) -> Answer | None:
         """Run work in a thread; a problem is noted and gives None."""
         try:
             return await self._in_thread(words, work, file)
-        except _FailedError:
+        except (_FailedError, _SupersededError):
             return None
 
-    async def _in_thread(self, words: str, work: Callable[[], Answer], file: LogFile | None = None) -> Answer:
-        """Run work in a thread; a problem is noted, and `_FailedError` raised."""
-        self.busy, self.share = words, None
+    async def _in_thread(
+        self,
+        words: str,
+        work: Callable[[], Answer],
+        file: LogFile | None = None,
+        superseded: Callable[[], bool] = lambda: False,
+    ) -> Answer:
+        """Run work in a thread; a problem is noted, and `_FailedError` raised; work that is superseded ends early."""
+
+        def watched() -> Answer:
+            self._worker.superseded = superseded
+            try:
+                return work()
+            except Exception as error:
+                # Work may stumble over what was put away meanwhile.
+                if superseded():
+                    raise _SupersededError from error
+                raise
+            finally:
+                del self._worker.superseded
+
+        self.busy, self.share, self._passes = words, None, 0
         self.changed.emit()
         try:
-            # It gives None where the server ends meanwhile, when no page is left.
-            return cast(Answer, await run.io_bound(work))
+            found = await run.io_bound(watched)
+            if app.is_stopping or app.is_stopped:
+                # It gives None where the server ends meanwhile, when no page is left.
+                self.close()
+                raise _SupersededError
+            return cast(Answer, found)
         except InputError as error:
             advice = error.advice
             if file is not None and isinstance(advice, Remedy) and advice.python != advice.shell:
@@ -224,6 +296,8 @@ class Desk:
         except (OSError, MemoryError) as error:
             self._note(f"{type(error).__name__}: {error}", [], file)
             raise _FailedError(unusable=False) from error
+        except _SupersededError:
+            raise
         except Exception as error:
             # A fault of the program must not end the page: the person may save the session.
             logging.getLogger(__name__).exception("the studio's work failed")
@@ -272,16 +346,26 @@ class Desk:
             return
         self._working = True
         try:
-            while (step := next(self._pending(), None)) is not None:
+            while (piece := next(self._pending(), None)) is not None:
                 session = self.session
+                superseded = partial(self._superseded, session, piece)
                 try:
-                    await self._in_thread(*step)
+                    await self._in_thread(piece.words, piece.work, piece.file, superseded)
+                except _SupersededError:
+                    if self._closed:
+                        return
                 except _FailedError as failed:
                     if session is self.session:
                         self._give_up(unusable=failed.unusable)
                         return
         finally:
             self._working = False
+
+    def _superseded(self, session: Session | None, piece: Piece) -> bool:
+        """Return whether nobody waits for work any more: other logs are open, or another model is asked about."""
+        if session is None or session is not self.session:
+            return True
+        return piece.judged is not None and session.stack.model != piece.judged.model
 
     def _give_up(self, *, unusable: bool) -> None:
         """Return to the step before one whose model cannot be fitted, or to the session before one without evidence.
@@ -303,10 +387,10 @@ class Desk:
     def _pending_first(self, session: Session) -> Iterator[Piece]:
         """List the pieces of work before anything can be fitted: a person sees the rows while the evidence is taken."""
         if self.traces is None or not self.traces.built or self.traces.log is not session.logs[session.shown]:
-            yield "reading the rows", self._drawn_rows, self.files[0]
+            yield Piece("reading the rows", self._drawn_rows, self.files[0])
         if not session.begun and not session.refused:
             names = " and ".join(file.name for file in self.files)
-            yield f"taking the evidence of {names}", partial(session.begin, self.progress), self.files[0]
+            yield Piece(f"taking the evidence of {names}", partial(session.begin, self.progress), self.files[0])
         elif self._before is not None:
             before, self._before = self._before, None
             self._close(before.traces)
@@ -325,23 +409,23 @@ class Desk:
         for step in session.steps[: session.position + 1]:
             # Earlier ones first: a session that was reopened goes the same way again.
             if session.made(step.stack) is None:
-                yield f"fitting {words}", partial(session.fit, step.stack, self.progress), None
+                yield Piece(f"fitting {words}", partial(session.fit, step.stack, self.progress))
                 return
         assert made is not None
         if made.comparison is None and session.has_reference:
-            yield f"comparing {words}", lambda: session.compare(stack, self.progress), None
+            yield Piece(f"comparing {words}", partial(session.compare, stack, self.progress), judged=stack)
         if made.diagnosis is None:
-            yield f"effects missing in {words}", lambda: session.diagnose(stack, self.progress), None
+            yield Piece(f"effects missing in {words}", partial(session.diagnose, stack, self.progress), judged=stack)
         if session.has_reference:
             for model in self._models_drawn(session):
                 if model not in self.models:
-                    yield "residuals over time", partial(self._drawn_model, model), None
+                    yield Piece("residuals over time", partial(self._drawn_model, model))
         if session.second is not None:
             second = session.made(session.second)
             if second is None or (second.comparison is None and session.has_reference):
-                yield "comparing the kept model", lambda: session.compare(session.second, self.progress), None
+                yield Piece("comparing the kept model", partial(session.compare, session.second, self.progress))
             if session.second.model != stack.model and session.weighed() is None:
-                yield "weighing the two models", lambda: session.weigh(self.progress), None
+                yield Piece("weighing the two models", partial(session.weigh, self.progress))
 
     @staticmethod
     def _models_drawn(session: Session) -> list[Stack]:

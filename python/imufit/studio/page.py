@@ -16,7 +16,7 @@ from imufit.studio.view_fall import FallView
 from imufit.studio.view_model import ModelView
 from imufit.studio.view_noise import NoiseView
 from imufit.studio.view_panels import PanelView
-from imufit.studio.view_top import Head, Top
+from imufit.studio.view_top import Head, Top, takes_drops
 from imufit.studio.view_two import TwoView
 from imufit.studio.view_words import WordsView
 
@@ -36,6 +36,7 @@ def page_of(desk: Desk) -> Callable[[], None]:
 
     def build() -> None:
         ui.add_css(style)
+        takes_drops(desk)
         head = Head(desk)
         with ui.element("main").classes("studio") as main:
             with _region("top"):

@@ -21,6 +21,9 @@ TOKEN_BYTES: Final = 24
 BACKLOG: Final = 64
 """Connections that may wait: one page opens about 40 at once."""
 
+GOODBYE_S: Final = 2
+"""Time that open pages have to leave when the server ends, s; a page that stays would hold the server."""
+
 _paths: dict[str, str] = {}
 """Titles of the pages by path."""
 
@@ -98,7 +101,9 @@ def serve(port: int = 0, ready: Callable[[str], None] | None = None) -> None:
         ui.run_with(outer, mount_path=f"/{token}", show_welcome_message=False, reconnect_timeout=30.0)
         if ready is not None:
             app.on_startup(lambda: ready(address_of(chosen, token)))
-        settings = uvicorn.Config(Guard(outer, token, chosen), log_level="error", access_log=False)
+        settings = uvicorn.Config(
+            Guard(outer, token, chosen), log_level="error", access_log=False, timeout_graceful_shutdown=GOODBYE_S
+        )
         # Ctrl-C is how a person ends the server, and no interruption of its work.
         with suppress(KeyboardInterrupt):
             uvicorn.Server(settings).run(sockets=[listening])

@@ -55,5 +55,6 @@ def start(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, read
         elif logs:
             await desk.open([LogFile(path, str(path), reading) for path in logs])
 
+    app.on_shutdown(desk.close)
     app.on_startup(lambda: background_tasks.create(first(), name="first log"))
     server.serve(port, ready)

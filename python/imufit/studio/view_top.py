@@ -28,6 +28,16 @@ MOST_BYTES: Final = 4 * 2**30
 """Largest file that the browser may send: 20 million rows of 14 columns take 2.2 GB."""
 NOTES: Final = 2
 """Notes that stand open: as many lines as the sentence over them has; the others fold away."""
+DROPS: Final = """
+const elsewhere = event => !event.target.closest || !event.target.closest('.q-uploader');
+document.addEventListener('dragover', event => { if (elsewhere(event)) event.preventDefault(); });
+document.addEventListener('drop', event => {
+  if (!elsewhere(event)) return;
+  event.preventDefault();
+  if (event.dataTransfer.files.length) getElement(UPLOADER).$refs.qRef.addFiles(event.dataTransfer.files);
+});
+"""
+"""Script by which a file that is dropped anywhere on the page goes to the uploader of a number."""
 PART_JUDGED: Final = "rule"
 """Icon of an adequate model where a sensor was not judged."""
 ICONS: Final = {"adequate": "check_circle", "missing": "help", "ambiguous": "call_split", "unknown": "error"}
@@ -161,6 +171,7 @@ class Top:
         desk = self._desk
         self._busy.visible = bool(desk.busy)
         share = "" if desk.share is None else f" {100.0 * desk.share:.0f} %"
+        share = f", pass {desk.passes + 1} over the rows" if desk.passes else share
         self._work.set_text(f"{printable(desk.busy)}{share}" if desk.busy else "")
 
     def refresh(self) -> None:
@@ -404,7 +415,20 @@ def _upload(desk: Desk) -> None:
     dialog.open()
 
 
-def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
+def takes_drops(desk: Desk) -> None:
+    """Let the whole page take files that are dropped on it.
+
+    Parameters
+    ----------
+    desk : Desk
+        Where the files go.
+    """
+    with ui.element("div").classes("hidden"):
+        uploader = _uploader(desk).props("data-mark=dropped")
+    ui.run_javascript(DROPS.replace("UPLOADER", str(uploader.id)))
+
+
+def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> ui.upload:
     async def take(event: events.MultiUploadEventArguments) -> None:
         files = []
         folder = desk.new_folder()
@@ -418,6 +442,7 @@ def _uploader(desk: Desk, done: Callable[[], object] | None = None) -> None:
             done()
         await desk.bring(files)
 
-    ui.upload(
+    box = ui.upload(
         label="Drop files or press +", multiple=True, auto_upload=True, on_multi_upload=take, max_total_size=MOST_BYTES
-    ).props("flat bordered").props("data-mark=upload")
+    )
+    return box.props("flat bordered").props("data-mark=upload")
