@@ -1,12 +1,17 @@
 """The command of the studio: its arguments, its address, and what it hands to the browser."""
 
 import re
+import subprocess
+import sys
+import time
 import webbrowser
 
 import pytest
 from click.testing import CliRunner
 from imufit.cli import engine
 from imufit.cli.app import imufit
+from imufit.lab.simulate import simulate
+from imufit.lab.simulated_log import save_simulation
 
 ADDRESS = "http://127.0.0.1:5000/some-token/"
 
@@ -72,3 +77,16 @@ def test_a_port_that_is_taken_is_named():
         port = taken.getsockname()[1]
         with pytest.raises(InputError, match=f"port {port} cannot be used"):
             server.serve(port)
+
+
+def test_a_server_that_is_told_to_end_does_not_wait_for_its_work(tmp_path):
+    """The evidence of a long log takes minutes."""
+    save_simulation(simulate("handheld", {}, 1, duration=300.0, rate=1000.0), tmp_path / "long.parquet")
+    command = [sys.executable, "-m", "imufit", "studio", "long.parquet", "--no-browser"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
+        assert server.stdout.readline().startswith("http://127.0.0.1:")
+        time.sleep(2.0)
+        server.terminate()
+        # The evidence takes a minute of two idle processors.
+        server.wait(timeout=25.0)
+        assert "Traceback" not in server.stderr.read()

@@ -144,6 +144,10 @@ def promise(effect: str, before: float, after: float) -> str:
         The error without and with it alone, over the noise floor.
     """
     if after < before:
+        if ratio(after) == ratio(before):
+            return (
+                f"Adding {effect} should lower the held-out error a little below {ratio(before)} times the noise floor"
+            )
         return f"Adding {effect} should cut the held-out error {fall(before, after)}"
     return f"Alone {effect} does not lower the held-out error; beside the other effects it may"
 

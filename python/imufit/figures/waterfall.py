@@ -102,7 +102,7 @@ def waterfall(
             marker="x",
             markersize=6.5,
             markeredgewidth=1.6,
-            zorder=4,
+            zorder=6,
             label="training error",
         )
     _values(axes, places, np.concatenate([[start], before]), np.concatenate([[start], after]))

@@ -153,7 +153,7 @@ def pictures(
         if diagnosis is not None and diagnosis.candidates
         else None,
         proposed=_parameters("predicted_parameters", "Predicted parameters over their typical sizes", best.parameters)
-        if best is not None and any(item.typical is not None for item in best.parameters)
+        if best is not None
         else None,
         parameters=_parameters("fitted_parameters", "Fitted parameters over their typical sizes", fitted),
         traces=_traces(rows, order),
@@ -260,7 +260,8 @@ def _fall(ladder: Ladder | None, addition: Addition | None) -> Picture | None:
 
 
 def _parameters(name: str, description: str, parameters: Sequence[Parameter]) -> Picture | None:
-    if not parameters:
+    # The picture holds values against typical sizes: a column's parameters have none.
+    if all(item.typical is None for item in parameters):
         return None
     height = 1.6 + 0.28 * len(parameters)
     return _sized(name, description, height, lambda figure: drawn_parameters(parameters, figure))

@@ -43,7 +43,7 @@ class Piece:
     file : LogFile or None
         The file that a problem of it concerns.
     judged : Stack or None
-        The model that is asked about, where the answer is of no use for another one.
+        The model that is asked about, where another model needs another answer.
     """
 
     words: str
@@ -95,7 +95,7 @@ class _FailedError(Exception):
 
 
 class _SupersededError(Exception):
-    """Work that nobody waits for any more: another log or another model is shown, or the server ends."""
+    """Work whose answer is not wanted any more: another log or another model is shown, or the server ends."""
 
 
 class Desk:
@@ -232,7 +232,7 @@ class Desk:
         if (done, total) == (0, 1):
             self.busy, self.share, self._passes = label, None, 0
         elif done < total:
-            # Nobody knows how many passes a search takes: only the first one's share is that of the work.
+            # The number of passes of a search is unknown: only the share of the first one is that of the work.
             self.share = done / total if self._passes == 0 else None
         else:
             self.share = None
@@ -362,7 +362,7 @@ class Desk:
             self._working = False
 
     def _superseded(self, session: Session | None, piece: Piece) -> bool:
-        """Return whether nobody waits for work any more: other logs are open, or another model is asked about."""
+        """Return whether an answer is not wanted any more: other logs are open, or another model is asked about."""
         if session is None or session is not self.session:
             return True
         return piece.judged is not None and session.stack.model != piece.judged.model

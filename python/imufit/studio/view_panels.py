@@ -81,13 +81,19 @@ class PanelView:
             return
         if session is not self._session:
             self._session, self._window, self._state = session, None, ()
+            self._setting = True
+            for choice in (self._channel, self._covariate):
+                choice.set_options([], value=None)
+            self._setting = False
             self._trace.update_figure(charts.empty("The rows are being read."))
             for chart in (self._panel, self._spectrum):
                 chart.update_figure(charts.empty("This stands here once the evidence is there."))
         made = session.made()
         found = None if made is None else made.comparison
         judged = session.begun and session.has_reference
-        self._covariate.visible = self._trace_kind.visible = judged
+        self._covariate.visible = judged
+        # Before a residual is there, the readings are drawn, and there is nothing to choose.
+        self._trace_kind.visible = judged and bool(self._desk.models)
         self._title.set_content(FAILS_WHERE if session.has_reference and not session.refused else "Readings")
         self._pair.visible = session.has_reference and not session.refused
         if not judged:

@@ -354,7 +354,7 @@ class Top:
             choices |= {name: printable(name, NAME) for name in names}
             with ui.row().classes("items-center"):
                 # Who added an effect has named it; another choice stays until the reveal.
-                present = _named(desk) if game.answer is None else game.answer
+                present = (_named(desk) or None) if game.answer is None else game.answer
                 value = present if present in choices else None
                 answer = ui.select(choices, value=value, label="Your answer", with_input=True).props("dense outlined")
                 answer.classes("min-w-56").props("data-mark=answer")
