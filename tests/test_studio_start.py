@@ -88,5 +88,8 @@ def test_a_server_that_is_told_to_end_does_not_wait_for_its_work(tmp_path):
         time.sleep(2.0)
         server.terminate()
         # The evidence takes a minute of two idle processors.
-        server.wait(timeout=25.0)
+        try:
+            server.wait(timeout=25.0)
+        finally:
+            server.kill()
         assert "Traceback" not in server.stderr.read()
