@@ -44,6 +44,7 @@ def test_an_answer_without_a_name_is_not_taken_for_one(sound, baseline, tmp_path
         "verdict": "missing",
         "best": "acc.scale",
         "ambiguous_with": [],
+        "candidates": [],
         "data_faults": [],
         "notes": [],
         "noise": [],

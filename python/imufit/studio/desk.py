@@ -279,7 +279,7 @@ class Desk:
         self.changed.emit()
         try:
             found = await run.io_bound(watched)
-            if app.is_stopping or app.is_stopped:
+            if app.is_stopping or self._closed:
                 # It gives None where the server ends meanwhile, when no page is left.
                 self.close()
                 raise _SupersededError
