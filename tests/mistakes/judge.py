@@ -86,8 +86,8 @@ class Answer:
 
     @property
     def shown(self) -> frozenset[str]:
-        """Effects said to be there: those blamed, and others that the log shows as well."""
-        seen = self.json["candidates"] if self.json is not None and self.blamed else []
+        """Effects said to be there: those blamed, and those that the sentence of a missing one names as well."""
+        seen = self.json["candidates"] if self.json is not None and self.verdict == "missing" else []
         return self.blamed | {item["effect"] for item in seen if item["status"] == "significant"}
 
     @property

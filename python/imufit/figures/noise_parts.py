@@ -83,7 +83,8 @@ def noise_parts(parts: Sequence[NoisePartLike], ax: place.Place | None = None) -
     axes.set_yticks(range(len(channels)), channels)
     axes.set_ylim(len(channels) - 0.5, -0.5)
     beyond = any(part.component in BEYOND and part.share >= LEAST_SHARE for part in parts)
-    note = f"{chr(10) if drawing.narrow else ' '}(hatched: beside the floor)" if beyond else ""
+    between = "\n" if drawing.narrow else " "
+    note = f"{between}(hatched: beside the floor)" if beyond else ""
     axes.set_xlabel(f"share of the floor's variance{note}", fontsize=9)
     drawing.legend(loc="outside lower center", ncols=2 if drawing.narrow else 5)
     style.title(axes, _sentence(parts))

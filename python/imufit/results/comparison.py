@@ -103,7 +103,6 @@ class Panel(Plotted, Part):
         return drawn_panels((self,), ax)
 
 
-WHOLE_LOG: Final = "the whole log"
 NEARLY_WHOLE: Final = 0.9
 """Part of a log: a stretch of so much of it says no more than the whole log does."""
 MOST_PANELS: Final = 12
@@ -240,14 +239,16 @@ class Comparison(Plotted, Result):
         if worst.ratio > 1.02:
             causes = [where for where in self.where if where.channel == worst.channel]
             cause = causes[0] if causes else self.where[0] if self.where else None
-            place = self._mostly_at(cause) if cause else WHOLE_LOG
-            text += f" {cause}{'' if place == WHOLE_LOG else f', most of it at {place}'}." if cause else ""
+            if cause is not None:
+                within = (
+                    "" if self._throughout(cause) else f", most of it at {quantity.span(cause.t_start, cause.t_end)}"
+                )
+                text += f" {cause}{within}."
         return text
 
-    def _mostly_at(self, cause: Where) -> str:
-        """Where in time most of a cause lies, in words."""
-        whole = cause.t_end - cause.t_start >= NEARLY_WHOLE * self.duration_s
-        return WHOLE_LOG if whole else quantity.span(cause.t_start, cause.t_end)
+    def _throughout(self, cause: Where) -> bool:
+        """Whether a cause lies in nearly the whole log."""
+        return cause.t_end - cause.t_start >= NEARLY_WHOLE * self.duration_s
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of `compare`; worst segments, notes and faults of the data besides."""
@@ -326,7 +327,12 @@ class Comparison(Plotted, Result):
             Rows at most.
         """
         rows = tuple(
-            (item.channel, item.covariate, quantity.share(item.share), self._mostly_at(item))
+            (
+                item.channel,
+                item.covariate,
+                quantity.share(item.share),
+                "the whole log" if self._throughout(item) else quantity.span(item.t_start, item.t_end),
+            )
             for item in self.where[:limit]
         )
         return Table("Dependences of the excess", ("channel", "covariate", ">share", ">mostly at"), rows)

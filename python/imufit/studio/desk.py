@@ -125,6 +125,8 @@ class Desk:
         The present work, in words; empty where there is none.
     share : float or None
         Share of the work that is done, where this is known.
+    passes : int
+        How many passes over the rows the present work has made.
     trouble : str
         The last problem; empty where there is none.
     in_shell : str
@@ -150,6 +152,7 @@ class Desk:
         self.models: dict[Stack, ModelTraces] = {}
         self.busy = ""
         self.share: float | None = None
+        self.passes = 0
         self.trouble = ""
         self.in_shell = ""
         self.cures: list[Option] = []
@@ -157,7 +160,6 @@ class Desk:
         self._folder = tempfile.TemporaryDirectory(prefix="imufit-")
         self._working = False
         self._closed = False
-        self._passes = 0
         self._worker = threading.local()
         self.troubled: LogFile | None = None
         self._before: Shown | None = None
@@ -227,21 +229,16 @@ class Desk:
         superseded = getattr(self._worker, "superseded", None)
         if superseded is None:
             return
-        if self._closed or superseded():
+        if superseded():
             raise _SupersededError
         if (done, total) == (0, 1):
-            self.busy, self.share, self._passes = label, None, 0
+            self.busy, self.share, self.passes = label, None, 0
         elif done < total:
             # The number of passes of a search is unknown: only the share of the first one is that of the work.
-            self.share = done / total if self._passes == 0 else None
+            self.share = done / total if self.passes == 0 else None
         else:
             self.share = None
-            self._passes += 1
-
-    @property
-    def passes(self) -> int:
-        """How many passes over the rows the present work has made."""
-        return self._passes
+            self.passes += 1
 
     def close(self) -> None:
         """End the work at its next step: the server ends."""
@@ -263,19 +260,22 @@ class Desk:
     ) -> Answer:
         """Run work in a thread; a problem is noted, and `_FailedError` raised; work that is superseded ends early."""
 
+        def unwanted() -> bool:
+            return self._closed or superseded()
+
         def watched() -> Answer:
-            self._worker.superseded = superseded
+            self._worker.superseded = unwanted
             try:
                 return work()
             except Exception as error:
                 # Work may stumble over what was put away meanwhile.
-                if superseded():
+                if unwanted():
                     raise _SupersededError from error
                 raise
             finally:
                 del self._worker.superseded
 
-        self.busy, self.share, self._passes = words, None, 0
+        self.busy, self.share, self.passes = words, None, 0
         self.changed.emit()
         try:
             found = await run.io_bound(watched)
