@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,16 +17,16 @@ if TYPE_CHECKING:
     from imufit.lab.simulate import Grade, Truth
 
 
-def parameter_units() -> dict[str, dict[str, str]]:
-    """Return the SI unit of each parameter of each effect."""
-    return {card.id: {name: unit for name, unit, _ in card.parameters} for card in engine.catalogue()}
+def parameter_units(effects: Iterable[str]) -> dict[str, dict[str, str]]:
+    """Return the SI unit of each parameter of each of some effects."""
+    return {key: {name: unit for name, unit, _ in engine.explain(key).parameters} for key in effects}
 
 
 def grade_rows(mark: Grade) -> tuple[tuple[str, str, str, str], ...]:
     """Return effect, name, truth and answer of each parameter that there is to find."""
     from imufit.figures import quantity  # noqa: PLC0415
 
-    units = parameter_units()
+    units = parameter_units(item.effect for item in mark.parameters)
 
     def shown(effect: str, name: str, value: float | None, error: float | None = None) -> str:
         unit = units.get(effect, {}).get(name)
@@ -49,7 +50,7 @@ def truth_rows(truth: Truth) -> tuple[tuple[str, str, str], ...]:
     """Return effect, parameters and size of all that was injected, in the shown units."""
     from imufit.figures import quantity  # noqa: PLC0415
 
-    units = parameter_units()
+    units = parameter_units(truth.effects)
     rows = []
     for effect, parameters in truth.effects.items():
         known = units.get(effect, {})

@@ -6,16 +6,19 @@ a turn takes, or of play in a drive.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from imufit._imufit import Problem, Status, Verdict
-from imufit.model.catalogue import find_effect
+from imufit.model.catalogue import each_log_has_its_own, find_effect
 
 if TYPE_CHECKING:
     from imufit.fitting import FittedStack
     from imufit.fitting.analysis import Analysis
+    from imufit.fitting.log_evidence import Values
     from imufit.model import EffectStack
 
 LESS = 0.01
@@ -59,8 +62,9 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
     others = fit.model
     for slot in beside:
         others = others.with_effect(ids[slot])
-    without = tried(fit, others)
-    evidence = _guarded(without, {slot: tried(fit, others.with_effect(ids[slot])) for slot in close})
+    steady = [ids[slot] for slot in close if not _curved(analysis, slot)]
+    without = tried(fit, others, steady)
+    evidence = _guarded(without, {slot: without.with_effect(fit, ids[slot]) for slot in close})
     most = max(evidence.values())
     # If columns hold all information, a fit decides by the error alone: freedom alone does not separate one cause from
     # another.
@@ -117,12 +121,28 @@ class Tried(NamedTuple):
     samples: float
     analysis: Analysis
 
+    def with_effect(self, fit: FittedStack, effect: str) -> Tried:
+        """Fit one effect more, from the best parameters of the others on.
 
-def tried(fit: FittedStack, model: EffectStack) -> Tried:
+        Parameters
+        ----------
+        fit : FittedStack
+            The fit that this stack was tried in place of: its searches say where the effect starts.
+        effect : str
+            Id of the effect.
+        """
+        start = replace(self.analysis, found=fit.analysis.found | self.analysis.found)
+        model, own = start.model, start.own
+        if effect in start.candidates and not each_log_has_its_own(effect):
+            slot = start.slots.index(effect)
+            estimate = start.estimate([slot])
+            model, own = start.moved_to(estimate)
+            return _tried(fit, start, model.with_effect(effect).starting_at({effect: [*estimate.values[slot]]}), own)
+        return _tried(fit, start, model.with_effect(effect), own)
+
+
+def tried(fit: FittedStack, model: EffectStack, also: Sequence[str] = ()) -> Tried:
     """Fit another stack, and return its log evidence around its best parameters.
-
-    The reference may have lost fast motion or not: such a loss equals the difference, of second order, between a late
-    sensor and a low-passed one.
 
     Parameters
     ----------
@@ -130,11 +150,22 @@ def tried(fit: FittedStack, model: EffectStack) -> Tried:
         Where to start from.
     model : EffectStack
         The stack.
+    also : sequence of str, optional
+        Effects whose columns its evidence has besides.
     """
+    return _tried(fit, fit.analysis, model, fit.own, also)
+
+
+def _tried(
+    fit: FittedStack, start: Analysis, model: EffectStack, own: Sequence[Values], also: Sequence[str] = ()
+) -> Tried:
+    # The reference may have lost fast motion or not: such a loss equals the difference, of second order, between a
+    # late sensor and a low-passed one.
     known = fit.analysis.candidates
     lost = [key for key, effect in known.items() if effect.reference_part == "bandwidth" and key not in model.effects]
-    analysis, estimate = fit.analysis.solved_for(model, fit.own, only=lost)
-    evidence = fit.analysis.ln_likelihood(analysis, estimate, analysis.candidate_slots)
+    analysis, estimate = start.solved_for(model, own, only={*lost, *also})
+    open_to = [slot for slot in analysis.candidate_slots if analysis.slots[slot] in lost]
+    evidence = fit.analysis.ln_likelihood(analysis, estimate, open_to)
     return Tried(evidence, estimate.held_out, estimate.samples, analysis)
 
 

@@ -79,7 +79,8 @@ def parameter_sizes(
     axes.set_yticks(places, [labels[index] for index in drawn])
     axes.set_ylim(len(drawn) - 0.5, -0.5)
     between = "\n" if drawing.narrow else " "
-    axes.set_xlabel(f"value over typical size{between}(shaded: up to that size; bars: 95 %)", fontsize=9)
+    scale = "; logarithmic beyond 1" if reach > 12.0 else ""
+    axes.set_xlabel(f"value over typical size{between}(shaded: up to that size; bars: 95 %{scale})", fontsize=9)
     count = int((~ordinary).sum())
     if count == 0:
         sentence = "Every parameter is of a plausible size"

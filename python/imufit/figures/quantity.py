@@ -7,7 +7,7 @@ import re
 
 _DEGREES = 180.0 / math.pi
 _GRAVITY = 9.80665
-_PARTS = re.compile(r"(?P<head>\([^()]*\)|rad/s\^2|rad/s|m/s\^2|[^/ ()]+)(?:(?:/| per )(?P<tail>.+))?")
+_PARTS = re.compile(r"(?P<head>\([^()]*\)|rad/s\^2|rad/s|m/s\^2|[^/ ()]+)(?:(?P<over>/| per )(?P<tail>.+))?")
 _SHORT = {"s": ((1e-4, 1e6, "µs"), (0.1, 1e3, "ms")), "m": ((0.1, 1e3, "mm"),)}
 """Times and lengths below so many s or m are shown in a smaller unit: no zero stands before the first digit."""
 _SPELLING = (("^2", "²"), ("^3", "³"), ("degC", "°C"), ("uT", "µT"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"))
@@ -52,7 +52,7 @@ def shown_unit(unit: str, size: float | None = None) -> tuple[float, str]:
     for rate, power in (("(rad/s)^2", 2), ("(rad/s)^3", 3), ("(rad/s)", 1), ("rad/s", 1)):
         if tail == rate:
             factor, tail = factor / _DEGREES**power, rate.replace("rad", "deg")
-    return factor, _pretty(f"{shown}/{tail}" if tail else shown)
+    return factor, _pretty(f"{shown}{parts['over']}{tail}" if tail else shown)
 
 
 def axis(name: str, unit: str) -> tuple[float, str]:
@@ -65,7 +65,7 @@ def axis(name: str, unit: str) -> tuple[float, str]:
     unit : str
         SI unit; empty for a column of the log whose unit nothing states.
     """
-    factor, shown = shown_unit(unit) if unit else (1.0, "as recorded")
+    factor, shown = shown_unit(unit) if unit else (1.0, "in the log's unit")
     return factor, f"{name}, {shown}"
 
 

@@ -271,9 +271,9 @@ class Analysis:
         known = [k for k, each in enumerate(self.logs) if effect_id in each.slots]
         return known if each_log_has_its_own(effect_id) else known[:1]
 
-    def estimate(self) -> Estimate:
-        """Fit the model's effects (and the unnamed ones) to the evidence."""
-        return self._estimate(self.fitted_slots)
+    def estimate(self, beside: Sequence[int] = ()) -> Estimate:
+        """Fit the model's effects (and the unnamed ones) to the evidence, and candidates of some slots beside them."""
+        return self._estimate([*self.fitted_slots, *beside])
 
     def estimate_unnamed(self) -> Estimate:
         """Keep the model as it is and fit only what is always fitted along."""
@@ -282,6 +282,9 @@ class Analysis:
     def _present(self, slot: int) -> list[float]:
         """Values that the evidence was taken around, of one log after the other where each has its own."""
         key = self.slots[slot]
+        if slot not in self.fitted_slots:
+            each = self.found[key].trial if key in self.found else [0.0] * len(find_effect(key).parameters)
+            return each * (len(self.having(key)) if each_log_has_its_own(key) else 1)
         if each_log_has_its_own(key):
             return [value for log in self.having(key) for value in self.own[log][key]]
         return self.model.stack()[slot][1]

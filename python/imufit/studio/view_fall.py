@@ -104,7 +104,7 @@ def _floor_words(session: Session, noise: tuple[NoisePart, ...], chosen: str | N
     names = [(part.component, f"{part.component.replace('_', ' ')} {quantity.share(part.share)}") for part in parts[:4]]
     floor = ", ".join(words for component, words in names if component not in BEYOND)
     slow = ", ".join(words for component, words in names if component in BEYOND)
-    beside = f" The zero moves slowly besides, in parts of the same variance: {slow}." if slow else ""
+    beside = f" Slow changes of the zero come on top: {slow} of that variance." if slow else ""
     return f"Noise floor of {channel}: {floor or 'not known'} of its variance.{beside}"
 
 

@@ -104,7 +104,7 @@ class PanelView:
             else:
                 words = "The readings are drawn while the evidence is taken."
             self._note.set_text(words)
-            self._refresh_readings()
+            self._refresh_readings(found)
             return
         if found is None:
             self._draw_at_once(session)
@@ -163,15 +163,19 @@ class PanelView:
             self._panel.update_figure(charts.residual_panel(panel))
         self._note.set_text(UNDER_WAY)
 
-    def _refresh_readings(self) -> None:
-        """Show the readings over time: of a log without a reference, or before the evidence is there."""
+    def _refresh_readings(self, found: Comparison | None) -> None:
+        """Show the readings over time: of a log without a reference, or before the evidence is there.
+
+        Unless the person chose a channel, the one that fails most at the rests is shown.
+        """
         desk = self._desk
         channels = [] if desk.traces is None else [item.name for item in desk.traces.channels if item.name[:3] in UNITS]
-        state = (desk.traces, desk.channel)
+        state = (desk.traces, desk.channel, found)
         if not channels or state == self._state:
             return
         self._state = state
-        channel = desk.channel if desk.channel in channels else channels[0]
+        wanted = (desk.channel, None if found is None else worst_channel(found))
+        channel = next((name for name in wanted if name in channels), channels[0])
         self._setting = True
         self._channel.set_options(channels, value=channel)
         self._setting = False

@@ -87,9 +87,11 @@ def _two_models(second: Made, present: Made, factor: float | None) -> None:
         f"{quantity.ratio(present.numbers.ratio)} with the present one. {lower(second, present)}"
     ).classes("studio-sentence").props("data-mark=two-sentence")
     if factor is not None:
-        choice = {"first": "the kept model", "second": "the present model", "neither": "neither model"}
+        better = "kept" if factor < 0.0 else "present"
+        odds = f"ln Bayes factor {abs(factor):.1f} in favour of the {better} one"
+        clear = preferred(factor) != "neither"
         Explained(
-            f"The log prefers {choice[preferred(factor)]} (ln Bayes factor {factor:+.1f} for the present one)."
+            f"The log prefers the {better} model: {odds}." if clear else f"The log prefers neither model: {odds}."
         ).classes("studio-sentence").props("data-mark=two-evidence")
     rows: list[tuple[str, ...]] = [
         ("held-out error", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))

@@ -287,7 +287,7 @@ pub fn decide(
         Some(_) if rivals.is_empty() => Kind::Missing,
         Some(_) => Kind::Ambiguous,
     };
-    let candidates = shown(search, &weighed, &members, best, &rivals);
+    let candidates = shown(search, &weighed, &members, best, &rivals, fitted);
     let correlations = correlations(problem, model, best, &candidates);
     // Where something is left, the cause that describes it best is stated first, whichever has shown that it is there.
     let stated = unexplained.iter().filter(|_| !left.is_empty());
@@ -565,6 +565,7 @@ fn shown(
     members: &[usize],
     best: Option<usize>,
     rivals: &[usize],
+    fitted: &[(usize, f64)],
 ) -> Vec<Candidate> {
     let base = held_out_of(search, None);
     let stack = search.stack(members);
@@ -606,7 +607,17 @@ fn shown(
             }
         })
         .collect();
-    share(&mut found, best, rivals);
+    if let Some(rest) = best.and_then(|best| search.stack(&search::without(members, best))) {
+        let of_fit = |slot: usize| fitted.iter().find(|(of, _)| *of == slot).map(|(_, ln)| *ln);
+        let beside_rest = |slot: usize| search.weigh(&rest, slot).map_or(f64::NEG_INFINITY, |w| w.ln_bayes);
+        let alike = best.iter().chain(rivals);
+        share(
+            &mut found,
+            &alike
+                .map(|slot| (*slot, of_fit(*slot).unwrap_or_else(|| beside_rest(*slot))))
+                .collect::<Vec<_>>(),
+        );
+    }
     let rank = |c: &Candidate| {
         (
             Some(c.slot) != best,
@@ -618,23 +629,18 @@ fn shown(
     found
 }
 
-/// Lets the best effect and its rivals share the probability, each by its evidence.
-fn share(found: &mut [Candidate], best: Option<usize>, rivals: &[usize]) {
-    let concerned = |c: &&mut Candidate| Some(c.slot) == best || rivals.contains(&c.slot);
-    let most = found
-        .iter_mut()
-        .filter(concerned)
-        .map(|c| c.ln_bayes)
-        .fold(f64::NEG_INFINITY, f64::max);
-    let of = |c: &Candidate| (c.ln_bayes - most).exp();
-    let total: f64 = found.iter_mut().filter(concerned).map(|c| of(c)).sum();
-    let all = found
-        .iter_mut()
-        .filter(concerned)
+/// Lets the best effect and its rivals share the probability, each by its log evidence in the place of the others.
+fn share(found: &mut [Candidate], alike: &[(usize, f64)]) {
+    let most = alike.iter().map(|(_, ln)| *ln).fold(f64::NEG_INFINITY, f64::max);
+    let of = |slot: usize| alike.iter().find(|(of, _)| *of == slot).map(|(_, ln)| (ln - most).exp());
+    let total: f64 = alike.iter().filter_map(|(slot, _)| of(*slot)).sum();
+    let all = (found.iter().filter(|c| of(c.slot).is_some()))
         .map(|c| c.probability)
         .fold(0.0, f64::max);
-    for candidate in found.iter_mut().filter(concerned) {
-        candidate.probability = all * of(candidate) / total.max(f64::MIN_POSITIVE);
+    for candidate in found {
+        if let Some(part) = of(candidate.slot) {
+            candidate.probability = all * part / total.max(f64::MIN_POSITIVE);
+        }
     }
 }
 

@@ -404,7 +404,7 @@ class _LivePage:
             return
         if self._wanted is None:
             with self._drawn:
-                ui.label("Lay it like this:").classes("text-sm")
+                ui.label("Lay it like this: the picture turns to the side.").classes("text-sm")
                 self._wanted = Body(("wanted",), compass=False)
         self._wanted.turn("wanted", side_rotation(side))
 

@@ -33,7 +33,7 @@ pub fn column(sensor: Sensor, name: &str) -> Covariate {
         .iter()
         .map(|v| Parameter {
             name: (*v).to_string(),
-            unit: format!("{}/{name}", sensor.unit()),
+            unit: format!("{} per {name}", sensor.unit()),
             typical: None,
             found: Found::Steps,
         })
