@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use imufit_model::bandwidth::Bandwidth;
 use imufit_model::facts::{Frame, LogFacts};
+use imufit_model::gravity_course::{GravityCourse, GravityParts};
 use imufit_model::kinematics_memory::KinematicsMemory;
 use imufit_model::rig::Rig;
 use imufit_model::sensor::Sensor;
@@ -55,6 +56,7 @@ pub struct Survey {
     counts: [usize; 3],
     temperature: (f64, usize),
     temperature_parts: Parts,
+    gravity_parts: GravityParts,
     covariates: Vec<(f64, usize)>,
     field: (Vector3<f64>, usize),
     attitude_width: Bandwidth,
@@ -181,6 +183,7 @@ impl Survey {
             counts: [0; 3],
             temperature: (0.0, 0),
             temperature_parts: Parts::new(given.n),
+            gravity_parts: GravityParts::new(given.n),
             covariates: vec![(0.0, 0); given.covariates.len()],
             field: (Vector3::zeros(), 0),
             attitude_width: Bandwidth::of_attitude(),
@@ -264,6 +267,8 @@ impl Survey {
             let known = attitude_at(window, i).filter(|q| measured && q.coords.iter().all(|v| v.is_finite()));
             if let Some(q) = known {
                 self.reference_step.add(q);
+                let force = q.inverse_transform_vector(&-self.given.gravity);
+                self.gravity_parts.add(row, window.t[i], force);
                 if let Some(travel) = self.travel.as_mut() {
                     travel.add(window.t[i], &q);
                 }
@@ -369,6 +374,7 @@ impl Survey {
             }),
             has_temperature: self.temperature.1 > 0,
             temperature_course: TemperatureCourse::of(&self.temperature_parts).map(Arc::new),
+            gravity_course: GravityCourse::of(&self.gravity_parts).map(Arc::new),
             attitude_smoothing,
             position_smoothing,
             silent_axes: self.silent_axes(attitude_columns, field),

@@ -482,10 +482,9 @@ fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) 
         let least = (own - search.threshold).max(0.0) + inquiry.threshold;
         let sensors = search.criterion.problem.slots[*member].effect.sensors();
         let instead = inquiry.exceeding(&without, least, sensors);
-        let fixed = (0..left.len()).any(|k| {
-            let steady = || dictionary::varying(search, &without, &others, &inquiry.unnamed[k]).min(instead[k]);
-            replaced(instead[k], left[k]) && replaced(steady(), left[k])
-        });
+        // A cause that only fluctuates from block to block takes no place either.
+        let steady = |k: usize| dictionary::varying(search, &without, &others, &inquiry.unnamed[k]);
+        let fixed = (0..left.len()).any(|k| replaced(instead[k], left[k]) && steady(k) >= inquiry.threshold);
         fixed
             || inquiry
                 .courses(&without, least, sensors)
@@ -632,7 +631,12 @@ fn shown(
 /// Lets the best effect and its rivals share the probability, each by its log evidence in the place of the others.
 fn share(found: &mut [Candidate], alike: &[(usize, f64)]) {
     let most = alike.iter().map(|(_, ln)| *ln).fold(f64::NEG_INFINITY, f64::max);
-    let of = |slot: usize| alike.iter().find(|(of, _)| *of == slot).map(|(_, ln)| (ln - most).exp());
+    let of = |slot: usize| {
+        alike
+            .iter()
+            .find(|(of, _)| *of == slot)
+            .map(|(_, ln)| (ln - most).exp())
+    };
     let total: f64 = alike.iter().filter_map(|(slot, _)| of(*slot)).sum();
     let all = (found.iter().filter(|c| of(c.slot).is_some()))
         .map(|c| c.probability)
@@ -665,4 +669,45 @@ fn correlations(
             (first.slot, c.slot, correlation)
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(slot: usize, ln_bayes: f64, probability: f64) -> Candidate {
+        Candidate {
+            slot,
+            status: Status::Significant,
+            ln_bayes,
+            probability,
+            parameters: Vec::new(),
+            detectable: Vec::new(),
+            gain: (1.0, 0.1),
+            held_out: (2.0, 1.0),
+        }
+    }
+
+    #[test]
+    fn rivals_share_by_their_evidence_in_each_others_place_and_not_alone() {
+        // Alone the second explains far more: what else is missing is charged to it.
+        let mut found = [
+            candidate(0, 20.0, 0.99),
+            candidate(1, 200.0, 1.0),
+            candidate(2, 50.0, 0.9),
+        ];
+        share(&mut found, &[(0, 31.0), (1, 30.0)]);
+        let odds = found[0].probability / found[1].probability;
+        assert!((odds - 1.0_f64.exp()).abs() < 1e-9);
+        assert!((found[0].probability + found[1].probability - 1.0).abs() < 1e-12);
+        assert!((found[2].probability - 0.9).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_fit_that_refutes_a_rival_leaves_it_nothing() {
+        let mut found = [candidate(0, 20.0, 0.99), candidate(1, 200.0, 1.0)];
+        share(&mut found, &[(0, 31.0), (1, f64::NEG_INFINITY)]);
+        assert!((found[0].probability - 1.0).abs() < 1e-12);
+        assert!(found[1].probability.abs() < 1e-12);
+    }
 }

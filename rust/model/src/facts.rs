@@ -5,6 +5,7 @@ use std::sync::Arc;
 pub use imufit_attitude::Frame;
 use nalgebra::Vector3;
 
+use crate::gravity_course::GravityCourse;
 use crate::kinematics_memory::KinematicsMemory;
 use crate::rig::Rig;
 use crate::smoothing::{NARROWEST, Smoothing};
@@ -52,6 +53,8 @@ pub struct LogFacts {
     pub has_temperature: bool,
     /// How its temperature went; `None` where too little of that is known.
     pub temperature_course: Option<Arc<TemperatureCourse>>,
+    /// How gravity went through the body's axes; `None` where too little of that is known.
+    pub gravity_course: Option<Arc<GravityCourse>>,
     /// How the reference attitude is differentiated.
     pub attitude_smoothing: Smoothing,
     /// How the reference position is differentiated; `None` without position.
@@ -145,6 +148,7 @@ impl LogFacts {
             sensor_dt: [dt; 3],
             has_temperature,
             temperature_course: None,
+            gravity_course: None,
             attitude_smoothing: NARROWEST,
             position_smoothing: None,
             ideal_noise: [0.0; 3],
@@ -200,6 +204,7 @@ impl LogFacts {
             sensor_dt: [dt; 3],
             has_temperature: temperature_mean.is_some(),
             temperature_course: None,
+            gravity_course: None,
             attitude_smoothing: NARROWEST,
             position_smoothing: None,
             column_noise: [f64::INFINITY; 3],

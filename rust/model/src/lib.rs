@@ -11,6 +11,7 @@ pub mod correction;
 pub mod effect;
 pub mod effects;
 pub mod facts;
+pub mod gravity_course;
 pub mod ideal;
 mod interpolated;
 pub mod kinematics_memory;

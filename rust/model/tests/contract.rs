@@ -89,6 +89,7 @@ fn every_built_in_effect_keeps_the_contract() {
         sensor_dt: [0.01; 3],
         has_temperature: true,
         temperature_course: None,
+        gravity_course: None,
         attitude_smoothing: NARROWEST,
         position_smoothing: Some(NARROWEST),
         column_noise: [0.0; 3],

@@ -93,6 +93,7 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
         sensor_dt: [0.01; 3],
         has_temperature: false,
         temperature_course: None,
+        gravity_course: None,
         attitude_smoothing: NARROWEST,
         position_smoothing: None,
         column_noise: [0.0; 3],

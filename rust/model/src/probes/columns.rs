@@ -4,6 +4,7 @@ use super::{CLEAR, Kind, Quantity, SMALL, WIDTHS, pairs};
 use crate::effect::{Columns, Rows};
 use crate::effects::lever_arm::accelerations_of_levers;
 use crate::facts::LogFacts;
+use crate::gravity_course::MEMORIES;
 use crate::sensor::Sensor;
 use crate::temperature_course::PASTS;
 use crate::triple::Triple;
@@ -114,6 +115,17 @@ pub(super) fn fill(kind: &Kind, sensor: Sensor, rows: &Rows, out: &mut Columns) 
                     let by = course.at(past, rows.t);
                     for axis in 0..3 {
                         out.set(3 * past + axis, axis, by.iter().copied());
+                    }
+                }
+            }
+        }
+        Kind::Creep => {
+            if let Some(course) = &rows.facts.gravity_course {
+                for memory in 0..MEMORIES {
+                    for axis in 0..3 {
+                        let followed = course.at(memory, axis, rows.t);
+                        let x = rows.x.axis(axis).iter();
+                        out.set(3 * memory + axis, axis, followed.iter().zip(x).map(|(y, x)| y - x));
                     }
                 }
             }

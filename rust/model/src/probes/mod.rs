@@ -28,6 +28,8 @@ enum Kind {
     Product(Quantity, Quantity),
     /// k s with s what the past of the temperature amounts to, see [`crate::temperature_course`].
     TemperaturePast,
+    /// k (y - x) with y what follows gravity along the axis within seconds, see [`crate::gravity_course`].
+    Creep,
     /// k P(t) x with Legendre polynomials P of the part of the log that has passed.
     GainInTime,
     /// k (c - mean)^2 x.
@@ -171,6 +173,7 @@ pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
             kinds.extend(others.iter().filter(known).map(|motion| (sensor, Kind::Other(*motion))));
             if sensor == Sensor::Acc {
                 kinds.push((sensor, Kind::OwnLevers));
+                kinds.extend(facts.gravity_course.iter().map(|_| (sensor, Kind::Creep)));
             }
             let by = |q: &Quantity| [Kind::GainBent(*q), Kind::TurnBy(*q), Kind::DelayBy(*q)];
             kinds.extend(quantities.iter().flat_map(by).map(|kind| (sensor, kind)));

@@ -3,6 +3,7 @@
 use super::{AXES, Kind, OF, Quantity, SMALL, WIDTHS, pairs};
 use crate::card::{Card, Found, Parameter, Stage, Traits};
 use crate::facts::LogFacts;
+use crate::gravity_course::MEMORIES;
 use crate::sensor::Sensor;
 use crate::temperature_course::PASTS;
 
@@ -22,6 +23,12 @@ pub(super) fn card(facts: &LogFacts, sensor: Sensor, kind: &Kind) -> Card {
             on_axes(PASTS),
             name(Quantity::Temperature),
             "its past counts as well",
+        ),
+        Kind::Creep => (
+            Stage::Offset,
+            on_axes(MEMORIES),
+            "f".to_string(),
+            "its past counts as well: creep",
         ),
         Kind::GainInTime => (Stage::Gain, on_axes(DEGREES), "t".to_string(), "the gain drifts"),
         Kind::GainBent(q) => (Stage::Gain, xyz(), name(*q), "its gain follows it, bent"),
