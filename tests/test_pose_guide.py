@@ -149,3 +149,14 @@ def test_unknown_criteria_are_refused():
         PoseGuide({"patience": 1.0})
     with pytest.raises(ValueError, match="hold is 0"):
         PoseGuide({"hold": 0.0})
+
+
+def test_a_side_that_was_held_is_not_asked_for_again_while_the_sensor_leaves_it():
+    where = course(["-z", "+x"], hold=4.0)
+    _, advice = guided(where, names="acc")
+    held = next(k for k, one in enumerate(advice) if one.state == "held")
+    accepted = next(k for k, one in enumerate(advice) if one.accepted == "-z")
+    leaving = [one for one in advice[held:accepted] if one.state == "moving"]
+    assert leaving
+    assert {one.wanted for one in leaving}.isdisjoint({"-z"})
+    assert all("-z" not in one.message for one in leaving)

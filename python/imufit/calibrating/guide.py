@@ -66,7 +66,7 @@ class PoseGuide:
 
     def __init__(self, settings: Mapping[str, float] | None = None) -> None:
         self._judge = _imufit.PoseJudge({"hold": 2.0, **(settings or {})})
-        self._counted = False
+        self._reached: str | None = None  # held long enough, and not yet left
         self.done: dict[str, Array] = {}
         self.rests = 0
 
@@ -98,6 +98,10 @@ class PoseGuide:
         if closed is not None:
             accepted, refused = self._take(np.array(closed["mean"]), closed["flaw"])
         side = None if judged["side"] is None else SIDES[judged["side"]]
+        if judged["state"] == "held":
+            self._reached = side
+        elif closed is not None:
+            self._reached = None
         return Advice(
             judged["state"],
             side,
@@ -105,7 +109,7 @@ class PoseGuide:
             self._ordered(side),
             accepted,
             self._message(judged["state"], side, judged["progress"], judged["unrest"], refused),
-            self._wanted(judged["state"], side),
+            self._wanted(side),
         )
 
     def finish(self) -> str | None:
@@ -138,21 +142,22 @@ class PoseGuide:
             return self.missing
         return tuple(sorted(self.missing, key=lambda s: (s != side, s[1] == side[1])))
 
-    def _wanted(self, state: str, side: str | None) -> str | None:
-        """Return the side to lay up next: a missing one that is held long enough leads to another one."""
-        held = side if state == "held" else None
-        return next((each for each in self._ordered(side) if each != held), None)
+    def _wanted(self, side: str | None) -> str | None:
+        """Return the side to lay up next: a missing one that was held long enough leads to another one."""
+        return next((each for each in self._ordered(side) if each != self._reached), None)
 
     def _message(self, state: str, side: str | None, progress: float, unrest: float, refused: str) -> str:
         if refused:
             return refused
         if self.complete:
             return "All six sides are known."
-        wanted = self._wanted(state, side)
+        wanted = self._wanted(side)
+        turn = f"Turn {wanted} up." if wanted else "Pick it up."
         if state == "moving":
-            return f"{side} up: hold still." if side in self.missing and unrest < NEARLY else f"Turn {wanted} up."
+            unknown = side in self.missing and side != self._reached
+            return f"{side} up: hold still." if unknown and unrest < NEARLY else turn
         if side in self.missing:
             if state == "held":
-                return f"{side} up: held. " + (f"Now turn {wanted} up." if wanted else "Pick it up.")
+                return f"{side} up: held. " + (f"Now turn {wanted} up." if wanted else turn)
             return f"{side} up: hold still, {100 * progress:.0f} %."
-        return f"Turn {wanted} up."
+        return turn

@@ -611,13 +611,15 @@ def moved(fit: Fit, target: Stack) -> Fit:
     return fit.moved(model)
 
 
-def worst_channel(found: Comparison) -> str | None:
+def worst_channel(found: Comparison, sensors: Sequence[str] = ("acc", "gyr", "mag")) -> str | None:
     """Return the channel that stands highest above its noise floor.
 
     Parameters
     ----------
     found : Comparison
         The residuals.
+    sensors : sequence of str, optional
+        Only channels of these sensors.
     """
-    known = [item for item in found.channels if math.isfinite(item.ratio)]
+    known = [item for item in found.channels if math.isfinite(item.ratio) and item.channel[:3] in sensors]
     return max(known, key=lambda item: item.ratio).channel if known else None

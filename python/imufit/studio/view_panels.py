@@ -10,6 +10,7 @@ from nicegui import events, run, ui
 from imufit.comparing.compare import MIN_SHARE
 from imufit.figures import quantity
 from imufit.fitting.passes import UNITS
+from imufit.model.catalogue import find_effect
 from imufit.printable import NAME, printable
 from imufit.results import Comparison, Spectrum, Unexplained
 from imufit.results.comparison import Panel
@@ -127,10 +128,13 @@ class PanelView:
     def _failing(self, found: Comparison) -> str | None:
         """Return the channel that the verdict names, or the one that fails most.
 
-        Where none fails any more, this is the one that failed at the start.
+        Of a named effect the channels of its sensors are looked at. Where none fails any more, this is the one that
+        failed at the start.
         """
-        if (named := self._left(found)) is not None:
-            return named.channel
+        if (left := self._left(found)) is not None:
+            return left.channel
+        if (named := self._named()) is not None:
+            return worst_channel(found, find_effect(named).sensors)
         worst = worst_channel(found)
         start = self._at_start()
         if start is None or any(item.channel == worst and item.ratio > FAILS for item in found.channels):
@@ -138,10 +142,15 @@ class PanelView:
         return worst_channel(start)
 
     def _left(self, found: Comparison) -> Unexplained | None:
-        """Return the dependence that the sentence over the page names, where a panel shows it."""
+        """Return the dependence that the sentence over the page names first, where a panel shows it."""
         made = None if self._session is None or self._desk.guessing else self._session.made()
-        left = () if made is None or made.diagnosis is None else made.diagnosis.unexplained[:1]
+        left = () if made is None or made.diagnosis is None or self._named() else made.diagnosis.unexplained[:1]
         return next((item for item in left if item.covariate in self._names(found, item.channel)), None)
+
+    def _named(self) -> str | None:
+        """Return the effect that the sentence over the page names, if any."""
+        made = None if self._session is None or self._desk.guessing else self._session.made()
+        return None if made is None or made.diagnosis is None else made.diagnosis.best
 
     def _names(self, found: Comparison, channel: str) -> list[str]:
         """Return what a channel's residual can stand against: covariates, the worst first, then causes of findings."""

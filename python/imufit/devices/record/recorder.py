@@ -258,7 +258,8 @@ def _finished(
             part.unlink(missing_ok=True)
         if problem is not None:
             raise problem
-        raise InputError(f"nothing was recorded from {reception.line.port}: {reception.nothing_whole}")
+        nothing = reception.nothing_whole or "no row came while it was being recorded"
+        raise InputError(f"nothing was recorded from {reception.line.port}: {nothing}")
     stop = f"the recording stopped: {problem.problem}; " if problem else ""
     try:
         recording = converted(journal.paths, path, ended=why, cpu_share=share)
