@@ -482,9 +482,20 @@ fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) 
         let least = (own - search.threshold).max(0.0) + inquiry.threshold;
         let sensors = search.criterion.problem.slots[*member].effect.sensors();
         let instead = inquiry.exceeding(&without, least, sensors);
-        // A cause that only fluctuates from block to block takes no place either.
-        let steady = |k: usize| dictionary::varying(search, &without, &others, &inquiry.unnamed[k]);
-        let fixed = (0..left.len()).any(|k| replaced(instead[k], left[k]) && steady(k) >= inquiry.threshold);
+        // A cause that only fluctuates from block to block takes no place. One with a coefficient for all logs, as an effect has, must be there
+        // besides; what bins of one log show is no property of the sensor unless it is likelier for that alone.
+        let fixed = (0..left.len()).any(|k| {
+            let steady = || dictionary::varying(search, &without, &others, &inquiry.unnamed[k]).min(instead[k]);
+            let common = matches!(inquiry.unnamed[k].origin, Origin::Probe(_));
+            let stays = |steady: f64| {
+                if common {
+                    steady >= inquiry.threshold
+                } else {
+                    replaced(steady, left[k])
+                }
+            };
+            replaced(instead[k], left[k]) && stays(steady())
+        });
         fixed
             || inquiry
                 .courses(&without, least, sensors)
