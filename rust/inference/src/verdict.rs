@@ -486,7 +486,8 @@ fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) 
         // besides; what bins of one log show is no property of the sensor unless it is likelier for that alone.
         let fixed = (0..left.len()).any(|k| {
             let steady = || dictionary::varying(search, &without, &others, &inquiry.unnamed[k]).min(instead[k]);
-            let common = matches!(inquiry.unnamed[k].origin, Origin::Probe(_));
+            let common =
+                matches!(inquiry.unnamed[k].origin, Origin::Probe(_)) || search.criterion.problem.parts.len() == 1;
             let stays = |steady: f64| {
                 if common {
                     steady >= inquiry.threshold
