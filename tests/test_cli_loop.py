@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from cli_stand_in import run, strict_json
+from imufit.lab.simulate.sealed import Truth, seal
 
 
 def test_same_hidden_seed_makes_the_same_log_and_the_seal_hides_the_effect(capsys, tmp_path):
@@ -19,6 +20,17 @@ def test_same_hidden_seed_makes_the_same_log_and_the_seal_hides_the_effect(capsy
     assert (tmp_path / "one.parquet").read_bytes() == (tmp_path / "two.parquet").read_bytes()
     sealed = (tmp_path / "one.parquet.sealed").read_text()
     assert not any(sensor in sealed for sensor in ("acc.", "gyr.", "mag.", "ref."))
+
+
+def test_reveal_states_units_and_knows_effects_outside_the_catalogue(capsys, tmp_path):
+    log = tmp_path / "log.parquet"
+    log.touch()
+    effects = {"gyr.column:vbat": {"x": 0.01}, "acc.creep": {"share": 0.02}}
+    seal(Truth("handheld", 1, effects, {}), log)
+    code, out, err = run(capsys, "reveal", log)
+    assert (code, err) == (0, [])
+    assert "x 0.573 deg/s per vbat" in out
+    assert "share 0.02" in out
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,8 +19,14 @@ if TYPE_CHECKING:
 
 
 def parameter_units(effects: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Return the SI unit of each parameter of each of some effects."""
-    return {key: {name: unit for name, unit, _ in engine.explain(key).parameters} for key in effects}
+    """Return the SI unit of each parameter of each of some effects; what no catalogue holds has none."""
+    from imufit.errors import InputError  # noqa: PLC0415
+
+    units = {}
+    for key in effects:
+        with suppress(InputError):
+            units[key] = {name: unit for name, unit, _ in engine.explain(key).parameters}
+    return units
 
 
 def grade_rows(mark: Grade) -> tuple[tuple[str, str, str, str], ...]:
