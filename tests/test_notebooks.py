@@ -20,7 +20,8 @@ USUAL = 400_000
 PICTURE = 100_000
 """Bytes of a picture."""
 TAGS = re.compile(r"<[^>]*>")
-FOREIGN = re.compile(r"/home/|/root/|/tmp/|/work/|/usr/|site-packages|Traceback|Warning|0x[0-9a-f]{6}")
+FOLDER = re.escape(f"/{ROOT.parts[1]}/")
+FOREIGN = re.compile(rf"/home/|/root/|/tmp/|{FOLDER}|/usr/|site-packages|Traceback|Warning|0x[0-9a-f]{{6}}")
 
 
 def stored(name):

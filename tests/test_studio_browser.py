@@ -162,7 +162,9 @@ def step_back_and_compare(page, ladder):
     wait_for_bars(page, len(ladder["steps"]) + 2)
     page.wait_for_function("""() => document.querySelector('[data-mark="trace"]').textContent.includes('kept model')""")
     assert "The kept model stands lower" in marked(page, "two-sentence").inner_text()
-    assert "The log prefers the kept model: ln Bayes factor" in marked(page, "two-evidence").inner_text()
+    evidence = marked(page, "two-evidence").inner_text()
+    assert "The log prefers the kept model: ln Bayes factor" in evidence
+    assert evidence.endswith("in favour of the kept one.")
     marked(page, "second").click()
     marked(page, f"switch-{first}").click()
     heights = wait_for_bars(page, len(ladder["steps"]) + 3)

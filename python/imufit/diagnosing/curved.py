@@ -132,13 +132,12 @@ class Tried(NamedTuple):
             Id of the effect.
         """
         start = replace(self.analysis, found=fit.analysis.found | self.analysis.found)
-        model, own = start.model, start.own
-        if effect in start.candidates and not each_log_has_its_own(effect):
-            slot = start.slots.index(effect)
-            estimate = start.estimate([slot])
-            model, own = start.moved_to(estimate)
-            return _tried(fit, start, model.with_effect(effect).starting_at({effect: [*estimate.values[slot]]}), own)
-        return _tried(fit, start, model.with_effect(effect), own)
+        if effect not in start.candidates or each_log_has_its_own(effect):
+            return _tried(fit, start, start.model.with_effect(effect), start.own)
+        slot = start.slots.index(effect)
+        estimate = start.estimate([slot])
+        model, own = start.moved_to(estimate)
+        return _tried(fit, start, model.with_effect(effect).starting_at({effect: [*estimate.values[slot]]}), own)
 
 
 def tried(fit: FittedStack, model: EffectStack, also: Sequence[str] = ()) -> Tried:

@@ -61,7 +61,8 @@ def parameter_sizes(
                 scaled[chosen], places[chosen], xerr=margin[chosen], fmt="o", markersize=5, color=colour, capsize=3
             )
     reach = float(np.max((np.abs(scaled) + margin)[seen], initial=0.0))
-    if reach > 12.0:
+    logarithmic = reach > 12.0
+    if logarithmic:
         axes.set_xscale("symlog", linthresh=1.0)
         axes.set_xlim(-1.6 * reach, 1.6 * reach)
     else:
@@ -79,7 +80,7 @@ def parameter_sizes(
     axes.set_yticks(places, [labels[index] for index in drawn])
     axes.set_ylim(len(drawn) - 0.5, -0.5)
     between = "\n" if drawing.narrow else " "
-    scale = "; logarithmic beyond 1" if reach > 12.0 else ""
+    scale = "; logarithmic beyond 1" if logarithmic else ""
     axes.set_xlabel(f"value over typical size{between}(shaded: up to that size; bars: 95 %{scale})", fontsize=9)
     count = int((~ordinary).sum())
     if count == 0:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.errors import InputError
-from imufit.fitting.log_evidence import LogEvidence, Values, evidence_again
+from imufit.fitting.log_evidence import LogEvidence, Values, evidence_again, trial
 from imufit.fitting.profile import Found, search
 from imufit.fitting.rest_passes import RestPasses
 from imufit.fitting.surveyed_log import SurveyedLog, survey
@@ -283,8 +283,8 @@ class Analysis:
         """Values that the evidence was taken around, of one log after the other where each has its own."""
         key = self.slots[slot]
         if slot not in self.fitted_slots:
-            each = self.found[key].trial if key in self.found else [0.0] * len(find_effect(key).parameters)
-            return each * (len(self.having(key)) if each_log_has_its_own(key) else 1)
+            logs = len(self.having(key)) if each_log_has_its_own(key) else 1
+            return trial(find_effect(key), self.found.get(key)) * logs
         if each_log_has_its_own(key):
             return [value for log in self.having(key) for value in self.own[log][key]]
         return self.model.stack()[slot][1]

@@ -244,7 +244,7 @@ def _empty(
 ) -> _imufit.Evidence:
     stack = [(find_effect(key), values) for key, values in fitted.items()]
     columns = surveyed.columns
-    asked = [(columns[key], _trial(columns[key], found.get(key))) for key in candidates]
+    asked = [(columns[key], trial(columns[key], found.get(key))) for key in candidates]
     return _imufit.Evidence(surveyed.facts, stack, asked, surveyed.passes.blocks, filters)
 
 
@@ -259,7 +259,16 @@ def _places(surveyed: SurveyedLog, slots: Sequence[str]) -> dict[str, range]:
     return places
 
 
-def _trial(effect: _imufit.Effect, found: Found | None) -> list[float]:
+def trial(effect: _imufit.Effect, found: Found | None) -> list[float]:
+    """Return the values that the columns of a candidate are taken for.
+
+    Parameters
+    ----------
+    effect : Effect
+        The candidate.
+    found : Found, optional
+        What a search found for the effect.
+    """
     return [0.0] * len(effect.parameters) if found is None else found.trial
 
 

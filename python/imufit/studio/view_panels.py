@@ -12,7 +12,7 @@ from imufit.figures import quantity
 from imufit.fitting.passes import UNITS
 from imufit.model.catalogue import find_effect
 from imufit.printable import NAME, printable
-from imufit.results import Comparison, Spectrum, Unexplained
+from imufit.results import Comparison, Diagnosis, Spectrum, Unexplained
 from imufit.results.comparison import Panel
 from imufit.studio import charts
 from imufit.studio.desk import Desk
@@ -133,8 +133,9 @@ class PanelView:
         """
         if (left := self._left(found)) is not None:
             return left.channel
-        if (named := self._named()) is not None:
-            return worst_channel(found, find_effect(named).sensors)
+        told = self._told()
+        if told is not None and told.best is not None:
+            return worst_channel(found, find_effect(told.best).sensors)
         worst = worst_channel(found)
         start = self._at_start()
         if start is None or any(item.channel == worst and item.ratio > FAILS for item in found.channels):
@@ -143,14 +144,13 @@ class PanelView:
 
     def _left(self, found: Comparison) -> Unexplained | None:
         """Return the dependence that the sentence over the page names first, where a panel shows it."""
-        made = None if self._session is None or self._desk.guessing else self._session.made()
-        left = () if made is None or made.diagnosis is None or self._named() else made.diagnosis.unexplained[:1]
+        told = self._told()
+        left = () if told is None or told.best is not None else told.unexplained[:1]
         return next((item for item in left if item.covariate in self._names(found, item.channel)), None)
 
-    def _named(self) -> str | None:
-        """Return the effect that the sentence over the page names, if any."""
-        made = None if self._session is None or self._desk.guessing else self._session.made()
-        return None if made is None or made.diagnosis is None else made.diagnosis.best
+    def _told(self) -> Diagnosis | None:
+        """Return the diagnosis that the sentence over the page states; None in a game that is not over."""
+        return None if self._desk.guessing else self._desk.diagnosis
 
     def _names(self, found: Comparison, channel: str) -> list[str]:
         """Return what a channel's residual can stand against: covariates, the worst first, then causes of findings."""

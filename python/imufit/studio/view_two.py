@@ -88,10 +88,9 @@ def _two_models(second: Made, present: Made, factor: float | None) -> None:
     ).classes("studio-sentence").props("data-mark=two-sentence")
     if factor is not None:
         better = "kept" if factor < 0.0 else "present"
-        odds = f"ln Bayes factor {abs(factor):.1f} in favour of the {better} one"
-        clear = preferred(factor) != "neither"
+        choice = "neither model" if preferred(factor) == "neither" else f"the {better} model"
         Explained(
-            f"The log prefers the {better} model: {odds}." if clear else f"The log prefers neither model: {odds}."
+            f"The log prefers {choice}: ln Bayes factor {abs(factor):.1f} in favour of the {better} one."
         ).classes("studio-sentence").props("data-mark=two-evidence")
     rows: list[tuple[str, ...]] = [
         ("held-out error", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))

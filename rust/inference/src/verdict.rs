@@ -468,6 +468,7 @@ fn disagreements(search: &Search, members: &[usize], weighed: &[Weighed]) -> Vec
 /// each with and without the other.
 fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) -> Option<usize> {
     let search = &inquiry.search;
+    let problem = search.criterion.problem;
     members.iter().copied().find(|member| {
         let others = search::without(members, *member);
         let Some(without) = search.stack(&others) else {
@@ -480,22 +481,18 @@ fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) 
         };
         // What has less evidence than the member takes no place.
         let least = (own - search.threshold).max(0.0) + inquiry.threshold;
-        let sensors = search.criterion.problem.slots[*member].effect.sensors();
+        let sensors = problem.slots[*member].effect.sensors();
         let instead = inquiry.exceeding(&without, least, sensors);
-        // A cause that only fluctuates from block to block takes no place. One with a coefficient for all logs, as an effect has, must be there
-        // besides; what bins of one log show is no property of the sensor unless it is likelier for that alone.
-        let fixed = (0..left.len()).any(|k| {
-            let steady = || dictionary::varying(search, &without, &others, &inquiry.unnamed[k]).min(instead[k]);
-            let common =
-                matches!(inquiry.unnamed[k].origin, Origin::Probe(_)) || search.criterion.problem.parts.len() == 1;
-            let stays = |steady: f64| {
-                if common {
-                    steady >= inquiry.threshold
-                } else {
-                    replaced(steady, left[k])
-                }
-            };
-            replaced(instead[k], left[k]) && stays(steady())
+        // Bins of one log among several show no property of the sensor.
+        let common = |k: usize| matches!(inquiry.unnamed[k].origin, Origin::Probe(_)) || problem.parts.len() == 1;
+        // A cause that only fluctuates from block to block takes no place.
+        let fixed = (0..left.len()).filter(|k| replaced(instead[*k], left[*k])).any(|k| {
+            let steady = dictionary::varying(search, &without, &others, &inquiry.unnamed[k]).min(instead[k]);
+            if common(k) {
+                steady >= inquiry.threshold
+            } else {
+                replaced(steady, left[k])
+            }
         });
         fixed
             || inquiry
@@ -621,13 +618,9 @@ fn shown(
     if let Some(rest) = best.and_then(|best| search.stack(&search::without(members, best))) {
         let of_fit = |slot: usize| fitted.iter().find(|(of, _)| *of == slot).map(|(_, ln)| *ln);
         let beside_rest = |slot: usize| search.weigh(&rest, slot).map_or(f64::NEG_INFINITY, |w| w.ln_bayes);
-        let alike = best.iter().chain(rivals);
-        share(
-            &mut found,
-            &alike
-                .map(|slot| (*slot, of_fit(*slot).unwrap_or_else(|| beside_rest(*slot))))
-                .collect::<Vec<_>>(),
-        );
+        let evidence = |slot: &usize| (*slot, of_fit(*slot).unwrap_or_else(|| beside_rest(*slot)));
+        let alike: Vec<(usize, f64)> = best.iter().chain(rivals).map(evidence).collect();
+        share(&mut found, &alike);
     }
     let rank = |c: &Candidate| {
         (

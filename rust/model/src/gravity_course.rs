@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::between_knots::between_knots;
+
 /// Knots of a course; a log is cut into so many parts of as many rows. Of ten minutes a part is 0.15 s, a fraction of the shortest memory.
 const KNOTS: usize = 4096;
 /// Time constants of memories, s: so many first-order lags side by side, each four times as long as the one before, make up any creep of a
@@ -9,10 +11,10 @@ const KNOTS: usize = 4096;
 const TIMES: [f64; 3] = [1.0, 4.0, 16.0];
 /// Memories that a course has.
 pub const MEMORIES: usize = TIMES.len();
-/// Knots that must be known, or there is no course.
+/// Least number of known knots of a course.
 const LEAST: usize = 16;
 
-/// Sums of gravity in the body frame over parts of a log.
+/// Sums of specific force at rest in the body frame over parts of a log.
 #[derive(Clone, Debug)]
 pub struct GravityParts {
     rows: usize,
@@ -68,21 +70,9 @@ impl GravityCourse {
         })
     }
 
-    /// One of the memories along an axis at some times that rise, linear between knots and constant beyond them.
+    /// One of the memories along an axis at some times.
     pub fn at(&self, memory: usize, axis: usize, t: &[f64]) -> Vec<f64> {
-        let values = &self.memories[memory];
-        let mut k = t
-            .first()
-            .map_or(0, |first| self.t.partition_point(|knot| knot <= first));
-        k = k.saturating_sub(1).min(self.t.len() - 2);
-        let at = |t: &f64| {
-            while k + 2 < self.t.len() && self.t[k + 1] <= *t {
-                k += 1;
-            }
-            let share = ((t - self.t[k]) / (self.t[k + 1] - self.t[k]).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            values[k][axis] + share * (values[k + 1][axis] - values[k][axis])
-        };
-        t.iter().map(at).collect()
+        between_knots(&self.t, |k| self.memories[memory][k][axis], t)
     }
 }
 

@@ -4,6 +4,7 @@
 //! rank and decide. Units are SI (uT for the magnetometer), vectors are in the body frame unless said otherwise.
 
 pub mod bandwidth;
+mod between_knots;
 pub mod card;
 pub mod catalogue;
 pub mod contract;

@@ -1,5 +1,7 @@
 //! How the temperature went during a log, coarsely: what depends on its past cannot be told from a window alone.
 
+use crate::between_knots::between_knots;
+
 /// Knots of a course; a log is cut into so many parts of as many rows.
 pub const KNOTS: usize = 256;
 /// Knots to either side that a rate is taken over.
@@ -87,22 +89,9 @@ impl TemperatureCourse {
         })
     }
 
-    /// One of the pasts at some times, linear between knots and constant beyond them.
+    /// One of the pasts at some times.
     pub fn at(&self, past: usize, t: &[f64]) -> Vec<f64> {
-        let values = &self.pasts[past];
-        let mut k = 0;
-        t.iter()
-            .map(|t| {
-                while k > 0 && self.t[k] > *t {
-                    k -= 1;
-                }
-                while k + 2 < self.t.len() && self.t[k + 1] <= *t {
-                    k += 1;
-                }
-                let share = ((t - self.t[k]) / (self.t[k + 1] - self.t[k])).clamp(0.0, 1.0);
-                values[k] + share * (values[k + 1] - values[k])
-            })
-            .collect()
+        between_knots(&self.t, |k| self.pasts[past][k], t)
     }
 }
 
