@@ -36,6 +36,8 @@ const BEYOND: f64 = 20.0;
 /// Variance of the scatter of block means, over that of the noise of their samples, from which on a body that nobody watches translates: what
 /// other missing effects leave of their second order scatters by 0.2.
 const TRANSLATES: f64 = 1.0;
+/// Variance that gains of a tenth, still missing, leave of what a candidate explains: the second order of the two.
+const SECOND_ORDER: f64 = 0.01;
 /// No axis reads so much of itself, or of another, too much.
 const LARGEST_GAIN: f64 = 0.3;
 
@@ -242,8 +244,9 @@ impl<'a> Search<'a> {
     }
 
     /// True if a candidate says how the motion of the body acts on the accelerometer where this motion is not known: without a reference
-    /// position a body that is on no rig may translate, which makes block means of the force scatter beside the candidate. `stack` holds it.
-    pub fn of_unseen_motion(&self, stack: &Stack, slot: usize) -> bool {
+    /// position a body that is on no rig may translate, which makes block means of the force scatter beside the candidate. `stack` is that of
+    /// all members, the candidate among them.
+    pub fn of_unseen_motion(&self, stack: &Stack, members: &[usize], slot: usize) -> bool {
         let problem = self.criterion.problem;
         let effect = &problem.slots[slot].effect;
         let by_motion = matches!(effect.card().stage, Stage::Time | Stage::Input) && effect.sensors() == [Sensor::Acc];
@@ -251,7 +254,12 @@ impl<'a> Search<'a> {
             let facts = &part.white.layout.facts;
             facts.position_smoothing.is_none() && !facts.rests && facts.rig.is_none()
         };
-        by_motion && problem.parts.iter().any(unknown) && stack.strength(Sensor::Acc.index()).scatter >= TRANSLATES
+        let scatter = |stack: &Stack| stack.strength(Sensor::Acc.index()).scatter;
+        let alone = || {
+            self.stack(&without(members, slot))
+                .map_or(0.0, |others| scatter(&others))
+        };
+        by_motion && problem.parts.iter().any(unknown) && scatter(stack) >= TRANSLATES.max(SECOND_ORDER * alone())
     }
 
     /// True if a candidate is there.

@@ -422,9 +422,9 @@ fn varying(inquiry: &Inquiry, members: &[usize], stack: &Stack, all: bool) -> Ve
 fn beside_unnamed(inquiry: &Inquiry) -> Option<(Vec<usize>, Vec<f64>)> {
     let search = &inquiry.search;
     let (mut members, mut stack) = search.find()?;
-    let found = members.len();
-    members.retain(|m| !search.of_unseen_motion(&stack, *m));
-    if members.len() < found {
+    let all = members.clone();
+    members.retain(|m| !search.of_unseen_motion(&stack, &all, *m));
+    if members.len() < all.len() {
         stack = search.stack(&members)?;
     }
     // What varies from block to block is no property of the sensor.

@@ -228,6 +228,7 @@ fn added_by_the_past(log: &Log, parts: &[Part], sensor: Sensor, seen: &Seen, n: 
             facts: log.facts,
             t: log.window.t,
             ideal: &ideal,
+            force: &ideal.f,
             x: match sensor {
                 Sensor::Acc => &ideal.f,
                 Sensor::Gyr => &ideal.omega,

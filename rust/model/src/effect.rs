@@ -17,6 +17,9 @@ pub struct Rows<'a> {
     pub t: &'a [f64],
     /// Ideal readings, reference effects applied.
     pub ideal: &'a Ideal,
+    /// Specific force that reaches the sensing elements, m/s^2: the ideal one and what effects of stage Input add to it. The three sensors
+    /// of one chip feel the same.
+    pub force: &'a Triple,
     /// Quantity that the stage acts on: ideal reading plus the effects of the stages before.
     pub x: &'a Triple,
     /// Sensor temperature less its mean over the log, K (n); NaN where not known.

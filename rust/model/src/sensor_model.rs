@@ -45,6 +45,32 @@ impl Slot {
             self.effect.candidate_columns(rows, sensor, &self.parameters, out)
         }
     }
+
+    /// Adds what the effect adds to the readings of a sensor, of which `columns` are its columns, to `sum`, which begins as `x`.
+    fn add_to(
+        &self,
+        rows: &Rows,
+        sensor: Sensor,
+        columns: &Columns,
+        sum: &mut Option<Triple>,
+        x: &Triple,
+    ) -> Result<(), EffectError> {
+        if let Some(added) = self.effect.added(rows, sensor, &self.parameters)? {
+            sum.get_or_insert_with(|| x.clone()).add(&added, 1.0);
+            return Ok(());
+        }
+        for (p, value) in self.parameters.iter().enumerate().filter(|(_, v)| **v != 0.0) {
+            for axis in 0..3 {
+                if let Some(column) = columns.get(p, axis) {
+                    let target = &mut sum.get_or_insert_with(|| x.clone()).0[axis];
+                    for (t, c) in target.iter_mut().zip(column) {
+                        *t += value * c;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Effects of the model and candidates, each parameter with a fixed place.
@@ -149,6 +175,7 @@ impl<'a> Past<'a> {
                 Sensor::Mag => &self.ideal.m,
             },
             ideal: &self.ideal,
+            force: &self.ideal.f,
             temperature: self.temperature.as_deref(),
             vibration: None,
             covariates: &self.covariates,
@@ -297,6 +324,7 @@ impl SensorModel {
                 facts,
                 t: &t,
                 ideal: &ideal,
+                force: &ideal.f,
                 x: &ideal.f,
                 temperature: Some(&ones),
                 vibration: Some(&ones),
@@ -406,14 +434,17 @@ impl SensorModel {
             let own = Ideal::of_sensor(window, facts, &change, sensor);
             let own_seen = own.as_ref().and_then(seen_of);
             let ideal = own.as_ref().unwrap_or(&ideal);
-            let rows = Rows {
+            let seen_ideal = if own.is_some() {
+                own_seen.as_ref()
+            } else {
+                seen.as_ref()
+            }
+            .unwrap_or(ideal);
+            let mut rows = Rows {
                 facts,
                 t: &window.t[core.clone()],
-                ideal: if own.is_some() {
-                    own_seen.as_ref().unwrap_or(ideal)
-                } else {
-                    seen.as_ref().unwrap_or(ideal)
-                },
+                ideal: seen_ideal,
+                force: &seen_ideal.f,
                 x: &ideal.f,
                 temperature: temperature.as_deref(),
                 vibration: vibration.as_deref(),
@@ -421,6 +452,14 @@ impl SensorModel {
                 position: &position,
                 history: 0,
             };
+            let force = if sensor == Sensor::Acc {
+                None
+            } else {
+                self.force(&rows)?
+            };
+            if let Some(force) = &force {
+                rows.force = force;
+            }
             let mut past = self
                 .with_past(whole, facts, sensor)
                 .map(|long| Past::new(&long, facts, &change, sensor, whole.begin - long.begin));
@@ -463,6 +502,23 @@ impl SensorModel {
             .zip(&self.on_axes)
             .map(|(channel, active)| channel.map(|c| c.residual_after(active, step)))
             .collect())
+    }
+
+    /// Specific force at the sensing elements; `None` where the model adds nothing to the ideal one.
+    fn force(&self, rows: &Rows) -> Result<Option<Triple>, EffectError> {
+        let mut columns = Columns::default();
+        let mut force: Option<Triple> = None;
+        for slot in self.slots.iter().filter(|s| s.in_model) {
+            let effect = &slot.effect;
+            // What lies in the past of the accelerometer is not at hand for other sensors.
+            if effect.card().stage == Stage::Input && effect.sensors().contains(&Sensor::Acc) && effect.memory() == 0.0
+            {
+                columns.reset(rows.len(), slot.parameters.len());
+                slot.columns(rows, Sensor::Acc, &mut columns)?;
+                slot.add_to(rows, Sensor::Acc, &columns, &mut force, &rows.ideal.f)?;
+            }
+        }
+        Ok(force)
     }
 
     /// Modelled readings of one sensor and the columns of its three channels, stage after stage. Columns are made of the smooth
@@ -508,14 +564,8 @@ impl SensorModel {
                 };
                 slot.columns(&rows, sensor, &mut columns)?;
                 // The value of a reference effect is in the ideal readings already.
-                let counts = slot.in_model && !in_reference(stage);
-                let added = if counts {
-                    slot.effect.added(&rows, sensor, &slot.parameters)?
-                } else {
-                    None
-                };
-                if let Some(added) = &added {
-                    after.get_or_insert_with(|| x.clone()).add(added, 1.0);
+                if slot.in_model && !in_reference(stage) {
+                    slot.add_to(&rows, sensor, &columns, &mut after, &x)?;
                 }
                 for axis in 0..3 {
                     let list = &self.on_axes[3 * sensor.index() + axis];
@@ -526,19 +576,9 @@ impl SensorModel {
                         .skip(from)
                         .take_while(|(_, p)| **p < slot.first + slot.parameters.len())
                     {
-                        let value = slot.parameters[p - slot.first];
-                        let column = columns.get(p - slot.first, axis);
-                        if counts
-                            && added.is_none()
-                            && value != 0.0
-                            && let Some(column) = column
-                        {
-                            let target = &mut after.get_or_insert_with(|| x.clone()).0[axis];
-                            for (t, c) in target.iter_mut().zip(column) {
-                                *t += value * c;
-                            }
-                        }
-                        out[axis][k] = column.map_or_else(|| vec![0.0; n], <[f64]>::to_vec);
+                        out[axis][k] = columns
+                            .get(p - slot.first, axis)
+                            .map_or_else(|| vec![0.0; n], <[f64]>::to_vec);
                     }
                 }
             }

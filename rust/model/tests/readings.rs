@@ -7,7 +7,7 @@ use imufit_model::kinematics_memory::KinematicsMemory;
 use imufit_model::sensor_model::SensorModel;
 use imufit_model::smoothing::NARROWEST;
 use imufit_model::window::Window;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 const N: usize = 400;
 const ROW: usize = 200;
@@ -55,6 +55,11 @@ fn time(row: usize) -> f64 {
 
 /// What an effect adds to the reading of channel after channel in one row.
 fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
+    added_beside(swing, &[], id, parameters)
+}
+
+/// The same in a model that has other effects.
+fn added_beside(swing: &Swing, others: &[(&str, &[f64])], id: &str, parameters: &[f64]) -> Vec<f64> {
     let t: Vec<f64> = (0..N).map(time).collect();
     let attitude: Vec<f64> = t
         .iter()
@@ -127,12 +132,13 @@ fn added(swing: &Swing, id: &str, parameters: &[f64]) -> Vec<f64> {
             .map(|c| c.map_or(f64::NAN, |c| -c.residual[0]))
             .collect()
     };
-    let effect = catalogue::find(id)
-        .into_iter()
-        .map(|effect| (effect, parameters.to_vec()));
-    of(effect.collect())
+    let effects = |given: &[(&str, &[f64])]| {
+        let known = |(id, values): &(&str, &[f64])| catalogue::find(id).map(|effect| (effect, values.to_vec()));
+        given.iter().filter_map(known).collect()
+    };
+    of(effects(&[others, &[(id, parameters)]].concat()))
         .iter()
-        .zip(of(vec![]))
+        .zip(of(effects(others)))
         .map(|(with, without)| with - without)
         .collect()
 }
@@ -189,6 +195,25 @@ fn the_earth_turns_about_its_axis_whatever_the_frame() {
         let expected = swing.attitude(time(ROW)).inverse_transform_vector(&axis);
         near(&added(&swing, "gyr.earth_rate", &[north, up]), 1, expected, 1e-12);
     }
+}
+
+#[test]
+fn a_gyroscope_feels_the_force_at_the_sensor() {
+    let (swing, t) = (swing(Frame::Ned), time(ROW));
+    let g = [2e-4, -1e-4, 3e-4, 5e-5, -2e-4, 1e-4, 4e-5, -3e-4, 6e-5];
+    let arm = [0.3, -0.2, 0.5];
+    let matrix = Matrix3::from_row_slice(&g);
+    let (omega, alpha, r) = (
+        swing.omega(t),
+        swing.axis * (-3.2 * (2.0 * t).sin()),
+        Vector3::from(arm),
+    );
+    let moved = omega.cross(&omega.cross(&r)) + alpha.cross(&r);
+    let alone = added(&swing, "gyr.g_sensitivity", &g);
+    near(&alone, 1, matrix * swing.force(t), 1e-9);
+    let beside = added_beside(&swing, &[("acc.lever_arm", &arm)], "gyr.g_sensitivity", &g);
+    near(&beside, 1, matrix * (swing.force(t) + moved), 1e-8);
+    assert!((matrix * moved).norm() > 2e-5);
 }
 
 #[test]

@@ -86,6 +86,7 @@ impl<'a> Table<'a> {
             facts,
             t: self.t,
             ideal: &self.ideal,
+            force: &self.ideal.f,
             x: &self.ideal.f,
             temperature: self.temperature.as_deref(),
             vibration: Some(&self.vibration),

@@ -102,6 +102,7 @@ pub fn dependence(
             facts,
             t: &t,
             ideal: &trial.ideal,
+            force: &trial.ideal.f,
             x: &x,
             temperature: Some(&trial.temperature),
             vibration: Some(&trial.temperature),

@@ -96,6 +96,8 @@ impl Block<'_> {
                     facts: self.facts,
                     t: self.t,
                     ideal: &self.ideal,
+                    // What the accelerometer reads is the force at the sensor.
+                    force: &self.ideal.f,
                     x: &x,
                     temperature: self.temperature,
                     vibration: self.vibration,

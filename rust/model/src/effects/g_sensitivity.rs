@@ -6,14 +6,14 @@ use crate::effect::{Columns, Rows};
 use crate::sensor::Sensor;
 
 fn fill(rows: &Rows, out: &mut Columns) {
-    matrix(&rows.ideal.f, out);
+    matrix(rows.force, out);
 }
 
 /// `gyr.g_sensitivity`. MPU6050 product specification 3.1: linear acceleration sensitivity 0.1 deg/s per g.
 pub fn g_sensitivity() -> Linear {
     let words = Words {
         name: "gyroscope g-sensitivity",
-        physics: "acceleration bends the vibrating structure of the gyroscope, which reads it as rotation",
+        physics: "the specific force at the sensor, that of a lever arm included, bends the vibrating structure of the gyroscope, which reads it as rotation",
         formula: "G f, full 3x3",
         signature: "at rest the rate residual changes with the attitude; in motion it follows the specific force",
         mistaken_for: "gyr.bias if the attitude never changes, gyr.bias_temperature if attitude and temperature change together",
