@@ -44,7 +44,7 @@ def test_other_toml_file_is_not_overwritten(tmp_path: Path) -> None:
             "FRD",
             "a.parquet: column frame: metadata frame is 'FRD', which is not a frame. Write NED, ENU or NWU.",
         ),
-        ("gravity", "x", "metadata gravity is 'x', which is not a gravity in m/s^2. Write a number such as 9.80665."),
+        ("gravity", "x", "metadata gravity is 'x', which is not a gravity in m/s². Write a number such as 9.80665."),
         ("gravity", True, "metadata gravity is True"),
         ("gravity", 981, "metadata gravity is 981"),
         ("mag_reference", [1, 2], "metadata mag_reference is [1, 2], not three numbers. Write [x, y, z] in uT"),

@@ -73,7 +73,7 @@ def test_a_rival_is_allowed_where_the_log_does_not_separate_it(tmp_path, seed):
     rival = next(effect for effect in alike if effect != truth)
     answer = game.reveal(rival, first)
     assert not answer.right
-    assert answer.sentences[0].startswith("Allowed")
+    assert answer.sentences[0].startswith("Accepted")
     assert "You could not have been sure" in answer.sentences[-1]
 
 

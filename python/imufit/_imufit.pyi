@@ -672,6 +672,7 @@ class _Judgement(TypedDict):
     side: int | None
     progress: float
     unrest: float
+    open: bool
     closed: _Pose | None
 
 class _Solution(TypedDict):

@@ -34,7 +34,7 @@ def _of_log(evidence: LogEvidence, sensor: str) -> str | None:
     channels = [k for k, name in enumerate(CHANNELS) if name[:3] == sensor]
     if sensor not in evidence.facts.sensors:
         if isinstance(evidence.passes, RestPasses):
-            return "the log has no reference, and too few rests to judge by instead"
+            return "the log has no reference, and too few rests to do without one"
         return "no sample has a reference beside it"
     if not any(np.isfinite(evidence.raw_variance[k]) for k in channels):
         return "too few samples have a reference around them"

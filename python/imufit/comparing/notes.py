@@ -44,10 +44,10 @@ def _of_rows(evidence: LogEvidence) -> list[str]:
         if any(steps):
             out.append(
                 f"Readings of {sensor} come in steps of {max(steps):.3g} {UNITS[sensor]}, coarse against the noise; "
-                "in motion the rounding is fitted along."
+                "in motion the rounding is fitted beside the model."
             )
     if facts.field_estimated and "mag" in facts.sensors:
-        out.append("The reference field was estimated from this log and is fitted along.")
+        out.append("The reference field is unknown: it is estimated from this log, beside the model.")
     if evidence.passes.commanded is not None:
         out.append("The reference is the attitude at ref_angle: ref_q differs from it only by noise.")
     coloured = sorted({CHANNELS[k][:3] for k, taps in enumerate(evidence.filters) if taps})
@@ -76,7 +76,7 @@ def _of_rests(evidence: LogEvidence, passes: RestPasses) -> list[str]:
     if rests.turns:
         told.append(f"{rests.turns} turns from rest to rest, along which the rate carries the direction of gravity")
     if "mag" in rests.sensors:
-        told.append("the length of the magnetic field, which is the same everywhere and is fitted along")
+        told.append("the length of the magnetic field, which is the same everywhere and is estimated beside the model")
     out = [f"The log has no reference attitude. It is judged by {'; '.join(told)}."]
     limits = []
     if "acc" in rests.sensors and not rests.labels:

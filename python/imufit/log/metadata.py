@@ -222,7 +222,7 @@ def _gravity(value: Any, file: str | Path | None) -> float:
     number = _number(value)
     if number is None or not SMALLEST_GRAVITY <= number <= 30.0:
         raise InputError(
-            f"metadata gravity is {_shown(value)}, which is not a gravity in m/s^2",
+            f"metadata gravity is {_shown(value)}, which is not a gravity in m/s²",
             file=file,
             column="gravity",
             remedy=f"Write a number such as {STANDARD_GRAVITY}.",

@@ -443,13 +443,13 @@ def _check_acc(
     if without_gravity(acc, gravity):
         still = rest_norm(acc, relative=False)
         raise place.error(
-            f"at rest the norm of acc is {still:.4g} m/s^2: gravity was taken off, and cannot be put back",
+            f"at rest the norm of acc is {still:.4g} m/s²: gravity was taken off, and cannot be put back",
             column="acc_x",
             remedy="Export the accelerometer itself, not the linear acceleration; where there is none, "
             "state its gravity in the metadata.",
         )
     if np.isfinite(norm) and not 5.0 < norm < 20.0:
-        return [f"{place.name}: at rest the norm of acc is {norm:.4g} m/s^2, far from 9.8: check its unit"]
+        return [f"{place.name}: at rest the norm of acc is {norm:.4g} m/s², far from 9.8: check its unit"]
     return []
 
 

@@ -23,6 +23,9 @@ from imufit.results.comparison import Panel
 if TYPE_CHECKING:
     from imufit.figures.allan import ChannelLike
 
+HOVER: Final = "%{xaxis.title.text}: %{x:.5g}<br>%{yaxis.title.text}: %{y:.4g}<extra>%{fullData.name}</extra>"
+"""The place of a point with quantities and units, as the axes name them."""
+
 Figure = dict[str, Any]
 Array = NDArray[np.float64]
 
@@ -61,7 +64,7 @@ def words(text: str) -> str:
 
 def _figure(traces: list[dict[str, Any]], x: str, y: str, **more: Any) -> Figure:
     """Lay out traces with a title on each axis."""
-    axis = {"zeroline": False, "automargin": True, "fixedrange": False}
+    axis = {"zeroline": False, "automargin": True, "fixedrange": False, "exponentformat": "power"}
     layout = {
         "height": HEIGHT,
         "margin": {"l": 56, "r": 12, "t": 8, "b": 44},
@@ -124,7 +127,7 @@ def residual_panel(
         _line(x, mean, BLUE, "now", mode="lines+markers"),
     ]
     if explained:
-        traces.append(_line(x[[0, -1]], x[[0, -1]], GREY, "if it were all", dash="dot"))
+        traces.append(_line(x[[0, -1]], x[[0, -1]], GREY, "if it explained all", dash="dot"))
     if other is not None:
         traces.append(_line(x_factor * other.centre, factor * other.mean, GREEN, "kept model", dash="dashdot"))
     if after is not None:
@@ -137,7 +140,7 @@ def residual_panel(
 def _line(x: Array, y: Array, colour: str, name: str, *, mode: str = "lines", dash: str = "solid") -> list[Figure]:
     line = {"color": colour, "width": LINE, "dash": dash}
     points = {"x": _numbers(x), "y": _numbers(y), "mode": mode, "name": name}
-    shown = {"hovertemplate": "%{x:.5g}: %{y:.4g}<extra>%{fullData.name}</extra>"}
+    shown = {"hovertemplate": HOVER}
     return [{"type": "scatter", **points, **shown, "line": line, "marker": {"color": colour, "size": 5}}]
 
 

@@ -21,7 +21,7 @@ from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, join_o
 from imufit.studio.mystery import DEMONSTRATION, Mystery
 from imufit.studio.session import Session
 from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
-from imufit.studio.stack import Stack
+from imufit.studio.stack import Stack, Step
 from imufit.studio.traces import ModelTraces, Traces
 
 Answer = TypeVar("Answer")
@@ -163,6 +163,7 @@ class Desk:
         self._worker = threading.local()
         self.troubled: LogFile | None = None
         self._before: Shown | None = None
+        self._kept = ""
 
     def new_folder(self) -> Path:
         """Make a folder for files that come together; it goes with the server.
@@ -218,6 +219,12 @@ class Desk:
     def unmapped(self) -> LogFile | None:
         """The file that cannot be read until its columns are named; None where the last problem is another one."""
         return self.troubled if self.in_shell else None
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether the way to the present model would be lost with its session; that of a game is not kept."""
+        session = self.session
+        return session is not None and self.mystery is None and len(session.steps) > 1 and self.saved() != self._kept
 
     # --- work
 
@@ -319,6 +326,11 @@ class Desk:
         self._no_trouble()
         self.changed.emit()
 
+    def forget_arrivals(self) -> None:
+        """Put away the files that await a choice: the present session stays."""
+        self.arrivals = []
+        self.changed.emit()
+
     def forget_wanted(self) -> None:
         """Leave the session whose logs are not there."""
         self.wanted = None
@@ -405,13 +417,11 @@ class Desk:
             return
         stack = session.stack
         made = session.made(stack)
-        words = " + ".join(stack.model.effects) or "the ideal sensor"
-        for step in session.steps[: session.position + 1]:
-            # Earlier ones first: a session that was reopened goes the same way again.
-            if session.made(step.stack) is None:
-                yield Piece(f"fitting {words}", partial(session.fit, step.stack, self.progress))
-                return
-        assert made is not None
+        words = _in_words(stack)
+        # Earlier ones first: a session that was reopened goes the same way again.
+        yield from self._unfitted(session, session.steps[: session.position + 1])
+        if made is None:
+            return
         if made.comparison is None and session.has_reference:
             yield Piece(f"comparing {words}", partial(session.compare, stack, self.progress), judged=stack)
         if made.diagnosis is None:
@@ -426,6 +436,13 @@ class Desk:
                 yield Piece("comparing the kept model", partial(session.compare, session.second, self.progress))
             if session.second.model != stack.model and session.weighed() is None:
                 yield Piece("weighing the two models", partial(session.weigh, self.progress))
+        # Steps that were undone before the session was saved: their bars stand beside the others.
+        yield from self._unfitted(session, session.steps[session.position + 1 :])
+
+    def _unfitted(self, session: Session, steps: Sequence[Step]) -> Iterator[Piece]:
+        for step in steps:
+            if session.made(step.stack) is None:
+                yield Piece(f"fitting {_in_words(step.stack)}", partial(session.fit, step.stack, self.progress))
 
     @staticmethod
     def _models_drawn(session: Session) -> list[Stack]:
@@ -477,7 +494,7 @@ class Desk:
             if found is not None:
                 self.arrivals = [item for item in self.arrivals if item.file.path != file.path] + [found]
         waiting = [offer for offer in self.offers if offer.way is not Way.OPEN]
-        if len(self.arrivals) == 1 and not waiting and self.arrivals[0].sensors:
+        if len(self.arrivals) == 1 and not waiting and self.arrivals[0].sensors and not self.unsaved:
             await self.open(self.offers[0].files)
         self.changed.emit()
 
@@ -595,6 +612,7 @@ class Desk:
             session.go(kept.steps, kept.position)
             session.second = kept.second
             self._take(session, kept.files, joined, None)
+            self._kept = self.saved()
             await self.update()
 
     def saved(self) -> str:
@@ -609,6 +627,17 @@ class Desk:
         if session is None:
             raise InputError("no log is open yet", remedy="Open a log first.")
         return as_toml(Kept(self.files, tuple(session.steps), session.position, session.second))
+
+    def save(self) -> str:
+        """Return the text of the session's file, and note that the person keeps it.
+
+        Raises
+        ------
+        InputError
+            No log is open.
+        """
+        self._kept = self.saved()
+        return self._kept
 
     # --- the game
 
@@ -629,3 +658,7 @@ class Desk:
         game = await self._tried("hiding an effect", lambda: Mystery.hidden(level, seed, self.new_folder()))
         if game is not None:
             await self.open([LogFile(game.log, game.log.name)], game)
+
+
+def _in_words(stack: Stack) -> str:
+    return " + ".join(stack.model.effects) or "the ideal sensor"

@@ -220,7 +220,7 @@ def _said(truth: Sequence[str], answer: str | None, right: bool, rival: bool) ->
     if answer is None:
         return f"{hid}."
     named = f"you named {answer}" if answer else "you answered that nothing is missing"
-    mark = "Right" if right else "Allowed, as the log separates the two no better" if rival else "Not right"
+    mark = "Right" if right else "Accepted, since this log cannot separate the two" if rival else "Not right"
     return f"{mark}: {hid}, and {named}."
 
 

@@ -40,7 +40,7 @@ def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
         return ""
     outdone = item.outcome == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
     if outdone and diagnosis.best is not None:
-        return f"; needless beside {printable(diagnosis.best, NAME)}"
+        return f"; explains nothing beside {printable(diagnosis.best, NAME)}"
     return f"; {item.outcome}"
 
 

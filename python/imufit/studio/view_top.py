@@ -108,7 +108,7 @@ class Head:
 
     def _download(self) -> None:
         try:
-            text = self._desk.saved()
+            text = self._desk.save()
         except InputError as error:
             ui.notify(str(error))
             return
@@ -291,6 +291,9 @@ class Top:
         desk = self._desk
         with ui.element("div").classes("studio-error").props('role="alert"'):
             ui.label(printable(desk.trouble)).props("data-mark=trouble")
+            if desk.session is not None and desk.troubled is not None and desk.troubled not in desk.files:
+                shown = " and ".join(printable(file.name, NAME) for file in desk.files)
+                ui.label(f"The page still shows {shown}.").classes("studio-muted")
             if desk.unmapped is not None:
                 self._mapping(desk.unmapped)
                 ui.label(f"In a shell: {printable(desk.in_shell)}").classes("studio-muted").props("data-mark=in-shell")
@@ -321,6 +324,10 @@ class Top:
         offers = desk.offers
         if not offers:
             ui.label("This file holds a reference alone: drop the sensor's file as well.").classes("studio-sentence")
+        if desk.unsaved:
+            ui.label("Another log takes the place of the present model, which is not saved.").classes(
+                "studio-sentence"
+            ).props("data-mark=unsaved")
         for offer in offers:
             ui.button(printable(offer.words, 2 * NAME), on_click=lambda offer=offer: desk.open(offer.files)).props(
                 "outline"
@@ -328,6 +335,7 @@ class Top:
         if len(desk.arrivals) == 1 and not desk.arrivals[0].sensors and desk.unmapped is None:
             ui.label("If it holds readings, name their columns:").classes("studio-muted")
             self._mapping(desk.arrivals[0].file)
+        ui.button("Cancel", on_click=desk.forget_arrivals).props("flat").props("data-mark=arrivals-cancel")
 
     def _game(self, judged: bool) -> None:
         desk = self._desk

@@ -31,6 +31,8 @@ pub struct Judgement {
     pub progress: f64,
     /// Scatter of the last readings over what is allowed at rest; above 1 the sensor is not still.
     pub unrest: f64,
+    /// Whether a pose is open: a disturbance that is as short as one may be does not end it.
+    pub open: bool,
     /// A pose that ended with this sample.
     pub closed: Option<Pose>,
 }
@@ -142,6 +144,7 @@ impl PoseJudge {
             side: (!self.force.is_empty()).then(|| Side::nearest(&self.force.mean())),
             progress: held.min(1.0),
             unrest,
+            open: self.pose.is_some(),
             closed,
         }
     }

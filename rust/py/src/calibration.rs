@@ -143,6 +143,7 @@ impl PyPoseJudge {
         dict.set_item("side", judged.side.map(Side::number))?;
         dict.set_item("progress", judged.progress)?;
         dict.set_item("unrest", judged.unrest)?;
+        dict.set_item("open", judged.open)?;
         dict.set_item("closed", judged.closed.map(|p| pose_dict(py, &p)).transpose()?)?;
         Ok(dict)
     }

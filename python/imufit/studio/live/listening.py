@@ -103,6 +103,8 @@ class Recorded:
         Rows on the disk.
     message : str
         Result or problem of the last recording.
+    made : bool
+        Whether the log is there to be opened.
     """
 
     path: Path | None = None
@@ -110,6 +112,7 @@ class Recorded:
     seconds: float = 0.0
     rows: int = 0
     message: str = ""
+    made: bool = False
 
 
 class Listening:
@@ -129,7 +132,9 @@ class Listening:
     rests : deque of Rest
         Rests so far, the last ones.
     rest : Rest or None
-        The present rest; None while the device moves.
+        The present rest, or the one that a movement has interrupted and may have ended; None without one.
+    moving : bool
+        Whether the device moves.
     problem : str
         Why following ended by itself; empty while it runs.
     stage : Stage or None
@@ -144,6 +149,7 @@ class Listening:
         self.rolling: Rolling | None = None
         self.rests: deque[Rest] = deque(maxlen=RESTS)
         self.rest: Rest | None = None
+        self.moving = True
         self.problem = ""
         self.stage: Stage | None = None
         self.calibrated: tuple[str, ...] = ()
@@ -266,7 +272,7 @@ class Listening:
             except InputError as error:
                 self._recorded = Recorded(recorder.path, False, seconds, recorder.n, str(error))
                 return
-            self._recorded = Recorded(recorder.path, False, seconds, recording.n, in_words(recording))
+            self._recorded = Recorded(recorder.path, False, seconds, recording.n, in_words(recording), True)
             if wizard is not None and wizard.complete:
                 self._calibrate(recorder.path)
 
@@ -296,11 +302,15 @@ class Listening:
         gyr = np.column_stack([batch[name] for name in GROUPS["gyr"]]).tolist() if "gyr" in sensors else None
         for row, t in enumerate(batch["t"].tolist()):
             judged = self._judge.step(t, acc[row], None if gyr is None else gyr[row])
-            begin = t if self.rest is None else self.rest.begin
-            self.rest = None if judged["state"] == "moving" else Rest(begin, t, judged["state"] == "held")
             closed = judged["closed"]
             if closed is not None:
                 self.rests.append(Rest(*closed["time"], closed["flaw"] is None))
+            if closed is not None or not judged["open"]:
+                self.rest = None
+            self.moving = judged["state"] == "moving"
+            if not self.moving:
+                begin = t if self.rest is None else self.rest.begin
+                self.rest = Rest(begin, t, judged["state"] == "held")
 
     # --- requests of a page
 

@@ -325,7 +325,7 @@ class _LivePage:
         waiting = state.trouble if state.trouble and not state.n else ""
         line = "line lost, trying again" if not state.connected else waiting
         self._name.text = ", ".join(each for each in (printable(state.device) or "device", line) if each)
-        self._rest.text = "" if not state.n else "at rest" if listening.rest is not None else "moving"
+        self._rest.text = "" if not state.n else "moving" if listening.moving else "at rest"
         self._show_readings(listening)
 
     def _show_readings(self, listening: Listening) -> None:
@@ -363,7 +363,7 @@ class _LivePage:
         if recorded.path is None:
             return
         name = printable(recorded.path.name)
-        self._look.visible = not recorded.running
+        self._look.visible = recorded.made
         if recorded.running:
             self._file.value = recorded.path.name
             said = recorded.message or "recording"

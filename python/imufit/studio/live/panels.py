@@ -78,7 +78,7 @@ def panel(rolling: Rolling, title: str, names: Sequence[str], seconds: float, re
                 "y": np.round(factor * values, DIGITS).tolist(),
                 "name": axis or words(name),
                 "line": {"color": AXES.get(axis, GREY), "width": 1.4},
-                "hovertemplate": "%{y:.4g}<extra>%{fullData.name}</extra>",
+                "hovertemplate": f"%{{y:.4g}} {shown}<extra>%{{fullData.name}}</extra>",
             }
         )
     shapes = [
@@ -98,7 +98,7 @@ def panel(rolling: Rolling, title: str, names: Sequence[str], seconds: float, re
         if rest.end > edge[0]
     ]
     # One margin for all panels: their times stand over one another.
-    axis_look = {"zeroline": False, "fixedrange": True}
+    axis_look = {"zeroline": False, "fixedrange": True, "exponentformat": "power"}
     layout = {
         "height": HEIGHT,
         "margin": {"l": 60, "r": 10, "t": 26, "b": 34},
