@@ -180,3 +180,44 @@ def test_a_log_with_sensors_can_be_the_reference_of_one_that_cannot_be_judged(lo
         (Way.JOIN, (spoilt.joined(log),)),
         (Way.OPEN, (log,)),
     ]
+
+
+def test_another_log_awaits_a_choice_while_the_model_is_not_saved(log, tmp_path):
+    other = tmp_path / "other.csv"
+    save_simulation(simulate("handheld", {}, 2, duration=20.0, rate=50.0), other)
+    brought = LogFile(other, other.name)
+
+    async def steps() -> None:
+        await desk.open([log])
+        assert not desk.unsaved
+        await desk.attempt(lambda: desk.session.add("gyr.bias"))
+        assert desk.unsaved
+        await desk.bring([brought])
+        assert desk.files == (log,)
+        assert [item.file for item in desk.arrivals] == [brought]
+        desk.forget_arrivals()
+        assert desk.files == (log,)
+        assert not desk.arrivals
+        desk.save()
+        assert not desk.unsaved
+        await desk.bring([brought])
+        assert desk.files == (brought,)
+
+    desk = Desk()
+    asyncio.run(steps())
+
+
+def test_a_session_that_is_reopened_knows_the_error_of_undone_steps(log):
+    async def steps() -> None:
+        await first.open([log])
+        await first.attempt(lambda: first.session.add("gyr.bias"))
+        await first.attempt(lambda: first.session.undo())
+        kept.write_text(first.save(), encoding="utf-8")
+        await second.reopen(kept)
+
+    first, second, kept = Desk(), Desk(), log.path.with_name("walk-session.toml")
+    asyncio.run(steps())
+    assert second.session.position == 0
+    ratios = [[desk.session.made(step.stack).numbers.ratio for step in desk.session.steps] for desk in (first, second)]
+    assert ratios[0] == ratios[1]
+    assert not second.unsaved
