@@ -15,7 +15,7 @@ from pathlib import Path
 
 from confirmed import Part, of_a_recording
 from imufit import InputError, Log, SensorModel
-from imufit.diagnosing.attitude import attitude_comparison
+from imufit.comparing.attitude import attitude_comparison
 
 Values = Mapping[str, Mapping[str, float]]
 WITHIN = 1.05

@@ -70,6 +70,11 @@ def page(chromium, address):
     opened.on("pageerror", lambda error: problems.append(str(error)))
     opened.set_default_timeout(SLOW_MS)
     opened.goto(address)
+    save = marked(opened, "save")
+    if save.is_enabled():
+        # The model of the test before gives way unasked.
+        with opened.expect_download():
+            save.click()
     yield opened
     context.close()
     assert asked
@@ -310,6 +315,23 @@ def test_a_mouse_click_on_a_candidate_leaves_the_page_where_it_is(page, folder):
     page.wait_for_timeout(800)
     assert page.evaluate("window.scrollY") == before
     assert marked(page, "card").inner_text().startswith(f"{effect}:")
+
+
+def test_a_log_does_not_replace_a_model_that_is_not_saved(page, folder):
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    page.locator('[data-mark^="add-"]').first.click()
+    wait_for_bars(page, 2)
+    drop(page, folder / "late.parquet")
+    marked(page, "unsaved").wait_for()
+    assert "walk.parquet" in marked(page, "logs").inner_text()
+    marked(page, "arrivals-cancel").click()
+    marked(page, "unsaved").wait_for(state="detached")
+    assert len(bars(page)) == 2
+    drop(page, folder / "late.parquet")
+    marked(page, "offer-open").click()
+    wait_for_bars(page, 1)
+    assert "late.parquet" in marked(page, "logs").inner_text()
 
 
 def test_a_typed_answer_counts(page):

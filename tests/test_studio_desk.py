@@ -211,7 +211,7 @@ def test_a_session_that_is_reopened_knows_the_error_of_undone_steps(log):
     async def steps() -> None:
         await first.open([log])
         await first.attempt(lambda: first.session.add("gyr.bias"))
-        await first.attempt(lambda: first.session.undo())
+        await first.attempt(first.session.undo)
         kept.write_text(first.save(), encoding="utf-8")
         await second.reopen(kept)
 

@@ -82,12 +82,11 @@ class Head:
             button.set_enabled(desk.session is not None and desk.session.begun)
 
     def _asked(self, level: int) -> Callable[[], object]:
-        """Return what begins a game; where a model was built on a log of one's own, the person is asked first."""
+        """Return what begins a game; a person is asked first where a model is not saved."""
         desk, play = self._desk, _player(self._desk, level)
 
         def ask() -> object:
-            session = desk.session
-            if session is None or desk.mystery is not None or not session.can_undo:
+            if not desk.unsaved:
                 return play()
             with ui.dialog() as dialog, ui.card():
                 ui.label("The game takes the place of the open session.")
