@@ -176,7 +176,7 @@ def spectrum(found: Spectrum, other: Spectrum | None = None) -> Figure:
     ends = found.frequency[[0, -1]]
     lines += _line(ends, np.full(2, factor * math.sqrt(found.floor)), GREY, "noise floor", dash="dash")
     # Decades alone carry numbers: the others would lie upon one another on a phone.
-    ticks = {"type": "log", "dtick": 1}
+    ticks = {"type": "log", "dtick": 1, "tickformat": "~g"}
     title = f"residual of {words(found.channel)}, {unit}/√Hz"
     return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=_logarithmic(lines))
 
@@ -217,7 +217,7 @@ def allan(sensor: str, channels: Sequence[ChannelLike]) -> Figure:
         drawn,
         "averaging time, s",
         f"{words(sensor)}, {shown}",
-        xaxis={"type": "log", "dtick": 1},
+        xaxis={"type": "log", "dtick": 1, "tickformat": "~g"},
         yaxis=_logarithmic(drawn),
     )
 
