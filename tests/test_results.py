@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from imufit._imufit import Problem
 from imufit.figures import quantity
 from imufit.figures.waterfall import waterfall
 from imufit.results import Addition, Parameter, Table
+from imufit.results.diagnosis import ENOUGH
 from imufit.results.parameter import parameter_table
 from imufit.results.sentences import explanation
 from loop_results import G_SENSITIVITY, addition, card, comparison, diagnosis, ladder
@@ -184,8 +186,11 @@ def test_a_probable_candidate_is_not_called_insignificant():
     found = diagnosis()
     likely = dataclasses.replace(found.candidates[2], probability=0.81)
     unlikely = dataclasses.replace(likely, probability=0.2)
-    rows = dataclasses.replace(found, candidates=(likely, unlikely)).candidate_table().rows
-    assert [row[1] for row in rows] == ["likely, not established", "not significant"]
+    certain = dataclasses.replace(likely, probability=0.9995)
+    rows = dataclasses.replace(found, candidates=(certain, likely, unlikely)).candidate_table().rows
+    assert [row[1] for row in rows] == ["in doubt", "likely, not established", "not significant"]
+    assert pytest.approx(ENOUGH, abs=5e-4) == 1.0 / (1.0 + math.exp(-Problem.ODDS))
+    assert "would be a guess" in explanation(card(), certain)
     assert likely.to_dict()["status"] == "not significant"
     assert "more probable than not" in explanation(card(), likely)
     assert "more probable than not" not in explanation(card(), unlikely)

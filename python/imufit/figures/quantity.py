@@ -156,6 +156,8 @@ def share(value: float | None) -> str:
     """Fraction as per cent, e.g. ``63 %``."""
     if value is None or not math.isfinite(value):
         return "-"
+    if 0.0 < value < 0.0005:
+        return "< 0.1 %"
     return f"{100.0 * value:.1f} %" if 0.0005 <= abs(value) < 0.0995 else f"{100.0 * value:.0f} %"
 
 

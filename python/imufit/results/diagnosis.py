@@ -38,6 +38,11 @@ NOT_SIGNIFICANT = "not significant"
 """Status of an effect that the log shows not to be there, or does not need beside others."""
 LIKELY = "likely, not established"
 """In words the status of an effect that is not significant, but more probable than not: a name needs better odds."""
+IN_DOUBT = "in doubt"
+"""In words the status of an effect with the odds that a name needs, which its kind of evidence does not earn it: an
+unnamed cause explains more in its place, its size changes over the log, or it needs a position that is not there."""
+ENOUGH = 0.881
+"""Probability from which on a candidate has the odds that a name needs, e² to one (`Problem.ODDS`)."""
 NEXT = 5
 """Candidates behind those that stand out that are shown with them: the answer stays on a screen of 24 lines."""
 NOT_TESTABLE = "not testable here"
@@ -158,7 +163,9 @@ class Candidate(Part):
     @property
     def outcome(self) -> str:
         """The status as it is shown beside the probability, which it does not contradict."""
-        return LIKELY if self.status == NOT_SIGNIFICANT and self.probability > 0.5 else self.status
+        if self.status != NOT_SIGNIFICANT or self.probability <= 0.5:
+            return self.status
+        return IN_DOUBT if self.probability >= ENOUGH else LIKELY
 
     @property
     def error_change(self) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from imufit.figures import quantity
 from imufit.results.data_fault import DataFault
-from imufit.results.diagnosis import LIKELY, NOT_TESTABLE, SIGNIFICANT, Candidate, Diagnosis
+from imufit.results.diagnosis import IN_DOUBT, LIKELY, NOT_TESTABLE, SIGNIFICANT, Candidate, Diagnosis
 from imufit.results.disagreement import Disagreement
 from imufit.results.effect_card import EffectCard
 from imufit.results.judged import left_out
@@ -51,6 +51,11 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
         )
     elif candidate.status == "implausible size":
         text += " No sensor of this kind has so much of it: something else looks like it here."
+    elif candidate.outcome == IN_DOUBT:
+        text += (
+            " There is evidence of it, but its name would be a guess: a cause without a name explains more instead, its"
+            " size changes over the log, or it needs a position that the reference lacks."
+        )
     elif candidate.outcome == LIKELY:
         text += " It is more probable than not, but these rows do not establish it: a longer log may."
     else:
