@@ -47,7 +47,7 @@ def _of_rows(evidence: LogEvidence) -> list[str]:
                 "in motion the rounding is fitted beside the model."
             )
     if facts.field_estimated and "mag" in facts.sensors:
-        out.append("The reference field is unknown: it is estimated from this log, beside the model.")
+        out.append("The reference field was estimated from this log, beside the model.")
     if evidence.passes.commanded is not None:
         out.append("The reference is the attitude at ref_angle: ref_q differs from it only by noise.")
     coloured = sorted({CHANNELS[k][:3] for k, taps in enumerate(evidence.filters) if taps})

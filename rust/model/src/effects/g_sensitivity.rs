@@ -13,7 +13,7 @@ fn fill(rows: &Rows, out: &mut Columns) {
 pub fn g_sensitivity() -> Linear {
     let words = Words {
         name: "gyroscope g-sensitivity",
-        physics: "the specific force at the sensor, that of a lever arm included, bends the vibrating structure of the gyroscope, which reads it as rotation",
+        physics: "specific force bends the vibrating structure of the gyroscope, which reads it as rotation",
         formula: "G f, full 3x3",
         signature: "at rest the rate residual changes with the attitude; in motion it follows the specific force",
         mistaken_for: "gyr.bias if the attitude never changes, gyr.bias_temperature if attitude and temperature change together",
