@@ -145,19 +145,19 @@ def test_what_stands_in_for_an_effect_gives_way_to_it():
     sim = simulate.simulate("handheld", dict.fromkeys(["acc.scale", "gyr.bias"]), 3, 120.0, size="large")
     fit = SensorModel(["gyr.bias", "acc.cubic"]).fit(sim.to_log())
     tried = set()
-    (swap,) = revise(fit, ["acc.cubic", "gyr.bias"], tried)
+    (swap,) = revise(fit, ["acc.cubic", "gyr.bias"], 2.0 * fit.ratio, tried)
     assert (swap.removed, swap.by) == ("acc.cubic", "acc.scale")
     assert swap.after < swap.before == pytest.approx(fit.ratio)
     assert frozenset({"acc.scale", "gyr.bias"}) in tried
     assert "acc.scale took the place of acc.cubic" in str(swap)
     # What the user began with stays, whatever it is.
-    assert revise(fit, ["gyr.bias"], set()) == []
+    assert revise(fit, ["gyr.bias"], 2.0 * fit.ratio, set()) == []
 
 
 def test_what_others_explain_is_taken_out_again():
     log = simulate.simulate("handheld", {"acc.scale": None}, 3, 120.0, size="large").to_log()
     fit = SensorModel(["acc.scale", "acc.cubic"]).fit(log)
-    (drop,) = revise(fit, ["acc.scale", "acc.cubic"], set())
+    (drop,) = revise(fit, ["acc.scale", "acc.cubic"], 2.0 * fit.ratio, set())
     assert (drop.removed, drop.by) == ("acc.cubic", None)
     assert drop.after == pytest.approx(drop.before, rel=0.002)
     assert "acc.cubic was taken out again" in str(drop)
@@ -167,7 +167,7 @@ def test_what_others_explain_is_taken_out_again():
 def test_a_model_with_all_that_is_there_is_not_revised():
     sim = simulate.simulate("handheld", dict.fromkeys(["acc.scale", "gyr.bias"]), 3, 120.0, size="large")
     fit = SensorModel(["acc.scale", "gyr.bias"]).fit(sim.to_log())
-    assert revise(fit, ["acc.scale", "gyr.bias"], set()) == []
+    assert revise(fit, ["acc.scale", "gyr.bias"], 2.0 * fit.ratio, set()) == []
 
 
 def test_the_way_is_told_without_what_was_taken_out_again():

@@ -21,12 +21,17 @@ if TYPE_CHECKING:
     from imufit.fitting.log_evidence import Values
     from imufit.model import EffectStack
 
+LESS = 0.01
+"""Part of what the best fit takes off the square of the held-out error by which another may take off less: a late
+reference and a gyroscope that would have to be early and low-passed differ by 0.1 % where smoothing the noise of the
+reference pays, a delay and a low-pass of a gyroscope by 0.3 %."""
+
 
 def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
     """Log Bayes factors of the best candidate and others like it, from fits beside all that is there, by slot.
 
-    Candidates whose columns differ by far need no fit, unless these columns depend on a search. Rivals whose columns
-    say all count alike.
+    Candidates whose columns differ by far need no fit, unless these columns depend on a search. That of a fit that
+    leaves a higher held-out error than another one is minus infinity; rivals whose columns say all count alike.
 
     Parameters
     ----------
@@ -59,12 +64,41 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
         others = others.with_effect(ids[slot])
     steady = [ids[slot] for slot in close if not _curved(analysis, slot)]
     without = tried(fit, others, steady)
-    evidence = {slot: without.with_effect(fit, ids[slot]).ln_evidence for slot in close}
+    evidence = _guarded(without, {slot: without.with_effect(fit, ids[slot]) for slot in close})
     most = max(evidence.values())
     # If columns hold all information, a fit decides by the error alone: freedom alone does not separate one cause from
     # another.
     equal = {slot for slot in close if np.isfinite(evidence[slot]) and not _curved(analysis, slot)}
     return [(slot, (most if slot in equal else ln) - without.ln_evidence) for slot, ln in evidence.items()]
+
+
+def _guarded(without: Tried, fits: dict[int, Tried]) -> dict[int, float]:
+    """Return log evidences by slot, minus infinity where another fit takes off more of the error by what counts."""
+    known = [each for each in fits.values() if np.isfinite(each.ln_evidence)]
+    lowest = min(known, key=lambda each: each.held_out, default=None)
+    return {
+        slot: each.ln_evidence if lowest is None or as_low(each, lowest, without.held_out) else -np.inf
+        for slot, each in fits.items()
+    }
+
+
+def as_low(fit: Tried, lowest: Tried, start: float) -> bool:
+    """Return whether a fit's held-out error is as low as the lowest one but for what does not count.
+
+    The evidence of a large log rests on the noise at frequencies that hold little of the error; where the error is not
+    the same, it decides. Only the fall of the error is compared, since the error holds noise of the reference as well.
+    Of n samples of white noise a square smaller by 1/n makes the data likelier by the root of e.
+
+    Parameters
+    ----------
+    fit, lowest : Tried
+        The fit, and the one with the lowest error.
+    start : float
+        Held-out error without what lowers it.
+    """
+    square = lowest.held_out**2
+    by_chance = 2.0 * Problem.ODDS / max(lowest.samples, 1.0) * square
+    return fit.held_out**2 <= square + max(LESS * (start**2 - square), by_chance)
 
 
 class Tried(NamedTuple):
@@ -76,12 +110,15 @@ class Tried(NamedTuple):
         Log of its marginal likelihood.
     held_out : float
         Its held-out error.
+    samples : float
+        Number of samples that this is of.
     analysis : Analysis
         Its evidence, without columns of effects that are not in it.
     """
 
     ln_evidence: float
     held_out: float
+    samples: float
     analysis: Analysis
 
     def with_effect(self, fit: FittedStack, effect: str) -> Tried:
@@ -128,7 +165,7 @@ def _tried(
     analysis, estimate = start.solved_for(model, own, only={*lost, *also})
     open_to = [slot for slot in analysis.candidate_slots if analysis.slots[slot] in lost]
     evidence = fit.analysis.ln_likelihood(analysis, estimate, open_to)
-    return Tried(evidence, estimate.held_out, analysis)
+    return Tried(evidence, estimate.held_out, estimate.samples, analysis)
 
 
 def _curved(analysis: Analysis, slot: int) -> bool:

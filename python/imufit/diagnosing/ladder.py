@@ -43,7 +43,7 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
     climb.up()
     seen: set[frozenset[str]] = set()
     revisions: list[Revision] = []
-    while way := revise(climb.fit, [step.effect for step in climb.steps], seen):
+    while way := revise(climb.fit, [step.effect for step in climb.steps], start.ratio, seen):
         revisions += way
         climb = climb.again([(revision.removed, revision.by) for revision in way])
         climb.up()

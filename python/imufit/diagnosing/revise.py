@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from imufit.diagnosing.curved import Tried, tried
+from imufit.diagnosing.curved import Tried, as_low, tried
 from imufit.results import Revision
 
 if TYPE_CHECKING:
@@ -18,12 +18,12 @@ SETTLED = 2.0
 """Log odds by which an effect must be likelier than each rival that it had when it was added: seven to one."""
 
 
-def revise(fit: FittedStack, added: Sequence[str], seen: set[frozenset[str]]) -> list[Revision]:
+def revise(fit: FittedStack, added: Sequence[str], start: float, seen: set[frozenset[str]]) -> list[Revision]:
     """Return how to get from a stack to the likeliest of those near it; empty if none is likelier.
 
     Each differs by one effect that is not there or stands in the place of another, and then lacks what this made
     needless. The columns propose, to first order; the marginal likelihood of the fits decides, every effect with the
-    odds against it.
+    odds against it. The held-out error must agree: that of the likelier stack is as low, but for what does not count.
 
     Parameters
     ----------
@@ -31,6 +31,8 @@ def revise(fit: FittedStack, added: Sequence[str], seen: set[frozenset[str]]) ->
         The model with all that was added.
     added : sequence of str
         Effects that may be taken out again: what the user began with stays.
+    start : float
+        Held-out error before anything was added.
     seen : set of frozenset of str
         Stacks that were tried before; those tried now are put in.
     """
@@ -39,7 +41,7 @@ def revise(fit: FittedStack, added: Sequence[str], seen: set[frozenset[str]]) ->
     members = [slot for slot in analysis.fitted_slots if ids[slot] in added]
     if len(members) < 2:
         return []
-    search = _Search(fit, frozenset(added), seen)
+    search = _Search(fit, frozenset(added), start, seen)
     for slot, other in analysis.problem.revisions(analysis.fitted_slots, members, analysis.candidate_slots):
         search.ask(ids[slot], None if other is None else ids[other])
     return search.way
@@ -76,8 +78,8 @@ def _likelihood(fit: FittedStack, model: EffectStack, found: Tried) -> float:
 class _Search:
     """The likeliest stack so far, and the way there."""
 
-    def __init__(self, fit: FittedStack, free: frozenset[str], seen: set[frozenset[str]]) -> None:
-        self.fit, self.free, self.seen = fit, free, seen
+    def __init__(self, fit: FittedStack, free: frozenset[str], start: float, seen: set[frozenset[str]]) -> None:
+        self.fit, self.free, self.start, self.seen = fit, free, start, seen
         self.first = tried(fit, fit.model)
         self.most = _likelihood(fit, fit.model, self.first) + MORE
         self.way: list[Revision] = []
@@ -92,7 +94,7 @@ class _Search:
             self.seen.add(frozenset(model.effects))
             found = tried(self.fit, model)
             likelihood = _likelihood(self.fit, model, found)
-            if likelihood > self.most:
+            if likelihood > self.most and as_low(found, self.first, self.start):
                 self.most = likelihood
                 errors = self.first.held_out, found.held_out
                 self.way = [Revision(effect, instead, *errors) for effect, instead in way]
