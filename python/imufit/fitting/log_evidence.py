@@ -267,7 +267,7 @@ def trial(effect: _imufit.Effect, found: Found | None) -> list[float]:
     effect : Effect
         The candidate.
     found : Found, optional
-        What a search found for the effect.
+        The result of the search for the effect; None without a search.
     """
     return [0.0] * len(effect.parameters) if found is None else found.trial
 

@@ -46,7 +46,7 @@ impl Slot {
         }
     }
 
-    /// Adds what the effect adds to the readings of a sensor, of which `columns` are its columns, to `sum`, which begins as `x`.
+    /// Adds the effect's share of a sensor's readings to `sum`. An empty sum starts as `x`. `columns` are those of the effect on this sensor.
     fn add_to(
         &self,
         rows: &Rows,
