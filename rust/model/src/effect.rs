@@ -102,6 +102,17 @@ impl Columns {
             .then(|| self.data[k].as_slice())
     }
 
+    /// Adds every column, times the value of its parameter, to a quantity.
+    pub fn add_to(&self, values: &[f64], sum: &mut Triple) {
+        for (p, value) in values.iter().enumerate().filter(|(_, v)| **v != 0.0) {
+            for (axis, target) in sum.0.iter_mut().enumerate() {
+                for (y, c) in target.iter_mut().zip(self.get(p, axis).unwrap_or_default()) {
+                    *y += value * c;
+                }
+            }
+        }
+    }
+
     /// Number of parameters.
     pub fn parameters(&self) -> usize {
         self.parameters

@@ -55,19 +55,11 @@ impl Slot {
         sum: &mut Option<Triple>,
         x: &Triple,
     ) -> Result<(), EffectError> {
-        if let Some(added) = self.effect.added(rows, sensor, &self.parameters)? {
-            sum.get_or_insert_with(|| x.clone()).add(&added, 1.0);
-            return Ok(());
-        }
-        for (p, value) in self.parameters.iter().enumerate().filter(|(_, v)| **v != 0.0) {
-            for axis in 0..3 {
-                if let Some(column) = columns.get(p, axis) {
-                    let target = &mut sum.get_or_insert_with(|| x.clone()).0[axis];
-                    for (t, c) in target.iter_mut().zip(column) {
-                        *t += value * c;
-                    }
-                }
-            }
+        let added = self.effect.added(rows, sensor, &self.parameters)?;
+        let sum = sum.get_or_insert_with(|| x.clone());
+        match added {
+            Some(added) => sum.add(&added, 1.0),
+            None => columns.add_to(&self.parameters, sum),
         }
         Ok(())
     }

@@ -111,13 +111,7 @@ impl Block<'_> {
                 }
                 part.effect
                     .columns(&rows, sensor, &part.parameters, &mut self.columns)?;
-                for (p, value) in part.parameters.iter().enumerate().filter(|(_, v)| **v != 0.0) {
-                    for (axis, target) in after.0.iter_mut().enumerate() {
-                        for (y, c) in target.iter_mut().zip(self.columns.get(p, axis).unwrap_or_default()) {
-                            *y += value * c;
-                        }
-                    }
-                }
+                self.columns.add_to(&part.parameters, &mut after);
             }
             if changed {
                 std::mem::swap(&mut x, &mut after);
