@@ -480,6 +480,7 @@ class _Estimate(TypedDict):
     folds: _Array
     training: float
     samples: float
+    misfit: float
 
 @final
 class Kind:
@@ -627,7 +628,7 @@ class Problem:
         model: Sequence[int],
         candidates: Sequence[int],
         probes: Sequence[int] = ...,
-        fitted: Sequence[tuple[int, float]] = ...,
+        fitted: Sequence[Sequence[tuple[int, float]]] = ...,
         refuted: Sequence[int] = ...,
         column_noise: Sequence[tuple[int, float]] = ...,
         seen: Sequence[tuple[int | None, int, float, str]] = ...,

@@ -51,6 +51,8 @@ def test_delays_and_lever_arm_of_broad_are_the_same_in_both_trials(name: str) ->
     result = imufit.ladder(log.rows(log.n // 2, log.n // 2 + log.n // 4))
     assert result.ratio_end < 0.9 * result.ratio_start
     assert {"acc.lever_arm", "mag.delay"} <= set(result.model)
+    # The effect that lowers the error most comes first, whatever fits have put in the place of another.
+    assert result.steps[0].after < 0.8 * result.ratio_start
     # The same sensor in every trial: its rates come four milliseconds after the cameras, its field fifteen.
     assert lag(result, "gyr") == pytest.approx(4.1e-3, rel=0.1)
     assert lag(result, "mag") == pytest.approx(15.0e-3, rel=0.1)
@@ -79,6 +81,23 @@ def test_error_falls_on_the_robot_arm(name: str) -> None:
     _, whole = climbed(name)
     assert whole.ratio_end < 0.5 * whole.ratio_start
     assert "mag.hard_iron" in whole.model
+
+
+def test_iron_of_the_robot_arm_is_named_beside_errors_that_nothing_explains() -> None:
+    # Poses come 14 times a second, so that the rest stands far above the noise: a fiftieth of the square of the error.
+    paths = [f"robot_arm/MPU6050RM3100_path{path}_150mms.parquet" for path in (1, 2, 3)]
+    answer = imufit.diagnose([imufit.read(recording(path)) for path in paths])
+    assert (answer.verdict, answer.best) == ("missing", "mag.hard_iron")
+
+
+@pytest.mark.parametrize("effects", [["mag.soft_iron"], ["mag.hard_iron", "mag.soft_iron"]])
+def test_iron_that_few_attitudes_do_not_determine_stays_of_the_size_that_iron_has(effects: list[str]) -> None:
+    # Ellipsoid and length of the field can run away together: plain least squares gave a hard iron of 250,000 µT.
+    log = imufit.read(recording("nine_axis_no_reference/xio_sensor_data.parquet"))
+    fit = imufit.fit(log, effects)
+    assert fit.training_ratio < imufit.fit(log, []).training_ratio
+    sizes = {"uT": 200.0, "1": 1.0}
+    assert all(abs(p.value) < sizes[p.unit] for p in fit.parameters)
 
 
 def test_bias_and_mount_of_the_encoder_rig_are_confirmed_by_the_other_half() -> None:

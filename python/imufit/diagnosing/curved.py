@@ -6,7 +6,7 @@ a turn takes, or of play in a drive.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -27,23 +27,25 @@ reference and a gyroscope that would have to be early and low-passed differ by 0
 reference pays, a delay and a low-pass of a gyroscope by 0.3 %."""
 
 
-def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
+def fitted(fit: FittedStack, result: Verdict, decided: Collection[int] = ()) -> list[tuple[int, float]]:
     """Log Bayes factors of the best candidate and others like it, from fits beside all that is there, by slot.
 
-    Candidates whose columns differ by far need no fit, unless these columns depend on a search. That of a fit that
-    leaves a higher held-out error than another one is minus infinity; rivals whose columns say all count alike.
+    Candidates whose columns differ by far need no fit, unless these columns depend on a search. Rivals whose columns
+    say all, and that leave an error as low, count alike.
 
     Parameters
     ----------
     fit : FittedStack
         The model.
     result : Verdict
-        The answer of the columns alone.
+        The answer of the columns, and of the fits so far.
+    decided : collection of int, optional
+        Slots of candidates among which fits have decided.
     """
     analysis = fit.analysis
     ids = analysis.slots
     best = result.best
-    if best is None or not (result.rivals or _curved(analysis, best)):
+    if best is None or best in decided or not (result.rivals or _curved(analysis, best)):
         return []
     items = {item.slot: item for item in result.candidates}
     alike = {second for _, second, _ in result.correlations}
@@ -64,22 +66,15 @@ def fitted(fit: FittedStack, result: Verdict) -> list[tuple[int, float]]:
         others = others.with_effect(ids[slot])
     steady = [ids[slot] for slot in close if not _curved(analysis, slot)]
     without = tried(fit, others, steady)
-    evidence = _guarded(without, {slot: without.with_effect(fit, ids[slot]) for slot in close})
-    most = max(evidence.values())
+    fits = {slot: without.with_effect(fit, ids[slot]) for slot in close}
     # If columns hold all information, a fit decides by the error alone: freedom alone does not separate one cause from
     # another.
-    equal = {slot for slot in close if np.isfinite(evidence[slot]) and not _curved(analysis, slot)}
+    flat = {slot: each for slot, each in fits.items() if not _curved(analysis, slot)}
+    lowest = min(flat.values(), key=lambda each: each.held_out, default=None)
+    equal = [slot for slot, each in flat.items() if lowest and as_low(each, lowest, without.held_out)]
+    evidence = {slot: each.ln_evidence for slot, each in fits.items()}
+    most = max((evidence[slot] for slot in equal), default=-np.inf)
     return [(slot, (most if slot in equal else ln) - without.ln_evidence) for slot, ln in evidence.items()]
-
-
-def _guarded(without: Tried, fits: dict[int, Tried]) -> dict[int, float]:
-    """Return log evidences by slot, minus infinity where another fit takes off more of the error by what counts."""
-    known = [each for each in fits.values() if np.isfinite(each.ln_evidence)]
-    lowest = min(known, key=lambda each: each.held_out, default=None)
-    return {
-        slot: each.ln_evidence if lowest is None or as_low(each, lowest, without.held_out) else -np.inf
-        for slot, each in fits.items()
-    }
 
 
 def as_low(fit: Tried, lowest: Tried, start: float) -> bool:

@@ -115,15 +115,25 @@ def _decided(fit: FittedStack, excluded: Sequence[str]) -> Verdict:
     refuted: list[int] = []
     result = analysis.problem.diagnose(*asked, column_noise=noise)
     odds = analysis.problem.threshold(len(analysis.candidates))
-    while (fits := fitted(fit, result)) and all(ln < odds for _, ln in fits):
-        refuted += [slot for slot, _ in fits]
-        result = analysis.problem.diagnose(*asked, refuted=refuted, column_noise=noise)
+    # Fits may put another effect in the place of the best one that lowers the error less than a third, which then comes
+    # first.
+    decided: list[list[tuple[int, float]]] = []
+    while fits := fitted(fit, result, {slot for each in decided for slot, _ in each}):
+        if all(ln < odds for _, ln in fits):
+            refuted += [slot for slot, _ in fits]
+            decided = []
+            result = analysis.problem.diagnose(*asked, refuted=refuted, column_noise=noise)
+        else:
+            decided.append(fits)
+            result = analysis.problem.diagnose(
+                *asked, fitted=decided, refuted=refuted, column_noise=noise, again=result
+            )
     seen = seen_in_rows(analysis)
     if result.best is None:
         seen += fast_changes(analysis, fit.estimate.step)
-    if fits or seen:
+    if seen:
         result = analysis.problem.diagnose(
-            *asked, fitted=fits, refuted=refuted, column_noise=noise, seen=seen, again=result
+            *asked, fitted=decided, refuted=refuted, column_noise=noise, seen=seen, again=result
         )
     return result
 

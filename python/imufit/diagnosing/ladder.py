@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -146,7 +147,10 @@ class Climb:
         return climb, replace(answer, sentence=" ".join(filter(None, (answer.sentence, *alike))))
 
     def again(self, changes: Sequence[tuple[str, str | None]]) -> Climb:
-        """Return the same way from the same start with effects replaced by others, or left out (None)."""
+        """Return a way from the same start with effects replaced by others, or left out (None).
+
+        Of those that are left each step adds the one that lowers the error most.
+        """
         effects = [step.effect for step in self.steps]
         other = Climb(self.start, self.first, self._progress)
         other.tied = dict(self.tied)
@@ -156,7 +160,9 @@ class Climb:
             rivals = other.tied.pop(removed, ())
             if rivals and by is not None:
                 other.tied[by] = tuple(rival for rival in (*rivals, removed) if rival != by)
-        for effect in effects:
+        while effects:
+            effect = min(effects, key=other._error_with)
+            effects.remove(effect)
             other._take(other._add(effect))
         other.diagnosis = other._diagnose()
         return other
@@ -172,6 +178,13 @@ class Climb:
         others = sum(item.effect != effect for item in self.diagnosis.candidates)
         self._progress(0, 1, f"step {len(self.steps) + 1}: {effect} against {others} candidates")
         return add(self.fit, effect, expected)
+
+    def _error_with(self, effect: str) -> float:
+        """Held-out error of the model so far with an effect beside it, by its columns."""
+        analysis = self.fit.analysis
+        if effect not in analysis.slots:
+            return math.inf
+        return analysis.estimate([analysis.slots.index(effect)]).held_out
 
     def _take(self, addition: Addition) -> None:
         self.fit = addition.fit

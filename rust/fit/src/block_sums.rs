@@ -159,16 +159,6 @@ fn directions(white: &Evidence, channel: usize) -> Option<Vec<Told>> {
 }
 
 impl ChannelSums {
-    /// The same for the parameters `kept`, then for directions in the parameters `others`.
-    #[must_use]
-    pub fn reduced(&self, kept: &[usize], others: &[usize], directions: &DMatrix<f64>) -> Self {
-        let mut sums = DMatrix::zeros(self.sums.nrows(), kept.len() + directions.ncols());
-        sums.columns_mut(0, kept.len()).copy_from(&self.columns(kept));
-        sums.columns_mut(kept.len(), directions.ncols())
-            .copy_from(&(self.columns(others) * directions));
-        self.with_sums(sums)
-    }
-
     /// The same with other sums.
     #[must_use]
     pub fn with_sums(&self, sums: DMatrix<f64>) -> Self {

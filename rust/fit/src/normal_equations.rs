@@ -71,34 +71,6 @@ impl NormalEquations {
         self.n += n as f64;
     }
 
-    /// Equations of the parameters `kept`, then of directions in the parameters `others`: `beta = directions * gamma`.
-    #[must_use]
-    pub fn reduced(&self, kept: &[usize], others: &[usize], directions: &DMatrix<f64>) -> Self {
-        let (p, m) = (kept.len(), directions.ncols());
-        let mut gram = DMatrix::zeros(p + m, p + m);
-        let inner = |rows: &[usize], columns: &[usize]| {
-            DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.gram[(rows[i], columns[j])])
-        };
-        gram.view_mut((0, 0), (p, p)).copy_from(&inner(kept, kept));
-        let mut right = DVector::zeros(p + m);
-        right.rows_mut(0, p).copy_from(&self.right.select_rows(kept));
-        if m > 0 {
-            let cross = inner(kept, others) * directions;
-            gram.view_mut((0, p), (p, m)).copy_from(&cross);
-            gram.view_mut((p, 0), (m, p)).copy_from(&cross.transpose());
-            let own = directions.tr_mul(&(inner(others, others) * directions));
-            gram.view_mut((p, p), (m, m)).copy_from(&own);
-            let of_others = self.right.select_rows(others);
-            right.rows_mut(p, m).copy_from(&directions.tr_mul(&of_others));
-        }
-        Self {
-            gram,
-            right,
-            square: self.square,
-            n: self.n,
-        }
-    }
-
     /// Equations of the parameters `kept` once others have been given values: what these explain is taken off the observations.
     #[must_use]
     pub fn given(&self, kept: &[usize], others: &[usize], values: &[f64]) -> Self {

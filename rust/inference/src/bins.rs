@@ -172,7 +172,7 @@ pub(crate) fn question(problem: &Problem, model: &[usize], channel: usize, covar
     Some(Question {
         raw: Vec::new(),
         white,
-        precision: DVector::from_fn(p + m, |k, _| model.get(k).map_or(0.0, |j| problem.precision(*j))),
+        prior: problem.prior(model).with_unknown(m),
         model: p,
         sums: sums.collect(),
         bounds: None,

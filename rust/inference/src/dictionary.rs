@@ -113,7 +113,7 @@ pub fn varying(search: &Search, stack: &Stack, members: &[usize], unnamed: &Unna
             let mut first = 0;
             let mut of_part = |(channel, covariate): &Bound| {
                 let question = bins::question(search.criterion.problem, &columns, *channel, covariate)?;
-                let own = first..first + question.precision.len() - question.model;
+                let own = first..first + question.parameters() - question.model;
                 first = own.end;
                 Some(search.varying_of(stack, members, question, &deviation[own], 0.0).common)
             };

@@ -54,10 +54,10 @@ pub fn estimate(problem: &Problem, model: &[usize]) -> Option<Estimate> {
 /// Covariance of parameters that are fitted to all whitened observations alike.
 fn covariance(problem: &Problem, model: &[usize]) -> Option<DMatrix<f64>> {
     let total = problem.total(model);
-    let inverse = total.solve(&problem.weak_precision(model))?.covariance();
+    let inverse = total.solve(&problem.prior(model).precision)?.covariance();
     let mut covariance = &inverse + &inverse * spread(problem, model) * &inverse;
     // Where the blocks scatter more than whitened noise does, they are believed.
-    let question = problem.question(model, &[], &DMatrix::zeros(0, 0));
+    let question = problem.question(model, &[]);
     if let Some(blocks) = scatter(&question) {
         for j in 0..model.len() {
             let ratio = blocks[j] / covariance[(j, j)];

@@ -27,8 +27,8 @@ pub fn held_out(question: &Question) -> HeldOut {
     for fold in 0..folds {
         let in_fold = |b: usize| b % folds == fold;
         let mut training = total.clone();
-        let mut judged = NormalEquations::zeros(question.precision.len());
-        let mut judged_raw = NormalEquations::zeros(question.precision.len());
+        let mut judged = NormalEquations::zeros(question.parameters());
+        let mut judged_raw = NormalEquations::zeros(question.parameters());
         for b in 0..blocks {
             if question.beside(b).any(in_fold) {
                 training.add(&question.white[b], -1.0);
@@ -40,7 +40,7 @@ pub fn held_out(question: &Question) -> HeldOut {
         }
         let beta = question
             .solve(&training)
-            .unwrap_or_else(|| DVector::zeros(question.precision.len()));
+            .unwrap_or_else(|| DVector::zeros(question.parameters()));
         white.push(judged.residual_square(&beta).max(0.0));
         square += judged_raw.residual_square(&beta).max(0.0);
         n += judged_raw.n;

@@ -13,7 +13,7 @@ use imufit_fit::whitening;
 use imufit_model::card::{Affine, Found, Parameter};
 use imufit_model::sensor::Sensor;
 use imufit_model::sensor_model::Slot;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// Evidence in the form that every question is asked of: the blocks of all logs, one log after the other.
 pub struct Problem {
@@ -57,14 +57,22 @@ pub enum Limit {
 /// A parameter that is limited: its slot, its number among those of the effect, and its limit.
 pub type Limited = (usize, usize, Limit);
 
-/// Parameters that a question is about: those of the model, then the reduced ones of a candidate.
+/// What is known of parameters before a log is seen.
+pub struct Prior {
+    /// Precision of each.
+    pub precision: DVector<f64>,
+    /// What it adds to the right-hand side of a step from where the evidence was taken: its mean is none of the effect.
+    right: DVector<f64>,
+}
+
+/// Parameters that a question is about: those of the model, then those of a candidate.
 pub struct Question {
     /// Whitened equations per block.
     pub white: Vec<NormalEquations>,
     /// Unwhitened equations per block.
     pub raw: Vec<NormalEquations>,
-    /// Prior precision of each parameter.
-    pub precision: DVector<f64>,
+    /// What is known of each parameter.
+    pub prior: Prior,
     /// Bounds of the step of each parameter, if there are any.
     pub bounds: Option<Bounds>,
     /// How many parameters belong to the model.
@@ -77,6 +85,8 @@ pub struct Question {
 
 /// Plausible sizes are this many times the typical ones.
 const PLAUSIBLE: f64 = 3.0;
+/// Part of the prior precision of other questions that an estimate has for a parameter without typical size.
+const OPEN: f64 = 0.01;
 /// A parameter without typical size is given one at which its effect would stand out by this factor.
 const STANDING_OUT: f64 = 100.0;
 
@@ -170,23 +180,47 @@ impl Problem {
         all.into_iter().filter(|j| !self.standing[*j]).collect()
     }
 
-    /// Step of some parameters within their bounds, by all whitened observations alike.
+    /// Step of some parameters within their bounds, by all whitened observations alike and by what is known of them.
     pub fn step_within(&self, parameters: &[usize]) -> Option<Within> {
-        let precision = self.weak_precision(parameters);
-        let total = self.total(parameters);
+        let prior = self.prior(parameters);
+        let total = prior.beside(&self.total(parameters));
         match self.bounds_of(parameters, 0) {
-            Some(bounds) => total.solve_within(&precision, &bounds),
-            None => total.solve(&precision).map(|solved| Within {
+            Some(bounds) => total.solve_within(&prior.precision, &bounds),
+            None => total.solve(&prior.precision).map(|solved| Within {
                 solution: solved.solution,
                 at_bound: vec![false; parameters.len()],
             }),
         }
     }
 
-    /// Prior precision of some parameters of an estimate: a hundredth of that of other questions, so that it decides only what the data leave
-    /// open.
-    pub fn weak_precision(&self, parameters: &[usize]) -> DVector<f64> {
-        DVector::from_iterator(parameters.len(), parameters.iter().map(|j| 0.01 * self.precision(*j)))
+    /// What is known of some parameters, as the criterion has it: their deviation is three times what is typical. Where nobody can tell what
+    /// that is, it decides only what the data leave open.
+    pub fn prior(&self, parameters: &[usize]) -> Prior {
+        let values: Vec<f64> = self.slots.iter().flat_map(|s| s.parameters.iter().copied()).collect();
+        let of = |j: usize| {
+            if self.typical[j] {
+                self.plausible[j].powi(-2)
+            } else {
+                OPEN * self.precision(j)
+            }
+        };
+        let pull = |j: usize| if self.typical[j] { -of(j) * values[j] } else { 0.0 };
+        Prior {
+            precision: DVector::from_iterator(parameters.len(), parameters.iter().map(|j| of(*j))),
+            right: DVector::from_iterator(parameters.len(), parameters.iter().map(|j| pull(*j))),
+        }
+    }
+
+    /// Whitened square of the residual per sample where the evidence was taken, with what is known of some parameters: what their estimate
+    /// makes least.
+    pub fn misfit(&self, parameters: &[usize]) -> f64 {
+        let total = self.total(&[]);
+        let prior = self.prior(parameters);
+        let values: Vec<f64> = self.slots.iter().flat_map(|s| s.parameters.iter().copied()).collect();
+        let known: f64 = (parameters.iter().zip(&prior.right))
+            .map(|(j, pull)| -pull * values[*j])
+            .sum();
+        (total.square + known) / total.n.max(1.0)
     }
 
     /// Bounds of some parameters and of so many more without any; `None` where nothing is bounded.
@@ -315,37 +349,42 @@ impl Problem {
         Question {
             white: equations.blocks(Form::White, model),
             raw: equations.blocks(Form::Raw, model),
-            ..self.question(model, &[], &DMatrix::zeros(0, 0))
+            ..self.question(model, &[])
         }
     }
 
-    /// The question of a candidate (in the given directions) on top of a model.
-    pub fn question(&self, model: &[usize], candidate: &[usize], directions: &DMatrix<f64>) -> Question {
-        let (p, m) = (model.len(), directions.ncols());
+    /// The question of a candidate on top of a model.
+    pub fn question(&self, model: &[usize], candidate: &[usize]) -> Question {
         let all: Vec<usize> = model.iter().chain(candidate).copied().collect();
-        let (kept, others): (Vec<usize>, Vec<usize>) = ((0..p).collect(), (p..all.len()).collect());
-        let reduce = |form| {
-            let blocks = self.equations.blocks(form, &all);
-            blocks.iter().map(|b| b.reduced(&kept, &others, directions)).collect()
-        };
-        let mut precision = DVector::from_element(p + m, 1.0);
-        for (k, j) in model.iter().enumerate() {
-            precision[k] = self.precision(*j);
-        }
-        let sums = self
-            .sums
-            .iter()
-            .map(|s| s.reduced(model, candidate, directions))
-            .collect();
+        let sums = |s: &ChannelSums| s.with_sums(s.columns(&all));
         Question {
-            white: reduce(Form::White),
-            raw: reduce(Form::Raw),
-            precision,
-            bounds: self.bounds_of(model, m),
-            model: p,
-            sums,
+            white: self.equations.blocks(Form::White, &all),
+            raw: self.equations.blocks(Form::Raw, &all),
+            prior: self.prior(&all),
+            bounds: self.bounds_of(model, candidate.len()),
+            model: model.len(),
+            sums: self.sums.iter().map(sums).collect(),
             logs: self.logs.clone(),
         }
+    }
+}
+
+impl Prior {
+    /// With so many parameters more of which nothing is known.
+    #[must_use]
+    pub fn with_unknown(self, more: usize) -> Self {
+        let all = self.precision.len() + more;
+        Self {
+            precision: self.precision.resize_vertically(all, 0.0),
+            right: self.right.resize_vertically(all, 0.0),
+        }
+    }
+
+    /// Equations of a step with this knowledge.
+    fn beside(&self, equations: &NormalEquations) -> NormalEquations {
+        let mut out = equations.clone();
+        out.right += &self.right;
+        out
     }
 }
 
@@ -360,7 +399,7 @@ impl Question {
 
     /// Sum over blocks.
     pub fn total(&self) -> NormalEquations {
-        let mut total = NormalEquations::zeros(self.precision.len());
+        let mut total = NormalEquations::zeros(self.parameters());
         for block in &self.white {
             total.add(block, 1.0);
         }
@@ -369,10 +408,16 @@ impl Question {
 
     /// Solution from the whitened equations given.
     pub fn solve(&self, equations: &NormalEquations) -> Option<DVector<f64>> {
+        let (equations, precision) = (self.prior.beside(equations), &self.prior.precision);
         match &self.bounds {
-            Some(bounds) => equations.solve_within(&self.precision, bounds).map(|w| w.solution),
-            None => equations.solve(&self.precision).map(|s| s.solution),
+            Some(bounds) => equations.solve_within(precision, bounds).map(|w| w.solution),
+            None => equations.solve(precision).map(|s| s.solution),
         }
+    }
+
+    /// Number of its parameters.
+    pub fn parameters(&self) -> usize {
+        self.prior.precision.len()
     }
 }
 

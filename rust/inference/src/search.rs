@@ -51,6 +51,8 @@ pub struct Search<'a> {
     pub candidates: Vec<usize>,
     /// Slots of candidates whose columns promise more than a fit keeps: they are not there.
     pub refuted: Vec<usize>,
+    /// Sensors whose error has a cause that nobody knows: no effect of theirs is named in its place.
+    pub outdone: Vec<Sensor>,
     asked: HashMap<usize, Asked>,
     stacks: Recent<Option<Arc<Stack<'a>>>>,
     /// Log Bayes factor from which on a candidate is there: the odds against one of so many.
@@ -104,6 +106,7 @@ impl<'a> Search<'a> {
             model: model.to_vec(),
             candidates: candidates.to_vec(),
             refuted: Vec::new(),
+            outdone: Vec::new(),
             asked,
             stacks: Recent::new(KEPT),
             threshold: threshold(candidates.len()),
@@ -264,7 +267,9 @@ impl<'a> Search<'a> {
 
     /// True if a candidate is there.
     pub fn there(&self, weighed: &Weighed) -> bool {
-        weighed.plausible == Plausible::Yes && self.explains(weighed)
+        let sensors = self.criterion.problem.slots[weighed.slot].effect.sensors();
+        let known = !sensors.iter().any(|sensor| self.outdone.contains(sensor));
+        known && weighed.plausible == Plausible::Yes && self.explains(weighed)
     }
 
     /// True if a candidate explains as much as one that is there, whether sensors can have its parameters or not.
@@ -290,7 +295,7 @@ impl<'a> Search<'a> {
         let problem = self.criterion.problem;
         let own = indices(&problem.slots, &[slot]);
         let columns: Vec<usize> = self.beside(stack, members).iter().map(|(j, _)| *j).collect();
-        let question = problem.question(&columns, &own, &DMatrix::identity(own.len(), own.len()));
+        let question = problem.question(&columns, &own);
         self.varying_of(stack, members, question, deviation, asked.trials)
     }
 
@@ -316,7 +321,7 @@ impl<'a> Search<'a> {
         trials: f64,
     ) -> Varying {
         for (k, (_, deviation)) in self.beside(stack, members).iter().enumerate() {
-            question.precision[k] = deviation.powi(-2);
+            question.prior.precision[k] = deviation.powi(-2);
         }
         let strength = |sensor| stack.strength(sensor);
         varying::ln_bayes(&question, deviation, &self.criterion.modes, strength).map_or(Varying::STEADY, |found| {

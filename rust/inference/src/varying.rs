@@ -89,7 +89,7 @@ pub fn ln_bayes(
     modes: &[Modes],
     strength: impl Fn(usize) -> Strength,
 ) -> Option<Varying> {
-    let (p, m) = (question.model, question.precision.len() - question.model);
+    let (p, m) = (question.model, question.parameters() - question.model);
     let channels: Vec<usize> = (0..question.sums.len())
         .filter(|c| {
             let sums = &question.sums[*c];
@@ -173,11 +173,11 @@ fn take_out(total: &mut NormalEquations, sums: &ChannelSums, factor: &DMatrix<f6
 
 /// Equations of every block, what the model takes up projected out.
 fn blocks(question: &Question, total: &NormalEquations, channels: &[usize]) -> Option<Vec<Block>> {
-    let (p, all) = (question.model, question.precision.len());
+    let (p, all) = (question.model, question.parameters());
     let m = all - p;
     let mut inner = total.gram.view((0, 0), (p, p)).into_owned();
     for k in 0..p {
-        inner[(k, k)] += question.precision[k];
+        inner[(k, k)] += question.prior.precision[k];
     }
     let mut map = DMatrix::zeros(all, m);
     map.view_mut((p, 0), (m, m)).fill_with_identity();

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use imufit_model::sensor::Sensor;
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::agreement::{self, Disagreement};
@@ -68,9 +67,9 @@ pub struct Candidate {
 /// What Gram matrices do not hold, and passes over the rows have found.
 #[derive(Clone, Debug, Default)]
 pub struct Known {
-    /// Log Bayes factors of candidates whose columns say little of their full size, from a fit with each of them and one without: these
-    /// decide among them.
-    pub fitted: Vec<(usize, f64)>,
+    /// Log Bayes factors of candidates whose columns say little of their full size, from a fit with each of them and one without: those of
+    /// one list decide which of them is there.
+    pub fitted: Vec<Vec<(usize, f64)>>,
     /// Candidates of which a fit keeps nothing that their columns promise: they are not there.
     pub refuted: Vec<usize>,
     /// Share of noise in the column of the log that a candidate reads.
@@ -92,8 +91,6 @@ pub struct Named {
     unexplained: Vec<Unexplained>,
     /// Effects of the model, of these or of the catalogue whose coefficient drifts or switches, by slot, and the log Bayes factors of that.
     varying: Vec<(usize, f64)>,
-    /// True if what explains most cannot be so large.
-    too_large: bool,
 }
 
 /// An unnamed cause beside the named effects.
@@ -141,7 +138,8 @@ pub struct Verdict {
 /// Share of all that is explained in the sensors of the best effect that named effects must have, or the answer is "unknown".
 const NAMED_SHARE: f64 = 0.8;
 
-/// Two columns may differ by this many times their noise (in variance) and still count as the same.
+/// Two columns may differ as by this many times their noise and still count as the same: noises of the shares v and w of their squares leave
+/// the same columns a squared correlation of (1 - v) (1 - w).
 const NOISE: f64 = 2.0;
 /// Log odds by which a cause without a name is less likely than one of the catalogue, before the log is seen.
 const UNNAMED: f64 = 5.0;
@@ -200,7 +198,6 @@ pub fn decide(
     probes: &[usize],
     known: &Known,
 ) -> Option<Verdict> {
-    let fitted = &known.fitted;
     let criterion = Criterion::new(problem);
     let mut search = Search::new(&criterion, model, candidates);
     search.refuted.clone_from(&known.refuted);
@@ -213,24 +210,24 @@ pub fn decide(
             .collect()
     };
     let threshold = search::threshold(unnamed.len()) + UNNAMED;
-    let inquiry = Inquiry {
+    let mut inquiry = Inquiry {
         search,
         unnamed,
         threshold,
     };
     let alone = inquiry.search.stack(&[])?;
     let weighed = inquiry.search.weigh_all(&alone, &[]);
+    inquiry.search.outdone = outdone(problem, &weighed);
     let earlier = known.named.as_ref().filter(|named| named.is_of(&inquiry));
     let named = match earlier {
         Some(named) => named.clone(),
-        None => named(&inquiry, &alone, &weighed)?,
+        None => named(&inquiry, &alone)?,
     };
     let Named {
         mut members,
         before,
         unexplained,
         varying,
-        too_large,
     } = named.clone();
     let search = &inquiry.search;
     let stack = search.stack(&members)?;
@@ -244,35 +241,47 @@ pub fn decide(
     let left: Vec<Shown> = (there.map(|left| cause(&left.unnamed, left.steady)))
         .chain(varying.iter().map(of_slot))
         .collect();
-    // Where more is left than effects explain, their names are those of the nearest shapes.
-    let mut unclear = unclear(&inquiry, &members, &instead, &left, None);
     // What people see is the error: the effect that lowers it most comes first. None does that foretells worse than nothing: then the noise
     // is not what the evidence takes it for.
     let base = held_out_of(search, None);
-    let error = |slot: &usize| {
-        let in_doubt = unclear.iter().any(|s| acts(*slot, s));
-        let with = held_out_of(search, Some(*slot));
-        (held_out::gain(&base, &with).0 > 0.0).then_some((*slot, in_doubt, with.ratio))
+    let foremost = |members: &[usize], unclear: &[Sensor]| {
+        let error = |slot: &usize| {
+            let in_doubt = unclear.iter().any(|s| acts(*slot, s));
+            let with = held_out_of(search, Some(*slot));
+            (held_out::gain(&base, &with).0 > 0.0).then_some((*slot, in_doubt, with.ratio))
+        };
+        let first = |a: &(usize, bool, f64), b: &(usize, bool, f64)| a.1.cmp(&b.1).then(a.2.total_cmp(&b.2));
+        members.iter().filter_map(error).min_by(first).map(|(slot, ..)| slot)
     };
-    let first = |a: &(usize, bool, f64), b: &(usize, bool, f64)| a.1.cmp(&b.1).then(a.2.total_cmp(&b.2));
-    let least = members.iter().filter_map(error).min_by(first);
-    let mut best = least.map(|(member, ..)| member);
-    let mut rivals = best.map_or_else(|| Some(Vec::new()), |best| rivals_of(search, &members, best, known))?;
-    if let Some(first) = best.filter(|best| fitted.iter().any(|(slot, _)| slot == best)) {
+    // Where more is left than effects explain, their names are those of the nearest shapes.
+    let mut unclear = unclear(&inquiry, &members, &instead, &left, &[]);
+    let mut best = foremost(&members, &unclear);
+    let mut decided: Vec<Decided> = Vec::new();
+    let mut open: Vec<&Vec<(usize, f64)>> = known.fitted.iter().collect();
+    while let Some((first, place)) = best.and_then(|first| Some((first, of_fits(&open, first)?))) {
         let can = |slot: usize| weighed.iter().any(|w| w.slot == slot && w.plausible == Plausible::Yes);
-        let possible = (fitted.iter()).filter(|(slot, ln)| ln.is_finite() && (can(*slot) || *slot == first));
-        rivals.retain(|r| !fitted.iter().any(|(slot, _)| slot == r));
-        let most = possible.max_by(|a, b| a.1.total_cmp(&b.1)).copied();
-        // Where a fit confirms none that sensors can have, what it confirms has another cause.
-        best = most.map(|(slot, _)| slot);
-        if let Some((slot, ln)) = most {
-            let as_likely = |f: &&(usize, f64)| f.0 != slot && f.1 >= ln - search.threshold;
-            rivals.extend(fitted.iter().filter(as_likely).map(|f| f.0));
-            members.iter_mut().filter(|m| **m == first).for_each(|m| *m = slot);
-            unclear = self::unclear(&inquiry, &members, &instead, &left, most);
-        }
+        let Some(found) = Decided::by(open.remove(place), |slot| can(slot) || slot == first, search.threshold) else {
+            // Where a fit confirms none that sensors can have, what it confirms has another cause.
+            best = None;
+            break;
+        };
+        members
+            .iter_mut()
+            .filter(|m| **m == first)
+            .for_each(|m| *m = found.slot);
+        let confirmed: Vec<(usize, f64)> = decided.iter().chain([&found]).map(|d| (d.slot, d.ln_bayes)).collect();
+        unclear = self::unclear(&inquiry, &members, &instead, &left, &confirmed);
+        // What a fit puts in the place of the first need not lower the error as much.
+        best = foremost(&members, &unclear).or(Some(found.slot));
+        decided.push(found);
     }
-    let impossible = too_large
+    let mut rivals = best.map_or_else(|| Some(Vec::new()), |best| rivals_of(search, &members, best, known))?;
+    let fits = decided.iter().find(|found| Some(found.slot) == best);
+    if let Some(found) = fits {
+        rivals.retain(|r| found.ln_of(*r).is_none());
+        rivals.extend(&found.rivals);
+    }
+    let impossible = !search.outdone.is_empty()
         || (search.weigh_all(&stack, &members).iter())
             .any(|w| w.plausible == Plausible::TooLarge && search.explains(w));
     let disagreements = disagreements(search, &members, &weighed);
@@ -287,7 +296,7 @@ pub fn decide(
         Some(_) if rivals.is_empty() => Kind::Missing,
         Some(_) => Kind::Ambiguous,
     };
-    let candidates = shown(search, &weighed, &members, best, &rivals, fitted);
+    let candidates = shown(search, &weighed, &members, best, &rivals, fits);
     let correlations = correlations(problem, model, best, &candidates);
     // Where something is left, the cause that describes it best is stated first, whichever has shown that it is there.
     let stated = unexplained.iter().filter(|_| !left.is_empty());
@@ -309,21 +318,59 @@ pub fn decide(
     })
 }
 
+/// Place of the list of fits that has a candidate.
+fn of_fits(open: &[&Vec<(usize, f64)>], slot: usize) -> Option<usize> {
+    open.iter().position(|fits| fits.iter().any(|(of, _)| *of == slot))
+}
+
+/// What fits of candidates in the place of one another say.
+struct Decided {
+    /// The likeliest one.
+    slot: usize,
+    /// Its log Bayes factor.
+    ln_bayes: f64,
+    /// Those as likely.
+    rivals: Vec<usize>,
+    /// Log Bayes factors of all, by slot.
+    fits: Vec<(usize, f64)>,
+}
+
+impl Decided {
+    /// By the fits: of those that can be named first; `None` if none of them can.
+    fn by(fits: &[(usize, f64)], can: impl Fn(usize) -> bool, threshold: f64) -> Option<Self> {
+        let possible = fits.iter().filter(|(slot, ln)| ln.is_finite() && can(*slot));
+        let (slot, ln_bayes) = *possible.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let as_likely = fits.iter().filter(|f| f.0 != slot && f.1 >= ln_bayes - threshold);
+        Some(Self {
+            slot,
+            ln_bayes,
+            rivals: as_likely.map(|f| f.0).collect(),
+            fits: fits.to_vec(),
+        })
+    }
+
+    /// Log Bayes factor of one of them.
+    fn ln_of(&self, slot: usize) -> Option<f64> {
+        self.fits.iter().find(|(of, _)| *of == slot).map(|(_, ln)| *ln)
+    }
+}
+
 /// Sensors that show a cause without a name, and its log Bayes factor.
 type Shown = (Vec<Sensor>, f64);
 
 /// Sensors in which named effects explain less than [`NAMED_SHARE`] of all that is explained, or less than one unnamed cause would in their
-/// place (`instead`). `left`: unnamed causes beside them. `fitted`: a member whose columns say little, and what it explains by a fit.
+/// place (`instead`). `left`: unnamed causes beside them. `fitted`: members whose columns say little, and what each explains by a fit.
 fn unclear(
     inquiry: &Inquiry,
     members: &[usize],
     instead: &[Shown],
     left: &[Shown],
-    fitted: Option<(usize, f64)>,
+    fitted: &[(usize, f64)],
 ) -> Vec<Sensor> {
     let search = &inquiry.search;
     let problem = search.criterion.problem;
     let all = search.evidence(members);
+    let stack = &search.stack(members);
     let of = |sensor: &&Sensor| {
         let acts = |slot: &usize| problem.slots[*slot].effect.sensors().contains(sensor);
         let (own, others): (Vec<usize>, Vec<usize>) = members.iter().partition(|slot| acts(slot));
@@ -331,40 +378,49 @@ fn unclear(
         let rest = search.evidence(&others);
         let columns = all - rest;
         let curved = |slot: usize| problem.slots[slot].effect.strongly_curved();
-        let named = match fitted.filter(|(slot, _)| own.contains(slot) && curved(*slot)) {
-            // A fit may show that columns taken at one point promise too little; what it explains is less where others have explained a part.
-            Some((slot, ln)) => columns.max(search.evidence(&search::without(members, slot)) + ln - rest),
-            None => columns,
-        };
+        // A fit may show that columns taken at one point promise too little; what it explains is less where others have explained a part.
+        let by_fit = fitted.iter().filter(|(slot, _)| own.contains(slot) && curved(*slot));
+        let named = by_fit
+            .map(|(slot, ln)| search.evidence(&search::without(members, *slot)) + ln - rest)
+            .fold(columns, f64::max);
         let most = |causes: &[Shown]| {
             let of_sensor = causes.iter().filter(|(sensors, _)| sensors.contains(sensor));
             of_sensor.map(|(_, ln)| *ln).fold(0.0, f64::max)
         };
-        named < NAMED_SHARE * (named + most(left)).max(most(instead) - inquiry.threshold)
+        // What is left is weighed at the noise that is left. The first effects were found in the noise that the others made: at one noise
+        // all are shares of one square.
+        let own = indices(&problem.slots, &own);
+        let at_last = stack
+            .as_ref()
+            .and_then(|stack| stack.ratio_of(&own))
+            .map_or(named, |ln| ln.max(named));
+        at_last < NAMED_SHARE * (at_last + most(left)) || named < NAMED_SHARE * (most(instead) - inquiry.threshold)
     };
     Sensor::ALL.iter().filter(of).copied().collect()
 }
 
-/// True if the candidate with most evidence would have to be larger than sensors have it.
-fn outdone(weighed: &[Weighed]) -> bool {
+/// Sensors on which the candidate with most evidence acts while it would have to be larger than sensors have it: a lesser effect in its place
+/// would be a wrong name. What moves only other sensors has causes of its own.
+fn outdone(problem: &Problem, weighed: &[Weighed]) -> Vec<Sensor> {
+    let mut found: Vec<Sensor> = Vec::new();
     let can = |w: &&Weighed| w.testable && matches!(w.plausible, Plausible::Yes | Plausible::TooLarge);
-    let most = weighed
-        .iter()
-        .filter(can)
-        .max_by(|a, b| a.ln_bayes.total_cmp(&b.ln_bayes));
-    most.is_some_and(|w| w.plausible == Plausible::TooLarge)
+    loop {
+        let sensors = |w: &Weighed| problem.slots[w.slot].effect.sensors();
+        let others = weighed
+            .iter()
+            .filter(can)
+            .filter(|w| !sensors(w).iter().any(|s| found.contains(s)));
+        match others.max_by(|a, b| a.ln_bayes.total_cmp(&b.ln_bayes)) {
+            Some(most) if most.plausible == Plausible::TooLarge => found.extend(sensors(most)),
+            _ => return found,
+        }
+    }
 }
 
-/// What the evidence names; `alone` is the stack of the model, beside which `weighed` are all candidates.
-fn named(inquiry: &Inquiry, alone: &Stack, weighed: &[Weighed]) -> Option<Named> {
+/// What the evidence names; `alone` is the stack of the model.
+fn named(inquiry: &Inquiry, alone: &Stack) -> Option<Named> {
     let before = inquiry.beside(alone);
-    // What explains most, and cannot be so large, has a cause that nobody knows: a lesser effect in its place would be a wrong name.
-    let too_large = outdone(weighed);
-    let (members, left) = if too_large {
-        (Vec::new(), before.clone())
-    } else {
-        beside_unnamed(inquiry)?
-    };
+    let (members, left) = beside_unnamed(inquiry)?;
     let stack = inquiry.search.stack(&members)?;
     let unexplained = unexplained(inquiry, &members, &stack, &left);
     let definite = unexplained.iter().any(|left| inquiry.holds(left));
@@ -374,7 +430,6 @@ fn named(inquiry: &Inquiry, alone: &Stack, weighed: &[Weighed]) -> Option<Named>
         before,
         unexplained,
         varying,
-        too_large,
     })
 }
 
@@ -532,8 +587,8 @@ fn same_but_noise(search: &Search, others: &[usize], best: &Weighed, slot: usize
             .find(|(s, _)| *s == slot)
             .map_or(0.0, |(_, v)| *v)
     };
-    let noise = noise(best.slot) + noise(slot);
-    if noise == 0.0 {
+    let same = (1.0 - noise(best.slot)) * (1.0 - noise(slot));
+    if same >= 1.0 {
         return false;
     }
     let problem = search.criterion.problem;
@@ -542,7 +597,7 @@ fn same_but_noise(search: &Search, others: &[usize], best: &Weighed, slot: usize
     let beta: Vec<f64> = best.parameters.iter().map(|p| p.0).collect();
     let (own, theirs) = (indices(slots, &[best.slot]), indices(slots, &[slot]));
     let correlation = similarity::correlation(problem, &fitted, &own, &beta, &theirs);
-    1.0 - correlation * correlation <= NOISE * noise
+    correlation * correlation >= same.powf(NOISE)
 }
 
 /// Sensors whose readings show an unnamed cause.
@@ -561,7 +616,7 @@ fn held_out_of(search: &Search, candidate: Option<usize>) -> HeldOut {
     let own = candidate.map_or_else(Vec::new, |slot| indices(&problem.slots, &[slot]));
     let question = match problem.known_values(&own) {
         Some(values) => problem.question_given(&model, &own, &values),
-        None => problem.question(&model, &own, &DMatrix::identity(own.len(), own.len())),
+        None => problem.question(&model, &own),
     };
     held_out::held_out(&question)
 }
@@ -573,7 +628,7 @@ fn shown(
     members: &[usize],
     best: Option<usize>,
     rivals: &[usize],
-    fitted: &[(usize, f64)],
+    fits: Option<&Decided>,
 ) -> Vec<Candidate> {
     let base = held_out_of(search, None);
     let stack = search.stack(members);
@@ -616,7 +671,7 @@ fn shown(
         })
         .collect();
     if let Some(rest) = best.and_then(|best| search.stack(&search::without(members, best))) {
-        let of_fit = |slot: usize| fitted.iter().find(|(of, _)| *of == slot).map(|(_, ln)| *ln);
+        let of_fit = |slot: usize| fits.and_then(|found| found.ln_of(slot));
         let beside_rest = |slot: usize| search.weigh(&rest, slot).map_or(f64::NEG_INFINITY, |w| w.ln_bayes);
         let evidence = |slot: &usize| (*slot, of_fit(*slot).unwrap_or_else(|| beside_rest(*slot)));
         let alike: Vec<(usize, f64)> = best.iter().chain(rivals).map(evidence).collect();

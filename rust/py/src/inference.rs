@@ -9,7 +9,7 @@ use imufit_inference::stack;
 use imufit_inference::{estimate, held_out, revision, verdict};
 use imufit_model::rest_channels;
 use imufit_model::sensor::CHANNELS;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -135,7 +135,7 @@ impl PyProblem {
     }
 
     /// Fits the slots given: step (k,) and covariance (k, k) of their k parameters, SI units, zero for those that are not fitted, not a number
-    /// for those at a bound; which of them are fitted, and which of these stand at a bound; full step (p,) of all; held-out and training residual RMS over noise floor; number of samples; whitened held-out sum of squares of each fold.
+    /// for those at a bound; which of them are fitted, and which of these stand at a bound; full step (p,) of all; held-out and training residual RMS over noise floor; number of samples; whitened held-out sum of squares of each fold; whitened square per sample before the step, with what is known of the parameters.
     fn estimate<'py>(&self, py: Python<'py>, slots: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
         self.known(&slots)?;
         let all = &self.0.slots;
@@ -143,10 +143,11 @@ impl PyProblem {
         let moved = |k: &usize| !self.0.fixed[parameters[*k]];
         let chosen: Vec<usize> = (0..parameters.len()).filter(moved).collect();
         let free: Vec<usize> = chosen.iter().map(|k| parameters[*k]).collect();
-        let (fitted, base) = compute(py, || {
+        let (fitted, base, misfit) = compute(py, || {
             (
                 estimate::estimate(&self.0, &free),
-                held_out::held_out(&self.0.question(&free, &[], &DMatrix::zeros(0, 0))),
+                held_out::held_out(&self.0.question(&free, &[])),
+                self.0.misfit(&free),
             )
         })?;
         let fitted = fitted.ok_or_else(|| value_error("the normal equations cannot be solved"))?;
@@ -177,11 +178,12 @@ impl PyProblem {
         out.set_item("folds", PyArray1::from_vec(py, base.white))?;
         out.set_item("training", (square / n.max(1.0)).sqrt())?;
         out.set_item("samples", n)?;
+        out.set_item("misfit", misfit)?;
         Ok(out)
     }
 
     /// Which effect is missing from the model of slots `model`, among the slots `candidates`; what none of them explains is
-    /// asked of the slots `probes`. `fitted` holds log Bayes factors of candidates from fits of their own, by slot; `refuted` those of which a fit keeps nothing; `column_noise` the share of
+    /// asked of the slots `probes`. `fitted` holds lists of log Bayes factors of candidates from fits in the place of one another, by slot; `refuted` those of which a fit keeps nothing; `column_noise` the share of
     /// noise in the column that a candidate reads; `seen` what rows show besides: (log or None, channel index, log Bayes factor, shape). `again` is an
     /// answer to the same question with the same candidates refuted: the effects that it names are taken over.
     #[pyo3(signature = (model, candidates, probes=Vec::new(), fitted=Vec::new(), refuted=Vec::new(), column_noise=Vec::new(), seen=Vec::new(), again=None))]
@@ -192,13 +194,13 @@ impl PyProblem {
         model: Vec<usize>,
         candidates: Vec<usize>,
         probes: Vec<usize>,
-        fitted: Vec<(usize, f64)>,
+        fitted: Vec<Vec<(usize, f64)>>,
         refuted: Vec<usize>,
         column_noise: Vec<(usize, f64)>,
         seen: Vec<Seen>,
         again: Option<&PyVerdict>,
     ) -> PyResult<PyVerdict> {
-        let pairs = fitted.iter().chain(&column_noise).map(|(slot, _)| slot);
+        let pairs = fitted.iter().flatten().chain(&column_noise).map(|(slot, _)| slot);
         self.known(model.iter().chain(&candidates).chain(&probes).chain(pairs))?;
         if seen.iter().any(|(_, channel, _, _)| *channel >= CHANNELS) {
             return Err(value_error("there is no such channel"));
