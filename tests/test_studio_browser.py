@@ -352,6 +352,27 @@ def test_a_typed_answer_counts(page):
     assert "you named acc.bias" in marked(page, "truth").inner_text()
 
 
+def test_a_session_does_not_replace_a_model_that_is_not_saved(page, folder, tmp_path):
+    session = tmp_path / "other-session.toml"
+    session.write_text(
+        'kind = "imufit session"\nformat = 1\nposition = 1\nlogs = [{ file = "lost.parquet" }]\n'
+        '[[steps]]\naction = "start"\neffect = ""\nstack = []\n'
+        '[[steps]]\naction = "add"\neffect = "acc.bias"\nstack = [{ effect = "acc.bias", on = true, held = {} }]\n'
+    )
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    page.locator('[data-mark^="add-"]').first.click()
+    wait_for_bars(page, 2)
+    drop(page, session)
+    marked(page, "unsaved").wait_for()
+    marked(page, "session-cancel").click()
+    marked(page, "unsaved").wait_for(state="detached")
+    assert len(bars(page)) == 2
+    drop(page, session)
+    marked(page, "offer-session").click()
+    marked(page, "wanted").wait_for()
+
+
 def test_a_session_asks_for_its_log(page, folder, tmp_path):
     session = tmp_path / "lost-session.toml"
     session.write_text(

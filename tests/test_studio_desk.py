@@ -207,6 +207,29 @@ def test_another_log_awaits_a_choice_while_the_model_is_not_saved(log, tmp_path)
     asyncio.run(steps())
 
 
+def test_a_session_awaits_a_choice_while_the_model_is_not_saved(log):
+    kept = log.path.with_name("walk-session.toml")
+
+    async def steps() -> None:
+        await desk.open([log])
+        await desk.attempt(lambda: desk.session.add("gyr.bias"))
+        kept.write_text(desk.save(), encoding="utf-8")
+        await desk.attempt(lambda: desk.session.add("acc.bias"))
+        assert desk.unsaved
+        await desk.bring([LogFile(kept, kept.name)])
+        assert desk.kept_session == kept
+        assert len(desk.session.steps) == 3
+        desk.forget_arrivals()
+        assert desk.kept_session is None
+        await desk.bring([LogFile(kept, kept.name)])
+        await desk.reopen(desk.kept_session)
+        assert desk.kept_session is None
+        assert len(desk.session.steps) == 2
+
+    desk = Desk()
+    asyncio.run(steps())
+
+
 def test_a_session_that_is_reopened_knows_the_error_of_undone_steps(log):
     async def steps() -> None:
         await first.open([log])

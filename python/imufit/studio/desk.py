@@ -109,6 +109,8 @@ class Desk:
         Its logs.
     arrivals : list of Arrival
         Files that were brought and await a choice.
+    kept_session : Path or None
+        The file of a session that was brought and awaits a choice, since the present model is not saved.
     wanted : LogsWantedError or None
         The session that waits for its logs.
     mystery : Mystery or None
@@ -143,6 +145,7 @@ class Desk:
         self.session: Session | None = None
         self.files: tuple[LogFile, ...] = ()
         self.arrivals: list[Arrival] = []
+        self.kept_session: Path | None = None
         self.wanted: LogsWantedError | None = None
         self.mystery: Mystery | None = None
         self.joined: tuple[str, ...] = ()
@@ -328,7 +331,7 @@ class Desk:
 
     def forget_arrivals(self) -> None:
         """Put away the files that await a choice: the present session stays."""
-        self.arrivals = []
+        self.arrivals, self.kept_session = [], None
         self.changed.emit()
 
     def forget_wanted(self) -> None:
@@ -470,7 +473,7 @@ class Desk:
     # --- files
 
     async def bring(self, files: Sequence[LogFile]) -> None:
-        """Recognise files that were brought; a session is opened, and so is a single log.
+        """Recognise files that were brought; a session is opened, and so is a single log, unless a model would be lost.
 
         Parameters
         ----------
@@ -485,7 +488,11 @@ class Desk:
             if file.path.suffix.lower() == SESSION_ENDING and not any(
                 other.path != file.path and other.path.stem == file.path.stem for other in files
             ):
-                await self.reopen(file.path)
+                if self.unsaved:
+                    self.kept_session = file.path
+                    self.changed.emit()
+                else:
+                    await self.reopen(file.path)
                 return
         for file in files:
             if file.path.suffix.lower() == SESSION_ENDING:
@@ -529,7 +536,7 @@ class Desk:
         if self.session is not None and self.session.begun:
             self._before = Shown(self.session, self.files, self.mystery, self.joined, self.traces, self.models)
         self._show(Shown(session, tuple(files), mystery, joined))
-        self.arrivals, self.wanted = [], None
+        self.arrivals, self.kept_session, self.wanted = [], None, None
         self._no_trouble()
         self.changed.emit()
 
@@ -599,6 +606,7 @@ class Desk:
                 return wanted
 
         kept = await self._tried(f"opening {path.name}", work)
+        self.kept_session = None
         self.wanted = kept if isinstance(kept, LogsWantedError) else None
         if kept is None or isinstance(kept, LogsWantedError):
             self.changed.emit()

@@ -187,6 +187,7 @@ class Top:
             desk.trouble,
             desk.in_shell,
             brought,
+            desk.kept_session,
             desk.wanted,
             desk.joined,
             desk.mystery,
@@ -203,6 +204,8 @@ class Top:
                 self._problem()
             if desk.wanted is not None:
                 self._wanted(desk.wanted)
+            if desk.kept_session is not None:
+                self._session(desk.kept_session)
             if desk.arrivals:
                 self._choice()
             if desk.mystery is not None:
@@ -236,6 +239,16 @@ class Top:
                 ui.button(words, on_click=action).props("outline size=12px").props(
                     attribute("data-mark", f"play-{number}")
                 )
+
+    def _session(self, path: Path) -> None:
+        """Ask whether a session may take the place of the present one."""
+        desk, name = self._desk, printable(path.name, NAME)
+        ui.label(f"The session {name} takes the place of the present model, which is not saved.").classes(
+            "studio-sentence"
+        ).props("data-mark=unsaved")
+        with ui.row():
+            ui.button(f"Open {name}", on_click=lambda: desk.reopen(path)).props("outline data-mark=offer-session")
+            ui.button("Cancel", on_click=desk.forget_arrivals).props("flat data-mark=session-cancel")
 
     def _wanted(self, wanted: LogsWantedError) -> None:
         """Ask for the logs of a session."""
