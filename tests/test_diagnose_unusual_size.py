@@ -39,10 +39,9 @@ def test_what_only_looks_like_it_is_not(seed):
     assert answer.best != "acc.scale_temperature"
 
 
-def test_what_cannot_be_so_large_in_one_sensor_leaves_another_sensor_its_name():
+def test_beside_what_cannot_be_so_large_no_effect_of_another_sensor_is_named():
+    # A heading of the reference that wanders would carry the accelerometer's error to the gyroscope.
     effects = {"acc.scale": {"x": 0.6, "y": 0.5}, "mag.hard_iron": {"x": 15.0, "y": -10.0, "z": 20.0}}
     answer = SensorModel().fit(simulate.simulate("handheld", effects, 4, 60.0).to_log()).diagnose()
-    assert (answer.verdict, answer.best) == ("missing", "mag.hard_iron")
-    names = {candidate.effect: candidate.status for candidate in answer.candidates}
-    assert names["acc.scale"] == "implausible size"
-    assert "acc" in {finding.channel.split("_")[0] for finding in answer.unexplained}
+    assert (answer.verdict, answer.best) == ("unknown", None)
+    assert not [candidate.effect for candidate in answer.candidates if candidate.status == "significant"]

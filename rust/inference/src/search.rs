@@ -51,8 +51,6 @@ pub struct Search<'a> {
     pub candidates: Vec<usize>,
     /// Slots of candidates whose columns promise more than a fit keeps: they are not there.
     pub refuted: Vec<usize>,
-    /// Sensors whose error has a cause that nobody knows: no effect of theirs is named in its place.
-    pub outdone: Vec<Sensor>,
     asked: HashMap<usize, Asked>,
     stacks: Recent<Option<Arc<Stack<'a>>>>,
     /// Log Bayes factor from which on a candidate is there: the odds against one of so many.
@@ -106,7 +104,6 @@ impl<'a> Search<'a> {
             model: model.to_vec(),
             candidates: candidates.to_vec(),
             refuted: Vec::new(),
-            outdone: Vec::new(),
             asked,
             stacks: Recent::new(KEPT),
             threshold: threshold(candidates.len()),
@@ -267,9 +264,7 @@ impl<'a> Search<'a> {
 
     /// True if a candidate is there.
     pub fn there(&self, weighed: &Weighed) -> bool {
-        let sensors = self.criterion.problem.slots[weighed.slot].effect.sensors();
-        let known = !sensors.iter().any(|sensor| self.outdone.contains(sensor));
-        known && weighed.plausible == Plausible::Yes && self.explains(weighed)
+        weighed.plausible == Plausible::Yes && self.explains(weighed)
     }
 
     /// True if a candidate explains as much as one that is there, whether sensors can have its parameters or not.

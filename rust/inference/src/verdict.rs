@@ -91,6 +91,8 @@ pub struct Named {
     unexplained: Vec<Unexplained>,
     /// Effects of the model, of these or of the catalogue whose coefficient drifts or switches, by slot, and the log Bayes factors of that.
     varying: Vec<(usize, f64)>,
+    /// True if what explains most cannot be so large.
+    too_large: bool,
 }
 
 /// An unnamed cause beside the named effects.
@@ -210,24 +212,24 @@ pub fn decide(
             .collect()
     };
     let threshold = search::threshold(unnamed.len()) + UNNAMED;
-    let mut inquiry = Inquiry {
+    let inquiry = Inquiry {
         search,
         unnamed,
         threshold,
     };
     let alone = inquiry.search.stack(&[])?;
     let weighed = inquiry.search.weigh_all(&alone, &[]);
-    inquiry.search.outdone = outdone(problem, &weighed);
     let earlier = known.named.as_ref().filter(|named| named.is_of(&inquiry));
     let named = match earlier {
         Some(named) => named.clone(),
-        None => named(&inquiry, &alone)?,
+        None => named(&inquiry, &alone, &weighed)?,
     };
     let Named {
         mut members,
         before,
         unexplained,
         varying,
+        too_large,
     } = named.clone();
     let search = &inquiry.search;
     let stack = search.stack(&members)?;
@@ -281,7 +283,7 @@ pub fn decide(
         rivals.retain(|r| found.ln_of(*r).is_none());
         rivals.extend(&found.rivals);
     }
-    let impossible = !search.outdone.is_empty()
+    let impossible = too_large
         || (search.weigh_all(&stack, &members).iter())
             .any(|w| w.plausible == Plausible::TooLarge && search.explains(w));
     let disagreements = disagreements(search, &members, &weighed);
@@ -399,28 +401,27 @@ fn unclear(
     Sensor::ALL.iter().filter(of).copied().collect()
 }
 
-/// Sensors on which the candidate with most evidence acts while it would have to be larger than sensors have it: a lesser effect in its place
-/// would be a wrong name. What moves only other sensors has causes of its own.
-fn outdone(problem: &Problem, weighed: &[Weighed]) -> Vec<Sensor> {
-    let mut found: Vec<Sensor> = Vec::new();
+/// True if the candidate with most evidence would have to be larger than sensors have it.
+fn outdone(weighed: &[Weighed]) -> bool {
     let can = |w: &&Weighed| w.testable && matches!(w.plausible, Plausible::Yes | Plausible::TooLarge);
-    loop {
-        let sensors = |w: &Weighed| problem.slots[w.slot].effect.sensors();
-        let others = weighed
-            .iter()
-            .filter(can)
-            .filter(|w| !sensors(w).iter().any(|s| found.contains(s)));
-        match others.max_by(|a, b| a.ln_bayes.total_cmp(&b.ln_bayes)) {
-            Some(most) if most.plausible == Plausible::TooLarge => found.extend(sensors(most)),
-            _ => return found,
-        }
-    }
+    let most = weighed
+        .iter()
+        .filter(can)
+        .max_by(|a, b| a.ln_bayes.total_cmp(&b.ln_bayes));
+    most.is_some_and(|w| w.plausible == Plausible::TooLarge)
 }
 
-/// What the evidence names; `alone` is the stack of the model.
-fn named(inquiry: &Inquiry, alone: &Stack) -> Option<Named> {
+/// What the evidence names; `alone` is the stack of the model, beside which `weighed` are all candidates.
+fn named(inquiry: &Inquiry, alone: &Stack, weighed: &[Weighed]) -> Option<Named> {
     let before = inquiry.beside(alone);
-    let (members, left) = beside_unnamed(inquiry)?;
+    // What explains most, and cannot be so large, has a cause that nobody knows: a lesser effect in its place would be a wrong name, and what
+    // all sensors share, such as the heading of the reference, carries it to the others.
+    let too_large = outdone(weighed);
+    let (members, left) = if too_large {
+        (Vec::new(), before.clone())
+    } else {
+        beside_unnamed(inquiry)?
+    };
     let stack = inquiry.search.stack(&members)?;
     let unexplained = unexplained(inquiry, &members, &stack, &left);
     let definite = unexplained.iter().any(|left| inquiry.holds(left));
@@ -430,6 +431,7 @@ fn named(inquiry: &Inquiry, alone: &Stack) -> Option<Named> {
         before,
         unexplained,
         varying,
+        too_large,
     })
 }
 
