@@ -488,7 +488,7 @@ class Analysis:
         for values in (estimate, self._partway(estimate, 0.0)):
             best = self.around(*self.moved_to(values), with_candidates=with_candidates, only=only)
             found = best.estimate()
-            if not _worse(found, estimate):
+            if self._exact or not _worse(found, estimate):
                 break
         return best, found
 
@@ -536,9 +536,14 @@ class Analysis:
             there = self._partway(estimate, 0.5**halvings)
             moved = self.around(*self.moved_to(there), lean=True)
             found = moved.estimate()
-            if not _worse(found, estimate):
+            if self._exact or not _worse(found, estimate):
                 return moved, found
         return self, self._partway(estimate, 0.0)
+
+    @property
+    def _exact(self) -> bool:
+        """True if a step is right though the misfit rises: a linear model's, or one to a value that the user fixes."""
+        return self.linear or bool(self.model.limits)
 
     def _partway(self, estimate: Estimate, share: float) -> Estimate:
         """Return an estimate with a share of its step."""
