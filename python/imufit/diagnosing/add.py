@@ -38,9 +38,7 @@ def add(fit: FittedStack, effect: str | Function, expected: float | None = None)
     if effect_id not in analysis.candidates:
         reason = analysis.refusal(find_effect(effect_id)) or "it is fitted along already"
         raise InputError(f"effect {effect_id} cannot be added: {reason}", file=fit.logs[0].path)
-    if expected is None:
-        slot = analysis.slots.index(effect_id)
-        expected = analysis.problem.estimate([*analysis.fitted_slots, slot])["held_out"]
+    expected = expected_error(fit, effect_id) if expected is None else expected
     better = fit.moved(model)
     return Addition(
         effect=effect_id,
@@ -52,3 +50,17 @@ def add(fit: FittedStack, effect: str | Function, expected: float | None = None)
         model=better.model.effects,
         fit=better,
     )
+
+
+def expected_error(fit: FittedStack, effect: str) -> float:
+    """Return the held-out error that an effect would leave beside a model, by its columns.
+
+    Parameters
+    ----------
+    fit : FittedStack
+        The model.
+    effect : str
+        Id of one of its candidates.
+    """
+    analysis = fit.analysis
+    return analysis.problem.estimate([*analysis.fitted_slots, analysis.slots.index(effect)])["held_out"]

@@ -69,7 +69,7 @@ def fitted(fit: FittedStack, result: Verdict, decided: Collection[int] = ()) -> 
     fits = {slot: without.with_effect(fit, ids[slot]) for slot in close}
     # If columns hold all information, a fit decides by the error alone: freedom alone does not separate one cause from
     # another.
-    flat = {slot: each for slot, each in fits.items() if not _curved(analysis, slot)}
+    flat = {slot: each for slot, each in fits.items() if ids[slot] in steady}
     lowest = min(flat.values(), key=lambda each: each.held_out, default=None)
     equal = [slot for slot, each in flat.items() if lowest and as_low(each, lowest, without.held_out)]
     evidence = {slot: each.ln_evidence for slot, each in fits.items()}

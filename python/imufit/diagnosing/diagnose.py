@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from imufit.fitting import FittedStack
 
 Array = NDArray[np.float64]
+_Seen = tuple[int | None, int, float, str]
 
 MIN_CORRELATION = 0.3
 """Below this, two effects are not worth naming together."""
@@ -113,29 +114,29 @@ def _decided(fit: FittedStack, excluded: Sequence[str]) -> Verdict:
     asked = analysis.fitted_slots, slots, analysis.probe_slots
     noise = column_noise(analysis)
     refuted: list[int] = []
-    result = analysis.problem.diagnose(*asked, column_noise=noise)
-    odds = analysis.problem.threshold(len(analysis.candidates))
-    # Fits may put another effect in the place of the best one that lowers the error less than a third, which then comes
-    # first.
     decided: list[list[tuple[int, float]]] = []
+
+    def answer(seen: Sequence[_Seen] = (), again: Verdict | None = None) -> Verdict:
+        return analysis.problem.diagnose(
+            *asked, fitted=decided, refuted=refuted, column_noise=noise, seen=seen, again=again
+        )
+
+    result = answer()
+    odds = analysis.problem.threshold(len(analysis.candidates))
+    # A fit may put an effect in the place of the best one that lowers the error less than a third effect does: this
+    # one comes first then, and is asked about as well.
     while fits := fitted(fit, result, {slot for each in decided for slot, _ in each}):
         if all(ln < odds for _, ln in fits):
             refuted += [slot for slot, _ in fits]
-            decided = []
-            result = analysis.problem.diagnose(*asked, refuted=refuted, column_noise=noise)
+            decided.clear()
+            result = answer()
         else:
             decided.append(fits)
-            result = analysis.problem.diagnose(
-                *asked, fitted=decided, refuted=refuted, column_noise=noise, again=result
-            )
+            result = answer(again=result)
     seen = seen_in_rows(analysis)
     if result.best is None:
         seen += fast_changes(analysis, fit.estimate.step)
-    if seen:
-        result = analysis.problem.diagnose(
-            *asked, fitted=decided, refuted=refuted, column_noise=noise, seen=seen, again=result
-        )
-    return result
+    return answer(seen, result) if seen else result
 
 
 def _spoilt(fit: FittedStack, faults: tuple[DataFault, ...]) -> Diagnosis:

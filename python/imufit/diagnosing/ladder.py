@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from imufit.comparing import attitude_comparison, comparison
-from imufit.diagnosing.add import add
+from imufit.diagnosing.add import add, expected_error
 from imufit.diagnosing.diagnose import diagnose
 from imufit.diagnosing.revise import revise, unsettled_rivals
 from imufit.figures import quantity
@@ -161,9 +161,10 @@ class Climb:
             if rivals and by is not None:
                 other.tied[by] = tuple(rival for rival in (*rivals, removed) if rival != by)
         while effects:
-            effect = min(effects, key=other._error_with)
+            errors = {effect: other._error_with(effect) for effect in effects}
+            effect = min(effects, key=errors.__getitem__)
             effects.remove(effect)
-            other._take(other._add(effect))
+            other._take(other._add(effect, errors[effect]))
         other.diagnosis = other._diagnose()
         return other
 
@@ -181,10 +182,7 @@ class Climb:
 
     def _error_with(self, effect: str) -> float:
         """Held-out error of the model so far with an effect beside it, by its columns."""
-        analysis = self.fit.analysis
-        if effect not in analysis.slots:
-            return math.inf
-        return analysis.estimate([analysis.slots.index(effect)]).held_out
+        return expected_error(self.fit, effect) if effect in self.fit.analysis.candidates else math.inf
 
     def _take(self, addition: Addition) -> None:
         self.fit = addition.fit

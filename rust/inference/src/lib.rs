@@ -9,6 +9,7 @@ pub mod asked;
 pub mod bins;
 pub mod courses;
 pub mod criterion;
+pub mod decided;
 pub mod dictionary;
 pub mod estimate;
 pub mod finding;

@@ -193,10 +193,15 @@ impl Problem {
         }
     }
 
-    /// What is known of some parameters, as the criterion has it: their deviation is three times what is typical. Where nobody can tell what
-    /// that is, it decides only what the data leave open.
+    /// Values that the evidence was taken around.
+    fn values(&self) -> Vec<f64> {
+        self.slots.iter().flat_map(|s| s.parameters.iter().copied()).collect()
+    }
+
+    /// Prior of some parameters, that of the criterion: their deviation is three times the typical size. A parameter without a typical size has
+    /// a weak prior, which decides only what the data leave open.
     pub fn prior(&self, parameters: &[usize]) -> Prior {
-        let values: Vec<f64> = self.slots.iter().flat_map(|s| s.parameters.iter().copied()).collect();
+        let values = self.values();
         let of = |j: usize| {
             if self.typical[j] {
                 self.plausible[j].powi(-2)
@@ -216,7 +221,7 @@ impl Problem {
     pub fn misfit(&self, parameters: &[usize]) -> f64 {
         let total = self.total(&[]);
         let prior = self.prior(parameters);
-        let values: Vec<f64> = self.slots.iter().flat_map(|s| s.parameters.iter().copied()).collect();
+        let values = self.values();
         let known: f64 = (parameters.iter().zip(&prior.right))
             .map(|(j, pull)| -pull * values[*j])
             .sum();

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::agreement::{self, Disagreement};
 use crate::criterion::Criterion;
+use crate::decided::{self, Decided, Fitted};
 use crate::dictionary::{self, Origin, Unnamed};
 use crate::finding::{self, Finding};
 use crate::held_out::{self, HeldOut};
@@ -69,7 +70,7 @@ pub struct Candidate {
 pub struct Known {
     /// Log Bayes factors of candidates whose columns say little of their full size, from a fit with each of them and one without: those of
     /// one list decide which of them is there.
-    pub fitted: Vec<Vec<(usize, f64)>>,
+    pub fitted: Vec<Vec<Fitted>>,
     /// Candidates of which a fit keeps nothing that their columns promise: they are not there.
     pub refuted: Vec<usize>,
     /// Share of noise in the column of the log that a candidate reads.
@@ -258,9 +259,9 @@ pub fn decide(
     // Where more is left than effects explain, their names are those of the nearest shapes.
     let mut unclear = unclear(&inquiry, &members, &instead, &left, &[]);
     let mut best = foremost(&members, &unclear);
-    let mut decided: Vec<Decided> = Vec::new();
-    let mut open: Vec<&Vec<(usize, f64)>> = known.fitted.iter().collect();
-    while let Some((first, place)) = best.and_then(|first| Some((first, of_fits(&open, first)?))) {
+    let mut settled: Vec<Decided> = Vec::new();
+    let mut open: Vec<&[Fitted]> = known.fitted.iter().map(Vec::as_slice).collect();
+    while let Some((first, place)) = best.and_then(|first| Some((first, decided::place(&open, first)?))) {
         let can = |slot: usize| weighed.iter().any(|w| w.slot == slot && w.plausible == Plausible::Yes);
         let Some(found) = Decided::by(open.remove(place), |slot| can(slot) || slot == first, search.threshold) else {
             // Where a fit confirms none that sensors can have, what it confirms has another cause.
@@ -271,14 +272,14 @@ pub fn decide(
             .iter_mut()
             .filter(|m| **m == first)
             .for_each(|m| *m = found.slot);
-        let confirmed: Vec<(usize, f64)> = decided.iter().chain([&found]).map(|d| (d.slot, d.ln_bayes)).collect();
+        let confirmed: Vec<Fitted> = settled.iter().chain([&found]).map(|d| (d.slot, d.ln_bayes)).collect();
         unclear = self::unclear(&inquiry, &members, &instead, &left, &confirmed);
         // What a fit puts in the place of the first need not lower the error as much.
         best = foremost(&members, &unclear).or(Some(found.slot));
-        decided.push(found);
+        settled.push(found);
     }
     let mut rivals = best.map_or_else(|| Some(Vec::new()), |best| rivals_of(search, &members, best, known))?;
-    let fits = decided.iter().find(|found| Some(found.slot) == best);
+    let fits = settled.iter().find(|found| Some(found.slot) == best);
     if let Some(found) = fits {
         rivals.retain(|r| found.ln_of(*r).is_none());
         rivals.extend(&found.rivals);
@@ -320,55 +321,12 @@ pub fn decide(
     })
 }
 
-/// Place of the list of fits that has a candidate.
-fn of_fits(open: &[&Vec<(usize, f64)>], slot: usize) -> Option<usize> {
-    open.iter().position(|fits| fits.iter().any(|(of, _)| *of == slot))
-}
-
-/// What fits of candidates in the place of one another say.
-struct Decided {
-    /// The likeliest one.
-    slot: usize,
-    /// Its log Bayes factor.
-    ln_bayes: f64,
-    /// Those as likely.
-    rivals: Vec<usize>,
-    /// Log Bayes factors of all, by slot.
-    fits: Vec<(usize, f64)>,
-}
-
-impl Decided {
-    /// By the fits: of those that can be named first; `None` if none of them can.
-    fn by(fits: &[(usize, f64)], can: impl Fn(usize) -> bool, threshold: f64) -> Option<Self> {
-        let possible = fits.iter().filter(|(slot, ln)| ln.is_finite() && can(*slot));
-        let (slot, ln_bayes) = *possible.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let as_likely = fits.iter().filter(|f| f.0 != slot && f.1 >= ln_bayes - threshold);
-        Some(Self {
-            slot,
-            ln_bayes,
-            rivals: as_likely.map(|f| f.0).collect(),
-            fits: fits.to_vec(),
-        })
-    }
-
-    /// Log Bayes factor of one of them.
-    fn ln_of(&self, slot: usize) -> Option<f64> {
-        self.fits.iter().find(|(of, _)| *of == slot).map(|(_, ln)| *ln)
-    }
-}
-
 /// Sensors that show a cause without a name, and its log Bayes factor.
 type Shown = (Vec<Sensor>, f64);
 
 /// Sensors in which named effects explain less than [`NAMED_SHARE`] of all that is explained, or less than one unnamed cause would in their
 /// place (`instead`). `left`: unnamed causes beside them. `fitted`: members whose columns say little, and what each explains by a fit.
-fn unclear(
-    inquiry: &Inquiry,
-    members: &[usize],
-    instead: &[Shown],
-    left: &[Shown],
-    fitted: &[(usize, f64)],
-) -> Vec<Sensor> {
+fn unclear(inquiry: &Inquiry, members: &[usize], instead: &[Shown], left: &[Shown], fitted: &[Fitted]) -> Vec<Sensor> {
     let search = &inquiry.search;
     let problem = search.criterion.problem;
     let all = search.evidence(members);

@@ -55,11 +55,11 @@ impl Slot {
         sum: &mut Option<Triple>,
         x: &Triple,
     ) -> Result<(), EffectError> {
-        let added = self.effect.added(rows, sensor, &self.parameters)?;
-        let sum = sum.get_or_insert_with(|| x.clone());
-        match added {
-            Some(added) => sum.add(&added, 1.0),
-            None => columns.add_to(&self.parameters, sum),
+        let own = || x.clone();
+        if let Some(added) = self.effect.added(rows, sensor, &self.parameters)? {
+            sum.get_or_insert_with(own).add(&added, 1.0);
+        } else if self.parameters.iter().any(|v| *v != 0.0) {
+            columns.add_to(&self.parameters, sum.get_or_insert_with(own));
         }
         Ok(())
     }
