@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from imufit._imufit import Problem, Status, Verdict
+from imufit._imufit import Effect, Problem, Status, Verdict
 from imufit.model.catalogue import each_log_has_its_own, find_effect
 
 if TYPE_CHECKING:
@@ -52,7 +52,8 @@ def fitted(fit: FittedStack, result: Verdict, decided: Collection[int] = ()) -> 
     near = {slot for slot in alike if items[slot].ln_bayes >= Problem.NEAR * items[best].ln_bayes}
     named = {best, *result.rivals}
     beside = [slot for slot, item in items.items() if item.status == Status.SIGNIFICANT and slot not in named]
-    in_its_place = {*named, *near, *(slot for slot in items if ids[slot] in analysis.found)}.difference(beside)
+    searched = {slot for slot in items if _found_by_search(analysis, slot)}
+    in_its_place = {*named, *near, *searched}.difference(beside)
     close = [
         slot
         for slot, item in items.items()
@@ -163,7 +164,16 @@ def _tried(
     return Tried(evidence, estimate.held_out, estimate.samples, analysis)
 
 
-def _curved(analysis: Analysis, slot: int) -> bool:
+def _effect(analysis: Analysis, slot: int) -> Effect:
     key = analysis.slots[slot]
-    effect = analysis.candidates.get(key) or find_effect(key)
-    return effect.strongly_curved
+    return analysis.candidates.get(key) or find_effect(key)
+
+
+def _curved(analysis: Analysis, slot: int) -> bool:
+    return _effect(analysis, slot).strongly_curved
+
+
+def _found_by_search(analysis: Analysis, slot: int) -> bool:
+    """Return whether a search alone finds what steps do not lead to."""
+    effect = _effect(analysis, slot)
+    return analysis.slots[slot] in analysis.found and (effect.jumps or bool(effect.searched))

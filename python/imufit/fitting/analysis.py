@@ -293,7 +293,9 @@ class Analysis:
         key = self.slots[slot]
         if slot not in self.fitted_slots:
             logs = len(self.having(key)) if each_log_has_its_own(key) else 1
-            return trial(find_effect(key), self.found.get(key)) * logs
+            effect = find_effect(key)
+            found = None if effect.tried_at_full_size else self.found.get(key)
+            return trial(effect, found) * logs
         if each_log_has_its_own(key):
             return [value for log in self.having(key) for value in self.own[log][key]]
         return self.model.stack()[slot][1]
@@ -301,7 +303,7 @@ class Analysis:
     @property
     def _held(self) -> list[int]:
         """Slots of effects that stay at what a search found: readings jump as they change, no slope leads there."""
-        return [slot for slot, (effect, _) in enumerate(self.model.stack()) if effect.tried_at_full_size]
+        return [slot for slot, (effect, _) in enumerate(self.model.stack()) if effect.jumps]
 
     def _estimate(self, chosen: list[int]) -> Estimate:
         held = [slot for slot in chosen if slot in self._held]

@@ -132,7 +132,7 @@ class LogEvidence:
     def _whitened(self, step: Array) -> LogEvidence:
         """Return evidence that replaces its whitened form, whitened; `step` leaves only its noise."""
         passes, facts = self.passes, self.facts
-        filters = passes.autocovariance(self.raw, facts, step).filters()
+        filters = passes.past_products(self.raw, facts, step).filters()
         if not any(filters):
             return replace(self, white=self.raw, filters=filters)
         white = passes.evidence(self.raw.with_filters(filters), facts, "whitening the evidence")

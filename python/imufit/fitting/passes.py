@@ -304,11 +304,11 @@ class Passes:
             for profile in profiles:
                 profile.add(arrays)
 
-    def autocovariance(
+    def past_products(
         self, evidence: _imufit.Evidence, facts: _imufit.Facts, step: NDArray[np.float64]
-    ) -> _imufit.Autocovariance:
-        """Autocovariance of the residual left by a step of all parameters."""
-        out = _imufit.Autocovariance()
+    ) -> _imufit.PastProducts:
+        """Products of the residual left by a step of all parameters with its own past."""
+        out = _imufit.PastProducts()
         for arrays in self.chunks(self.margin(facts), "measuring the noise"):
             out.add(arrays, evidence, step)
         return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,23 +64,30 @@ def search(
     }
     # The longest log limits the longest times.
     guides = {key: logs[max(known, key=lambda k: _duration(logs[k]))].facts for key, known in tellers.items() if known}
+    # What steps move from any trial is tried only as far as it may explain something.
+    moved = {key: [[0.0]] for key in guides if candidates[key].tried_at_full_size and not candidates[key].jumps}
+    moved = {key: zero for key, zero in moved.items() if candidates[key].search(guides[key])}
+    furthest = {
+        key: _imufit.furthest_trial(searches)
+        for key, searches in _filled(logs, fitted, candidates, tellers, moved).items()
+    }
     finer = 0
-    if around is None:
-        grids = {key: candidates[key].search(facts) for key, facts in guides.items()}
-    else:
-        grids = {key: candidates[key].search(facts, around[key], finer) for key, facts in guides.items()}
-        finer += 1
-    grids = {key: grid for key, grid in grids.items() if grid}
+
+    def grids_of(found: Mapping[str, list[float]] | None, keys: Iterable[str]) -> dict[str, list[list[float]]]:
+        every = {
+            key: candidates[key].search(guides[key], *(() if found is None else (found[key], finer))) for key in keys
+        }
+        near = {
+            key: [at for at in grid if key not in furthest or abs(at[0]) <= furthest[key]]
+            for key, grid in every.items()
+        }
+        # One trial is no choice.
+        return {key: grid for key, grid in near.items() if len(grid) > (key in furthest)}
+
+    grids = grids_of(around, guides)
+    finer += around is not None
     while grids:
-        profiles: dict[str, list[_imufit.Profile]] = {key: [] for key in grids}
-        for k, (each, values) in enumerate(zip(logs, fitted, strict=True)):
-            stack = [(find_effect(key), at) for key, at in values.items()]
-            asked = [key for key in grids if k in tellers[key]]
-            own = [_imufit.Profile(each.facts, stack, candidates[key], grids[key]) for key in asked]
-            each.passes.fill(own, each.facts)
-            for key, profile in zip(asked, own, strict=True):
-                profiles[key].append(profile)
-        for key, searches in profiles.items():
+        for key, searches in _filled(logs, fitted, candidates, tellers, grids).items():
             best = _imufit.best_trial(searches)
             grid = grids.pop(key)
             if best is not None:
@@ -88,10 +95,28 @@ def search(
                 steps = _steps(grid)
                 found[key] = _found(candidates[key], grid[number], step, spread, steps)
                 if gain > CHANCE and not any(s > h for s, h in zip(spread, steps, strict=True)):
-                    grids[key] = candidates[key].search(guides[key], found[key].trial, finer)
-        grids = {key: grid for key, grid in grids.items() if grid}
+                    grids |= grids_of({key: found[key].trial}, [key])
         finer += 1
     return found
+
+
+def _filled(
+    logs: Sequence[SurveyedLog],
+    fitted: Sequence[Mapping[str, list[float]]],
+    candidates: Mapping[str, _imufit.Effect],
+    tellers: Mapping[str, list[int]],
+    grids: Mapping[str, list[list[float]]],
+) -> dict[str, list[_imufit.Profile]]:
+    """Try the values of each grid on the logs that can show the effect (`tellers`)."""
+    profiles: dict[str, list[_imufit.Profile]] = {key: [] for key in grids}
+    for k, (each, values) in enumerate(zip(logs, fitted, strict=True)):
+        stack = [(find_effect(key), at) for key, at in values.items()]
+        asked = [key for key in grids if k in tellers[key]]
+        own = [_imufit.Profile(each.facts, stack, candidates[key], grids[key]) for key in asked]
+        each.passes.fill(own, each.facts)
+        for key, profile in zip(asked, own, strict=True):
+            profiles[key].append(profile)
+    return profiles
 
 
 def _duration(each: SurveyedLog) -> float:
@@ -107,9 +132,11 @@ def _steps(grid: list[list[float]]) -> list[float]:
 def _found(
     effect: _imufit.Effect, trial: list[float], step: list[float], spread: list[float], steps: list[float]
 ) -> Found:
-    if effect.tried_at_full_size:
+    if effect.jumps:
         # A grid does not resolve more than its own step.
         return Found(step, step, [max(s, h / np.sqrt(12.0)) for s, h in zip(spread, steps, strict=True)])
+    if effect.tried_at_full_size:
+        return Found(trial, trial, [0.0] * len(trial))
     start = [
         searched if name in effect.searched else moved
         for (name, _, _), searched, moved in zip(effect.parameters, trial, step, strict=True)

@@ -134,7 +134,7 @@ class _Sight:
         parameters = self._parameters(effect)
         if not parameters:
             return EffectSight(key, (), "yes")
-        if not self._alike.tells(key) and not effect.tried_at_full_size:
+        if not self._alike.tells(key) and not effect.jumps:
             return EffectSight(key, (), "no", self._why(effect) or "nothing that it depends on changes in this log")
         seen = [p.name for p in parameters if p.seen]
         like = tuple(other for other in self._alike.like(key) if other != key)
@@ -166,10 +166,10 @@ class _Sight:
         value over its error, less what the freedom of all parameters costs by their typical sizes, or parts of these.
         """
         asked = self._asked.get(self._slots[effect.id])
-        if asked is not None and not effect.tried_at_full_size:
+        if asked is not None and not effect.jumps:
             return self._as_asked(effect, asked)
         found = self._analysis.found.get(effect.id)
-        if effect.tried_at_full_size:
+        if effect.jumps:
             errors = np.asarray(found.spread if found is not None else [np.nan] * len(effect.parameters))
             skipped = {name for (name, _, _), error in zip(effect.parameters, errors, strict=True) if not error > 0.0}
         else:
@@ -180,7 +180,7 @@ class _Sight:
             for (name, unit, size), error in zip(effect.parameters, errors, strict=True)
             if name not in skipped
         ]
-        if not effect.tried_at_full_size and all(size is None for _, _, size, _ in kept):
+        if not effect.jumps and all(size is None for _, _, size, _ in kept):
             # Where no card bounds a size, an error far below what the rows themselves give comes from the prior.
             own = dict(zip((name for name, _, _ in effect.parameters), self._alike.errors(effect.id), strict=True))
             kept = [(n, u, s, error if error > 0.5 * own[n] else np.inf) for n, u, s, error in kept]
@@ -232,7 +232,7 @@ class _Sight:
         if "gyr" in effect.sensors and largest is not None and largest < SLOW and effect.affine != "offset":
             return f"the sensor hardly turns (at most {np.degrees(largest):.2g} deg/s)"
         slot = self._slots[effect.id]
-        if slot not in self._offsets and not effect.tried_at_full_size:
+        if slot not in self._offsets and not effect.jumps:
             alone, beside = self._errors([], slot), self._errors(self._offsets, slot)
             if np.any(beside > SHADOWED * alone):
                 return "it looks like a constant offset: there are too few different attitudes and rates"

@@ -331,7 +331,7 @@ class Session:
         model = stack.model
         slots = self.start.analysis.slots
         return model.holds or any(
-            effect not in slots or find_effect(effect).nonlinear or find_effect(effect).tried_at_full_size
+            effect not in slots or find_effect(effect).nonlinear or find_effect(effect).jumps
             for effect in model.effects
         )
 

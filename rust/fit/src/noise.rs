@@ -1,13 +1,14 @@
-//! Noise of the residual: autocovariance and spectrum, from which whitening filters come.
+//! Noise of the residual: how it follows its own past, from which whitening filters come.
 
 use imufit_model::effect::EffectError;
 use imufit_model::facts::LOOKBACK;
 use imufit_model::sensor::{CHANNELS, Sensor};
 use imufit_model::window::Window;
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::evidence::{Evidence, PART, Samples};
-use crate::whitening::MAX_ORDER;
+use crate::whitening::{self, Filter, MAX_ORDER};
 
 /// Rows looked at, at most about: parts spread evenly over the log tell the noise as well as all of it.
 const ROWS: usize = 1 << 17;
@@ -41,25 +42,28 @@ fn block_means(evidence: &Evidence, channel: usize, step: &[f64]) -> Vec<f64> {
     (0..blocks).map(mean).collect()
 }
 
-/// Autocovariances of the residual left by given parameters (all of them, candidates too), summed over windows.
+/// Products of a sample with itself and with those before it, the sample first, of each with each.
+type Products = [[f64; MAX_ORDER + 1]; MAX_ORDER + 1];
+
+/// Products of the residual left by given parameters (all of them, candidates too) with its own past, summed over windows.
 #[derive(Clone, Debug)]
-pub struct Autocovariance {
-    /// Sum of products at each lag, per channel.
-    sums: Vec<[f64; MAX_ORDER + 1]>,
-    /// Number of products at each lag, per channel.
+pub struct PastProducts {
+    /// Per channel, by how many samples are before the one that the products belong to.
+    sums: Vec<Vec<Products>>,
+    /// Number of samples that have so many before them.
     counts: Vec<[usize; MAX_ORDER + 1]>,
 }
 
-impl Default for Autocovariance {
+impl Default for PastProducts {
     fn default() -> Self {
         Self {
-            sums: vec![[0.0; MAX_ORDER + 1]; CHANNELS],
+            sums: vec![vec![[[0.0; MAX_ORDER + 1]; MAX_ORDER + 1]; MAX_ORDER + 1]; CHANNELS],
             counts: vec![[0; MAX_ORDER + 1]; CHANNELS],
         }
     }
 }
 
-impl Autocovariance {
+impl PastProducts {
     /// Adds core rows of a window, of a long log only some parts: the residual less the columns times `step` and less the mean of its block.
     pub fn add(&mut self, window: &Window, evidence: &Evidence, step: &[f64]) -> Result<(), EffectError> {
         let layout = &evidence.layout;
@@ -75,8 +79,9 @@ impl Autocovariance {
         // Summed in the order of time, so that the result does not depend on the number of threads.
         for part in parts {
             let part = part?;
-            let pairs = self.sums.iter_mut().flatten().zip(part.sums.iter().flatten());
-            pairs.for_each(|(a, b)| *a += b);
+            let own = self.sums.iter_mut().flatten().flatten().flatten();
+            own.zip(part.sums.iter().flatten().flatten().flatten())
+                .for_each(|(a, b)| *a += b);
             let pairs = self.counts.iter_mut().flatten().zip(part.counts.iter().flatten());
             pairs.for_each(|(a, b)| *a += b);
         }
@@ -102,13 +107,14 @@ impl Autocovariance {
                     *value -= means[channel][layout.block(window.offset + window.begin + k)];
                 }
                 for k in samples.with_past(core - window.begin, 0) {
-                    let now = residual[samples.rows[k]];
-                    for lag in 0..=MAX_ORDER.min(samples.run[k]) {
-                        if samples.rows[k] - samples.rows[k - lag] > LOOKBACK {
-                            break;
+                    let near = |lag: &usize| samples.rows[k] - samples.rows[k - lag] <= LOOKBACK;
+                    let past = (0..=MAX_ORDER.min(samples.run[k])).take_while(near).count() - 1;
+                    out.counts[channel][past] += 1;
+                    let sums = &mut out.sums[channel][past];
+                    for i in 0..=past {
+                        for j in 0..=i {
+                            sums[i][j] += residual[samples.rows[k - i]] * residual[samples.rows[k - j]];
                         }
-                        out.sums[channel][lag] += now * residual[samples.rows[k - lag]];
-                        out.counts[channel][lag] += 1;
                     }
                 }
             }
@@ -116,14 +122,22 @@ impl Autocovariance {
         Ok(out)
     }
 
-    /// Autocovariance of a channel, lag 0 first, and its number of samples. It ends with the last lag that most samples
-    /// look back on: a slow sensor has few samples within [`LOOKBACK`] rows.
-    pub fn of_channel(&self, channel: usize) -> (Vec<f64>, usize) {
+    /// Whitening filter of a channel; empty where its residual is white. It looks back as far as most samples do: a slow sensor has few
+    /// samples within [`LOOKBACK`] rows.
+    pub fn filter(&self, channel: usize) -> Filter {
         let counts = &self.counts[channel];
-        let seen = self.sums[channel]
-            .iter()
-            .zip(counts)
-            .take_while(|(_, n)| 2 * **n >= counts[0].max(1));
-        (seen.map(|(s, n)| s / *n as f64).collect(), counts[0])
+        let looking_back = |order: usize| counts[order..].iter().sum::<usize>();
+        let order = (0..=MAX_ORDER).rfind(|p| 2 * looking_back(*p) >= looking_back(0).max(1));
+        let order = order.unwrap_or(0);
+        let mut products = DMatrix::zeros(order + 1, order + 1);
+        for sums in &self.sums[channel][order..] {
+            for i in 0..=order {
+                for j in 0..=i {
+                    products[(i, j)] += sums[i][j];
+                }
+            }
+        }
+        products.fill_upper_triangle_with_lower_triangle();
+        whitening::filter(&products, looking_back(order))
     }
 }

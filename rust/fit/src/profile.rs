@@ -236,6 +236,28 @@ impl Profile {
     }
 }
 
+/// Sizes beyond this many times the residual over the candidate's column are not worth a trial: a motion goes nowhere faster than by its
+/// rate, so that the change of a size is at most the column times it, and a change twice as large as the residual leaves more than there
+/// is. A motion of one frequency has gone as far as it goes at 0.64 of that, and its next period explains as much, hence twice as far.
+const FURTHEST: f64 = 4.0;
+
+/// Largest size of a candidate with one parameter that is worth a trial, from searches whose first trial has its column at zero;
+/// infinite where that column is not there.
+pub fn furthest(logs: &[&Profile]) -> f64 {
+    let (mut change, mut left) = (0.0, 0.0);
+    for log in logs.iter().filter(|l| l.trials > 0) {
+        for (channel, sums) in log.channels.iter().enumerate().filter(|(_, s)| s.n > 0) {
+            let last = sums.base.nrows() - 1;
+            let square = sums.base[(last, last)];
+            if square > 0.0 && places(&log.model, channel, &log.range(0)).len() == 1 {
+                change += sums.own[0][(0, 0)] / square * sums.n as f64;
+                left += sums.n as f64;
+            }
+        }
+    }
+    FURTHEST * (left / change).sqrt()
+}
+
 /// Step of the first `fitted` parameters that goes best with given values of the others, and these.
 fn with_given(equations: &NormalEquations, fitted: usize, values: &[f64]) -> Option<DVector<f64>> {
     let kept: Vec<usize> = (0..fitted).collect();

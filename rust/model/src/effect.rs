@@ -202,9 +202,15 @@ pub trait Effect: Send + Sync {
         self.columns(rows, sensor, trial, out)
     }
 
-    /// True if [`Effect::candidate_columns`] times the trial's own values are what the effect of that size does, so that a search
-    /// asks how well just that size does.
+    /// True if a candidate's columns at a trial, times the trial's own values, are what the effect of that size does, so that a search
+    /// asks how well just that size does. Of an effect whose value lies in the ideal readings they are taken from these, whatever
+    /// [`Effect::candidate_columns`] are.
     fn tried_at_full_size(&self) -> bool {
+        false
+    }
+
+    /// True if readings jump as its parameters change: no slope leads anywhere, and it stays at what a search finds.
+    fn jumps(&self) -> bool {
         false
     }
 

@@ -289,6 +289,15 @@ impl Ideal {
         }
     }
 
+    /// What a sensor reads.
+    pub const fn quantity(&self, sensor: Sensor) -> &Triple {
+        match sensor {
+            Sensor::Acc => &self.f,
+            Sensor::Gyr => &self.omega,
+            Sensor::Mag => &self.m,
+        }
+    }
+
     /// Time derivative of what a sensor reads.
     pub const fn rate(&self, sensor: Sensor) -> &Triple {
         match sensor {

@@ -161,11 +161,7 @@ impl<'a> Past<'a> {
         Rows {
             facts,
             t: self.t,
-            x: match sensor {
-                Sensor::Acc => &self.ideal.f,
-                Sensor::Gyr => &self.ideal.omega,
-                Sensor::Mag => &self.ideal.m,
-            },
+            x: self.ideal.quantity(sensor),
             ideal: &self.ideal,
             force: &self.ideal.f,
             temperature: self.temperature.as_deref(),
@@ -220,7 +216,12 @@ impl SensorModel {
                 });
             }
             slots.push(Slot {
-                tried: effect.search(facts, None).len().max(1),
+                // From any trial of what is tried at full size steps lead on, unless it jumps.
+                tried: if effect.tried_at_full_size() && !effect.jumps() {
+                    1
+                } else {
+                    effect.search(facts, None).len().max(1)
+                },
                 effect,
                 parameters,
                 in_model,
@@ -266,12 +267,8 @@ impl SensorModel {
     /// Modelled readings of one sensor and the columns of its three axes for ideal readings that are known otherwise than from a
     /// reference: `rows.x` counts for nothing.
     pub fn modelled(&self, rows: Rows, sensor: Sensor) -> Result<(Triple, AxisColumns), EffectError> {
-        let ideal = match sensor {
-            Sensor::Acc => &rows.ideal.f,
-            Sensor::Gyr => &rows.ideal.omega,
-            Sensor::Mag => &rows.ideal.m,
-        };
-        self.predict(rows, None, ideal.clone(), None, sensor)
+        let ideal = rows.ideal.quantity(sensor);
+        self.predict(rows, None, ideal.clone(), None, &vec![None; self.slots.len()], sensor)
     }
 
     /// Sets the parameters of the model's effects from a vector over all parameters.
@@ -456,13 +453,16 @@ impl SensorModel {
                 .with_past(whole, facts, sensor)
                 .map(|long| Past::new(&long, facts, &change, sensor, whole.begin - long.begin));
             let past = past.as_mut().map(|p| p.rows(facts, sensor, &seen_of));
-            let reading_of = match sensor {
-                Sensor::Acc => &ideal.f,
-                Sensor::Gyr => &ideal.omega,
-                Sensor::Mag => &ideal.m,
-            };
-            let (modelled, columns) =
-                self.predict(rows, past.as_ref(), reading_of.clone(), ideal.detail(sensor), sensor)?;
+            let reading_of = ideal.quantity(sensor);
+            let secants = self.secants(window, facts, sensor, reading_of);
+            let (modelled, columns) = self.predict(
+                rows,
+                past.as_ref(),
+                reading_of.clone(),
+                ideal.detail(sensor),
+                &secants,
+                sensor,
+            )?;
             for (axis, columns) in columns.into_iter().enumerate() {
                 let residual = core
                     .clone()
@@ -478,6 +478,28 @@ impl SensorModel {
             covariates,
             temperature,
         })
+    }
+
+    /// For each candidate that is tried at full size, and whose value lies in the ideal readings, what these change by per unit of the
+    /// size tried; `x` is the sensor's ideal reading as it is.
+    fn secants(&self, window: &Window, facts: &LogFacts, sensor: Sensor, x: &Triple) -> Vec<Option<Triple>> {
+        let change = self.reference_change();
+        let of = |slot: &Slot| {
+            let effect = &slot.effect;
+            let size = slot.parameters[0];
+            let asked = !slot.in_model && effect.tried_at_full_size() && in_reference(effect.card().stage);
+            if !asked || size == 0.0 || !effect.sensors().contains(&sensor) {
+                return None;
+            }
+            let changed = change.and(effect.reference_change(&slot.parameters));
+            let ideal = Ideal::of_sensor(window, facts, &changed, sensor)
+                .unwrap_or_else(|| Ideal::new(window, facts, &changed));
+            let mut secant = ideal.quantity(sensor).clone();
+            secant.add(x, -1.0);
+            secant.scale(1.0 / size);
+            Some(secant.without(facts.silent_axes[sensor.index()]))
+        };
+        self.slots.iter().map(of).collect()
     }
 
     /// Residual of each channel over the core rows of a window after a step of all parameters.
@@ -514,13 +536,14 @@ impl SensorModel {
     }
 
     /// Modelled readings of one sensor and the columns of its three channels, stage after stage. Columns are made of the smooth
-    /// quantity; `detail` joins it before readings are rounded and cut off.
+    /// quantity; `detail` joins it before readings are rounded and cut off. A candidate with a secant has this for its column.
     fn predict(
         &self,
         rows: Rows,
         past: Option<&Rows>,
         mut x: Triple,
         detail: Option<&Triple>,
+        secants: &[Option<Triple>],
         sensor: Sensor,
     ) -> Result<(Triple, AxisColumns), EffectError> {
         let n = rows.len();
@@ -542,7 +565,7 @@ impl SensorModel {
             }
             let mut after: Option<Triple> = None;
             let seen = silent.contains(&true).then(|| x.without(silent));
-            for slot in &self.slots {
+            for (slot, secant) in self.slots.iter().zip(secants) {
                 if slot.effect.card().stage != stage || !slot.effect.sensors().contains(&sensor) {
                     continue;
                 }
@@ -554,7 +577,13 @@ impl SensorModel {
                         ..rows
                     },
                 };
-                slot.columns(&rows, sensor, &mut columns)?;
+                if let Some(secant) = secant {
+                    for axis in 0..3 {
+                        columns.set(0, axis, secant.axis(axis).iter().copied());
+                    }
+                } else {
+                    slot.columns(&rows, sensor, &mut columns)?;
+                }
                 // The value of a reference effect is in the ideal readings already.
                 if slot.in_model && !in_reference(stage) {
                     slot.add_to(&rows, sensor, &columns, &mut after, &x)?;

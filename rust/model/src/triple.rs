@@ -30,6 +30,13 @@ impl Triple {
         }
     }
 
+    /// Multiplies all by a factor.
+    pub fn scale(&mut self, factor: f64) {
+        for v in self.0.iter_mut().flatten() {
+            *v *= factor;
+        }
+    }
+
     /// The opposite.
     #[must_use]
     pub fn negative(&self) -> Self {

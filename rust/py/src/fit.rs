@@ -5,11 +5,10 @@ use std::sync::Arc;
 use imufit_attitude::Frame;
 use imufit_fit::bins::Bins;
 use imufit_fit::evidence::{Evidence, Layout};
-use imufit_fit::noise::Autocovariance;
+use imufit_fit::noise::PastProducts;
 use imufit_fit::profile::{self, Profile};
 use imufit_fit::reference_noise;
 use imufit_fit::survey::{Given, Survey};
-use imufit_fit::whitening::filter_from_autocovariance;
 use imufit_model::rig::Rig;
 use imufit_model::sensor::CHANNELS;
 use imufit_model::sensor_model::SensorModel;
@@ -248,6 +247,14 @@ impl PyProfile {
 /// Number of a trial, the candidate's parameters, their standard deviations, drop of the sum of squares.
 type BestTrial = (usize, Vec<f64>, Vec<f64>, f64);
 
+/// Largest size that is worth a trial, from searches of several logs whose first trial is zero; infinite where nothing would change.
+#[pyfunction]
+fn furthest_trial(searches: Vec<PyRef<'_, PyProfile>>) -> f64 {
+    let logs: Vec<&Profile> = searches.iter().map(|s| &s.0).collect();
+    let furthest = imufit_fit::profile::furthest(&logs);
+    if furthest.is_nan() { f64::INFINITY } else { furthest }
+}
+
 /// Number of the best trial of searches over several logs for the same trials, the candidate's parameters as a step finds
 /// them, their standard deviation where they are the mean of trials of that size (else zero), and the drop of the sum of squares in units of the noise; None where no sample can be used.
 #[pyfunction]
@@ -279,15 +286,15 @@ fn evaluate<'py>(
         .collect())
 }
 
-/// Autocovariances of the residual, from which whitening filters come.
-#[pyclass(name = "Autocovariance", module = "imufit._imufit")]
-pub struct PyAutocovariance(Autocovariance);
+/// Products of the residual with its own past, from which whitening filters come.
+#[pyclass(name = "PastProducts", module = "imufit._imufit")]
+pub struct PyPastProducts(PastProducts);
 
 #[pymethods]
-impl PyAutocovariance {
+impl PyPastProducts {
     #[new]
     fn new() -> Self {
-        Self(Autocovariance::default())
+        Self(PastProducts::default())
     }
 
     /// Adds the core rows of a chunk: the residual of the evidence's layout less its columns times `step`.
@@ -308,17 +315,7 @@ impl PyAutocovariance {
 
     /// Whitening filter of each of the nine channels, its taps; empty where the residual is white.
     fn filters(&self) -> Vec<Vec<f64>> {
-        (0..CHANNELS)
-            .map(|channel| {
-                let (covariance, n) = self.0.of_channel(channel);
-                filter_from_autocovariance(&covariance, n)
-            })
-            .collect()
-    }
-
-    /// Autocovariance of a channel, lag 0 first, in the square of its unit.
-    fn of_channel(&self, channel: usize) -> Vec<f64> {
-        self.0.of_channel(channel).0
+        (0..CHANNELS).map(|channel| self.0.filter(channel)).collect()
     }
 }
 
@@ -327,7 +324,8 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<PySurvey>()?;
     m.add_class::<PyEvidence>()?;
     m.add_class::<PyProfile>()?;
-    m.add_class::<PyAutocovariance>()?;
+    m.add_class::<PyPastProducts>()?;
+    m.add_function(wrap_pyfunction!(furthest_trial, m)?)?;
     m.add_function(wrap_pyfunction!(best_trial, m)?)?;
     m.add_function(wrap_pyfunction!(evaluate, m)?)?;
     Ok(())

@@ -161,10 +161,16 @@ impl PyEffect {
         self.0.strongly_curved()
     }
 
-    /// True if a search finds it by how well it does at just the size tried, and no step moves it.
+    /// True if its columns as a candidate are those of the size that a search found, counted from nothing.
     #[getter]
     fn tried_at_full_size(&self) -> bool {
         self.0.tried_at_full_size()
+    }
+
+    /// True if readings jump as its parameters change, so that it stays at what a search finds.
+    #[getter]
+    fn jumps(&self) -> bool {
+        self.0.jumps()
     }
 
     /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new

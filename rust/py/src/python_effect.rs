@@ -209,6 +209,10 @@ impl Effect for PythonEffect {
         self.card.parameters.iter().all(|p| p.found != Found::Steps)
     }
 
+    fn jumps(&self) -> bool {
+        self.tried_at_full_size()
+    }
+
     fn strongly_curved(&self) -> bool {
         self.tried_at_full_size()
     }

@@ -3,6 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::Words;
+use super::timing::{finer, trials};
 use crate::card::{Card, Reach, ReferencePart, Scope, Stage, Traits, VECTOR, parameters};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
@@ -235,6 +236,24 @@ impl Effect for Reference {
 
     fn strongly_curved(&self) -> bool {
         matches!(self.kind, Kind::Delay | Kind::Skew)
+    }
+
+    fn tried_at_full_size(&self) -> bool {
+        self.kind == Kind::Delay
+    }
+
+    fn search(&self, facts: &LogFacts, found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {
+        let early = |tau: &f64| *tau != 0.0;
+        let sizes = match (self.kind, found) {
+            (Kind::Delay, None) => {
+                let late = trials(facts, 1.0);
+                let early = late.iter().copied().filter(early).map(|tau| -tau);
+                early.chain(late.iter().copied()).collect()
+            }
+            (Kind::Delay, Some((at, round))) => finer(at[0], round),
+            _ => Vec::new(),
+        };
+        sizes.into_iter().map(|tau| vec![tau]).collect()
     }
 
     fn reference_change(&self, parameters: &[f64]) -> ReferenceChange {

@@ -202,25 +202,11 @@ impl Effect for RigEffect {
         Ok(())
     }
 
-    fn candidate_columns(
-        &self,
-        rows: &Rows,
-        sensor: Sensor,
-        trial: &[f64],
-        out: &mut Columns,
-    ) -> Result<(), EffectError> {
-        let width = trial[0];
-        if self.kind != Kind::Backlash || width == 0.0 {
-            return self.columns(rows, sensor, trial, out);
-        }
-        let secants = play_columns(rows, width, move |slack, c| {
-            [slack.error / width, slack.follow * c.rate / width]
-        });
-        turned(rows, sensor, out, secants);
-        Ok(())
+    fn tried_at_full_size(&self) -> bool {
+        self.kind == Kind::Backlash
     }
 
-    fn tried_at_full_size(&self) -> bool {
+    fn jumps(&self) -> bool {
         self.kind == Kind::Backlash
     }
 

@@ -7,6 +7,39 @@ use crate::facts::LogFacts;
 use crate::ideal::{ReferenceChange, SensorTime};
 use crate::sensor::Sensor;
 
+/// Least delay or lag that is tried, s: columns at zero describe what is less, since no motion of a body turns faster.
+const LEAST_TRIED: f64 = 0.005;
+/// Ratio of one trial to the one before.
+const RATIO: f64 = std::f64::consts::SQRT_2;
+/// Trials of one sign: up to 0.16 s, beyond which a recording is joined wrongly.
+const TRIALS: i32 = 11;
+
+/// Delays or lags to try, s: none, and ever larger ones as far as the rows around a window reach if `past` times the value is looked back.
+pub(super) fn trials(facts: &LogFacts, past: f64) -> Vec<f64> {
+    let reach = facts.margin() as f64 * facts.dt;
+    let sizes = (0..TRIALS).map(|k| LEAST_TRIED * RATIO.powi(k));
+    [0.0]
+        .into_iter()
+        .chain(sizes.filter(|tau| past * tau < reach))
+        .collect()
+}
+
+/// Finer steps from one trial to the next: 9 % each, so that a secant misses the square of a delay by a tenth at most.
+const FINER: i32 = 4;
+
+/// Trials around the best of a round, up to the next ones of the round before; none after the last round.
+pub(super) fn finer(best: f64, round: usize) -> Vec<f64> {
+    if round > 0 || best == 0.0 {
+        return Vec::new();
+    }
+    (1 - FINER..FINER)
+        .map(|k| best * RATIO.powf(f64::from(k) / f64::from(FINER)))
+        .collect()
+}
+
+/// Time constants of a lag that are looked back: the last node of its quadrature.
+const LAGS_BACK: f64 = 9.4;
+
 /// What happens to the quantity in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -115,6 +148,19 @@ impl Effect for Timing {
 
     fn strongly_curved(&self) -> bool {
         true
+    }
+
+    fn tried_at_full_size(&self) -> bool {
+        true
+    }
+
+    fn search(&self, facts: &LogFacts, found: Option<(&[f64], usize)>) -> Vec<Vec<f64>> {
+        let past = match self.kind {
+            Kind::Delay => 1.0,
+            Kind::Lag => LAGS_BACK,
+        };
+        let sizes = found.map_or_else(|| trials(facts, past), |(at, round)| finer(at[0], round));
+        sizes.into_iter().map(|tau| vec![tau]).collect()
     }
 
     fn sign(&self) -> Sign {
