@@ -67,6 +67,9 @@ def fitted(fit: FittedStack, result: Verdict, decided: Collection[int] = ()) -> 
         others = others.with_effect(ids[slot])
     steady = [ids[slot] for slot in close if not _curved(analysis, slot)]
     without = tried(fit, others, steady)
+    if not np.isfinite(without.ln_evidence):
+        # Others that no sensor can have without one of these are not there without it.
+        without = tried(fit, fit.model, steady)
     fits = {slot: without.with_effect(fit, ids[slot]) for slot in close}
     # If columns hold all information, a fit decides by the error alone: freedom alone does not separate one cause from
     # another.

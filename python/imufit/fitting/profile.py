@@ -136,7 +136,7 @@ def _found(
         # A grid does not resolve more than its own step.
         return Found(step, step, [max(s, h / np.sqrt(12.0)) for s, h in zip(spread, steps, strict=True)])
     if effect.tried_at_full_size:
-        return Found(trial, trial, [0.0] * len(trial))
+        return Found(step, step, spread)
     start = [
         searched if name in effect.searched else moved
         for (name, _, _), searched, moved in zip(effect.parameters, trial, step, strict=True)

@@ -53,7 +53,8 @@ pub struct Best {
     /// Number of the trial.
     pub trial: usize,
     /// The candidate's parameters as a step from zero along the trial's columns finds them; where a search asks how well just
-    /// the tried size does, the mean of all trials, each by how likely it makes the readings.
+    /// the tried size does, the size between the trials that does best, or of what jumps the mean of all trials, each by how likely it
+    /// makes the readings.
     pub parameters: Vec<f64>,
     /// Standard deviation of that mean; zero elsewhere.
     pub spread: Vec<f64>,
@@ -285,6 +286,21 @@ fn likely(tried: &[(&[f64], f64)]) -> (Vec<f64>, Vec<f64>) {
     (means, spread)
 }
 
+/// Where a parabola through the best value tried and those next to it is least; the best value itself where it is zero or the last.
+fn vertex(tried: &[(&[f64], f64)]) -> Option<f64> {
+    let mut points: Vec<(f64, f64)> = tried.iter().map(|(values, square)| (values[0], *square)).collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let best = (0..points.len()).min_by(|a, b| points[*a].1.total_cmp(&points[*b].1))?;
+    let (at, square) = points[best];
+    if at == 0.0 || best == 0 || best + 1 == points.len() {
+        return Some(at);
+    }
+    let [(before, left), (after, right)] = [points[best - 1], points[best + 1]];
+    let (rise_left, rise_right) = ((left - square) * (after - at), (right - square) * (at - before));
+    let least = at + 0.5 * (rise_left * (after - at) - rise_right * (at - before)) / (rise_left + rise_right);
+    Some(if least.is_finite() { least } else { at })
+}
+
 /// The trial that lowers the sum of squares of all logs most; `None` without trials or samples. The searches are for the same
 /// trials; the candidate's parameters are the same in all logs, the model's move along in each log by themselves.
 pub fn best(logs: &[&Profile]) -> Option<Best> {
@@ -338,7 +354,14 @@ pub fn best(logs: &[&Profile]) -> Option<Best> {
             })
             .collect();
         let tried: Option<Vec<(&[f64], f64)>> = solved.iter().map(|s| Some((logs[0].given(s.0)?, s.1))).collect();
-        of_given = tried.map(|tried| likely(&tried));
+        of_given = tried.and_then(|tried| {
+            let moves = logs[0].slot(0).is_some_and(|slot| !slot.effect.jumps());
+            if moves {
+                vertex(&tried).map(|at| (vec![at], vec![0.0]))
+            } else {
+                Some(likely(&tried))
+            }
+        });
         let (trial, square, step) = solved.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
         let alone = equations(trial, &weights).selected(&(0..fitted).collect::<Vec<_>>());
         let without = alone.solve(&DVector::zeros(fitted))?.solution;
@@ -355,4 +378,26 @@ pub fn best(logs: &[&Profile]) -> Option<Best> {
             gain,
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::vertex;
+
+    #[test]
+    fn the_best_size_lies_between_trials_and_never_beyond_their_ends() {
+        let sizes = [0.0, 0.01, 0.014, 0.02];
+        let of = |square: fn(f64) -> f64| -> Option<f64> {
+            let tried: Vec<([f64; 1], f64)> = sizes.iter().map(|size| ([*size], square(*size))).collect();
+            vertex(
+                &tried
+                    .iter()
+                    .map(|(values, square)| (&values[..], *square))
+                    .collect::<Vec<_>>(),
+            )
+        };
+        assert!((of(|tau| 3.0 + (tau - 0.0127).powi(2)).expect("a size") - 0.0127).abs() < 1e-12);
+        assert_eq!(of(|tau| tau), Some(0.0));
+        assert_eq!(of(|tau| -tau), Some(0.02));
+    }
 }
