@@ -12,7 +12,6 @@ _Chunk = dict[str, Any]
 
 __all__ = [
     "NORM_SEEN",
-    "PastProducts",
     "Candidate",
     "Disagreement",
     "Effect",
@@ -22,6 +21,7 @@ __all__ = [
     "Finding",
     "Kind",
     "LineDecoder",
+    "PastProducts",
     "PoseJudge",
     "Problem",
     "Profile",
@@ -50,6 +50,7 @@ __all__ = [
     "find_effect",
     "find_rests",
     "frame_vectors",
+    "furthest_trial",
     "kalman_steady_state",
     "magnitude_calibration",
     "matrix_from_quaternion_rows",
