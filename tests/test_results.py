@@ -174,8 +174,8 @@ def test_a_figure_says_of_a_candidate_that_raises_the_error_alone_what_the_table
     raising = dataclasses.replace(found.candidates[0], held_out_before=133.0, held_out_after=204.0)
     drawn = dataclasses.replace(found, candidates=(raising, *found.candidates[1:]))
     axes = drawn.plot().axes[0]
-    assert raising.error_change == "stays at 133"
-    assert axes.texts[0].get_text() == "stays at 133"
+    assert raising.error_change == "rises to 204"
+    assert axes.texts[0].get_text() == "rises to 204"
     assert (
         axes.get_title(loc="left").replace("\n", " ").startswith("Alone gyr.g_sensitivity does not lower the held-out")
     )

@@ -122,15 +122,16 @@ def fall(before: float | None, after: float | None) -> str:
 
 
 def change(before: float, after: float) -> str:
-    """Return an error without and with an effect alone, such as ``2.17 → 1.31``, or ``stays at 2.17``.
+    """Return an error without and with an effect alone: ``2.17 → 1.31``, ``stays at 2.17`` or ``rises to 4.31``.
 
     Parameters
     ----------
     before, after : float
         The ratios.
     """
-    falls = after < before and ratio(after) != ratio(before)
-    return f"{ratio(before)} → {ratio(after)}" if falls else f"stays at {ratio(before)}"
+    if ratio(after) == ratio(before):
+        return f"stays at {ratio(before)}"
+    return f"{ratio(before)} → {ratio(after)}" if after < before else f"rises to {ratio(after)}"
 
 
 def promise(effect: str, before: float, after: float) -> str:

@@ -12,7 +12,10 @@ from imufit.fitting.surveyed_log import SurveyedLog
 from imufit.model.catalogue import find_effect
 
 CHANCE = 20.0
-"""Drop of the sum of squares, in units of the noise, below which the best of a grid is not worth a finer one."""
+"""Drop of the sum of squares, in units of the noise, below which the best of a grid is not worth a finer one. A
+lateness that changes readings by less than their noise is left to its slope, which has no noise of the reference in
+common with the residual. Noise has no direction of time: what a sensor that knows what comes explains as well is
+noise."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ def search(
     }
     # The longest log limits the longest times.
     guides = {key: logs[max(known, key=lambda k: _duration(logs[k]))].facts for key, known in tellers.items() if known}
-    # What steps move from any trial is tried only as far as it may explain something.
+    # An effect that steps move from any trial is tried only as far as it may explain something.
     moved = {key: [[0.0]] for key in guides if candidates[key].tried_at_full_size and not candidates[key].jumps}
     moved = {key: zero for key, zero in moved.items() if candidates[key].search(guides[key])}
     furthest = {
@@ -81,7 +84,7 @@ def search(
             key: [at for at in grid if key not in furthest or abs(at[0]) <= furthest[key]]
             for key, grid in every.items()
         }
-        # One trial is no choice.
+        # A single trial leaves nothing to choose.
         return {key: grid for key, grid in near.items() if len(grid) > (key in furthest)}
 
     grids = grids_of(around, guides)
@@ -91,11 +94,13 @@ def search(
             best = _imufit.best_trial(searches)
             grid = grids.pop(key)
             if best is not None:
-                number, step, spread, gain = best
+                number, step, spread, gain, mirrored, samples = best
                 steps = _steps(grid)
                 found[key] = _found(candidates[key], grid[number], step, spread, steps)
                 if gain > CHANCE and not any(s > h for s, h in zip(spread, steps, strict=True)):
                     grids |= grids_of({key: found[key].trial}, [key])
+                if key in furthest and key not in grids and gain - max(mirrored, 0.0) < samples:
+                    del found[key]
         finer += 1
     return found
 

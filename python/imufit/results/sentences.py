@@ -53,8 +53,9 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
         text += " No sensor of this kind has so much of it: something else looks like it here."
     elif candidate.outcome == IN_DOUBT:
         text += (
-            " There is evidence of it, but its name would be a guess: a cause without a name explains more instead, its"
-            " size changes over the log, or it needs a position that the reference lacks."
+            " There is evidence of it, but its name would be a guess: it does not lower the held-out error, a cause"
+            " without a name explains more instead, its size changes over the log, or it needs a position that the"
+            " reference lacks."
         )
     elif candidate.outcome == LIKELY:
         text += " It is more probable than not, but these rows do not establish it: a longer log may."
@@ -146,8 +147,8 @@ def _nearest(found: Diagnosis) -> str:
     doubtful = next((candidate for candidate in found.candidates if candidate.status in DOUBTS), None)
     if doubtful is not None:
         return f" {doubtful.effect} comes nearest, but {DOUBTS[doubtful.status]}."
-    seen = next((candidate for candidate in found.candidates if candidate.status == SIGNIFICANT), None)
-    if seen is None:
+    seen = next((candidate for candidate in found.candidates if candidate.outcome == IN_DOUBT), None)
+    if seen is None or seen.held_out_after < seen.held_out_before:
         return ""
     return f" {seen.effect} has evidence, but does not lower the held-out error: the noise may be another one."
 

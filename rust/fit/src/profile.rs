@@ -60,6 +60,10 @@ pub struct Best {
     pub spread: Vec<f64>,
     /// Drop of the sum of squares in units of the noise that the trial leaves.
     pub gain: f64,
+    /// The same of the first trial of the other sign; zero where there is none.
+    pub mirrored: f64,
+    /// Samples of the channels that the candidate acts on.
+    pub samples: f64,
 }
 
 /// A search for the best trial of one candidate on top of a model.
@@ -210,6 +214,14 @@ impl Profile {
         out
     }
 
+    /// Samples of the channels that a trial acts on.
+    fn samples(&self, trial: usize) -> f64 {
+        let range = self.range(trial);
+        let own = self.channels.iter().enumerate();
+        let acts = own.filter(|(channel, _)| !places(&self.model, *channel, &range).is_empty());
+        acts.map(|(_, sums)| sums.n as f64).sum()
+    }
+
     /// Mean square of a channel's residual after a step of the model and one trial.
     fn mean_square(&self, trial: usize, step: &DVector<f64>, channel: usize) -> f64 {
         let sums = &self.channels[channel];
@@ -288,7 +300,9 @@ fn likely(tried: &[(&[f64], f64)]) -> (Vec<f64>, Vec<f64>) {
 
 /// Where a parabola through the best value tried and those next to it is least; the best value itself where it is zero or the last.
 fn vertex(tried: &[(&[f64], f64)]) -> Option<f64> {
-    let mut points: Vec<(f64, f64)> = tried.iter().map(|(values, square)| (values[0], *square)).collect();
+    let (most, _) = tried.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let same = tried.iter().filter(|(values, _)| values[0] * most[0] >= 0.0);
+    let mut points: Vec<(f64, f64)> = same.map(|(values, square)| (values[0], *square)).collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let best = (0..points.len()).min_by(|a, b| points[*a].1.total_cmp(&points[*b].1))?;
     let (at, square) = points[best];
@@ -331,7 +345,7 @@ pub fn best(logs: &[&Profile]) -> Option<Best> {
         sum
     };
     let mut found: Option<(usize, DVector<f64>)> = None;
-    let (mut gain, mut of_given) = (0.0, None);
+    let (mut gain, mut mirrored, mut of_given) = (0.0, 0.0, None);
     for _ in 0..ROUNDS {
         let weights: Vec<[f64; CHANNELS]> = (0..logs.len())
             .map(|log| {
@@ -362,10 +376,14 @@ pub fn best(logs: &[&Profile]) -> Option<Best> {
                 Some(likely(&tried))
             }
         });
-        let (trial, square, step) = solved.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let size = |trial: usize| logs[0].slot(trial).map_or(0.0, |slot| slot.parameters[0]);
+        let (trial, square, step) = solved.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.clone();
+        let other = solved.iter().find(|s| size(s.0) * size(trial) < 0.0).map(|s| s.1);
         let alone = equations(trial, &weights).selected(&(0..fitted).collect::<Vec<_>>());
         let without = alone.solve(&DVector::zeros(fitted))?.solution;
-        gain = alone.residual_square(&without) - square;
+        let before = alone.residual_square(&without);
+        gain = before - square;
+        mirrored = other.map_or(0.0, |square| before - square);
         found = Some((trial, step));
     }
     found.map(|(trial, step)| {
@@ -376,6 +394,8 @@ pub fn best(logs: &[&Profile]) -> Option<Best> {
             parameters,
             spread,
             gain,
+            mirrored,
+            samples: logs.iter().map(|log| log.samples(trial)).sum(),
         }
     })
 }

@@ -597,7 +597,9 @@ fn shown(
         .map(|w| {
             let with = held_out_of(search, Some(w.slot));
             let there = members.contains(&w.slot);
-            let status = if there || (rivals.contains(&w.slot) && w.plausible == Plausible::Yes) {
+            // Where none stands out, none is named.
+            let named = best.is_some() && (there || (rivals.contains(&w.slot) && w.plausible == Plausible::Yes));
+            let status = if named {
                 Status::Significant
             } else if !w.testable {
                 Status::NotTestable

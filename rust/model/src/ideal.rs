@@ -267,6 +267,29 @@ impl Ideal {
         Some(now)
     }
 
+    /// What a sensor reads of the smooth motion, late or sluggish as `change` has it. Of the noise of the reference, which the residual has
+    /// in common with any difference of readings, little is left.
+    pub fn smooth_reading(window: &Window, facts: &LogFacts, change: &ReferenceChange, sensor: Sensor) -> Triple {
+        let SensorTime { delay, lag } = change.sensors[sensor.index()];
+        let before = |past: f64| {
+            let clock = change.clock(facts).before(past);
+            let ideal = Self::by_clock(window, facts, change, clock, Motion::Smooth);
+            match sensor {
+                Sensor::Acc => ideal.f,
+                Sensor::Gyr => ideal.omega,
+                Sensor::Mag => ideal.m,
+            }
+        };
+        if lag == 0.0 {
+            return before(delay);
+        }
+        let mut mean = Triple::zeros(window.end - window.begin);
+        for (node, weight) in PAST {
+            mean.add(&before(delay + lag * node), weight);
+        }
+        mean
+    }
+
     const fn smooth(&mut self) -> [&mut Triple; 8] {
         [
             &mut self.omega,

@@ -1,5 +1,6 @@
 //! A stack of effects on top of the ideal readings: prediction, residual and columns of the design matrix.
 
+use std::cell::LazyCell;
 use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -454,7 +455,7 @@ impl SensorModel {
                 .map(|long| Past::new(&long, facts, &change, sensor, whole.begin - long.begin));
             let past = past.as_mut().map(|p| p.rows(facts, sensor, &seen_of));
             let reading_of = ideal.quantity(sensor);
-            let secants = self.secants(window, facts, sensor, reading_of);
+            let secants = self.secants(window, facts, sensor);
             let (modelled, columns) = self.predict(
                 rows,
                 past.as_ref(),
@@ -481,9 +482,11 @@ impl SensorModel {
     }
 
     /// For each candidate that is tried at full size, and whose value lies in the ideal readings, what these change by per unit of the
-    /// size tried; `x` is the sensor's ideal reading as it is.
-    fn secants(&self, window: &Window, facts: &LogFacts, sensor: Sensor, x: &Triple) -> Vec<Option<Triple>> {
+    /// size tried.
+    fn secants(&self, window: &Window, facts: &LogFacts, sensor: Sensor) -> Vec<Option<Triple>> {
         let change = self.reference_change();
+        let reading = |change: &ReferenceChange| Ideal::smooth_reading(window, facts, change, sensor);
+        let now: LazyCell<Triple, _> = LazyCell::new(|| reading(&change));
         let of = |slot: &Slot| {
             let effect = &slot.effect;
             let size = slot.parameters[0];
@@ -491,11 +494,8 @@ impl SensorModel {
             if !asked || size == 0.0 || !effect.sensors().contains(&sensor) {
                 return None;
             }
-            let changed = change.and(effect.reference_change(&slot.parameters));
-            let ideal = Ideal::of_sensor(window, facts, &changed, sensor)
-                .unwrap_or_else(|| Ideal::new(window, facts, &changed));
-            let mut secant = ideal.quantity(sensor).clone();
-            secant.add(x, -1.0);
+            let mut secant = reading(&change.and(effect.reference_change(&slot.parameters)));
+            secant.add(&now, -1.0);
             secant.scale(1.0 / size);
             Some(secant.without(facts.silent_axes[sensor.index()]))
         };
@@ -577,12 +577,13 @@ impl SensorModel {
                         ..rows
                     },
                 };
+                slot.columns(&rows, sensor, &mut columns)?;
                 if let Some(secant) = secant {
+                    // Where the smooth motion is not known, the slope has to do.
                     for axis in 0..3 {
-                        columns.set(0, axis, secant.axis(axis).iter().copied());
+                        let known = columns.column(0, axis).iter_mut().zip(secant.axis(axis));
+                        known.filter(|(_, v)| v.is_finite()).for_each(|(own, v)| *own = *v);
                     }
-                } else {
-                    slot.columns(&rows, sensor, &mut columns)?;
                 }
                 // The value of a reference effect is in the ideal readings already.
                 if slot.in_model && !in_reference(stage) {

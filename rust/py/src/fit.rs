@@ -244,8 +244,8 @@ impl PyProfile {
     }
 }
 
-/// Number of a trial, the candidate's parameters, their standard deviations, drop of the sum of squares.
-type BestTrial = (usize, Vec<f64>, Vec<f64>, f64);
+/// Number of a trial, the candidate's parameters, their standard deviations, drop of the sum of squares, that of the mirrored trial, samples.
+type BestTrial = (usize, Vec<f64>, Vec<f64>, f64, f64, f64);
 
 /// Largest size that is worth a trial, from searches of several logs whose first trial is zero; infinite where nothing would change.
 #[pyfunction]
@@ -256,12 +256,22 @@ fn furthest_trial(searches: Vec<PyRef<'_, PyProfile>>) -> f64 {
 }
 
 /// Number of the best trial of searches over several logs for the same trials, the candidate's parameters as a step finds
-/// them, their standard deviation where they are the mean of trials of that size (else zero), and the drop of the sum of squares in units of the noise; None where no sample can be used.
+/// them, their standard deviation where they are the mean of trials of that size (else zero), the drop of the sum of squares in units of the noise, that of a trial of the other sign, and the samples of
+/// the channels that it acts on; None where no sample can be used.
 #[pyfunction]
 fn best_trial(py: Python<'_>, profiles: Vec<PyRef<'_, PyProfile>>) -> PyResult<Option<BestTrial>> {
     let logs: Vec<&Profile> = profiles.iter().map(|p| &p.0).collect();
     let best = compute(py, || profile::best(&logs))?;
-    Ok(best.map(|best| (best.trial, best.parameters, best.spread, best.gain)))
+    Ok(best.map(|best| {
+        (
+            best.trial,
+            best.parameters,
+            best.spread,
+            best.gain,
+            best.mirrored,
+            best.samples,
+        )
+    }))
 }
 
 /// Residual of each of the nine channels over the core rows of a chunk, (rows,), SI units (magnetometer uT), after a

@@ -27,14 +27,14 @@ pub(super) fn trials(facts: &LogFacts, past: f64) -> Vec<f64> {
 /// Finer steps from one trial to the next: 9 % each, so that a secant misses the square of a delay by a tenth at most.
 const FINER: i32 = 4;
 
-/// Trials around the best of a round, up to the next ones of the round before; none after the last round.
+/// Trials around the best of a round, up to the next ones of the round before, and its mirror image: a sensor that knows what comes. None
+/// after the last round.
 pub(super) fn finer(best: f64, round: usize) -> Vec<f64> {
     if round > 0 || best == 0.0 {
         return Vec::new();
     }
-    (1 - FINER..FINER)
-        .map(|k| best * RATIO.powf(f64::from(k) / f64::from(FINER)))
-        .collect()
+    let near = (1 - FINER..FINER).map(|k| best * RATIO.powf(f64::from(k) / f64::from(FINER)));
+    near.chain([-best]).collect()
 }
 
 /// Time constants of a lag that are looked back: the last node of its quadrature.
