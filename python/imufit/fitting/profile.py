@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,10 +12,7 @@ from imufit.fitting.surveyed_log import SurveyedLog
 from imufit.model.catalogue import find_effect
 
 CHANCE = 20.0
-"""Drop of the sum of squares, in units of the noise, below which the best of a grid is not worth a finer one. A
-lateness that changes readings by less than their noise is left to its slope, which has no noise of the reference in
-common with the residual. Noise has no direction of time: what a sensor that knows what comes explains as well is
-noise."""
+"""Drop of the sum of squares, in units of the noise, below which the best of a grid is not worth a finer one."""
 
 
 @dataclass(frozen=True)
@@ -61,47 +58,72 @@ def search(
     dict of str to Found
         By id, for those of the candidates that have a grid.
     """
-    found: dict[str, Found] = {}
     tellers = {
         key: [k for k, each in enumerate(logs) if each.refusal(effect) is None] for key, effect in candidates.items()
     }
     # The longest log limits the longest times.
     guides = {key: logs[max(known, key=lambda k: _duration(logs[k]))].facts for key, known in tellers.items() if known}
-    # An effect that steps move from any trial is tried only as far as it may explain something.
-    moved = {key: [[0.0]] for key in guides if candidates[key].tried_at_full_size and not candidates[key].jumps}
-    moved = {key: zero for key, zero in moved.items() if candidates[key].search(guides[key])}
-    furthest = {
-        key: _imufit.furthest_trial(searches)
-        for key, searches in _filled(logs, fitted, candidates, tellers, moved).items()
-    }
+    at_first = {key: candidates[key].search(guides[key]) for key in guides}
+    sized = {key: grid for key, grid in at_first.items() if grid and _steps_lead_on(candidates[key])}
+    found = _sized(logs, fitted, candidates, tellers, guides, sized)
     finer = 0
-
-    def grids_of(found: Mapping[str, list[float]] | None, keys: Iterable[str]) -> dict[str, list[list[float]]]:
-        every = {
-            key: candidates[key].search(guides[key], *(() if found is None else (found[key], finer))) for key in keys
-        }
-        near = {
-            key: [at for at in grid if key not in furthest or abs(at[0]) <= furthest[key]]
-            for key, grid in every.items()
-        }
-        # A single trial leaves nothing to choose.
-        return {key: grid for key, grid in near.items() if len(grid) > (key in furthest)}
-
-    grids = grids_of(around, guides)
-    finer += around is not None
+    if around is None:
+        grids = {key: grid for key, grid in at_first.items() if grid and key not in sized}
+    else:
+        grids = {key: candidates[key].search(guides[key], around[key], finer) for key in guides if key not in sized}
+        finer += 1
+    grids = {key: grid for key, grid in grids.items() if grid}
     while grids:
         for key, searches in _filled(logs, fitted, candidates, tellers, grids).items():
             best = _imufit.best_trial(searches)
             grid = grids.pop(key)
             if best is not None:
-                number, step, spread, gain, mirrored, samples = best
+                number, step, spread, gain, *_ = best
                 steps = _steps(grid)
                 found[key] = _found(candidates[key], grid[number], step, spread, steps)
                 if gain > CHANCE and not any(s > h for s, h in zip(spread, steps, strict=True)):
-                    grids |= grids_of({key: found[key].trial}, [key])
-                if key in furthest and key not in grids and gain - max(mirrored, 0.0) < samples:
-                    del found[key]
+                    grids[key] = candidates[key].search(guides[key], found[key].trial, finer)
+        grids = {key: grid for key, grid in grids.items() if grid}
         finer += 1
+    return found
+
+
+def _steps_lead_on(effect: _imufit.Effect) -> bool:
+    """Return whether a size is tried only as a place to start from: columns and steps lead on from there."""
+    return effect.tried_at_full_size and not effect.jumps
+
+
+def _sized(
+    logs: Sequence[SurveyedLog],
+    fitted: Sequence[Mapping[str, list[float]]],
+    candidates: Mapping[str, _imufit.Effect],
+    tellers: Mapping[str, list[int]],
+    guides: Mapping[str, _imufit.Facts],
+    grids: Mapping[str, list[list[float]]],
+) -> dict[str, Found]:
+    """Find sizes of effects that change readings by more than their noise; a smaller one is left to its slope.
+
+    A difference of two ideal readings has the noise of the reference in common with the residual, a slope has not.
+    Noise has no direction of time: what a sensor that knows what comes would explain as well is noise.
+    """
+    zero = _filled(logs, fitted, candidates, tellers, {key: [[0.0]] for key in grids})
+    furthest = {key: _imufit.furthest_trial(searches) for key, searches in zero.items()}
+    near = {key: [at for at in grid if abs(at[0]) <= furthest[key]] for key, grid in grids.items()}
+    # A single trial leaves nothing to choose.
+    near = {key: grid for key, grid in near.items() if len(grid) > 1}
+    finer: dict[str, list[list[float]]] = {}
+    for key, searches in _filled(logs, fitted, candidates, tellers, near).items():
+        best = _imufit.best_trial(searches)
+        if best is not None and best[3] > CHANCE:
+            finer[key] = candidates[key].search(guides[key], best[1], 0)
+    found: dict[str, Found] = {}
+    finer = {key: grid for key, grid in finer.items() if grid}
+    for key, searches in _filled(logs, fitted, candidates, tellers, finer).items():
+        best = _imufit.best_trial(searches)
+        if best is not None:
+            _, size, spread, gain, mirrored, samples = best
+            if gain - max(mirrored, 0.0) >= samples:
+                found[key] = Found(size, size, spread)
     return found
 
 
@@ -140,8 +162,6 @@ def _found(
     if effect.jumps:
         # A grid does not resolve more than its own step.
         return Found(step, step, [max(s, h / np.sqrt(12.0)) for s, h in zip(spread, steps, strict=True)])
-    if effect.tried_at_full_size:
-        return Found(step, step, spread)
     start = [
         searched if name in effect.searched else moved
         for (name, _, _), searched, moved in zip(effect.parameters, trial, step, strict=True)
