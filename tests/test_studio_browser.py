@@ -381,8 +381,7 @@ def test_a_session_asks_for_its_log(page, folder, tmp_path):
         '[[steps]]\naction = "add"\neffect = "acc.bias"\nstack = [{ effect = "acc.bias", on = true, held = {} }]\n'
     )
     drop(page, session)
-    marked(page, "wanted").wait_for()
-    assert "lost-session.toml wants lost.parquet" in marked(page, "wanted").inner_text()
+    page.get_by_text("lost-session.toml wants lost.parquet").wait_for()
     page.locator(".q-dialog").wait_for(state="detached")
     (tmp_path / "lost.parquet").write_bytes((folder / "walk.parquet").read_bytes())
     drop(page, tmp_path / "lost.parquet")

@@ -71,7 +71,7 @@ mod tests {
     fn noise(taps: &[f64], n: usize) -> Vec<f64> {
         let mut state = 1_u64;
         let mut white = || {
-            // Sum of twelve uniform numbers (Knuth 1997, 3.4.1); multiplier of his MMIX generator.
+            // The sum of twelve uniform numbers is nearly normal.
             (0..12)
                 .map(|_| {
                     state = state
