@@ -39,9 +39,9 @@ NOT_SIGNIFICANT = "not significant"
 LIKELY = "likely, not established"
 """In words the status of an effect that is not significant, but more probable than not: a name needs better odds."""
 IN_DOUBT = "in doubt"
-"""In words the status of an effect with the odds that a name needs, which its kind of evidence does not earn it: it does
-not lower the held-out error, an unnamed cause explains more in its place, its size changes over the log, or it needs a
-position that is not there."""
+"""In words the status of an effect with the odds that a name needs, which its kind of evidence does not earn it: it
+does not lower the held-out error, an unnamed cause explains more in its place, its size changes over the log, or it
+needs a position that is not there."""
 ENOUGH = 0.881
 """Probability from which on a candidate has the odds that a name needs, e² to one (`Problem.ODDS`)."""
 NEXT = 5

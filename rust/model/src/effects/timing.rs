@@ -38,7 +38,7 @@ pub(super) fn finer(best: f64, round: usize) -> Vec<f64> {
 }
 
 /// Time constants of a lag that are looked back: the last node of its quadrature.
-const LAGS_BACK: f64 = 9.4;
+const LAGS_BACK: f64 = 16.0;
 
 /// What happens to the quantity in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
