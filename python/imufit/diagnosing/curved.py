@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from imufit._imufit import Effect, Problem, Status, Verdict
+from imufit.fitting.profile import steps_lead_on
 from imufit.model.catalogue import each_log_has_its_own, find_effect
 
 if TYPE_CHECKING:
@@ -178,5 +179,4 @@ def _curved(analysis: Analysis, slot: int) -> bool:
 
 def _found_by_search(analysis: Analysis, slot: int) -> bool:
     """Return whether a search alone finds what steps do not lead to."""
-    effect = _effect(analysis, slot)
-    return analysis.slots[slot] in analysis.found and (effect.jumps or bool(effect.searched))
+    return analysis.slots[slot] in analysis.found and not steps_lead_on(_effect(analysis, slot))

@@ -64,7 +64,7 @@ def search(
     # The longest log limits the longest times.
     guides = {key: logs[max(known, key=lambda k: _duration(logs[k]))].facts for key, known in tellers.items() if known}
     at_first = {key: candidates[key].search(guides[key]) for key in guides}
-    sized = {key: grid for key, grid in at_first.items() if grid and _steps_lead_on(candidates[key])}
+    sized = {key: grid for key, grid in at_first.items() if grid and steps_lead_on(candidates[key])}
     found = _sized(logs, fitted, candidates, tellers, guides, sized)
     finer = 0
     if around is None:
@@ -88,8 +88,14 @@ def search(
     return found
 
 
-def _steps_lead_on(effect: _imufit.Effect) -> bool:
-    """Return whether a size is tried only as a place to start from: columns and steps lead on from there."""
+def steps_lead_on(effect: _imufit.Effect) -> bool:
+    """Return whether a size is tried only as a place to start from: columns and steps lead on from there.
+
+    Parameters
+    ----------
+    effect : Effect
+        The effect.
+    """
     return effect.tried_at_full_size and not effect.jumps
 
 

@@ -11,8 +11,7 @@ pub const MAX_ORDER: usize = 12;
 const EXACT: f64 = 1e-13;
 
 /// Fits an autoregressive filter by least squares to `n` samples with their past, from the products of the sample (first) and of those
-/// before it, each with each (the covariance method of Makhoul 1975); the order by
-/// Schwarz's criterion.
+/// before it, each with each (the covariance method of Makhoul 1975); the order by Schwarz's criterion.
 ///
 /// Autocovariances at one lag after the other need not be those of any process where samples are few or very much alike, and their recursion
 /// then ends at an order of one or two. Squares of what is left are never negative.

@@ -229,11 +229,7 @@ fn added_by_the_past(log: &Log, parts: &[Part], sensor: Sensor, seen: &Seen, n: 
             t: log.window.t,
             ideal: &ideal,
             force: &ideal.f,
-            x: match sensor {
-                Sensor::Acc => &ideal.f,
-                Sensor::Gyr => &ideal.omega,
-                Sensor::Mag => &ideal.m,
-            },
+            x: ideal.quantity(sensor),
             temperature: log.temperature.as_deref(),
             vibration: log.vibration.as_deref(),
             covariates: &log.covariates,

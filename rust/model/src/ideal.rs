@@ -277,11 +277,7 @@ impl Ideal {
         let before = |past: f64| {
             let clock = change.clock(facts).before(past);
             let ideal = Self::by_clock(window, facts, change, clock, Motion::Smooth);
-            match sensor {
-                Sensor::Acc => ideal.f,
-                Sensor::Gyr => ideal.omega,
-                Sensor::Mag => ideal.m,
-            }
+            ideal.quantity(sensor).clone()
         };
         if lag == 0.0 {
             return before(delay);

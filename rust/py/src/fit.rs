@@ -256,8 +256,9 @@ fn furthest_trial(searches: Vec<PyRef<'_, PyProfile>>) -> f64 {
 }
 
 /// Number of the best trial of searches over several logs for the same trials, the candidate's parameters as a step finds
-/// them, their standard deviation where they are the mean of trials of that size (else zero), the drop of the sum of squares in units of the noise, that of a trial of the other sign, and the samples of
-/// the channels that it acts on; None where no sample can be used.
+/// them, their standard deviation where they are the mean of trials of that size (else zero), the drop of the sum of
+/// squares in units of the noise, that of a trial of the other sign, and the samples of the channels that it acts on;
+/// None where no sample can be used.
 #[pyfunction]
 fn best_trial(py: Python<'_>, profiles: Vec<PyRef<'_, PyProfile>>) -> PyResult<Option<BestTrial>> {
     let logs: Vec<&Profile> = profiles.iter().map(|p| &p.0).collect();

@@ -8,8 +8,8 @@ use super::reference::wrong;
 use crate::card::{Card, Found, Parameter, Reach, ReferencePart, Stage, parameters};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
-use crate::ideal::{Command, ReferenceChange};
-use crate::rig::{Play, Rig, RigError, Slack};
+use crate::ideal::ReferenceChange;
+use crate::rig::{Play, Rig, RigError};
 use crate::sensor::Sensor;
 
 /// What is wrong with the rig.
@@ -114,14 +114,7 @@ fn travel(rig: &Rig) -> f64 {
 /// Fills the columns of `P` parameters from d delta / dp and d (d delta / dt) / dp of each row.
 fn turned<const P: usize>(rows: &Rows, sensor: Sensor, out: &mut Columns, slopes: impl Iterator<Item = [[f64; 2]; P]>) {
     let ideal = rows.ideal;
-    let (u, x) = (
-        ideal.rig_axis,
-        match sensor {
-            Sensor::Acc => &ideal.f,
-            Sensor::Gyr => &ideal.omega,
-            Sensor::Mag => &ideal.m,
-        },
-    );
+    let (u, x) = (ideal.rig_axis, ideal.quantity(sensor));
     let slopes: Vec<_> = slopes.collect();
     for axis in 0..3 {
         let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -137,17 +130,14 @@ fn turned<const P: usize>(rows: &Rows, sensor: Sensor, out: &mut Columns, slopes
     }
 }
 
-/// Play of a width over the rows: change of error and of its rate per rad of width.
-fn play_columns<'a>(
-    rows: &'a Rows,
-    width: f64,
-    slope: impl Fn(Slack, &Command) -> [f64; 2] + 'a,
-) -> impl Iterator<Item = [[f64; 2]; 1]> + 'a {
+/// Change of the error per rad of the play's width over the rows. The end of a crossing shifts with the width, which no slope can tell: the
+/// rate has none.
+fn play_slopes<'a>(rows: &'a Rows, width: f64) -> impl Iterator<Item = [[f64; 2]; 1]> + 'a {
     let command = &rows.ideal.command;
     let first = command.first().map_or(0.0, |c| c.t);
     let mut play = rows.facts.rig.as_ref().map(|rig| Play::new(rig, width, first));
     command.iter().map(move |c| match play.as_mut() {
-        Some(play) if c.angle.is_finite() => [slope(play.at(c.t, c.angle), c)],
+        Some(play) if c.angle.is_finite() => [[play.at(c.t, c.angle).slope, 0.0]],
         _ => [[f64::NAN; 2]],
     })
 }
@@ -175,11 +165,7 @@ impl Effect for RigEffect {
     fn columns(&self, rows: &Rows, sensor: Sensor, parameters: &[f64], out: &mut Columns) -> Result<(), EffectError> {
         let command = &rows.ideal.command;
         match self.kind {
-            Kind::Backlash => {
-                // The end of a crossing shifts with the width, which no slope can tell: the rate has none.
-                let slopes = play_columns(rows, parameters[0], |slack, _| [slack.slope, 0.0]);
-                turned(rows, sensor, out, slopes);
-            }
+            Kind::Backlash => turned(rows, sensor, out, play_slopes(rows, parameters[0])),
             Kind::Flexure => {
                 let slopes = command.iter().map(|c| {
                     let (sin, cos) = c.angle.sin_cos();
