@@ -44,6 +44,7 @@ def fails(capsys, *arguments, code=2):
         (["compare"], "LOG"),
         (["compare", "nowhere.csv"], "nowhere.csv"),
         (["compare", "LOG", "--jsn", "-"], "--json"),
+        (["compare", "LOG", "--report", "page.html"], "did you mean --html?"),
         (["compare", "LOG", "extra"], "extra"),
         (["compare", "LOG", "--html", "no/such/dir/page.html"], "does not exist"),
         (["compare", "LOG", "--plot", "figure.txt"], ".png"),

@@ -11,9 +11,10 @@ from imufit.figures import quantity
 from imufit.figures.waterfall import waterfall
 from imufit.results import Addition, Parameter, Table
 from imufit.results.diagnosis import ENOUGH
+from imufit.results.noise_part import noise_table
 from imufit.results.parameter import parameter_table
 from imufit.results.sentences import explanation
-from loop_results import G_SENSITIVITY, addition, card, comparison, diagnosis, ladder
+from loop_results import G_SENSITIVITY, addition, card, comparison, diagnosis, ladder, noise
 from matplotlib.figure import Figure
 
 EVERY = [comparison(), diagnosis(), diagnosis("ambiguous"), diagnosis("unknown"), addition(), ladder(), ladder(False)]
@@ -148,6 +149,18 @@ def test_text_table_aligns_and_html_table_escapes():
     table = Table("T", ("name", ">value"), (("a<b", "1"), ("c", "10")))
     assert str(table).splitlines()[-1] == "c        10"
     assert "a&lt;b" in table.html()
+
+
+def test_a_small_fall_of_an_error_has_a_digit_more():
+    assert quantity.change(1.0044, 1.0021) == "1.004 → 1.002"
+    assert quantity.fall(1.0044, 1.0021) == "from 1.004 to 1.002 times the noise floor"
+    assert quantity.change(1.0021, 1.0044) == "rises to 1.004"
+    assert quantity.change(1.00441, 1.00442) == "stays at 1.00"
+
+
+def test_parts_of_the_noise_beside_the_floor_are_shown_as_added():
+    shares = [(row[1], row[3]) for row in noise_table(noise()).rows[:3]]
+    assert shares == [("white", "70 %"), ("reference", "30 %"), ("random walk", "+ 40 %")]
 
 
 def test_card_prints_its_parts_and_equal_typical_sizes_once():

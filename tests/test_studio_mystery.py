@@ -30,7 +30,7 @@ def test_a_large_effect_is_named_by_the_evidence(tmp_path):
     unit = next(unit for key, unit, _ in find_effect(truth).parameters if key == name)
     assert f"{name} = {quantity.quantity(value, unit)}" in right.sentences[1]
     assert "> 99.9 %" in right.sentences[2]
-    assert right.sentences[-1] == f"You could have been sure: {truth} stands out, with a probability of > 99.9 %."
+    assert right.sentences[-1] == f"You could have been sure: {truth} has a probability of > 99.9 %."
     assert right.lesson == LEVELS[1].lesson
     wrong = game.reveal(NOTHING, first)
     assert not wrong.right

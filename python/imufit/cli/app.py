@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import click
 
-from imufit.cli.names import OneOf
+from imufit.cli.names import OneOf, no_such_option
 from imufit.cli.on_demand import Commands
 from imufit.printable import MESSAGE, printable
 from imufit.remedy import Reader, told_to
@@ -128,6 +128,8 @@ def _unusable(error: Exception) -> str | None:
     """Return what is wrong with the input or the arguments; None if the fault is the program's."""
     from imufit.errors import InputError  # noqa: PLC0415
 
+    if isinstance(error, click.NoSuchOption):
+        return no_such_option(error)
     if isinstance(error, click.ClickException):
         return error.format_message()
     if isinstance(error, OSError):

@@ -200,7 +200,11 @@ def json_option(command: Command) -> Command:
 def html_option(command: Command) -> Command:
     """Add --html."""
     return click.option(
-        "--html", "html_file", type=OutputFile(), metavar="FILE", help="Write one HTML page that opens offline."
+        "--html",
+        "html_file",
+        type=OutputFile(),
+        metavar="FILE",
+        help="Write a report, an HTML page that opens offline.",
     )(command)
 
 

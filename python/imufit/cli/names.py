@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -57,6 +58,27 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     if len(names) > 12:
         return f"unknown {kind} {name!r}: `imufit explain` lists all that there are"
     return f"unknown {kind} {name!r}: there is {', '.join(names)}"
+
+
+def no_such_option(error: click.NoSuchOption) -> str:
+    """Say that a command lacks an option, and which one has a name like it or says its word in the help.
+
+    Parameters
+    ----------
+    error : NoSuchOption
+        What the parser says, with the options of a similar name.
+
+    Returns
+    -------
+    str
+        One line, such as that ``--report`` may mean ``--html``, whose help begins with "Write a report".
+    """
+    name = error.option_name.lstrip("-").lower()
+    params = error.ctx.command.params if error.ctx else []
+    helps = {each.opts[0]: each.help or "" for each in params if isinstance(each, click.Option)}
+    said = [option for option, text in helps.items() if name in re.findall(r"\w+", text.lower())]
+    near = said or error.possibilities or []
+    return f"no option {error.option_name}: did you mean {' or '.join(near)}?" if near else error.format_message()
 
 
 def beginning(names: Iterable[str], incomplete: str) -> list[CompletionItem]:

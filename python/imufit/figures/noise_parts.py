@@ -17,9 +17,6 @@ COLOURS: Final = {
 }
 """Colours of the components (Okabe and Ito), those beyond the floor last."""
 
-BEYOND: Final = ("random_walk", "block_scatter")
-"""Components that stand beside the floor: they move the zero from one part of the log to the next."""
-
 LEAST_SHARE: Final = 0.002
 """Share that is a pixel of a bar of 500; smaller parts stand in the table alone."""
 
@@ -37,7 +34,11 @@ class NoisePartLike(Protocol):
 
     @property
     def share(self) -> float:
-        """Part of the floor's variance."""
+        """Its variance over the floor's."""
+
+    @property
+    def beyond(self) -> bool:
+        """Whether it stands beside the floor."""
 
 
 def noise_parts(parts: Sequence[NoisePartLike], ax: place.Place | None = None) -> place.Drawing:
@@ -71,7 +72,7 @@ def noise_parts(parts: Sequence[NoisePartLike], ax: place.Place | None = None) -
             left=[ends[part.channel] for part in chosen],
             height=0.66,
             color=colour,
-            hatch="////" if component in BEYOND else None,
+            hatch="////" if chosen[0].beyond else None,
             edgecolor="#ffffff",
             linewidth=0.6,
             label=component.replace("_", " "),
@@ -82,7 +83,7 @@ def noise_parts(parts: Sequence[NoisePartLike], ax: place.Place | None = None) -
     axes.set_xlim(0.0, 1.05 * max(1.0, *ends.values()))
     axes.set_yticks(range(len(channels)), channels)
     axes.set_ylim(len(channels) - 0.5, -0.5)
-    beyond = any(part.component in BEYOND and part.share >= LEAST_SHARE for part in parts)
+    beyond = any(part.beyond and part.share >= LEAST_SHARE for part in parts)
     between = "\n" if drawing.narrow else " "
     note = f"{between}(hatched: beside the floor)" if beyond else ""
     axes.set_xlabel(f"share of the floor's variance{note}", fontsize=9)
@@ -96,7 +97,7 @@ def _sentence(parts: Sequence[NoisePartLike]) -> str:
     """Name the largest part of the floor over all channels."""
     sums: dict[str, float] = {}
     for part in parts:
-        if part.component not in BEYOND:
+        if not part.beyond:
             sums[part.component] = sums.get(part.component, 0.0) + part.share
     if not sums:
         return "Parts of the noise floor"

@@ -118,8 +118,6 @@ def _claim(panel: PanelLike) -> str:
     """Say what the panel shows."""
     if not np.isfinite(panel.share):
         return f"{panel.channel} against {panel.covariate}"
-    if panel.share < VISIBLE:
-        return f"{panel.covariate} explains no visible part of {panel.channel}"
     return f"{panel.covariate} explains {quantity.share(panel.share)} of {panel.channel}"
 
 

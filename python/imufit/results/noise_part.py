@@ -30,7 +30,7 @@ class NoisePart(Part):
     unit : str
         Of a density, of a walk per root of time, or of the channel.
     share : float
-        Its part of the floor's variance; that of a walk or a scatter of the zero stands over the same variance.
+        Its variance over the floor's. Those of the floor sum to 1; a walk or a scatter of the zero comes on top.
     """
 
     channel: str
@@ -38,6 +38,11 @@ class NoisePart(Part):
     value: float
     unit: str
     share: float
+
+    @property
+    def beyond(self) -> bool:
+        """Whether it moves the zero from one part of the log to the next, and so stands beside the floor."""
+        return self.component in ("random_walk", "block_scatter")
 
     def to_dict(self) -> dict[str, Any]:
         """JSON of one component."""
@@ -55,7 +60,8 @@ def noise_table(parts: Sequence[NoisePart]) -> Table:
 
     def row(part: NoisePart) -> tuple[str, ...]:
         component = part.component.replace("_", " ")
-        return part.channel, component, quantity.quantity(part.value, part.unit), quantity.share(part.share)
+        share = f"{'+ ' if part.beyond else ''}{quantity.share(part.share)}"
+        return part.channel, component, quantity.quantity(part.value, part.unit), share
 
     rows = tuple(row(part) for part in parts)
     return Table("Noise", ("channel", "component", ">size", ">share of the floor"), rows)

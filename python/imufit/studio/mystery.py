@@ -252,9 +252,9 @@ def _sureness(first: Diagnosis) -> str:
     named = first.best_candidate
     best = math.nan if named is None else named.probability
     if first.verdict == "adequate":
-        return "You could not have named an effect: no effect stands out of the noise of this log."
+        return "You could not have named an effect: this log has evidence of none."
     if first.verdict == "missing" and best >= SURE:
-        return f"You could have been sure: {first.best} stands out, with a probability of {quantity.probability(best)}."
+        return f"You could have been sure: {first.best} has a probability of {quantity.probability(best)}."
     if first.verdict == "ambiguous":
         return f"You could not have been sure: {', '.join(first.named)} explain this log equally well."
     return "You could not have been sure: the evidence names no single effect."

@@ -14,6 +14,7 @@ from imufit.results.diagnosis import NOT_SIGNIFICANT, NOT_TESTABLE, SIGNIFICANT
 from imufit.results.parameter import in_lines
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
+from imufit.studio.presses import Presses
 from imufit.studio.view_panels import PanelView
 
 FIRST: Final = 5
@@ -59,6 +60,7 @@ class CandidateView:
         self._desk, self._panels = desk, panels
         self._looked_at = self._pinned = ""
         self._drawn: tuple[object, bool] | None = None
+        self._added = Presses()
         ui.html("Candidates", tag="h2", sanitize=False)
         self._list = ui.column().classes("w-full gap-0")
         self._card = ui.column().classes("w-full gap-1 studio-item studio-card").props("data-mark=card")
@@ -124,8 +126,8 @@ class CandidateView:
 
                 async def add() -> None:
                     session = desk.session
-                    # The second click of a double click finds the effect added.
-                    if session is None or effect in session.stack.model.effects:
+                    # The second click of a double click finds the effect added, or another row beneath the pointer.
+                    if session is None or effect in session.stack.model.effects or not self._added.counts():
                         return
                     self._pin("")
                     off = effect in session.stack.effects

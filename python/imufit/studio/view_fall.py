@@ -8,7 +8,6 @@ from typing import Final
 from nicegui import ui
 
 from imufit.figures import quantity
-from imufit.figures.noise_parts import BEYOND
 from imufit.results.noise_part import NoisePart
 from imufit.studio import charts
 from imufit.studio.desk import Desk
@@ -101,9 +100,9 @@ def _floor_words(session: Session, noise: tuple[NoisePart, ...], chosen: str | N
     parts.sort(key=lambda part: -part.share)
     if not parts:
         return ""
-    names = [(part.component, f"{part.component.replace('_', ' ')} {quantity.share(part.share)}") for part in parts[:4]]
-    floor = ", ".join(words for component, words in names if component not in BEYOND)
-    slow = ", ".join(words for component, words in names if component in BEYOND)
+    names = [(part.beyond, f"{part.component.replace('_', ' ')} {quantity.share(part.share)}") for part in parts[:4]]
+    floor = ", ".join(words for beyond, words in names if not beyond)
+    slow = ", ".join(words for beyond, words in names if beyond)
     beside = f" Slow changes of the zero come on top: {slow} of that variance." if slow else ""
     return f"Noise floor of {channel}: {floor or 'not known'} of its variance.{beside}"
 
