@@ -28,6 +28,9 @@ CLOSER: Final = 0.25
 than 0.7, and a filter leaves rounding."""
 AROUND: Final = 8
 """Readings on either side that a reading is foretold from."""
+POLYNOMIALS: Final = ((1, 1), (2, 3), (4, 4), (8, 6))
+"""Readings on either side, and degree, of polynomials in time that foretell a reading: from a line between its
+neighbours to a smooth curve through all."""
 EVEN: Final = 0.2
 """Part by which a step may differ from the usual one."""
 LEAST_ROWS: Final = 500
@@ -60,7 +63,8 @@ def own_filter_faults(turning: Turning, facts: _imufit.Facts) -> list[DataFault]
     columns = [after - own, *_errors(turning, at, first)]
     left = _left(rate - own, np.stack(columns, axis=-1))
     place = np.cumsum(known) - 1
-    unforeseen = _unforeseen(turning.gyr[known][: place[at[-1]] + 1])[place[at]]
+    rows = np.flatnonzero(known)[: place[at[-1]] + 1]
+    unforeseen = _unforeseen(turning.t[rows], turning.gyr[rows])[place[at]]
     # Only the unpredictable part shows which reference followed it: readings that stand still are followed by every
     # reference.
     telling = unforeseen >= np.nanmedian(unforeseen)
@@ -103,12 +107,30 @@ def _left(wanted: Array, columns: Array) -> Array:
     return np.asarray(left)
 
 
-def _unforeseen(gyr: Array) -> Array:
-    """Length (n,) of what the readings around do not foretell of each reading, rad/s; NaN at the ends."""
+def _unforeseen(t: Array, gyr: Array) -> Array:
+    """Length (n,) of what the readings around do not foretell of each reading, rad/s; NaN at the ends.
+
+    A sensor may sample evenly although its stamps are not even, or unevenly as the stamps say: neighbours foretell a
+    reading by their number and by their times.
+    """
     missed = np.full(gyr.shape, np.nan)
+    beside = np.arange(2 * AROUND + 1) != AROUND
+    away = sliding_window_view(t, 2 * AROUND + 1)
+    away = (away - away[:, [AROUND]]) / np.median(np.diff(t))
+    weights = [_weights(away, reach, degree) for reach, degree in POLYNOMIALS]
     for axis in range(3):
         around = sliding_window_view(gyr[:, axis], 2 * AROUND + 1)
-        others = np.delete(around, AROUND, axis=1)
+        foretold = [np.einsum("ij,ij->i", each, around) for each in weights]
+        others = np.column_stack([around[:, beside], *foretold])
         solved = np.linalg.lstsq(others, around[:, AROUND], rcond=None)[0]
         missed[AROUND:-AROUND, axis] = around[:, AROUND] - others @ solved
     return np.asarray(np.linalg.norm(missed, axis=1))
+
+
+def _weights(away: Array, reach: int, degree: int) -> Array:
+    """Weights (k, w) of neighbours in the value at 0 of a polynomial through those nearest; `away` are their times."""
+    near = [*range(AROUND - reach, AROUND), *range(AROUND + 1, AROUND + reach + 1)]
+    powers = (away[:, near] / reach)[..., None] ** np.arange(degree + 1)
+    weights = np.zeros(away.shape)
+    weights[:, near] = np.linalg.pinv(powers)[:, 0]
+    return weights
