@@ -198,9 +198,10 @@ def _same_column(effect: str, other: str) -> bool:
 
 
 def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] = ()) -> str | None:
-    """Return the effect to add next: the best significant one that nothing else in the catalogue explains as well.
+    """Return the effect to add next: the significant one that lowers the error most.
 
-    Where others do, it is what stands out whichever of them is there; where nothing does, the first of them.
+    Where others explain as much as the best one, what stands out whichever of them is there comes first if it lowers
+    the error more: beside a large effect that is left out, small ones would be found in what is its.
 
     Parameters
     ----------
@@ -214,8 +215,10 @@ def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] 
     if diagnosis.verdict in ("adequate", "unknown") or diagnosis.without:
         return None
     if diagnosis.verdict == "ambiguous":
-        offered = (_beside_the_unsure(fit), diagnosis.best, *diagnosis.ambiguous_with)
-        return next((effect for effect in offered if effect is not None and effect not in futile), None)
+        after = {item.effect: item.held_out_after for item in diagnosis.candidates}
+        first = filter(None, (_beside_the_unsure(fit), diagnosis.best))
+        offered = (*sorted(first, key=lambda effect: after.get(effect, math.inf)), *diagnosis.ambiguous_with)
+        return next((effect for effect in offered if effect not in futile), None)
     significant = (c for c in diagnosis.candidates if c.status == SIGNIFICANT)
     return next((c.effect for c in significant if c.effect not in futile), None)
 

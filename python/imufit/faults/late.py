@@ -9,6 +9,7 @@ another motion.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,7 +20,7 @@ from imufit import _imufit
 from imufit.faults.frames import MISSED, explains
 from imufit.faults.samples import Samples, samples
 from imufit.faults.turning import LEAST_SWING, Turning
-from imufit.joining.likeliest import CommonRates, Likeliest, likeliest
+from imufit.joining.likeliest import SURE, CommonRates, Likeliest, likeliest, placed
 from imufit.joining.refine import Aligned
 from imufit.joining.search import Correlation, comparable
 from imufit.results import fault_words
@@ -68,14 +69,15 @@ def late_faults(turning: Turning, parts: Sequence[Part], facts: _imufit.Facts, p
         return [DataFault(fault, "ref", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
 
     fits = found is not None and explains(found.best.traces.left, left)
-    if found is not None and fits and not found.ambiguous:
-        best = found.best
-        return named("late", fault_words.late(best.aligned.lag, best.traces.correlation, correlation, path))
-    drift = None if fits else likeliest(sensor, body, Correlation(sensor, body, None))
+    drift = found if fits else likeliest(sensor, body, Correlation(sensor, body, None))
     if drift is not None and explains(drift.best.traces.left, left) and not drift.ambiguous:
-        clocks = drift.best.aligned
-        words = fault_words.skew(clocks.lag, clocks.skew, drift.best.traces.correlation, correlation, path)
-        return named("skew", words)
+        clocks, traces = drift.best.aligned, drift.best.traces
+        # One lag, that in the middle, is named where the rates agree as well then.
+        middle = clocks.lag + 0.5 * clocks.skew * float(body.t[-1] - body.t[0])
+        steady = placed(sensor, body, rates, replace(clocks, lag=middle, skew=0.0))
+        if explains(steady.traces.left, left) and drift.best.odds(steady) < SURE:
+            return named("late", fault_words.late(middle, steady.traces.correlation, correlation, path))
+        return named("skew", fault_words.skew(clocks.lag, clocks.skew, traces.correlation, correlation, path))
     if fits or _strange(turning, found, samples(parts, facts)):
         return named("another_motion", fault_words.another_motion(correlation, _lags(found), fits=fits))
     return []

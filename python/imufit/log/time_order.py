@@ -314,7 +314,9 @@ class TimeScan:
         if stamps.size >= COARSE_AT_LEAST and bool(np.all(stamps == stamps.astype(np.float32))):
             digit = float(np.spacing(np.float32(stamp)))
             different = np.unique(stamps)
-            if different.size > 1 and digit > 0.5 * float(np.median(np.diff(different))):
+            # Of rows with one stamp in all, that none is further from the next than a second is the least there is.
+            apart = float(np.median(np.diff(different))) if different.size > 1 else 1.0
+            if digit > 0.5 * apart:
                 problem += (
                     f": t is in single precision (float32), which resolves times of this size only to {digit:g} s"
                 )

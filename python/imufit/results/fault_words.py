@@ -187,7 +187,8 @@ def skew(lag: float, rate: float, correlation: float, declared: float, path: Pat
     """Say that the reference's clock runs at another rate, from a lag on, s, and how well the rates agree then."""
     return (
         f"The clock of the reference runs {100.0 * abs(rate):.3g} % {'fast' if rate > 0.0 else 'slow'} against the "
-        f"sensors' (correlation of the rates {correlation:.2f}, {declared:.2f} as declared).",
+        f"sensors', and begins {abs(lag):.2f} s {'late' if lag > 0.0 else 'early'} (correlation of the rates "
+        f"{correlation:.2f}, {declared:.2f} as declared).",
         "Put the reference on their clock: " + _joined(path, f"{lag:.4f}", rate),
     )
 
