@@ -66,7 +66,7 @@ def no_such_option(error: click.NoSuchOption) -> str:
     Parameters
     ----------
     error : NoSuchOption
-        What the parser says, with the options of a similar name.
+        The parser's error, with the options of a similar name.
 
     Returns
     -------

@@ -200,8 +200,8 @@ def _same_column(effect: str, other: str) -> bool:
 def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] = ()) -> str | None:
     """Return the effect to add next: the significant one that lowers the error most.
 
-    Where others explain as much as the best one, what stands out whichever of them is there comes first if it lowers
-    the error more: beside a large effect that is left out, small ones would be found in what is its.
+    Where others explain as much as the best one, an effect that stands out whichever of them is there comes first if it
+    lowers the error more. A large effect that is left out would be charged to small ones.
 
     Parameters
     ----------

@@ -156,7 +156,8 @@ def promise(effect: str, before: float, after: float) -> str:
         The error without and with it alone, over the noise floor.
     """
     if after < before:
-        if len(set(_apart(before, after))) == 1:
+        first, last = _apart(before, after)
+        if first == last:
             return (
                 f"Adding {effect} should lower the held-out error a little below {ratio(before)} times the noise floor"
             )
