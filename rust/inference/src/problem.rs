@@ -11,6 +11,7 @@ use imufit_fit::normal_equations::NormalEquations;
 use imufit_fit::part::{self, Part};
 use imufit_fit::whitening;
 use imufit_model::card::{Affine, Found, Parameter};
+use imufit_model::effect::Sign;
 use imufit_model::sensor::Sensor;
 use imufit_model::sensor_model::Slot;
 use nalgebra::DVector;
@@ -426,13 +427,20 @@ impl Question {
     }
 }
 
-/// Which of `p` parameters are fixed, and the bounds of the step of each; of an effect that each log has for itself those of all logs.
+/// Which of `p` parameters are fixed, and the bounds of the step of each; of an effect that each log has for itself those of all logs. An
+/// effect of the model keeps to its sign, unless a limit says otherwise.
 fn limited(slots: &[Slot], limits: &[Limited], p: usize) -> (Vec<bool>, Bounds) {
     let mut fixed = vec![false; p];
     let mut bounds = Bounds {
         lower: DVector::from_element(p, f64::NEG_INFINITY),
         upper: DVector::from_element(p, f64::INFINITY),
     };
+    let of_one_sign = |slot: &&Slot| slot.in_model && slot.effect.sign() == Sign::Positive;
+    for slot in slots.iter().filter(of_one_sign) {
+        for (k, value) in slot.parameters.iter().enumerate() {
+            bounds.lower[slot.first + k] = -value;
+        }
+    }
     for (number, parameter, limit) in limits {
         let slot = &slots[*number];
         let count = slot.effect.card().parameters.len();

@@ -163,7 +163,11 @@ impl<'a> Search<'a> {
         let plausible = self.plausible(slot, &parameters);
         Some(Weighed {
             slot,
-            ln_bayes: if testable { ln_bayes } else { 0.0 },
+            ln_bayes: if testable && plausible != Plausible::No {
+                ln_bayes
+            } else {
+                0.0
+            },
             parameters,
             plausible,
             testable,
