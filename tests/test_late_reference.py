@@ -18,7 +18,7 @@ from imufit.log import LogStream, Metadata
 from imufit.results import DataFault
 from join_pairs import repetitive
 from recording import recording
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 EFFECT = {"acc.bias": None}
 
@@ -97,6 +97,36 @@ def test_a_lag_that_the_effect_finds_is_left_to_it(lag: float) -> None:
         assert "ref.delay" in found.sentence
 
 
+def on_another_clock(log: Log, skew: float = 0.0, lag: float = 0.0) -> Log:
+    """Stamp the reference with a clock that is late by a lag, s, and faster than the sensor's by a share `skew`."""
+    assert log.ref_q is not None
+    since = log.t - log.t[0]
+    known = np.isfinite(log.ref_q).all(axis=1)
+    stamps = since[known] * (1.0 + skew) + lag
+    turns = Slerp(stamps, Rotation.from_quat(log.ref_q[known][:, [1, 2, 3, 0]]))
+    q = turns(np.clip(since, stamps[0], stamps[-1])).as_quat()[:, [3, 0, 1, 2]]
+    there = (since >= stamps[0]) & (since <= stamps[-1])
+    return replace(log, ref_q=np.where(there[:, None], q, np.nan), ref_p=None)
+
+
+@pytest.mark.parametrize("scenario", ["turntable", "arm", "handheld"])
+def test_a_clock_that_runs_away_is_named_however_slow_the_motion(scenario: str) -> None:
+    log = on_another_clock(simulate(scenario, EFFECT, seed=4, duration=60.0).to_log(), 0.01)
+    (found,) = named(log)
+    assert (found.fault, found.sensor, found.spoils) == ("skew", "ref", True)
+    assert "fast against the sensors', and begins together with it" in found.evidence
+    words = shlex.split(found.shell_remedy)
+    # Of the reference's clock, in parts per million.
+    assert float(words[words.index("--skew") + 1]) == pytest.approx(1e6 * 0.01 / 1.01, rel=0.01)
+    assert SensorModel().fit(log).diagnose().best is None
+
+
+@pytest.mark.parametrize("skew", [1e-4, -5e-4])
+def test_a_clock_that_the_effect_follows_is_left_to_it(skew: float) -> None:
+    log = on_another_clock(simulate("turntable", EFFECT, seed=5, duration=60.0).to_log(), skew)
+    assert named(log) == ()
+
+
 def test_other_axes_are_not_a_lag() -> None:
     log = simulate("handheld", EFFECT, seed=3, duration=40.0).to_log()
     assert log.gyr is not None
@@ -156,3 +186,11 @@ def test_real_recordings_are_called_late_only_when_they_are_shifted(name: str) -
     # Rows of a receiver that caught up are not evenly spaced: a shift by rows is not everywhere one by that time.
     (moved,) = [each for each in named(shifted(log, 2.0)) if each.fault == "late"]
     assert lag_of(moved) == pytest.approx(2.0, abs=0.2)
+
+
+@pytest.mark.parametrize("lag", [-1.0, 0.5])
+def test_poses_whose_times_scatter_show_their_lag_in_wider_bins(lag: float) -> None:
+    # The arm's own sensors come 0.1 s late.
+    log = imufit.read(recording("robot_arm/MPU6050RM3100_path1_300mms.parquet"))
+    (moved,) = [each for each in named(on_another_clock(log, lag=lag)) if each.fault == "late"]
+    assert lag_of(moved) == pytest.approx(lag - 0.1, abs=0.1)

@@ -1,9 +1,9 @@
 """A reference that turns as the gyroscope does at another time, on another clock, or at no time at all.
 
 A reference that is late, or early, by more than `ref.delay` can follow has the rates of the gyroscope at another time.
-The lag is looked for as `imufit.joining` does between two recordings; here both stand in one log. Where no lag serves
-the whole log, one that grows may: the clocks run at different rates. Where none of them does, the reference is of
-another motion.
+The lag is looked for as `imufit.joining` does between two recordings; here both stand in one log. Where a lag that
+grows leaves less of the rates, beyond chance, the clocks run at different rates. Where no lag serves, the reference is
+of another motion.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from imufit import _imufit
 from imufit.faults.frames import MISSED, explains
 from imufit.faults.samples import Samples, samples
 from imufit.faults.turning import LEAST_SWING, Turning
-from imufit.joining.likeliest import SURE, CommonRates, Likeliest, likeliest, placed
+from imufit.joining.likeliest import SURE, Likeliest, Placed, likeliest_of_all_widths, placed
 from imufit.joining.refine import Aligned
 from imufit.joining.search import Correlation, comparable
+from imufit.model.catalogue import find_effect
 from imufit.results import fault_words
 from imufit.results.data_fault import DataFault
 
@@ -57,30 +58,50 @@ def late_faults(turning: Turning, parts: Sequence[Part], facts: _imufit.Facts, p
     sensor, body = turning.sensor, turning.body
     if not comparable(sensor, body):
         return []
-    rates = Correlation(sensor, body)
-    declared = CommonRates.of(sensor, body, rates, AS_DECLARED)
-    left = _left_by_an_effect(declared)
-    if left <= MISSED:
+    reach = max(size for (size,) in find_effect("ref.delay").search(facts))
+    declared = placed(sensor, body, Correlation(sensor, body), AS_DECLARED)
+    left, lag = _left_by_effects(declared)
+    if left <= MISSED and lag <= reach:
         return []
-    correlation = declared.correlation(np.eye(3))
-    found = likeliest(sensor, body, rates)
-
-    def named(fault: str, words: fault_words.Words) -> list[DataFault]:
-        return [DataFault(fault, "ref", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
-
-    fits = found is not None and explains(found.best.traces.left, left)
-    drift = found if fits else likeliest(sensor, body, Correlation(sensor, body, None))
-    if drift is not None and explains(drift.best.traces.left, left) and not drift.ambiguous:
-        clocks, traces = drift.best.aligned, drift.best.traces
+    found = _likeliest_clock(turning)
+    fits = _explains(turning, found)
+    correlation = declared.traces.correlation
+    fault: str | None = None
+    if found is not None and fits and not found.ambiguous:
+        clocks, traces = found.best.aligned, found.best.traces
+        length = float(body.t[-1] - body.t[0])
         # One lag, that in the middle, is named where the rates agree as well then.
-        middle = clocks.lag + 0.5 * clocks.skew * float(body.t[-1] - body.t[0])
-        steady = placed(sensor, body, rates, replace(clocks, lag=middle, skew=0.0))
-        if explains(steady.traces.left, left) and drift.best.odds(steady) < SURE:
-            return named("late", fault_words.late(middle, steady.traces.correlation, correlation, path))
-        return named("skew", fault_words.skew(clocks.lag, clocks.skew, traces.correlation, correlation, path))
-    if fits or _strange(turning, found, samples(parts, facts)):
-        return named("another_motion", fault_words.another_motion(correlation, _lags(found), fits=fits))
-    return []
+        middle = clocks.lag + 0.5 * clocks.skew * length
+        steady = placed(sensor, body, found.search, replace(clocks, lag=middle, skew=0.0))
+        if left <= MISSED and max(abs(clocks.lag), abs(clocks.lag + clocks.skew * length)) <= reach:
+            pass
+        elif found.best.odds(steady) < SURE:
+            fault, words = "late", fault_words.late(middle, steady.traces.correlation, correlation, path)
+        else:
+            fault = "skew"
+            words = fault_words.skew(clocks.lag, clocks.skew, traces.correlation, correlation, path)
+    elif left > MISSED and (fits or _strange(turning, found, samples(parts, facts))):
+        fault, words = "another_motion", fault_words.another_motion(correlation, _lags(found), fits=fits)
+    if fault is None:
+        return []
+    return [DataFault(fault, "ref", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
+
+
+def _likeliest_clock(turning: Turning) -> Likeliest | None:
+    """Find the likeliest lag, or one that grows where it leaves less of the rates beyond chance, or alone little."""
+    one, growing = (likeliest_of_all_widths(turning.sensor, turning.body, skew) for skew in (0.0, None))
+    if one is None or growing is None or not _explains(turning, growing):
+        return one
+    steady = placed(turning.sensor, turning.body, growing.search, one.best.aligned)
+    return growing if growing.best.odds(steady) >= SURE or not _explains(turning, one) else one
+
+
+def _explains(turning: Turning, found: Likeliest | None) -> bool:
+    """Say whether an alignment leaves little of the rates, and little of what the declared clock leaves of them."""
+    if found is None:
+        return False
+    declared = placed(turning.sensor, turning.body, found.search, AS_DECLARED)
+    return explains(found.best.traces.left, declared.traces.left)
 
 
 def _lags(found: Likeliest | None) -> list[tuple[float, float]]:
@@ -111,17 +132,23 @@ def _agreement(rows: Samples, sensor: str) -> float:
     return float(np.sum(y * x)) / size if size > 0.0 else 0.0
 
 
-def _left_by_an_effect(declared: CommonRates) -> float:
-    """Return the share of the rates (square) that the declared clock leaves if `ref.delay` comes to help.
+def _left_by_effects(declared: Placed) -> tuple[float, float]:
+    """Return what `ref.delay` and `ref.skew` leave of the rates, and the largest lag that they would stand for, s.
 
-    The effect starts from the derivative of the ideal readings. Where this column leaves less than a fifth, the effect
-    finds the lag.
+    The first is a share of the squares. Both effects start from the derivative of the ideal readings. Where these
+    columns leave less than a fifth, and the lag is one that the effects follow, they find it.
     """
-    if not len(declared.measured):
+    common = declared.common
+    if common is None or not len(common.measured):
         # At the declared times the two have no motion in common.
-        return 1.0
-    mount = declared.mount()
-    columns = np.stack([(each @ mount.T).ravel() for each in (declared.expected, declared.change)], axis=1)
-    measured = declared.measured.ravel()
+        return 1.0, 0.0
+    mount = declared.aligned.mount
+    since = (common.since / max(float(common.since.max()), 1e-300))[:, None]
+    shown = (common.expected, common.change, common.change * since)
+    columns = np.stack([(each @ mount.T).ravel() for each in shown], axis=1)
+    measured = common.measured.ravel()
     solved = np.linalg.lstsq(columns, measured, rcond=None)[0]
-    return float(np.sum((measured - columns @ solved) ** 2) / max(float(measured @ measured), 1e-300))
+    left = float(np.sum((measured - columns @ solved) ** 2) / max(float(measured @ measured), 1e-300))
+    # The rates of late stamps are scale * expected(t + lag).
+    lags = np.array([solved[1], solved[1] + solved[2]]) / solved[0] if solved[0] else np.zeros(2)
+    return left, float(np.abs(lags).max())

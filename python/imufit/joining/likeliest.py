@@ -86,16 +86,13 @@ class Likeliest:
         The likeliest one.
     second : Placed or None
         Of the others the one against which the odds are least; None if no other comes near.
-    independent : float
-        Time after which the rates say something new, s.
-    tried : float
-        Number of different alignments that were looked at.
+    search : LagSearch
+        Where it was looked for.
     """
 
     best: Placed
     second: Placed | None
-    independent: float
-    tried: float
+    search: LagSearch
 
     @property
     def rival(self) -> float:
@@ -110,7 +107,7 @@ class Likeliest:
     @property
     def unrelated(self) -> bool:
         """True if one of as many unrelated alignments agrees as well."""
-        return 0.5 * self.best.traces.gain / self.independent < SURE + float(np.log(self.tried))
+        return 0.5 * self.best.traces.gain / self.search.independent < SURE + float(np.log(self.search.tried))
 
 
 def likeliest(
@@ -178,7 +175,7 @@ def likeliest_of(
     if not found:
         return None
     best, *others = sorted(found, key=lambda each: -each.traces.gain)
-    return Likeliest(best, min(others, key=best.odds, default=None), search.independent, search.tried)
+    return Likeliest(best, min(others, key=best.odds, default=None), search)
 
 
 def left_error(left: Array) -> float:
@@ -209,6 +206,8 @@ class CommonRates:
         Of the reference, rad/s, axes of its body.
     change : (k, 3) array
         Time derivative of the latter, rad/s^2.
+    since : (k,) array
+        Middles of these bins after the reference's first sample, s, on its clock.
     middle : (m,) array
         Middle of each of the reference's bins, s, on its clock.
     overlap : float
@@ -218,11 +217,12 @@ class CommonRates:
     measured: Array
     expected: Array
     change: Array
+    since: Array
     middle: Array
     overlap: float
 
     @classmethod
-    def of(cls, sensor: Course, body: Course, rates: Correlation, aligned: Aligned) -> CommonRates:
+    def of(cls, sensor: Course, body: Course, rates: LagSearch, aligned: Aligned) -> CommonRates:
         """Take the means over the same times of both under an alignment."""
         other, step = rates.other, rates.step
         edges = other.start + step * np.arange(len(other.values) + 1, dtype=np.float64)
@@ -235,7 +235,9 @@ class CommonRates:
             measured, expected = (each - each.mean(axis=0) for each in (measured[known], other.values[known]))
         else:
             measured = expected = change = np.zeros((0, 3))
-        return cls(measured, expected, change, 0.5 * (edges[1:] + edges[:-1]), float(known.sum() * step))
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        since = middle[known] - float(body.t[0]) if known.sum() > 2 else np.zeros(0)
+        return cls(measured, expected, change, since, middle, float(known.sum() * step))
 
     def mount(self) -> Array:
         """Turn from the reference body's axes to the sensor's that makes the rates agree best, (3, 3)."""
@@ -253,7 +255,7 @@ class CommonRates:
         return float(np.sum(self.measured * (self.expected @ mount.T)) / size) if size > 0.0 else 0.0
 
 
-def placed(sensor: Course, body: Course, rates: Correlation, aligned: Aligned) -> Placed:
+def placed(sensor: Course, body: Course, rates: LagSearch, aligned: Aligned) -> Placed:
     """Return an alignment with the mount that makes the mean rates agree best, and these rates."""
     own, other, step = rates.own, rates.other, rates.step
     common = CommonRates.of(sensor, body, rates, aligned)

@@ -185,11 +185,12 @@ def late(lag: float, correlation: float, declared: float, path: Path | None) -> 
 
 def skew(lag: float, rate: float, correlation: float, declared: float, path: Path | None) -> Words:
     """Say that the reference's clock runs at another rate, from a lag on, s, and how well the rates agree then."""
+    apart = f"{abs(lag):.2f}"
+    begins = f"{apart} s {'late' if lag > 0.0 else 'early'}" if float(apart) else "together with it"
     return (
         f"The clock of the reference runs {100.0 * abs(rate):.3g} % {'fast' if rate > 0.0 else 'slow'} against the "
-        f"sensors', and begins {abs(lag):.2f} s {'late' if lag > 0.0 else 'early'} (correlation of the rates "
-        f"{correlation:.2f}, {declared:.2f} as declared).",
-        "Put the reference on their clock: " + _joined(path, f"{lag:.4f}", rate),
+        f"sensors', and begins {begins} (correlation of the rates {correlation:.2f}, {declared:.2f} as declared).",
+        "Put the reference on their clock: " + _joined(path, f"{round(lag, 4) + 0.0:.4f}", rate),
     )
 
 
