@@ -364,3 +364,17 @@ def test_effects_of_a_file_go_into_a_pickle_and_to_another_process(tmp_path):
         assert find_effect("gyr.weight")
     finally:
         forget("gyr.weight")
+
+
+@pytest.mark.parametrize("start", [0.0, 0.05])
+def test_a_fit_keeps_an_effect_to_its_sign(user_effect, start: float) -> None:
+    @user_effect("gyr.damped", parameters={"k": "1"}, typical=0.1, sign="positive", explanation="rates are damped")
+    def damped(w, k):
+        return -k * w.x
+
+    log = imufit.simulate("handheld", {"gyr.scale": {"x": 0.03, "y": 0.03, "z": 0.03}}, seed=5).to_log()
+    raised = SensorModel(["gyr.damped"], {"gyr.damped": {"k": start}}).fit(log)
+    assert raised.params["gyr.damped.k"].value == 0.0
+    assert raised.diagnose().best == "gyr.scale"
+    shrunk = replace(log, gyr=0.9 * log.gyr)
+    assert SensorModel(["gyr.damped"]).fit(shrunk).params["gyr.damped.k"].value == pytest.approx(0.073, abs=0.005)

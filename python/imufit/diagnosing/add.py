@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from imufit.errors import InputError
@@ -14,7 +15,9 @@ if TYPE_CHECKING:
     from imufit.model.user_function import Function
 
 
-def add(fit: FittedStack, effect: str | Function, expected: float | None = None) -> Addition:
+def add(
+    fit: FittedStack, effect: str | Function, expected: float | None = None, only: Collection[str] | None = None
+) -> Addition:
     """Add an effect to a fitted model and refit.
 
     Parameters
@@ -25,6 +28,8 @@ def add(fit: FittedStack, effect: str | Function, expected: float | None = None)
         The effect: its id, or the function of one of your own.
     expected : float, optional
         Held-out error expected; asked of the evidence if not given.
+    only : collection of str, optional
+        Effects about which the new fit will be asked; by default all that the log can show.
 
     Raises
     ------
@@ -39,7 +44,7 @@ def add(fit: FittedStack, effect: str | Function, expected: float | None = None)
         reason = analysis.refusal(find_effect(effect_id)) or "it is fitted along already"
         raise InputError(f"effect {effect_id} cannot be added: {reason}", file=fit.logs[0].path)
     expected = expected_error(fit, effect_id) if expected is None else expected
-    better = fit.moved(model)
+    better = fit.moved(model, only)
     return Addition(
         effect=effect_id,
         before=fit.ratio,

@@ -164,7 +164,8 @@ class Climb:
             errors = {effect: other._error_with(effect) for effect in effects}
             effect = min(effects, key=errors.__getitem__)
             effects.remove(effect)
-            other._take(other._add(effect, errors[effect]))
+            # Only the last fit is asked what else is missing.
+            other._take(other._add(effect, errors[effect], effects or None))
         other.diagnosis = other._diagnose()
         return other
 
@@ -174,11 +175,11 @@ class Climb:
         self._progress(0, 1, f"step {len(self.steps) + 1}: effects missing in {on_top}")
         return diagnose(self.fit)
 
-    def _add(self, effect: str, expected: float | None = None) -> Addition:
-        """Add an effect to the model so far."""
+    def _add(self, effect: str, expected: float | None = None, only: Collection[str] | None = None) -> Addition:
+        """Add an effect to the model so far; see :func:`imufit.diagnosing.add.add`."""
         others = sum(item.effect != effect for item in self.diagnosis.candidates)
         self._progress(0, 1, f"step {len(self.steps) + 1}: {effect} against {others} candidates")
-        return add(self.fit, effect, expected)
+        return add(self.fit, effect, expected, only)
 
     def _error_with(self, effect: str) -> float:
         """Held-out error of the model so far with an effect beside it, by its columns."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -80,15 +80,17 @@ class FittedStack(Plotted, Result):
         """
         return cls(*Analysis.of(model, logs_of(log), progress or silent).solved())
 
-    def moved(self, model: EffectStack) -> Self:
+    def moved(self, model: EffectStack, only: Collection[str] | None = None) -> Self:
         """Fit another stack of effects to the same logs, starting from this one's values.
 
         Parameters
         ----------
         model : EffectStack
             The other stack.
+        only : collection of str, optional
+            Effects about which the new fit will be asked; by default all that the logs can show.
         """
-        return type(self)(*self.analysis.solved_for(model, self.own))
+        return type(self)(*self.analysis.solved_for(model, self.own, only=only))
 
     def of_logs(self, chosen: Sequence[int]) -> Self:
         """Fit the same effects to some of the logs alone, from the evidence that there is.

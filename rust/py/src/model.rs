@@ -6,7 +6,7 @@ use imufit_fit::bins::{Bins, CovariateSamples};
 use imufit_model::card::{Affine, Found, Reach, ReferencePart, Scope, Stage};
 use imufit_model::catalogue;
 use imufit_model::contract;
-use imufit_model::effect::Effect;
+use imufit_model::effect::{Effect, Sign};
 use imufit_model::facts::LogFacts;
 use imufit_model::probes::{acts_on, cause};
 use imufit_model::sensor::{AXES, Sensor};
@@ -173,13 +173,14 @@ impl PyEffect {
         self.0.jumps()
     }
 
-    /// True if its reading is not proportional to its parameters, so that the fit has to be repeated around the new
-    /// values.
+    /// True if its reading is not proportional to its parameters, or these keep to a sign, so that the fit has to be
+    /// repeated around the new values.
     #[getter]
     fn nonlinear(&self) -> bool {
         let card = self.0.card();
         let stepped = card.parameters.iter().any(|p| p.found == Found::SearchThenSteps);
-        stepped || matches!(card.stage, Stage::Reference | Stage::Time | Stage::Range)
+        let bounded = self.0.sign() == Sign::Positive;
+        stepped || bounded || matches!(card.stage, Stage::Reference | Stage::Time | Stage::Range)
     }
 
     /// Stage at which it acts: reference, time, input, gain, offset, rounding or range.
