@@ -220,8 +220,8 @@ def next_effect(fit: FittedStack, diagnosis: Diagnosis, futile: Collection[str] 
         first = filter(None, (_beside_the_unsure(fit), diagnosis.best))
         offered = (*sorted(first, key=lambda effect: after.get(effect, math.inf)), *diagnosis.ambiguous_with)
         return next((effect for effect in offered if effect not in futile), None)
-    significant = (c for c in diagnosis.candidates if c.status == SIGNIFICANT)
-    return next((c.effect for c in significant if c.effect not in futile), None)
+    significant = [c for c in diagnosis.candidates if c.status == SIGNIFICANT and c.effect not in futile]
+    return min(significant, key=lambda c: c.held_out_after).effect if significant else None
 
 
 def _beside_the_unsure(fit: FittedStack) -> str | None:
