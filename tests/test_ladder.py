@@ -2,14 +2,16 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from imufit import SensorModel, ladder
-from imufit.diagnosing.ladder import Climb
+from imufit.diagnosing.ladder import Climb, next_effect
 from imufit.diagnosing.revise import revise
 from imufit.lab import simulate
 from imufit.lab.simulate import OBSERVABLE, Noise
+from imufit.results.diagnosis import SIGNIFICANT
 from scipy.spatial.transform import Rotation
 from test_diagnose import static
 
@@ -178,3 +180,14 @@ def test_the_way_is_told_without_what_was_taken_out_again():
     assert [step.effect for step in again.steps] == ["acc.scale"] == list(again.fit.model.effects)
     assert again.steps[0].before == climb.start.ratio
     assert again.diagnosis.best == "gyr.bias"
+
+
+def test_the_effect_that_lowers_the_error_most_comes_first() -> None:
+    def candidate(effect: str, ln_bayes: float, after: float) -> SimpleNamespace:
+        return SimpleNamespace(effect=effect, status=SIGNIFICANT, ln_bayes=ln_bayes, held_out_after=after)
+
+    late, iron = candidate("gyr.delay", 900.0, 33.1), candidate("mag.hard_iron", 470.0, 4.5)
+    found = SimpleNamespace(verdict="missing", without=(), candidates=(late, iron))
+    assert next_effect(None, found) == "mag.hard_iron"
+    assert next_effect(None, found, {"mag.hard_iron"}) == "gyr.delay"
+    assert next_effect(None, found, {"mag.hard_iron", "gyr.delay"}) is None
