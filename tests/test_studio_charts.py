@@ -10,6 +10,8 @@ def test_steps_that_were_undone_stand_in_the_legend():
     undone = charts.fall(names, ratios, expected, 1)
     assert "undone" not in [trace["name"] for trace in there["data"] if "name" in trace]
     assert "undone" in [trace["name"] for trace in undone["data"] if "name" in trace]
+    over = [next(trace["text"] for trace in made["data"] if "text" in trace) for made in (there, undone)]
+    assert over == [["15.8", "15.7", "now<br>15.7"], ["15.8", "now<br>15.7", "15.7"]]
     assert undone["data"][0]["marker"]["opacity"] == [1.0, 1.0, charts.UNDONE]
 
 

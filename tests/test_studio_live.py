@@ -55,17 +55,30 @@ def part_from_the_device(page):
     page.wait_for_function("() => document.body.classList.contains('body--dark')")
 
 
+def the_recording_says_where_it_is(page, path, rows):
+    """The whole path is stated, and the browser can have the file."""
+    assert f"Saved as {path.resolve()}." in page.get_by_test_id("recorded").inner_text()
+    with page.expect_download() as download:
+        page.get_by_test_id("download").click()
+    assert download.value.suggested_filename == path.name
+    assert download.value.path().stat().st_size == path.stat().st_size > rows
+
+
 def test_unusable_port_and_hostile_names_are_text(served):
     folder, address, browser = served
     page = browser.new_page(viewport={"width": 380, "height": 800})
     wrong = problems(page)
     page.goto(f"{address}live")
-    page.get_by_test_id("record").click()
     page.get_by_text("Connect a device first.").wait_for(timeout=PATIENCE)
+    wait_until(page, lambda: page.get_by_test_id("record").is_disabled())
+    assert page.get_by_role("button", name="Calibrate").is_disabled()
+    # An emulated device has no bits per second.
+    assert not page.get_by_label("bits per second").is_visible()
     field = page.get_by_label("device")
     field.click()
     field.fill("/dev/<img src=x onerror=document.title='taken'>")
     field.press("Enter")
+    page.get_by_label("bits per second").wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Connect", exact=True).click()
     page.get_by_text("cannot be opened").or_(page.get_by_text("does not exist")).wait_for(timeout=PATIENCE)
     assert page.title() == "imufit live"
@@ -92,7 +105,9 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     assert words(page, "ytitle") == ["m/s²", "deg/s", "µT", "°C"]
     wait_until(page, lambda: min(page.evaluate(DRAWN)) > 50)
     page.get_by_text("at rest", exact=True).wait_for(timeout=PATIENCE)
-    page.get_by_text("roll", exact=False).first.wait_for(timeout=PATIENCE)
+    angles = page.get_by_text("roll", exact=False).first
+    angles.wait_for(timeout=PATIENCE)
+    assert "(filter " in angles.inner_text()
     assert page.locator(".studio-body canvas").count() == 1
 
     # the red button records a log that imufit reads back; a page that is loaded again finds the recording running
@@ -110,6 +125,7 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     assert log.n > 100
     assert np.linalg.norm(log.acc, axis=1).mean() == pytest.approx(9.8, abs=0.2)
     assert f"{log.n} rows" in page.get_by_test_id("recorded").inner_text()
+    the_recording_says_where_it_is(page, folder / "walk.parquet", log.n)
 
     # the times of the four panels stand over one another
     edges = page.evaluate("[...document.querySelectorAll('.js-plotly-plot')].map(plot => plot._fullLayout._size.l)")

@@ -28,9 +28,12 @@ def test_a_large_effect_is_named_by_the_evidence(tmp_path):
     assert right.sentences[0] == f"Right: {truth} was hidden, and you named {truth}."
     name, value = next(iter(unseal(game.log).effects[truth].items()))
     unit = next(unit for key, unit, _ in find_effect(truth).parameters if key == name)
-    assert f"{name} = {quantity.quantity(value, unit)}" in right.sentences[1]
-    assert "> 99.9 %" in right.sentences[2]
-    assert right.sentences[-1] == f"You could have been sure: {truth} has a probability of > 99.9 %."
+    # One line on the probability, and the hidden values beside those of the evidence until the effect is in the model.
+    assert right.sentences[1:] == (f"You could have been sure: the evidence gives {truth} a probability of > 99.9 %.",)
+    assert (right.values[0].key, right.values[0].hidden) == (f"{truth}.{name}", quantity.quantity(value, unit))
+    assert right.values[0].fitted.endswith("(to first order)")
+    fitted = next(item for item in first.candidates if item.effect == truth).parameters
+    assert [row.fitted for row in game.reveal(truth, first, fitted).values] == [item.shown for item in fitted]
     assert right.lesson == LEVELS[1].lesson
     wrong = game.reveal(NOTHING, first)
     assert not wrong.right
@@ -61,6 +64,7 @@ def test_nothing_may_be_hidden(tmp_path):
     false_alarm = game.reveal("acc.bias", first)
     assert not false_alarm.right
     assert "You could not have named an effect" in false_alarm.sentences[-1]
+    assert false_alarm.values == ()
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

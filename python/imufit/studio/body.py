@@ -33,6 +33,7 @@ LOOKS: Final[Mapping[str, tuple[str, float, bool]]] = {
 """Colour, opacity, and whether only the edges are drawn, by name of an attitude."""
 GROWN: Final = {"measured": 1.0, "predicted": 1.02, "reference": 1.04, "wanted": 1.0}
 """Sizes by name: surfaces of equal attitudes would flicker through one another."""
+TURNS: Final = "Drag to turn, use the wheel to zoom."
 GROUND: Final = 2
 """Half the width of the ground, in its squares."""
 PICTURES: Final = 15.0
@@ -96,6 +97,7 @@ class Body:
                     scene.text(word, "font-weight: 600; opacity: 0.7").move(place[0], place[1], 0.0)
             for name in names:
                 self._bodies[name] = self._body(name)
+        ui.label(TURNS).classes("studio-muted")
         scene.move_camera(x=-3.3, y=-5.6, z=5.05, look_at_x=0.0, look_at_y=0.0, look_at_z=0.6, duration=0.0)
 
     def _body(self, name: str) -> Object3D:

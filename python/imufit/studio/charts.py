@@ -23,8 +23,10 @@ from imufit.results.comparison import Panel
 if TYPE_CHECKING:
     from imufit.figures.allan import ChannelLike
 
-HOVER: Final = "%{xaxis.title.text}: %{x:.5g}<br>%{yaxis.title.text}: %{y:.4g}<extra>%{fullData.name}</extra>"
-"""The place of a point with quantities and units, as the axes name them."""
+HOVER: Final = "%{fullData.name}<br>%{xaxis.title.text}: %{x:.5g}<br>%{yaxis.title.text}: %{y:.4g}<extra></extra>"
+"""Name of the trace, and place of a point with quantities and units, as the axes name them."""
+LABEL: Final[dict[str, Any]] = {"bgcolor": "#333333", "font": {"color": "#ffffff"}, "align": "left"}
+"""Look of the label at a point: white on dark grey, contrast 12.6, whatever the colour of the trace."""
 
 Figure = dict[str, Any]
 Array = NDArray[np.float64]
@@ -33,6 +35,8 @@ HEIGHT: Final = 240
 """Height of a figure, px: two of them and the sentence fit on a laptop's screen."""
 TICK: Final = 24
 """Characters under a bar, as many as most effects' names have: pointing at the bar shows the step in full."""
+NOW: Final = "now"
+"""Mark over the bar of the present step."""
 FALL_HEIGHT: Final = 270
 """Height of the fall of the error, px: the labels under the bars and the legend leave a third of it to the bars."""
 SMALL: Final = 11
@@ -41,8 +45,8 @@ SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
 DECADES: Final = 6
 """Numbers that the logarithmic axis of the fall has room for."""
-ROOM: Final = 1.45
-"""Height of the fall's axis over its highest bar: the bar's number has 13 px over a plot of some 80 px on a phone."""
+ROOM: Final = 1.6
+"""Height of the fall's axis over its highest bar: mark and number of the present bar have 30 px of 80 px on a phone."""
 UNDONE: Final = 0.35
 """Opacity of the bar of a step that was undone: far paler than the others, and still seen."""
 LINE: Final = 1.6
@@ -73,7 +77,7 @@ def _figure(traces: list[dict[str, Any]], x: str, y: str, **more: Any) -> Figure
         "xaxis": {**axis, "title": {"text": x, "standoff": 6}, **more.pop("xaxis", {})},
         "yaxis": {**axis, "title": {"text": y, "standoff": 6}, **more.pop("yaxis", {})},
         "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
-        "hoverlabel": {"namelength": -1},
+        "hoverlabel": LABEL,
         "showlegend": True,
         **more,
     }
@@ -216,9 +220,12 @@ def allan(sensor: str, channels: Sequence[ChannelLike]) -> Figure:
     return _figure(
         drawn,
         "averaging time, s",
-        f"{words(sensor)}, {shown}",
-        xaxis={"type": "log", "dtick": 1, "tickformat": "~g"},
+        f"Allan deviation, {shown}",
+        xaxis={"type": "log", "dtick": "D2", "tickformat": "~g"},
         yaxis=_logarithmic(drawn),
+        title={"text": words(sensor), "x": 0.0, "xanchor": "left", "y": 0.98, "font": {"size": 13}},
+        margin={"l": 56, "r": 12, "t": 26, "b": 44},
+        legend={"orientation": "h", "x": 1.0, "xanchor": "right", "y": 1.0, "yanchor": "bottom"},
     )
 
 
@@ -248,6 +255,7 @@ def fall(
     places = list(range(len(ratios)))
     names = [words(label) for label in labels]
     texts = [quantity.ratio(value) if math.isfinite(value) else "…" for value in ratios]
+    texts[position] = f"{NOW}<br>{texts[position]}"
     colours = [VERMILION if k == 0 else BLUE for k in places]
     bars: list[Figure] = [
         {

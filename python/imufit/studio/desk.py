@@ -115,6 +115,8 @@ class Desk:
         The session that waits for its logs.
     mystery : Mystery or None
         The game, while one is played.
+    replacing : bool
+        Whether another log is being loaded, which takes the place of the one that is shown.
     joined : tuple of str
         How the references of the logs were joined to them.
     channel, covariate : str or None
@@ -148,6 +150,7 @@ class Desk:
         self.kept_session: Path | None = None
         self.wanted: LogsWantedError | None = None
         self.mystery: Mystery | None = None
+        self.replacing = False
         self.joined: tuple[str, ...] = ()
         self.channel: str | None = None
         self.covariate: str | None = None
@@ -203,8 +206,15 @@ class Desk:
         """
         session, game = self.session, self.mystery
         first = None if session is None else session.made(Stack())
-        if game is not None and first is not None and first.diagnosis is not None:
-            game.reveal(answer, first.diagnosis)
+        if session is not None and game is not None and first is not None and first.diagnosis is not None:
+            numbers = session.numbers()
+            game.reveal(answer, first.diagnosis, () if numbers is None else numbers.parameters)
+            self.changed.emit()
+
+    def close_game(self) -> None:
+        """Put the end of the game away; its log stays open."""
+        if self.mystery is not None:
+            self.mystery.closed = True
             self.changed.emit()
 
     @property
@@ -225,9 +235,9 @@ class Desk:
 
     @property
     def unsaved(self) -> bool:
-        """Whether the way to the present model would be lost with its session; that of a game is not kept."""
+        """Whether the way to the present model would be lost with its session."""
         session = self.session
-        return session is not None and self.mystery is None and len(session.steps) > 1 and self.saved() != self._kept
+        return session is not None and len(session.steps) > 1 and self.saved() != self._kept
 
     # --- work
 
@@ -260,6 +270,15 @@ class Desk:
             return await self._in_thread(words, work, file)
         except (_FailedError, _SupersededError):
             return None
+
+    async def _loaded(self, words: str, work: Callable[[], Answer], file: LogFile | None = None) -> Answer | None:
+        """Run work that makes another log: meanwhile the answers on the present one are not shown."""
+        self.replacing = True
+        try:
+            return await self._tried(words, work, file)
+        finally:
+            self.replacing = False
+            self.changed.emit()
 
     async def _in_thread(
         self,
@@ -527,7 +546,7 @@ class Desk:
             return Session([log for log, _ in opened]), tuple(words for _, joined in opened for words in joined)
 
         names = " and ".join(file.name for file in files)
-        return await self._tried(f"opening {names}", work, files[0])
+        return await self._loaded(f"opening {names}", work, files[0])
 
     def _take(
         self, session: Session, files: Sequence[LogFile], joined: tuple[str, ...], mystery: Mystery | None
@@ -614,8 +633,7 @@ class Desk:
         opened = await self._opened(kept.files)
         if opened is not None:
             session, joined = opened
-            # A log of the same name in another folder would be another log.
-            logs = " and ".join(str(file.path) for file in kept.files)
+            logs = " and ".join(file.path.name for file in kept.files)
             joined = (f"The session {path.name} was opened with {logs}.", *joined)
             session.go(kept.steps, kept.position)
             session.second = kept.second
@@ -663,7 +681,7 @@ class Desk:
         seed : int
             Picks the log.
         """
-        game = await self._tried("hiding an effect", lambda: Mystery.hidden(level, seed, self.new_folder()))
+        game = await self._loaded("hiding an effect", lambda: Mystery.hidden(level, seed, self.new_folder()))
         if game is not None:
             await self.open([LogFile(game.log, game.log.name)], game)
 

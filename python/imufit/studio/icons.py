@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 from nicegui import ui
 
 from imufit.studio.attribute import attribute
+
+KEPT: Final = "imufit-colours"
+"""Name under which the browser keeps the choice of light or dark."""
 
 
 def with_words(icon: str, words: str, action: Callable[[], object] | None) -> ui.button:
@@ -41,10 +45,18 @@ def bare(icon: str, words: str, action: Callable[[], object]) -> ui.button:
 
 
 def light_or_dark() -> ui.button:
-    """Return the button that changes between light and dark; before the first press the computer's choice stands."""
+    """Return the button that changes between light and dark on all pages, where the computer chose before."""
     dark = ui.dark_mode(value=None)
 
-    def turn() -> None:
-        dark.value = True if dark.value is None else not dark.value
+    async def turn() -> None:
+        dark.value = not await ui.run_javascript("document.body.classList.contains('body--dark')")
+        ui.run_javascript(f"localStorage.setItem('{KEPT}', '{'dark' if dark.value else 'light'}')")
 
+    async def recall() -> None:
+        kept = await ui.run_javascript(f"localStorage.getItem('{KEPT}')")
+        if kept in ("dark", "light"):
+            dark.value = kept == "dark"
+
+    # The browser keeps the choice, and can be asked once it is connected.
+    ui.timer(0, recall, once=True)
     return with_words("dark_mode", "Light or dark", turn)

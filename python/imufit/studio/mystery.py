@@ -17,7 +17,7 @@ from imufit.lab.simulate.separation import Separation
 from imufit.lab.simulate.study import Study
 from imufit.lab.simulated_log import save_simulation
 from imufit.model.catalogue import units_of
-from imufit.results import Diagnosis
+from imufit.results import Diagnosis, Parameter
 
 if TYPE_CHECKING:
     from imufit.lab.simulate import Simulation, Truth
@@ -96,6 +96,26 @@ _RIVALS: Final = (("tilt", "mag.hard_iron"), ("arm", "gyr.delay"), ("arm", "gyr.
 
 
 @dataclass(frozen=True)
+class Compared:
+    """A hidden value beside the fitted one.
+
+    Attributes
+    ----------
+    key : str
+        The parameter, such as ``acc.bias.x``.
+    hidden : str
+        The hidden value with its unit.
+    fitted : str
+        Value and standard error of the present model. Where the model lacks the effect, they are those that the
+        evidence gives to first order, and say so.
+    """
+
+    key: str
+    hidden: str
+    fitted: str
+
+
+@dataclass(frozen=True)
 class Verdict:
     """The end of a game.
 
@@ -106,7 +126,9 @@ class Verdict:
     truth : tuple of str
         The hidden effects; empty where nothing was hidden.
     sentences : tuple of str
-        Truth, answer, hidden values, evidence, and how sure one could have been.
+        Truth and answer, and how sure the evidence is.
+    values : tuple of Compared
+        The hidden values; empty where nothing was hidden.
     lesson : str
         The sentence on the method.
     """
@@ -114,6 +136,7 @@ class Verdict:
     right: bool
     truth: tuple[str, ...]
     sentences: tuple[str, ...]
+    values: tuple[Compared, ...]
     lesson: str
 
 
@@ -131,6 +154,8 @@ class Mystery:
         Id of the effect that the person chose, or `NOTHING`; None before a choice.
     verdict : Verdict or None
         After the reveal.
+    closed : bool
+        Whether the person has put the verdict away.
     """
 
     level: int
@@ -138,6 +163,7 @@ class Mystery:
     log: Path
     answer: str | None = None
     verdict: Verdict | None = None
+    closed: bool = False
 
     @classmethod
     def hidden(cls, level: int, seed: int, folder: Path) -> Mystery:
@@ -170,7 +196,7 @@ class Mystery:
         save_simulation(simulation, path)
         return cls(level, seed, path)
 
-    def reveal(self, answer: str | None, first: Diagnosis) -> Verdict:
+    def reveal(self, answer: str | None, first: Diagnosis, fitted: Sequence[Parameter] = ()) -> Verdict:
         """Open the truth and judge an answer.
 
         Parameters
@@ -179,6 +205,8 @@ class Mystery:
             Id of an effect; empty answers that nothing is missing, and None where no answer was asked for.
         first : Diagnosis
             The diagnosis of the ideal sensor on this log.
+        fitted : sequence of Parameter
+            Those of the present model.
         """
         truth = unseal(self.log)
         hidden_effects = tuple(truth.effects)
@@ -188,12 +216,8 @@ class Mystery:
         self.verdict = Verdict(
             right,
             hidden_effects,
-            (
-                _said(hidden_effects, answer, right, rival),
-                *_values(truth),
-                _evidence(truth, first),
-                _sureness(first),
-            ),
+            (_said(hidden_effects, answer, right, rival), _sureness(first, _evidence(truth, first))),
+            tuple(_values(truth, first, fitted)),
             _lesson(LEVELS[self.level], hidden_effects),
         )
         return self.verdict
@@ -224,37 +248,45 @@ def _said(truth: Sequence[str], answer: str | None, right: bool, rival: bool) ->
     return f"{mark}: {hid}, and {named}."
 
 
-def _values(truth: Truth) -> list[str]:
-    """Give the values of each hidden effect, to be held beside the fitted ones."""
-    sentences = []
+def _values(truth: Truth, first: Diagnosis, fitted: Sequence[Parameter]) -> list[Compared]:
+    """Give the hidden values beside the fitted ones."""
+    known = {item.key: item.shown for item in fitted}
+    found = []
     for effect, hidden_values in truth.effects.items():
         units = units_of(effect)
-        shown = (f"{name} = {quantity.quantity(value, units[name])}" for name, value in hidden_values.items())
-        sentences.append(f"Hidden in {effect}: {', '.join(shown)}.")
-    return sentences
+        judged = (item for candidate in first.candidates if candidate.effect == effect for item in candidate.parameters)
+        expected = {item.key: f"{item.shown} (to first order)" for item in judged}
+        for name, value in hidden_values.items():
+            key = f"{effect}.{name}"
+            shown = known.get(key, expected.get(key, "not known"))
+            found.append(Compared(key, quantity.quantity(value, units[name]), shown))
+    return found
 
 
 def _evidence(truth: Truth, first: Diagnosis) -> str:
     """Say which probability the evidence gives to the truth."""
     if not truth.effects:
         largest = max((item.probability for item in first.candidates), default=0.0)
-        return f"The evidence gives its likeliest candidate a probability of {quantity.probability(largest)}."
+        return f"the evidence gives its likeliest candidate a probability of {quantity.probability(largest)}"
     effect = next(iter(truth.effects))
     found = next((item for item in first.candidates if item.effect == effect), None)
     if found is None:
-        return f"The log cannot show {effect}: the evidence holds no such candidate."
-    likely = quantity.probability(found.probability)
-    return f"The evidence gives {effect} a probability of {likely}{first.shared(found)}."
+        return f"the evidence holds no candidate {effect}, which this log cannot show"
+    return (
+        f"the evidence gives {effect} a probability of {quantity.probability(found.probability)}{first.shared(found)}"
+    )
 
 
-def _sureness(first: Diagnosis) -> str:
-    """Say how sure one could have been."""
+def _sureness(first: Diagnosis, evidence: str) -> str:
+    """Say how sure one could have been, by the evidence in words."""
     named = first.best_candidate
     best = math.nan if named is None else named.probability
     if first.verdict == "adequate":
-        return "You could not have named an effect: this log has evidence of none."
+        return f"You could not have named an effect: {evidence}."
     if first.verdict == "missing" and best >= SURE:
-        return f"You could have been sure: {first.best} has a probability of {quantity.probability(best)}."
+        return f"You could have been sure: {evidence}."
     if first.verdict == "ambiguous":
-        return f"You could not have been sure: {', '.join(first.named)} explain this log equally well."
-    return "You could not have been sure: the evidence names no single effect."
+        return (
+            f"You could not have been sure, since {', '.join(first.named)} explain this log equally well: {evidence}."
+        )
+    return f"You could not have been sure, since the evidence names no single effect: {evidence}."

@@ -64,7 +64,9 @@ def page_of(desk: Desk) -> Callable[[], None]:
             for view in (head, model, fall, two):
                 view.refresh()
             beside.visible = two.kept
-            main.classes(**({"add": "studio-kept"} if two.kept else {"remove": "studio-kept"}))
+            # Nothing is to be compared while both are the same: a line stands in the place of the table.
+            for name, on in (("studio-kept", two.differs), ("studio-same", two.kept and not two.differs)):
+                main.classes(**({"add": name} if on else {"remove": name}))
 
         def pictures() -> None:
             for view in (top, candidates, panels, vocabulary):

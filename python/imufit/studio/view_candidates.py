@@ -23,6 +23,7 @@ FIRST: Final = 5
 INTO_SIGHT: Final = "document.querySelector('{}').scrollIntoView({{block: 'nearest', behavior: 'smooth'}})"
 """Script that brings an element into sight, where it is not: on a phone the candidates fill the screen."""
 
+SWITCHED_OFF: Final = "switched off in the model"
 TOUCH: Final = "touch"
 """Kind of pointer, in the browser's words, with which nothing can be pointed at: a finger."""
 
@@ -59,7 +60,8 @@ class CandidateView:
     def __init__(self, desk: Desk, panels: PanelView) -> None:
         self._desk, self._panels = desk, panels
         self._looked_at = self._pinned = ""
-        self._drawn: tuple[object, bool] | None = None
+        self._drawn: tuple[object, ...] | None = None
+        self._off: frozenset[str] = frozenset()
         self._added = Presses()
         ui.html("Candidates", tag="h2", sanitize=False)
         self._list = ui.column().classes("w-full gap-0")
@@ -69,7 +71,10 @@ class CandidateView:
     def refresh(self) -> None:
         """Show the candidates on top of the present model."""
         diagnosis = self._desk.diagnosis
-        state = (diagnosis, self._desk.guessing)
+        session = self._desk.session
+        # An effect that is switched off is a candidate again, and the model has it already.
+        self._off = frozenset() if session is None else frozenset(session.stack.effects)
+        state = (diagnosis, self._desk.guessing, self._off)
         if state == self._drawn:
             return
         self._drawn = state
@@ -127,19 +132,21 @@ class CandidateView:
                 async def add() -> None:
                     session = desk.session
                     # The second click of a double click finds the effect added, or another row beneath the pointer.
-                    if session is None or effect in session.stack.model.effects or not self._added.counts():
+                    if session is None or effect in session.stack.effects or not self._added.counts():
                         return
                     self._pin("")
-                    off = effect in session.stack.effects
                     client = ui.context.client
                     client.run_javascript(INTO_SIGHT.format(".studio-fall"))
-                    await desk.attempt(lambda: session.switch(effect, True) if off else session.add(effect))
+                    await desk.attempt(lambda: session.add(effect))
                     # The sentence on top has another height by now, and the effect's card is gone.
                     client.run_javascript(INTO_SIGHT.format(".studio-fall"))
 
-                ui.button("Add", on_click=add).props("dense size=12px" + ("" if named else " outline")).props(
-                    attribute("data-mark", f"add-{effect}")
-                )
+                if effect in self._off:
+                    ui.label(SWITCHED_OFF).classes("studio-muted").props(attribute("data-mark", f"off-{effect}"))
+                else:
+                    ui.button("Add", on_click=add).props("dense size=12px" + ("" if named else " outline")).props(
+                        attribute("data-mark", f"add-{effect}")
+                    )
             if diagnosis is None:
                 return
             likely = f"{quantity.probability(item.probability)} probable{diagnosis.shared(item)}"

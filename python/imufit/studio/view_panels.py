@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -17,6 +18,7 @@ from imufit.results.comparison import Panel
 from imufit.studio import charts
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
+from imufit.studio.icons import bare
 from imufit.studio.session import Session, worst_channel
 from imufit.studio.stack import Stack
 
@@ -28,6 +30,12 @@ FAILS_WHERE: Final = "Where it fails"
 TIME: Final = "t"
 RISES: Final = " If {cause} is missing, the residual follows the dotted line."
 UNDER_WAY: Final = "The fit is under way: spectrum and trace are those of the model before."
+ZOOM_BY_MOUSE: Final = "Drag over a figure to zoom, double-click to see all of it."
+ZOOM_BY_FINGER: Final = "A swipe scrolls the page. These buttons zoom the figure over time:"
+NARROWER: Final = 0.5
+"""Width of the window after a press that zooms in, over that before: four presses show a sixteenth of the log."""
+ONWARD: Final = 0.5
+"""Part of the window's width by which a press moves the window: half of what was seen stays in sight."""
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
 
@@ -63,7 +71,8 @@ class PanelView:
                 self._panel.props("data-mark=panel")
                 self._spectrum = ui.plotly(charts.empty("")).classes("studio-chart").props("data-mark=spectrum")
             with ui.element("div").classes("studio-chart studio-wide"):
-                ui.label("Drag over a figure to zoom, double-click to see all of it.").classes("studio-muted")
+                ui.label(ZOOM_BY_MOUSE).classes("studio-muted studio-mouse").props("data-mark=zoom-mouse")
+                self._zoom_buttons()
                 # The choice stands over the one figure that it changes.
                 self._trace_kind = ui.toggle(
                     {RESIDUAL: "residual", READING: "reading"}, value=RESIDUAL, on_change=self._other_kind
@@ -72,6 +81,20 @@ class PanelView:
         ui.timer(1.0, self._grow)
         self._trace.on("plotly_relayout", self._zoomed, throttle=0.1)
         self._trace.on("plotly_doubleclick", lambda: self._zoom(None))
+
+    def _zoom_buttons(self) -> None:
+        """Offer what a mouse does by dragging: a finger's drag scrolls the page."""
+        with ui.element("div").classes("studio-finger").props("data-mark=zoom-finger"):
+            ui.label(ZOOM_BY_FINGER).classes("studio-muted")
+            with ui.row().classes("gap-1"):
+                for icon, words, width, move in (
+                    ("zoom_in", "Zoom in", NARROWER, 0.0),
+                    ("zoom_out", "Zoom out", 1.0 / NARROWER, 0.0),
+                    ("chevron_left", "Earlier", 1.0, -ONWARD),
+                    ("chevron_right", "Later", 1.0, ONWARD),
+                ):
+                    bare(icon, words, partial(self._to_window, width, move))
+                bare("zoom_out_map", "All of it", partial(self._zoom, None))
 
     # --- choice of channel and covariate
 
@@ -279,7 +302,8 @@ class PanelView:
         )
         level = next(item for item in found.channels if item.channel == channel)
         rises = "" if panel is not None or covariate is None else RISES.format(cause=covariate)
-        self._note.set_text(f"{channel} stands at {quantity.ratio(level.ratio)} times its noise floor.{rises}")
+        beside = _without_effect_on(self._proposed, channel)
+        self._note.set_text(f"{channel} stands at {quantity.ratio(level.ratio)} times its noise floor.{rises}{beside}")
         ui.timer(0, lambda: self._draw_trace(channel), once=True)
 
     async def _draw_cause(self, channel: str, cause: str) -> None:
@@ -337,6 +361,20 @@ class PanelView:
         elif given.get("xaxis.autorange"):
             await self._zoom(None)
 
+    async def _to_window(self, width: float, move: float) -> None:
+        """Show a window of another width or place; one as wide as the log shows all of it."""
+        traces = self._desk.traces
+        if traces is None or (span := traces.span) is None:
+            return
+        begin, end = self._window or span
+        half = 0.5 * width * (end - begin)
+        if 2.0 * half >= span[1] - span[0]:
+            await self._zoom(None)
+            return
+        middle = 0.5 * (begin + end) + move * (end - begin)
+        middle = min(max(middle, span[0] + half), span[1] - half)
+        await self._zoom((middle - half, middle + half))
+
     async def _zoom(self, window: tuple[float, float] | None) -> None:
         if window != self._window:
             self._window = window
@@ -348,6 +386,13 @@ def _with_share(covariate: str, share: float | None) -> str:
     """Return a covariate, with the share of the excess that it explains where that is worth naming."""
     name = printable(covariate, NAME)
     return name if share is None else f"{name} ({quantity.share(share)})"
+
+
+def _without_effect_on(effect: str, channel: str) -> str:
+    """Return the sentence on an effect of another sensor: with it, the channel's residual stays as it is."""
+    if not effect or channel[:3] in find_effect(effect).sensors:
+        return ""
+    return f" {printable(effect, NAME)} does not act on {channel}."
 
 
 def _panel_of(panels: Any, channel: str, covariate: str | None) -> Panel | None:

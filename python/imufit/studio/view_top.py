@@ -9,7 +9,6 @@ from typing import Final
 
 from nicegui import events, ui
 
-from imufit.errors import InputError
 from imufit.figures import quantity
 from imufit.printable import NAME, printable
 from imufit.remedy import Option
@@ -22,7 +21,9 @@ from imufit.studio.icons import light_or_dark, with_words
 from imufit.studio.log_file import LogFile, option_words, remedies
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING, SEEDS
 from imufit.studio.recipe import as_python, as_shell
+from imufit.studio.saving import download_game, download_session, save_first
 from imufit.studio.session_file import LogsWantedError
+from imufit.studio.view_verdict import show_verdict
 
 MOST_BYTES: Final = 4 * 2**30
 """Largest file that the browser may send: 20 million rows of 14 columns take 2.2 GB."""
@@ -58,7 +59,7 @@ class Head:
             ui.label("imufit").classes("studio-title")
             self._logs = ui.label("").classes("studio-log").props("data-mark=logs")
             with_words("folder_open", "Open a log", lambda: _upload(desk)).props("data-mark=open")
-            self._save = with_words("save", "Save the session", self._download).props("data-mark=save")
+            self._save = with_words("save", "Save the session", lambda: download_session(desk)).props("data-mark=save")
             with with_words("content_copy", "Copy the model", None).props("data-mark=copy") as self._copy, ui.menu():
                 ui.menu_item("Copy as Python", lambda: self._show("Python")).props("data-mark=copy-python")
                 ui.menu_item("Copy as shell", lambda: self._show("shell")).props("data-mark=copy-shell")
@@ -66,7 +67,7 @@ class Head:
                 for number, level in LEVELS.items():
                     if number == DEMONSTRATION:
                         continue
-                    ui.menu_item(f"Level {number}: {level.title}", self._asked(number)).props(
+                    ui.menu_item(f"Level {number}: {level.title}", _player(desk, number)).props(
                         attribute("data-mark", f"level-{number}")
                     )
             for path, title in server.other_pages():
@@ -80,48 +81,6 @@ class Head:
         self._logs.set_text(names or "no log")
         for button in (self._save, self._copy):
             button.set_enabled(desk.session is not None and desk.session.begun)
-
-    def _asked(self, level: int) -> Callable[[], object]:
-        """Return what begins a game; a person is asked first where a model is not saved."""
-        desk, play = self._desk, _player(self._desk, level)
-
-        def ask() -> object:
-            if not desk.unsaved:
-                return play()
-            with ui.dialog() as dialog, ui.card():
-                ui.label("The game takes the place of the open session.")
-
-                async def begin() -> None:
-                    dialog.close()
-                    await play()
-
-                with ui.row():
-                    ui.button("Save the session", on_click=self._download).props("outline")
-                    ui.button("Play", on_click=begin).props("data-mark=replace")
-                    ui.button("Cancel", on_click=dialog.close).props("flat")
-            dialog.on("hide", dialog.delete)
-            dialog.open()
-            return None
-
-        return ask
-
-    def _download(self) -> None:
-        try:
-            text = self._desk.save()
-        except InputError as error:
-            ui.notify(str(error))
-            return
-        name = f"{Path(self._desk.files[0].name).stem}-session.toml"
-        ui.download.content(text.encode(), name)
-        log = self._desk.game_log()
-        ui.notify(f"Saved {printable(name, NAME)}" + ("." if log is None else f", and the log {log.name}."))
-        self._download_game()
-
-    def _download_game(self) -> None:
-        """Give the log of a game to the person: session and copied text name it."""
-        log = self._desk.game_log()
-        if log is not None:
-            ui.download.content(log.read_bytes(), log.name)
 
     def _show(self, form: str) -> None:
         """Show the text that makes the present model, and lay a copy in the clipboard."""
@@ -140,7 +99,9 @@ class Head:
             ui.label(text).classes("studio-copy").props("data-mark=copied")
             with ui.row():
                 if desk.game_log() is not None:
-                    ui.button("Save the log", on_click=self._download_game).props("outline").props("data-mark=save-log")
+                    ui.button("Save the log", on_click=lambda: download_game(desk)).props("outline").props(
+                        "data-mark=save-log"
+                    )
                 ui.button("Close", on_click=dialog.close).props("flat")
         dialog.on("hide", dialog.delete)
         dialog.open()
@@ -194,6 +155,8 @@ class Top:
             verdict,
             answer,
             bool(desk.busy) and session is None,
+            desk.replacing,
+            desk.mystery is not None and desk.mystery.closed,
         )
         if state == self._state and self._state:
             return
@@ -208,9 +171,10 @@ class Top:
                 self._session(desk.kept_session)
             if desk.arrivals:
                 self._choice()
-            if desk.mystery is not None:
+            # While another log is loaded, the answers on the present one would pass for answers on it.
+            if desk.mystery is not None and not desk.mystery.closed and not desk.replacing:
                 self._game(diagnosis is not None)
-            if diagnosis is not None and not desk.guessing:
+            if diagnosis is not None and not desk.guessing and not desk.replacing:
                 self._verdict(diagnosis)
             waiting = session is None and not desk.busy
             if (waiting or (session is not None and session.refused)) and not desk.arrivals and desk.wanted is None:
@@ -392,10 +356,10 @@ class Top:
                 why = ui.label("Choose an answer, then reveal the truth.").classes("studio-muted")
                 why.props("data-mark=unanswered").bind_visibility_from(answer, "value", lambda chosen: chosen is None)
             return
-        for sentence in game.verdict.sentences:
-            ui.label(printable(sentence)).classes("studio-sentence").props("data-mark=truth")
-        ui.label(game.verdict.lesson).classes("studio-muted").props("data-mark=lesson")
-        ui.button("Play again", on_click=_player(desk, game.level)).props("outline").props("data-mark=again")
+        show_verdict(game.verdict)
+        with ui.row():
+            ui.button("Play again", on_click=_player(desk, game.level)).props("outline").props("data-mark=again")
+            ui.button("Close", on_click=desk.close_game).props("flat").props("data-mark=game-close")
 
 
 ADDED: Final = "The bars show what the effect took off the error. Reveal the truth, or add another effect."
@@ -420,7 +384,8 @@ def _number_of(desk: Desk, name: str | None) -> int:
 
 
 def _player(desk: Desk, level: int, seed: int | None = None) -> Callable[[], Awaitable[None]]:
-    return lambda: desk.play(level, secrets.randbelow(SEEDS) if seed is None else seed)
+    """Return what begins a game; a person is asked first where a model is not saved."""
+    return save_first(desk, lambda: desk.play(level, secrets.randbelow(SEEDS) if seed is None else seed))
 
 
 def _upload(desk: Desk) -> None:

@@ -30,23 +30,27 @@ class TwoView:
     ----------
     kept : bool
         Whether a model is kept.
+    differs : bool
+        Whether the kept model is another one than the present one, so that there is something to lay out.
     """
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self.kept = False
+        self.kept = self.differs = False
         self._shown: tuple[object, ...] = ()
-        ui.html("Two models", tag="h2", sanitize=False)
+        self._heading = ui.html("Two models", tag="h2", sanitize=False)
         self._two = ui.column().classes("w-full gap-1").props("data-mark=two")
 
     def refresh(self) -> None:
         """Lay out the kept model and the present one beside each other, where one is kept."""
         session = self._desk.session
         if session is None or not session.begun or session.second is None:
-            self.kept, self._shown = False, ()
+            self.kept = self.differs = False
+            self._shown = ()
             self._two.clear()
             return
         self.kept = True
+        self.differs = self._heading.visible = session.second.model != session.stack.model
         second = session.made(session.second)
         present = session.made()
         levels = tuple(made is not None and made.comparison is not None for made in (second, present))
@@ -57,7 +61,7 @@ class TwoView:
         self._shown = state
         self._two.clear()
         with self._two:
-            if session.second.model == session.stack.model:
+            if not self.differs:
                 ui.label("The kept model is the present one. Change the present one to compare.").classes(
                     "studio-muted"
                 )

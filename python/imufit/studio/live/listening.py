@@ -25,7 +25,8 @@ from imufit.devices.record.arrived import Arrived
 from imufit.devices.record.attitude import sensors_in
 from imufit.devices.record.reception import Reception
 from imufit.errors import InputError
-from imufit.log import read
+from imufit.lab.simulate import SCENARIOS, simulate
+from imufit.log import Log, read
 from imufit.log.columns import GROUPS, SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.results import Recording
@@ -35,6 +36,8 @@ Array = NDArray[np.float64]
 
 EVERY: Final = 0.1
 """Time from one state to the next, s."""
+RATE: Final = 100.0
+"""Rows a second of an emulated device that names none, as of `imufit emulate`."""
 RESTS: Final = 100
 """Rests that are remembered: an hour of them on a screen of a minute."""
 
@@ -141,6 +144,8 @@ class Listening:
         Where the calibration stands; None while none is guided.
     calibrated : tuple of str
         Sentences of the last calibration, or its problem.
+    model : Path or None
+        File of the model of the last calibration; None where none was saved.
     """
 
     def __init__(self, source: Source) -> None:
@@ -153,6 +158,7 @@ class Listening:
         self.problem = ""
         self.stage: Stage | None = None
         self.calibrated: tuple[str, ...] = ()
+        self.model: Path | None = None
         self._judge = _imufit.PoseJudge()
         self._over = threading.Event()
         self._emulator: Emulator | None = None
@@ -216,7 +222,7 @@ class Listening:
         if not port:
             # A socket on this computer: the device begins when it is listened to, on every operating system.
             self._emulator = Emulator(
-                source.scenario, on="socket://127.0.0.1:0", loop=True, speed=source.speed, rate=source.rate
+                emulated(source), on="socket://127.0.0.1:0", loop=True, speed=source.speed, rate=source.rate
             ).__enter__()
             port = self._emulator.port
         monitor = Monitor(
@@ -346,7 +352,7 @@ class Listening:
             Log to write; it must not exist.
         """
         columns = () if self.rolling is None else self.rolling.columns
-        self.calibrated = ()
+        self.calibrated, self.model = (), None
         self._wizard = Wizard(sensors_in(columns) or ("acc", "gyr", "mag"))
         self.stage = self._wizard.stage
         self.record(path)
@@ -359,8 +365,24 @@ class Listening:
         except InputError as error:
             self.calibrated = (str(error),)
         else:
-            self.calibrated = (*in_sentences(result), f"Saved as {model.name}.")
+            self.model = model.resolve()
+            self.calibrated = (*in_sentences(result), f"Saved as {self.model}.")
         self._wizard = self.stage = None
+
+
+def emulated(source: Source) -> Log | str:
+    """Return what an emulated device measures: the scenario in the frame of the page, so that it lies level there.
+
+    Parameters
+    ----------
+    source : Source
+        The device. An unknown scenario is returned as it is: the emulator refuses it in words.
+    """
+    if source.scenario not in SCENARIOS:
+        return source.scenario
+    made = simulate(source.scenario, rate=source.rate or RATE, frame=source.frame)
+    # A log is named after its file, and the device after the log.
+    return made.to_log().with_fields(path=Path(source.scenario))
 
 
 def in_sentences(result: Calibration) -> tuple[str, ...]:

@@ -35,8 +35,14 @@ EMULATED: Final = "emulate "
 RECORDS: Final = "The red button records what comes from now on."
 FIRST_CONNECT: Final = "Connect a device first."
 GUIDES: Final = "Six sides on a table, then free rotation."
-FRAMES: Final = {"NED": "NED: lies z down", "NWU": "NWU: lies z up", "ENU": "ENU: lies z up, yaw from east"}
+FRAMES: Final = {
+    "NED": "level when its z axis points down (frame NED)",
+    "NWU": "level when its z axis points up (frame NWU)",
+    "ENU": "level when its z axis points up, yaw from east (frame ENU)",
+}
 """Frames by name, with the way a level device lies."""
+LIES: Final[Frame] = "NWU"
+"""Frame that is offered first: most boards lie with their z axis up, and so does the emulated device offered first."""
 
 
 FIRST: Final = "six_sides"
@@ -159,11 +165,13 @@ class _LivePage:
                     .style("min-width: 13rem")
                     .props('data-testid="device"')
                 )
-                self._frame = ui.select(FRAMES, value="NED", label="frame").style("min-width: 11rem")
+                self._frame = ui.select(FRAMES, value=LIES, label="frame").style("min-width: 13rem; flex: 1 1 20rem")
                 self._baud = ui.number("bits per second", value=115200, min=300, format="%d").style("width: 8rem")
                 self._connect = ui.button("Connect", on_click=self._connect_or_not).props("unelevated")
-            with ui.expansion("Text without a header").props("dense").classes("w-full text-sm"):
+            with ui.expansion("Text without a header").props("dense").classes("w-full text-sm") as self._plain:
                 self._header = ui.input("names of the columns", placeholder="t_ms,acc_x,acc_y,acc_z").classes("w-full")
+                # Without this the placeholder is hidden by the field's own name.
+                self._header.props("stack-label")
             self._problem = ui.label().classes("text-negative text-sm")
 
     def _status(self) -> None:
@@ -191,10 +199,15 @@ class _LivePage:
                 self._red.props('round color=red-8 aria-label="record" title="record" data-testid="record"')
                 self._file = ui.input("log to record", value=str(free_name(Path.cwd(), "recording").name))
                 self._file.classes("grow").props('data-testid="file"')
-            self._recorded = ui.label(RECORDS).classes("text-sm")
+            self._recorded = ui.label(FIRST_CONNECT).classes("text-sm").style("overflow-wrap: anywhere")
             self._recorded.props('data-testid="recorded"')
-            self._look = ui.button("Open in the studio", on_click=self._look_at).props("outline size=12px")
-            self._look.props('data-testid="look"').visible = False
+            with ui.row().classes("gap-2") as self._made:
+                self._look = ui.button("Open in the studio", on_click=self._look_at).props("outline size=12px")
+                self._look.props('data-testid="look"')
+                ui.button("Download", icon="download", on_click=self._download).props("outline size=12px").props(
+                    'data-testid="download"'
+                )
+            self._made.visible = False
 
     def _guide(self) -> None:
         with ui.column().classes("studio-region gap-2"):
@@ -237,7 +250,6 @@ class _LivePage:
         try:
             await _device.connect(self._source())
             self._problem.text = ""
-            self._recorded.text = RECORDS
             if not self._plots:
                 self._ask_for_rows("The readings stand here once the device sends some.")
         except InputError as error:
@@ -266,8 +278,8 @@ class _LivePage:
     def _record_or_stop(self) -> None:
         listening = _device.listening
         if listening is None:
-            ui.notify(FIRST_CONNECT)
-        elif _device.recorded.running:
+            return
+        if _device.recorded.running:
             listening.stop()
         else:
             listening.record(self._path("recording"))
@@ -280,6 +292,11 @@ class _LivePage:
         ui.navigate.to("./")
         await self._opener(path)
 
+    def _download(self) -> None:
+        path = _device.recorded.path
+        if path is not None:
+            ui.download.file(path)
+
     def _path(self, stem: str) -> Path:
         """Return the log to record: the one named, in the folder that the studio was started in, or a free name."""
         named = str(self._file.value or "").strip()
@@ -288,8 +305,8 @@ class _LivePage:
     def _calibrate_or_stop(self) -> None:
         listening = _device.listening
         if listening is None:
-            ui.notify(FIRST_CONNECT)
-        elif listening.stage is not None:
+            return
+        if listening.stage is not None:
             listening.stop()
         else:
             listening.guide(free_name(Path.cwd(), "calibration"))
@@ -304,6 +321,10 @@ class _LivePage:
         self._connect.text = "Connect" if listening is None else "Disconnect"
         for element in (self._choice, self._frame, self._baud, self._header):
             element.set_enabled(listening is None)
+        # An emulated device has neither a serial line nor lines of text.
+        self._baud.visible = self._plain.visible = not str(self._choice.value or "").startswith(EMULATED)
+        # A recording whose log is being written has its device no more.
+        self._red.set_enabled(listening is not None)
         state = None if listening is None else listening.state
         # The last numbers stay beside the last readings.
         if listening is not None or not self._plots:
@@ -340,7 +361,9 @@ class _LivePage:
         name, q = _attitude(state.angles)
         if self._body is not None:
             self._body.show("measured", q, listening.source.frame)
-        self._angles.text = f"{angles_in_words(q)} ({name})" if q is not None else "The attitude is not known yet."
+        self._angles.text = (
+            f"{angles_in_words(q)} (filter {name})" if q is not None else "The attitude is not known yet."
+        )
 
     def _make_panels(self, columns: tuple[str, ...]) -> None:
         """Make the panels and the body of the device's columns."""
@@ -360,28 +383,32 @@ class _LivePage:
         word = "stop" if recorded.running else "record"
         self._red.props(f'aria-label="{word}" title="{word}"')
         self._file.set_enabled(not recorded.running)
+        self._made.visible = recorded.made
         if recorded.path is None:
+            self._recorded.text = FIRST_CONNECT if _device.listening is None else RECORDS
             return
         name = printable(recorded.path.name)
-        self._look.visible = recorded.made
         if recorded.running:
             self._file.value = recorded.path.name
             said = recorded.message or "recording"
             self._recorded.text = f"{said} {name}: {recorded.rows} rows, {recorded.seconds:.0f} s"
-        elif self._recorded.text != f"{name}: {recorded.message}":
-            self._recorded.text = f"{name}: {recorded.message}"
+            return
+        saved = f" Saved as {printable(str(recorded.path.resolve()))}." if recorded.made else ""
+        said = f"{name}: {recorded.message}.{saved}" if saved else f"{name}: {recorded.message}"
+        if self._recorded.text != said:
+            self._recorded.text = said
             self._file.value = free_name(Path.cwd(), "recording").name
 
     def _show_guide(self, listening: Listening | None) -> None:
         stage = None if listening is None else listening.stage
         self._start.text = "Calibrate" if stage is None else "Stop"
         # The guide records, too: one recording at a time.
-        self._start.set_enabled(stage is not None or listening is None or not listening.recorded.running)
+        self._start.set_enabled(stage is not None or (listening is not None and not listening.recorded.running))
         self._progress.visible = self._sides.visible = stage is not None
         if stage is None:
             self._draw_side(None)
             if listening is not None and listening.calibrated:
-                self._show_result(listening.calibrated)
+                self._show_result(listening.calibrated, listening.model)
             else:
                 self._message.text = GUIDES
             return
@@ -408,7 +435,7 @@ class _LivePage:
                 self._wanted = Body(("wanted",), compass=False)
         self._wanted.turn("wanted", side_rotation(side))
 
-    def _show_result(self, sentences: tuple[str, ...]) -> None:
+    def _show_result(self, sentences: tuple[str, ...], model: Path | None) -> None:
         shown = tuple(child.text for child in self._result.default_slot.children if isinstance(child, ui.label))
         said = tuple(printable(sentence) for sentence in sentences)
         self._message.text = "The calibration has ended."
@@ -416,7 +443,11 @@ class _LivePage:
             self._result.clear()
             with self._result:
                 for sentence in said:
-                    ui.label(sentence).classes("text-sm")
+                    ui.label(sentence).classes("text-sm").style("overflow-wrap: anywhere")
+                if model is not None:
+                    ui.button("Download", icon="download", on_click=lambda: ui.download.file(model)).props(
+                        'outline size=12px data-testid="download-model"'
+                    )
 
 
 def _attitude(angles: dict[str, Array]) -> tuple[str, Array | None]:

@@ -11,7 +11,7 @@ from imufit.figures import quantity
 from imufit.figures.style import AXES, GREY
 from imufit.log.columns import GROUPS, SENSOR_NAMES, SENSORS, UNITS
 from imufit.printable import NAME, printable
-from imufit.studio.charts import words
+from imufit.studio.charts import LABEL, words
 from imufit.studio.live.listening import Rest
 from imufit.studio.live.rolling import Rolling
 
@@ -78,7 +78,7 @@ def panel(rolling: Rolling, title: str, names: Sequence[str], seconds: float, re
                 "y": np.round(factor * values, DIGITS).tolist(),
                 "name": axis or words(name),
                 "line": {"color": AXES.get(axis, GREY), "width": 1.4},
-                "hovertemplate": f"%{{y:.4g}} {shown}<extra>%{{fullData.name}}</extra>",
+                "hovertemplate": f"%{{fullData.name}}: %{{y:.4g}} {shown}<extra></extra>",
             }
         )
     shapes = [
@@ -108,6 +108,7 @@ def panel(rolling: Rolling, title: str, names: Sequence[str], seconds: float, re
         "yaxis": {**axis_look, "title": {"text": shown or "value", "standoff": 4}, "nticks": 5},
         "title": {"text": words(title), "x": 0.0, "xanchor": "left", "y": 0.98, "font": {"size": 13}},
         "legend": {"orientation": "h", "x": 1.0, "xanchor": "right", "y": 1.0, "yanchor": "bottom"},
+        "hoverlabel": LABEL,
         "showlegend": len(names) > 1,
         "shapes": shapes,
         "uirevision": "live",
