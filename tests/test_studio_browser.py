@@ -640,6 +640,33 @@ TARGETS = """() => [...document.querySelectorAll(
 """Whatever is tapped and is smaller than the 44 px of the accessibility guidelines."""
 
 
+def a_swipe_scrolls_and_buttons_zoom(context, page):
+    """A finger that moves over the trace scrolls the page and leaves the window as it is."""
+    spans = "() => document.querySelector('[data-mark=trace]')._fullLayout.xaxis.range.map(Number)"
+    marked(page, "trace").scroll_into_view_if_needed()
+    page.wait_for_timeout(800)  # the page may still be on its way to the bars
+    before, place = page.evaluate(spans), page.evaluate("scrollY")
+    box = marked(page, "trace").bounding_box()
+    finger = context.new_cdp_session(page)
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.4 * box["height"]
+    finger.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
+    for k in range(11):
+        finger.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [{"x": x, "y": y - 20 * k}]})
+        page.wait_for_timeout(30)
+    finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    page.wait_for_function("place => Math.abs(scrollY - place) > 50", arg=place)
+    assert page.evaluate(spans) == before
+    assert not marked(page, "zoom-mouse").is_visible()
+    marked(page, "zoom-finger").get_by_label("Zoom in").tap()
+    middle, half = 0.5 * sum(before), 0.25 * (before[1] - before[0])
+    page.wait_for_function(
+        f"([a, b]) => {{ const [c, d] = ({spans})(); return Math.abs(a - c) + Math.abs(b - d) < 1e-6 * (b - a); }}",
+        arg=[middle - half, middle + half],
+    )
+    marked(page, "zoom-finger").get_by_label("All of it").tap()
+    page.wait_for_function(f"([a, b]) => Math.abs(({spans})()[0] - a) < 1e-6 * (b - a)", arg=before)
+
+
 def test_a_finger_finds_everything_that_is_tapped(chromium, address, folder):
     context = chromium.new_context(viewport={"width": 380, "height": 800}, has_touch=True, is_mobile=True)
     page = context.new_page()
@@ -655,6 +682,7 @@ def test_a_finger_finds_everything_that_is_tapped(chromium, address, folder):
     places = page.locator(".studio-head button").evaluate_all("(all) => all.map((item) => item.offsetTop)")
     assert len(places) > 3
     assert len(set(places)) == 1
+    a_swipe_scrolls_and_buttons_zoom(context, page)
     page.goto(f"{address}live")
     page.get_by_role("button", name="Calibrate").wait_for()
     assert page.evaluate(TARGETS) == []

@@ -15,8 +15,9 @@ CHANCE = 20.0
 """Drop of the sum of squares, in units of the noise, below which the best of a grid is not worth a finer one."""
 
 COARSE = 0.5
-"""Share of what a size explains that its nearest trial explains at least: trials are 41 % apart, so that the nearest is
-off by 19 % at most, and at two radians of the motion in that time it leaves a seventh (4 % where the motion is slow)."""
+"""Share of what a size explains that its nearest trial explains at least. Trials are 41 % apart, so that the nearest
+one is off by 19 % at most. It leaves 4 % of what slow motion makes, and a seventh where the body turns by two radians
+in that time."""
 
 
 @dataclass(frozen=True)
