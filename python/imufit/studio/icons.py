@@ -49,7 +49,7 @@ def light_or_dark() -> ui.button:
     dark = ui.dark_mode(value=None)
 
     async def turn() -> None:
-        dark.value = not await ui.run_javascript("document.body.classList.contains('body--dark')")
+        dark.value = not await ui.run_javascript("Quasar.Dark.isActive")
         ui.run_javascript(f"localStorage.setItem('{KEPT}', '{'dark' if dark.value else 'light'}')")
 
     async def recall() -> None:
