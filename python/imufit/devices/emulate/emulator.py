@@ -25,6 +25,7 @@ from imufit.devices.emulate.source import Effects, Source, open_source
 from imufit.devices.emulate.transmission import DRAINED, Parts, Transmission
 from imufit.errors import InputError
 from imufit.log import Log
+from imufit.log.metadata import Frame
 from imufit.remedy import keyword, option
 
 PROBE = 5.0
@@ -68,6 +69,8 @@ class Emulator:
         Effects of a scenario's sensor, as for `imufit.lab.simulate.simulate`.
     seed : int
         Of a scenario, the jitter, and all chance.
+    frame : {"NED", "ENU", "NWU"}
+        In which a scenario is simulated, so that its device lies level there.
     start : int
         Number of the device's first start, 0 to 255.
     wait : bool, optional
@@ -107,6 +110,7 @@ class Emulator:
         fault_rates: Mapping[str, float] | None = None,
         effects: Effects | None = None,
         seed: int = 0,
+        frame: Frame = "NED",
         start: int = 1,
         wait: bool | None = None,
         sent: Path | bool = False,
@@ -123,7 +127,9 @@ class Emulator:
         if duration is not None and not duration > 0.0:
             raise InputError(f"the duration is {duration} s", remedy="Give a number above 0.")
         ticks = clock or Clock()
-        opened_at = partial(open_source, source, device=device, effects=effects, seed=seed, mapping=tuple(mapping))
+        opened_at = partial(
+            open_source, source, device=device, effects=effects, seed=seed, frame=frame, mapping=tuple(mapping)
+        )
         # Capacity of the line in a second of the device.
         carried = None if baud is None else int(baud / (hurry if np.isfinite(hurry) else 1.0))
         if carried is not None and (rate == "max" or np.isfinite(hurry)):

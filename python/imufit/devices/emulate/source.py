@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from imufit.errors import InputError
 from imufit.lab.simulate import SCENARIOS, Noise, simulate
 from imufit.log import Log, parse_mapping, read
+from imufit.log.metadata import Frame
 from imufit.remedy import keyword
 
 Array = NDArray[np.float64]
@@ -142,6 +143,7 @@ def open_source(
     device: str = "floats",
     effects: Effects | None = None,
     seed: int = 0,
+    frame: Frame = "NED",
     mapping: Iterable[str] = (),
 ) -> Source:
     """Return the readings of a scenario, simulated, or of a log.
@@ -160,6 +162,8 @@ def open_source(
         Effects of the scenario's sensor, as for `imufit.lab.simulate.simulate`.
     seed : int
         Of a scenario's motion and noise.
+    frame : {"NED", "ENU", "NWU"}
+        In which a scenario is simulated, so that its device lies level there.
     mapping : iterable of str
         Columns and units of a file, such as ``acc_x=AccX[g]``.
 
@@ -176,6 +180,7 @@ def open_source(
                 seed,
                 min(duration or LENGTH, LENGTH),
                 rate or 100.0,
+                frame=frame,
                 noise=_noise(device, source),
             )
         except ValueError as error:

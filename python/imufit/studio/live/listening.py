@@ -25,8 +25,7 @@ from imufit.devices.record.arrived import Arrived
 from imufit.devices.record.attitude import sensors_in
 from imufit.devices.record.reception import Reception
 from imufit.errors import InputError
-from imufit.lab.simulate import SCENARIOS, simulate
-from imufit.log import Log, read
+from imufit.log import read
 from imufit.log.columns import GROUPS, SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.results import Recording
@@ -36,8 +35,6 @@ Array = NDArray[np.float64]
 
 EVERY: Final = 0.1
 """Time from one state to the next, s."""
-RATE: Final = 100.0
-"""Rows a second of an emulated device that names none, as of `imufit emulate`."""
 RESTS: Final = 100
 """Rests that are remembered: an hour of them on a screen of a minute."""
 
@@ -222,7 +219,12 @@ class Listening:
         if not port:
             # A socket on this computer: the device begins when it is listened to, on every operating system.
             self._emulator = Emulator(
-                emulated(source), on="socket://127.0.0.1:0", loop=True, speed=source.speed, rate=source.rate
+                source.scenario,
+                on="socket://127.0.0.1:0",
+                loop=True,
+                speed=source.speed,
+                rate=source.rate,
+                frame=source.frame,
             ).__enter__()
             port = self._emulator.port
         monitor = Monitor(
@@ -368,21 +370,6 @@ class Listening:
             self.model = model.resolve()
             self.calibrated = (*in_sentences(result), f"Saved as {self.model}.")
         self._wizard = self.stage = None
-
-
-def emulated(source: Source) -> Log | str:
-    """Return what an emulated device measures: the scenario in the frame of the page, so that it lies level there.
-
-    Parameters
-    ----------
-    source : Source
-        The device. An unknown scenario is returned as it is: the emulator refuses it in words.
-    """
-    if source.scenario not in SCENARIOS:
-        return source.scenario
-    made = simulate(source.scenario, rate=source.rate or RATE, frame=source.frame)
-    # A log is named after its file, and the device after the log.
-    return made.to_log().with_fields(path=Path(source.scenario))
 
 
 def in_sentences(result: Calibration) -> tuple[str, ...]:
