@@ -20,7 +20,7 @@ from imufit import _imufit
 from imufit.faults.frames import MISSED, explains
 from imufit.faults.samples import Samples, samples
 from imufit.faults.turning import LEAST_SWING, Turning
-from imufit.joining.likeliest import SURE, Likeliest, Placed, likeliest_of_all_widths, placed
+from imufit.joining.likeliest import SURE, CommonRates, Likeliest, likeliest_of_all_widths, placed
 from imufit.joining.refine import Aligned
 from imufit.joining.search import Correlation, comparable
 from imufit.model.catalogue import find_effect
@@ -59,32 +59,37 @@ def late_faults(turning: Turning, parts: Sequence[Part], facts: _imufit.Facts, p
     if not comparable(sensor, body):
         return []
     reach = max(size for (size,) in find_effect("ref.delay").search(facts))
-    declared = placed(sensor, body, Correlation(sensor, body), AS_DECLARED)
+    declared = CommonRates.of(sensor, body, Correlation(sensor, body), AS_DECLARED)
     left, lag = _left_by_effects(declared)
     if left <= MISSED and lag <= reach:
         return []
+
+    def named(fault: str, words: fault_words.Words) -> list[DataFault]:
+        return [DataFault(fault, "ref", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
+
+    correlation = declared.correlation(np.eye(3))
     found = _likeliest_clock(turning)
     fits = _explains(turning, found)
-    correlation = declared.traces.correlation
-    fault: str | None = None
     if found is not None and fits and not found.ambiguous:
-        clocks, traces = found.best.aligned, found.best.traces
-        length = float(body.t[-1] - body.t[0])
-        # One lag, that in the middle, is named where the rates agree as well then.
-        middle = clocks.lag + 0.5 * clocks.skew * length
-        steady = placed(sensor, body, found.search, replace(clocks, lag=middle, skew=0.0))
-        if left <= MISSED and max(abs(clocks.lag), abs(clocks.lag + clocks.skew * length)) <= reach:
-            pass
-        elif found.best.odds(steady) < SURE:
-            fault, words = "late", fault_words.late(middle, steady.traces.correlation, correlation, path)
-        else:
-            fault = "skew"
-            words = fault_words.skew(clocks.lag, clocks.skew, traces.correlation, correlation, path)
-    elif left > MISSED and (fits or _strange(turning, found, samples(parts, facts))):
-        fault, words = "another_motion", fault_words.another_motion(correlation, _lags(found), fits=fits)
-    if fault is None:
-        return []
-    return [DataFault(fault, "ref", None, facts.t_start, facts.t_end, facts.n, *words, spoils=True)]
+        clocks = found.best.aligned
+        at_end = clocks.lag + clocks.skew * float(body.t[-1] - body.t[0])
+        if left <= MISSED and max(abs(clocks.lag), abs(at_end)) <= reach:
+            return []
+        return named(*_clock_words(turning, found, 0.5 * (clocks.lag + at_end), correlation, path))
+    if left > MISSED and (fits or _strange(turning, found, samples(parts, facts))):
+        return named("another_motion", fault_words.another_motion(correlation, _lags(found), fits=fits))
+    return []
+
+
+def _clock_words(
+    turning: Turning, found: Likeliest, middle: float, declared: float, path: Path | None
+) -> tuple[str, fault_words.Words]:
+    """Name what is wrong with a clock: one lag, that in the middle (s), where the rates agree as well then."""
+    clocks = found.best.aligned
+    steady = placed(turning.sensor, turning.body, found.search, replace(clocks, lag=middle, skew=0.0))
+    if found.best.odds(steady) < SURE:
+        return "late", fault_words.late(middle, steady.traces.correlation, declared, path)
+    return "skew", fault_words.skew(clocks.lag, clocks.skew, found.best.traces.correlation, declared, path)
 
 
 def _likeliest_clock(turning: Turning) -> Likeliest | None:
@@ -132,21 +137,20 @@ def _agreement(rows: Samples, sensor: str) -> float:
     return float(np.sum(y * x)) / size if size > 0.0 else 0.0
 
 
-def _left_by_effects(declared: Placed) -> tuple[float, float]:
+def _left_by_effects(declared: CommonRates) -> tuple[float, float]:
     """Return what `ref.delay` and `ref.skew` leave of the rates, and the largest lag that they would stand for, s.
 
     The first is a share of the squares. Both effects start from the derivative of the ideal readings. Where these
     columns leave less than a fifth, and the lag is one that the effects follow, they find it.
     """
-    common = declared.common
-    if common is None or not len(common.measured):
+    if not len(declared.measured):
         # At the declared times the two have no motion in common.
         return 1.0, 0.0
-    mount = declared.aligned.mount
-    since = (common.since / max(float(common.since.max()), 1e-300))[:, None]
-    shown = (common.expected, common.change, common.change * since)
+    mount = declared.mount()
+    since = (declared.since / max(float(declared.since.max()), 1e-300))[:, None]
+    shown = (declared.expected, declared.change, declared.change * since)
     columns = np.stack([(each @ mount.T).ravel() for each in shown], axis=1)
-    measured = common.measured.ravel()
+    measured = declared.measured.ravel()
     solved = np.linalg.lstsq(columns, measured, rcond=None)[0]
     left = float(np.sum((measured - columns @ solved) ** 2) / max(float(measured @ measured), 1e-300))
     # The rates of late stamps are scale * expected(t + lag).

@@ -230,13 +230,14 @@ class CommonRates:
         known = other.known & sensor.seen(on_sensor[:-1], on_sensor[1:])
         inside = np.clip(on_sensor, sensor.t[0], sensor.t[-1])
         measured = np.diff(sensor.angle_at(inside), axis=0) / np.diff(on_sensor)[:, None]
+        middle = 0.5 * (edges[1:] + edges[:-1])
         if known.sum() > 2:
             change = np.gradient(other.values, step, axis=0)[known]
+            since = middle[known] - float(body.t[0])
             measured, expected = (each - each.mean(axis=0) for each in (measured[known], other.values[known]))
         else:
             measured = expected = change = np.zeros((0, 3))
-        middle = 0.5 * (edges[1:] + edges[:-1])
-        since = middle[known] - float(body.t[0]) if known.sum() > 2 else np.zeros(0)
+            since = np.zeros(0)
         return cls(measured, expected, change, since, middle, float(known.sum() * step))
 
     def mount(self) -> Array:
