@@ -70,6 +70,8 @@ def test_unusable_port_and_hostile_names_are_text(served):
     wrong = problems(page)
     page.goto(f"{address}live")
     page.get_by_text("Connect a device first.").wait_for(timeout=PATIENCE)
+    # The words come with the page; what is typed before the page is connected is lost.
+    page.wait_for_function("() => window.did_handshake", timeout=PATIENCE)
     wait_until(page, lambda: page.get_by_test_id("record").is_disabled())
     assert page.get_by_role("button", name="Calibrate").is_disabled()
     # An emulated device has no bits per second.
