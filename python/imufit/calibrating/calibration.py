@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,11 @@ Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
 _OFF_DIAGONAL = {row + column: (i, j) for i, row in enumerate(AXES) for j, column in enumerate(AXES) if i != j}
+
+
+BEYOND: Final = 4.0
+"""Standard errors from zero from which on a parameter is an error of the sensor: by chance, one of sixteen thousand
+values lies so far away."""
 
 
 def rms(values: Array) -> float:
@@ -221,6 +226,15 @@ class SensorCalibration(Part):
         """Whether the error is lower with it, where possible on what the fit did not see; true where none is known."""
         unseen = self.held_out if np.isfinite(self.held_out) else self.after
         return not np.isfinite(self.before) or unseen < self.before
+
+    @property
+    def shows_error(self) -> bool:
+        """Whether a parameter lies so far from that of an ideal sensor that chance does not account for it."""
+        return any(
+            abs(value) > BEYOND * self.standard_errors[effect][name] > 0.0
+            for effect, values in self.effects.items()
+            for name, value in values.items()
+        )
 
 
 @dataclass(frozen=True, repr=False)

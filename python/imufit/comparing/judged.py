@@ -22,7 +22,20 @@ def judged(analysis: Analysis) -> tuple[Judged, ...]:
     recorded = {column[:3] for each in analysis.logs for column in each.surveyed.log.columns}
     sensors = [sensor for sensor in ("acc", "gyr", "mag") if sensor in recorded]
     reasons = {sensor: _reason(analysis, sensor) for sensor in sensors}
-    return tuple(Judged(sensor, reason is None, reason) for sensor, reason in reasons.items())
+    return tuple(
+        Judged(sensor, reason is None, reason, "" if reason is None else _advice(analysis, sensor))
+        for sensor, reason in reasons.items()
+    )
+
+
+def _advice(analysis: Analysis, sensor: str) -> str:
+    """Return what the first log that could say so lacks."""
+    lacking = (
+        each.passes.rests.lacking
+        for each in analysis.logs
+        if isinstance(each.passes, RestPasses) and sensor in ("acc", "gyr")
+    )
+    return next(lacking, "")
 
 
 def _reason(analysis: Analysis, sensor: str) -> str | None:

@@ -101,7 +101,8 @@ def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
     )
     if wrong := tuple(contradicted(fit)):
         # The residual follows the wrong value, and names no other cause.
-        return replace(found, sentence=" ".join(wrong), unexplained=())
+        sentence = " ".join(sentences.contradicted(held, given) for held, given in wrong)
+        return replace(found, sentence=sentence, unexplained=(), contradicted=tuple(held for held, _ in wrong))
     return replace(
         found, sentence=sentences.answer(found, best, ratio=fit.ratio, untold=len(unshown), spoilt=result.spoilt)
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
-from imufit.results import sentences
+from imufit.results import Parameter
 
 if TYPE_CHECKING:
     from imufit.fitting import FittedStack
@@ -15,8 +15,8 @@ FAR: Final = 4.0
 happens once in 16,000."""
 
 
-def contradicted(fit: FittedStack) -> Iterator[str]:
-    """Say of each fixed value that the logs contradict how far it is from the value that they give, to first order.
+def contradicted(fit: FittedStack) -> Iterator[tuple[Parameter, Parameter]]:
+    """Return each fixed value that the logs contradict, and the value that they give in its place, to first order.
 
     Parameters
     ----------
@@ -31,4 +31,4 @@ def contradicted(fit: FittedStack) -> Iterator[str]:
     for found in model.listed():
         held = fixed.get(found.key)
         if held is not None and abs(found.value - held.value) > FAR * found.standard_error > 0.0:
-            yield sentences.contradicted(held, found)
+            yield held, found

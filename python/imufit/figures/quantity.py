@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 
 _DEGREES = 180.0 / math.pi
 _GRAVITY = 9.80665
@@ -205,6 +206,47 @@ def p_value(value: float | None) -> str:
     )
 
 
+@dataclass(frozen=True)
+class Digits:
+    """A value in the digits that its standard error warrants.
+
+    Attributes
+    ----------
+    value, error : str
+        In the shown unit; the error is empty where there is none.
+    factor : float
+        Shown value = factor * value in the SI unit.
+    unit : str
+        The shown unit.
+    """
+
+    value: str
+    error: str
+    factor: float
+    unit: str
+
+
+def digits_of(value: float, standard_error: float, unit: str) -> Digits:
+    """Return a value in the shown unit, rounded by its standard error.
+
+    Parameters
+    ----------
+    value, standard_error : float
+        In `unit`.
+    unit : str
+        SI unit.
+    """
+    known = math.isfinite(standard_error) and standard_error > 0.0
+    factor, shown = shown_unit(unit, max(abs(value), standard_error) if known else value)
+    value, standard_error = factor * value, factor * standard_error
+    if not known:
+        return Digits(number(value), "", factor, shown)
+    if standard_error >= 1e5 or standard_error < 1e-6:
+        return Digits(number(value), number(standard_error, 2), factor, shown)
+    places = max(0, 1 - math.floor(math.log10(standard_error)))
+    return Digits(f"{value:.{places}f}", f"{standard_error:.{places}f}", factor, shown)
+
+
 def with_error(value: float, standard_error: float, unit: str) -> str:
     """Value and standard error in the shown unit, rounded by the error.
 
@@ -220,15 +262,8 @@ def with_error(value: float, standard_error: float, unit: str) -> str:
     str
         For instance ``0.0200 ± 0.0004 deg/s per g``.
     """
-    known = math.isfinite(standard_error) and standard_error > 0.0
-    factor, shown = shown_unit(unit, max(abs(value), standard_error) if known else value)
-    value, standard_error = factor * value, factor * standard_error
-    if not known:
-        return f"{number(value)} {shown}"
-    if standard_error >= 1e5 or standard_error < 1e-6:
-        return f"{number(value)} ± {number(standard_error, 2)} {shown}"
-    places = max(0, 1 - math.floor(math.log10(standard_error)))
-    return f"{value:.{places}f} ± {standard_error:.{places}f} {shown}"
+    shown = digits_of(value, standard_error, unit)
+    return f"{shown.value} ± {shown.error} {shown.unit}" if shown.error else f"{shown.value} {shown.unit}"
 
 
 def mean(value: float | None, unit: str, standard_error: float) -> str:

@@ -73,8 +73,10 @@ class RestReadings:
         Values of every covariate, between which bins are cut.
     means : list of float
         Mean temperature and mean of each covariate over what is judged; NaN where unknown.
+    lacking : str
+        The rests that acc and gyr need to be judged, where there are too few; empty elsewhere.
     notes : tuple of str
-        What could not be used, and why.
+        What could not be used, and why; what is lacking first.
     """
 
     arrays: dict[str, Any]
@@ -91,6 +93,7 @@ class RestReadings:
     expected: list[float]
     samples: list[Array]
     means: list[float]
+    lacking: str
     notes: tuple[str, ...]
 
 
@@ -105,7 +108,7 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
         Names of its columns that can act on sensors.
     """
     notes: list[str] = []
-    poses, gyr_noise = _poses(log, notes)
+    poses, gyr_noise, lacking = _poses(log)
     field_rows = _field_rows(log, notes)
     parts = PARTS if len(poses) < FEWEST_RESTS else 1
     blocks = min(BLOCKS, len(poses)) * parts if poses else FIELD_BLOCKS
@@ -160,7 +163,8 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
         expected=expected.tolist(),
         samples=_samples(stills, arrays["field"], poses, float(expected[0]), len(covariates)),
         means=_means(stills, arrays["field"]),
-        notes=tuple(notes),
+        lacking=lacking,
+        notes=(lacking, *notes) if lacking else tuple(notes),
     )
 
 
@@ -253,8 +257,8 @@ def _pose_rows(pose: Pose) -> NDArray[np.intp]:
     return rows
 
 
-def _poses(log: Log, notes: list[str]) -> tuple[list[Pose], float]:
-    """Return the usable rests, none if they are too few, and the gyroscope's noise at rest, rad/s."""
+def _poses(log: Log) -> tuple[list[Pose], float, str]:
+    """Return the usable rests, none if they are too few, the gyroscope's noise at rest, rad/s, and what is lacking."""
     poses: list[Pose] = []
     noise = np.nan
     if log.acc is not None and np.isfinite(log.acc).any():
@@ -264,15 +268,16 @@ def _poses(log: Log, notes: list[str]) -> tuple[list[Pose], float]:
             check_unit(poses, log)
     poses = labelled(log, poses)
     if len(poses) >= FEWEST_RESTS or all_sides(poses):
-        return poses, noise
+        return poses, noise, ""
     sensors = " and ".join(name for name in ("acc", "gyr") if getattr(log, name) is not None)
-    if sensors:
-        notes.append(
-            f"{len(poses)} {'rest is' if len(poses) == 1 else 'rests are'} too few to judge {sensors} by without a "
-            f"reference: lay the sensor down in at least {FEWEST_RESTS}, better {BLOCKS}, different attitudes for two "
-            f"seconds each, or on all six sides and label these ({' '.join(SIDES)} in the column pose)."
-        )
-    return [], noise
+    if not sensors:
+        return [], noise, ""
+    lacking = (
+        f"{len(poses)} {'rest is' if len(poses) == 1 else 'rests are'} too few to judge {sensors} by without a "
+        f"reference: lay the sensor down in at least {FEWEST_RESTS}, better {BLOCKS}, different attitudes for two "
+        f"seconds each, or on all six sides and label these ({' '.join(SIDES)} in the column pose)."
+    )
+    return [], noise, lacking
 
 
 def _as_they_scatter(

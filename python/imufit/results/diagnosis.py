@@ -268,6 +268,8 @@ class Diagnosis(Plotted, Result):
         Every sensor of the logs: whether it was judged, and why not.
     noise : tuple of NoisePart
         The noise floor of each channel as a sum of parts.
+    contradicted : tuple of Parameter
+        Fixed values of the model that the logs contradict. Any candidate may look as if it were there beside them.
     """
 
     verdict: str
@@ -286,6 +288,7 @@ class Diagnosis(Plotted, Result):
     evidence: str = "reference"
     judged: tuple[Judged, ...] = ()
     noise: tuple[NoisePart, ...] = ()
+    contradicted: tuple[Parameter, ...] = ()
 
     @property
     def best_candidate(self) -> Candidate | None:
@@ -315,6 +318,7 @@ class Diagnosis(Plotted, Result):
             "noise": [part.to_dict() for part in self.noise],
             **logs_json(self.logs),
             **({"disagrees": [item.to_dict() for item in self.disagrees]} if self.logs else {}),
+            **({"contradicted": [item.key for item in self.contradicted]} if self.contradicted else {}),
             **({"without": [item.to_dict() for item in self.without]} if self.without else {}),
         }
 
@@ -401,9 +405,19 @@ class Diagnosis(Plotted, Result):
         item : Candidate
             One of the candidates.
         """
-        alike = self.named if self.verdict == "ambiguous" else ()
-        rivals = [name for name in alike if name != item.effect]
-        return f", shared with {' and '.join(rivals)}" if item.effect in alike and rivals else ""
+        rivals = self.sharing(item)
+        return f", shared with {' and '.join(rivals)}" if rivals else ""
+
+    def sharing(self, item: Candidate) -> tuple[str, ...]:
+        """Return the ids of the rivals that share the probability of a candidate.
+
+        Parameters
+        ----------
+        item : Candidate
+            One of the candidates.
+        """
+        alike = self.named if self.verdict == "ambiguous" and item.effect in self.named else ()
+        return tuple(name for name in alike if name != item.effect)
 
     def _stands_out(self, item: Candidate) -> bool:
         return item.status == SIGNIFICANT or item.effect in self.named

@@ -21,15 +21,19 @@ class Judged(Part):
         True where its readings were compared with a reference.
     reason : str or None
         Why they were not.
+    advice : str
+        What a recording needs so that they can be judged; empty where this is not known or not needed.
     """
 
     sensor: str
     judged: bool
     reason: str | None
+    advice: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON of one sensor."""
-        return {"judged": self.judged, "reason": self.reason}
+        """JSON of one sensor; the advice where there is some."""
+        advice = {"advice": self.advice} if self.advice else {}
+        return {"judged": self.judged, "reason": self.reason, **advice}
 
 
 def left_out(sensors: Sequence[Judged]) -> str:

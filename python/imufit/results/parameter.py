@@ -100,6 +100,11 @@ class Parameter(Plotted, Part):
             return f"{quantity.quantity(self.value, self.unit)} (at its {self.at_bound})"
         return quantity.with_error(self.value, self.standard_error, self.unit) if self.told else "not determined"
 
+    @property
+    def digits(self) -> quantity.Digits:
+        """The value in the digits in which it is shown."""
+        return quantity.digits_of(self.value, self.standard_error, self.unit)
+
     def to_dict(self) -> dict[str, Any]:
         """JSON of one parameter: value, standard error, unit, typical size; its limits, if it has any."""
         limits = {"min": self.lower, "max": self.upper}

@@ -19,6 +19,7 @@ from imufit.figures.style import AXES, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
 from imufit.printable import NAME, printable
 from imufit.results import Spectrum
 from imufit.results.comparison import Panel
+from imufit.studio.names import channel_name, covariate_name, effect_name
 
 if TYPE_CHECKING:
     from imufit.figures.allan import ChannelLike
@@ -27,6 +28,9 @@ HOVER: Final = "%{fullData.name}<br>%{xaxis.title.text}: %{x:.5g}<br>%{yaxis.tit
 """Name of the trace, and place of a point with quantities and units, as the axes name them."""
 LABEL: Final[dict[str, Any]] = {"bgcolor": "#333333", "font": {"color": "#ffffff"}, "align": "left"}
 """Look of the label at a point: white on dark grey, contrast 12.6, whatever the colour of the trace."""
+
+SYMBOL: Final = '<span style="font-size: 85%">({})</span>'
+"""Symbol behind the words of a quantity in a title, a little smaller than these."""
 
 Figure = dict[str, Any]
 Array = NDArray[np.float64]
@@ -115,8 +119,11 @@ def residual_panel(
     explained : bool
         Whether the panel stands against the part of the residual that the covariate explains.
     """
-    name = words(panel.covariate)
-    name = f"part of {words(panel.channel)} that {name} explains" if explained else name
+    channel = words(channel_name(panel.channel))
+    cause = words(covariate_name(panel.covariate))
+    symbol = words(panel.covariate)
+    name = cause if cause == symbol else f"{cause} {SYMBOL.format(symbol)}"
+    name = f"part of {channel} that {cause} explains" if explained else name
     x_factor, x_title = quantity.axis(name, panel.covariate_unit)
     factor, unit = quantity.shown_unit(panel.channel_unit)
     x, mean = x_factor * panel.centre, factor * panel.mean
@@ -135,9 +142,9 @@ def residual_panel(
     if other is not None:
         traces.append(_line(x_factor * other.centre, factor * other.mean, GREEN, "kept model", dash="dashdot"))
     if after is not None:
-        name = f"with {words(effect)}"
+        name = f"with {words(effect_name(effect))}"
         traces.append(_line(x_factor * after.centre, factor * after.mean, ORANGE, name, dash="dash"))
-    y_title = f"residual of {words(panel.channel)}, {unit}"
+    y_title = f"residual of {channel}, {unit}"
     return _figure([trace for part in traces for trace in part], x_title, y_title, yaxis={"range": [-limit, limit]})
 
 
@@ -181,7 +188,7 @@ def spectrum(found: Spectrum, other: Spectrum | None = None) -> Figure:
     lines += _line(ends, np.full(2, factor * math.sqrt(found.floor)), GREY, "noise floor", dash="dash")
     # Decades alone carry numbers: the others would lie upon one another on a phone.
     ticks = {"type": "log", "dtick": 1, "tickformat": "~g"}
-    title = f"residual of {words(found.channel)}, {unit}/√Hz"
+    title = f"residual of {words(channel_name(found.channel))}, {unit}/√Hz"
     return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=_logarithmic(lines))
 
 
@@ -365,4 +372,4 @@ def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *,
     for name, t, values in lines:
         colour, dash = LOOKS.get(name, (GREY, "solid"))
         drawn += _line(t, factor * values, colour, name, dash=dash)
-    return _figure(drawn, "time, s", f"{title} of {words(channel)}, {shown}")
+    return _figure(drawn, "time, s", f"{title} of {words(channel_name(channel))}, {shown}")

@@ -19,6 +19,7 @@ from imufit.remedy import Option, Remedy
 from imufit.results import Diagnosis
 from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, join_of, offers, remedies
 from imufit.studio.mystery import DEMONSTRATION, Mystery
+from imufit.studio.names import capital, fitting, model_name
 from imufit.studio.session import Session
 from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
 from imufit.studio.stack import Stack, Step
@@ -128,9 +129,9 @@ class Desk:
     busy : str
         The present work, in words; empty where there is none.
     share : float or None
-        Share of the work that is done, where this is known.
+        Share of the rows that the present pass has read; None between two passes.
     passes : int
-        How many passes over the rows the present work has made.
+        How many passes over all rows the present work has made; how many a search will make is not known before.
     trouble : str
         The last problem; empty where there is none.
     in_shell : str
@@ -182,6 +183,17 @@ class Desk:
         """List the folders of the files that the browser sent, the latest first."""
         folders = [path for path in Path(self._folder.name).iterdir() if path.is_dir()]
         return sorted(folders, key=lambda path: -path.stat().st_mtime_ns)
+
+    @property
+    def waiting_for(self) -> str:
+        """The present work in a sentence, and how far it is; empty where there is none."""
+        if not self.busy:
+            return ""
+        far = "" if self.share is None else f"{100.0 * self.share:.0f} % of the rows are read"
+        if self.passes:
+            before = f"all rows were read {'once' if self.passes == 1 else f'{self.passes} times'}"
+            far = f"{before}, and {far} again" if far else before
+        return f"{capital(self.busy)}{f': {far}' if far else ''}."
 
     @property
     def guessing(self) -> bool:
@@ -254,8 +266,7 @@ class Desk:
         if (done, total) == (0, 1):
             self.busy, self.share, self.passes = label, None, 0
         elif done < total:
-            # The number of passes of a search is unknown: only the share of the first one is that of the work.
-            self.share = done / total if self.passes == 0 else None
+            self.share = done / total
         else:
             self.share = None
             self.passes += 1
@@ -421,10 +432,14 @@ class Desk:
     def _pending_first(self, session: Session) -> Iterator[Piece]:
         """List the pieces of work before anything can be fitted: a person sees the rows while the evidence is taken."""
         if self.traces is None or not self.traces.built or self.traces.log is not session.logs[session.shown]:
-            yield Piece("reading the rows", self._drawn_rows, self.files[0])
+            yield Piece("reading the rows, to draw them over time", self._drawn_rows, self.files[0])
         if not session.begun and not session.refused:
             names = " and ".join(file.name for file in self.files)
-            yield Piece(f"taking the evidence of {names}", partial(session.begin, self.progress), self.files[0])
+            yield Piece(
+                f"weighing every effect on {names}, for the verdict and the candidates",
+                partial(session.begin, self.progress),
+                self.files[0],
+            )
         elif self._before is not None:
             before, self._before = self._before, None
             self._close(before.traces)
@@ -439,32 +454,45 @@ class Desk:
             return
         stack = session.stack
         made = session.made(stack)
-        words = _in_words(stack)
+        words = model_name(stack.model.effects)
         # Earlier ones first: a session that was reopened goes the same way again.
         yield from self._unfitted(session, session.steps[: session.position + 1])
         if made is None:
             return
         if made.comparison is None and session.has_reference:
-            yield Piece(f"comparing {words}", partial(session.compare, stack, self.progress), judged=stack)
+            yield Piece(
+                f"computing the residuals of {words}, for the figures",
+                partial(session.compare, stack, self.progress),
+                judged=stack,
+            )
         if made.diagnosis is None:
-            yield Piece(f"effects missing in {words}", partial(session.diagnose, stack, self.progress), judged=stack)
+            yield Piece(
+                f"looking for what {words} lacks, for the verdict",
+                partial(session.diagnose, stack, self.progress),
+                judged=stack,
+            )
         if session.has_reference:
             for model in self._models_drawn(session):
                 if model not in self.models:
-                    yield Piece("residuals over time", partial(self._drawn_model, model))
+                    yield Piece("computing the residuals over time, to draw them", partial(self._drawn_model, model))
         if session.second is not None:
             second = session.made(session.second)
             if second is None or (second.comparison is None and session.has_reference):
-                yield Piece("comparing the kept model", partial(session.compare, session.second, self.progress))
+                yield Piece(
+                    "computing the residuals of the kept model, for the figures",
+                    partial(session.compare, session.second, self.progress),
+                )
             if session.second.model != stack.model and session.weighed() is None:
-                yield Piece("weighing the two models", partial(session.weigh, self.progress))
+                yield Piece(
+                    "weighing the two models, for the one that the log prefers", partial(session.weigh, self.progress)
+                )
         # Steps that were undone before the session was saved: their bars stand beside the others.
         yield from self._unfitted(session, session.steps[session.position + 1 :])
 
     def _unfitted(self, session: Session, steps: Sequence[Step]) -> Iterator[Piece]:
         for step in steps:
             if session.made(step.stack) is None:
-                yield Piece(f"fitting {_in_words(step.stack)}", partial(session.fit, step.stack, self.progress))
+                yield Piece(fitting(step.stack.model.effects), partial(session.fit, step.stack, self.progress))
 
     @staticmethod
     def _models_drawn(session: Session) -> list[Stack]:
@@ -684,7 +712,3 @@ class Desk:
         game = await self._loaded("hiding an effect", lambda: Mystery.hidden(level, seed, self.new_folder()))
         if game is not None:
             await self.open([LogFile(game.log, game.log.name)], game)
-
-
-def _in_words(stack: Stack) -> str:
-    return " + ".join(stack.model.effects) or "the ideal sensor"

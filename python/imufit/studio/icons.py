@@ -27,7 +27,7 @@ def with_words(icon: str, words: str, action: Callable[[], object] | None) -> ui
         f'flat dense stack aria-label="{words}" title="{words}"'
     ) as button:
         ui.label(words).classes("studio-words")
-    return button
+    return button.classes("studio-worded")
 
 
 def bare(icon: str, words: str, action: Callable[[], object]) -> ui.button:
@@ -42,6 +42,22 @@ def bare(icon: str, words: str, action: Callable[[], object]) -> ui.button:
     """
     button = ui.button(icon=icon, on_click=action).props("flat dense round " + attribute("aria-label", words))
     return button.classes("studio-bare")
+
+
+def stated(state: str, words: str, action: Callable[[], object]) -> ui.button:
+    """Return a small button with the present state written on it, which changes the state.
+
+    Parameters
+    ----------
+    state : str
+        The state in one word.
+    words : str
+        The state, and what a press does; they may hold names from files.
+    action : callable
+        The action.
+    """
+    button = ui.button(state, on_click=action).props("flat dense size=12px " + attribute("aria-label", words))
+    return button.classes("studio-bare studio-state")
 
 
 def light_or_dark() -> ui.button:

@@ -18,6 +18,7 @@ from imufit.lab.simulate.study import Study
 from imufit.lab.simulated_log import save_simulation
 from imufit.model.catalogue import units_of
 from imufit.results import Diagnosis, Parameter
+from imufit.studio.names import capital, effect_name, with_symbol
 
 if TYPE_CHECKING:
     from imufit.lab.simulate import Simulation, Truth
@@ -240,12 +241,16 @@ def _lesson(level: Level, truth: Sequence[str]) -> str:
 
 
 def _said(truth: Sequence[str], answer: str | None, right: bool, rival: bool) -> str:
-    hid = f"{' and '.join(truth)} was hidden" if truth else "Nothing was hidden"
+    hid = f"{' and '.join(map(_named, truth))} was hidden" if truth else "nothing was hidden"
     if answer is None:
-        return f"{hid}."
-    named = f"you named {answer}" if answer else "you answered that nothing is missing"
+        return f"{capital(hid)}."
+    named = f"you named {_named(answer)}" if answer else "you answered that nothing is missing"
     mark = "Right" if right else "Accepted, since this log cannot separate the two" if rival else "Not right"
     return f"{mark}: {hid}, and {named}."
+
+
+def _named(effect: str) -> str:
+    return with_symbol(effect_name(effect), effect)
 
 
 def _values(truth: Truth, first: Diagnosis, fitted: Sequence[Parameter]) -> list[Compared]:
@@ -271,10 +276,9 @@ def _evidence(truth: Truth, first: Diagnosis) -> str:
     effect = next(iter(truth.effects))
     found = next((item for item in first.candidates if item.effect == effect), None)
     if found is None:
-        return f"the evidence holds no candidate {effect}, which this log cannot show"
-    return (
-        f"the evidence gives {effect} a probability of {quantity.probability(found.probability)}{first.shared(found)}"
-    )
+        return f"the evidence holds no candidate {_named(effect)}, which this log cannot show"
+    likely = f"{quantity.probability(found.probability)}{first.shared(found)}"
+    return f"the evidence gives {_named(effect)} a probability of {likely}"
 
 
 def _sureness(first: Diagnosis, evidence: str) -> str:
@@ -286,7 +290,6 @@ def _sureness(first: Diagnosis, evidence: str) -> str:
     if first.verdict == "missing" and best >= SURE:
         return f"You could have been sure: {evidence}."
     if first.verdict == "ambiguous":
-        return (
-            f"You could not have been sure, since {', '.join(first.named)} explain this log equally well: {evidence}."
-        )
+        alike = ", ".join(map(_named, first.named))
+        return f"You could not have been sure, since {alike} explain this log equally well: {evidence}."
     return f"You could not have been sure, since the evidence names no single effect: {evidence}."

@@ -61,7 +61,7 @@ def save_first(desk: Desk, action: Callable[[], Awaitable[None]]) -> Callable[[]
             await action()
             return
         with ui.dialog() as dialog, ui.card():
-            ui.label("Save the session first?").classes("studio-id")
+            ui.label("Save the session first?").classes("studio-name")
             ui.label("The new log takes the place of the present model, which is not saved.").classes("studio-muted")
 
             async def go_on() -> None:

@@ -26,6 +26,7 @@ from imufit.model.catalogue import each_log_has_its_own, find_effect
 from imufit.progress import Progress, silent
 from imufit.results import Comparison, Diagnosis, Parameter
 from imufit.results.comparison import Panel
+from imufit.studio.names import fitting
 from imufit.studio.stack import Action, Stack, Step
 from imufit.studio.traces import ModelTraces, Traces
 
@@ -558,7 +559,7 @@ class Session:
 
     def _moved(self, base: Made, target: Stack, progress: Progress) -> Made:
         fit = self._with_evidence(base)
-        progress(0, 1, f"fitting {' + '.join(target.effects) or 'the ideal sensor'}")
+        progress(0, 1, fitting(target.effects))
         return Made(moved(fit, target), (*base.way, target))
 
     def _with_evidence(self, made: Made) -> Fit:

@@ -1,31 +1,46 @@
-"""Right region: what is missing, with probability, expected drop and rivals, and the card of the effect looked at."""
+"""Right region: what is missing, with probability, expected drop and rivals; a card opens in its candidate's row."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from nicegui import events, ui
+from nicegui import ui
 
 from imufit.figures import quantity
 from imufit.model.catalogue import card_of, find_effect
-from imufit.printable import NAME, printable
-from imufit.results import Candidate, Diagnosis
+from imufit.printable import printable
+from imufit.results import Candidate, Diagnosis, Parameter
 from imufit.results.diagnosis import NOT_SIGNIFICANT, NOT_TESTABLE, SIGNIFICANT
 from imufit.results.parameter import in_lines
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
+from imufit.studio.heading import heading_of
+from imufit.studio.names import capital, effect_name, parameter_name, with_symbol
 from imufit.studio.presses import Presses
 from imufit.studio.view_panels import PanelView
 
 FIRST: Final = 5
 """Candidates that are shown at once: the best and its rivals; the others fold away."""
 
-INTO_SIGHT: Final = "document.querySelector('{}').scrollIntoView({{block: 'nearest', behavior: 'smooth'}})"
-"""Script that brings an element into sight, where it is not: on a phone the candidates fill the screen."""
+ROW_INTO_SIGHT: Final = (
+    "requestAnimationFrame(() => document.getElementById('{}')"
+    ".scrollIntoView({{block: 'nearest', behavior: 'smooth'}}))"
+)
+"""Script that brings a candidate with its card into sight, as far as it is not, once the card is laid out."""
+BARS_INTO_SIGHT: Final = "document.querySelector('.studio-fall').scrollIntoView({block: 'end', behavior: 'smooth'})"
+"""Script that lays the bars at the lower edge of the window: the sentence on top stands over them."""
 
 SWITCHED_OFF: Final = "switched off in the model"
-TOUCH: Final = "touch"
-"""Kind of pointer, in the browser's words, with which nothing can be pointed at: a finger."""
+FIGURES: Final = (
+    "Point at an effect to see what it would explain, or press its name for its card. Each line gives the probability, "
+    "and the held-out error of all channels without and with the effect."
+)
+NO_FIGURES: Final = "Point at an effect to see what it would explain, or press its name for its card."
+CONTRADICTED: Final = (
+    "{keys} fixed at a value that the log contradicts. The candidates stand here without figures: whatever is added "
+    "now would make up for that value first."
+)
+"""Sentence over the candidates beside a wrong fixed value, whose error each of them would explain."""
 
 LOWERS: Final = 0.99
 """Held-out error with a candidate over that without from which on the candidate lowers it for the eye."""
@@ -42,8 +57,14 @@ def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
         return ""
     outdone = item.outcome == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
     if outdone and diagnosis.best is not None:
-        return f"; explains nothing beside {printable(diagnosis.best, NAME)}"
+        return f"; explains nothing beside {effect_name(diagnosis.best)}"
     return f"; {item.outcome}"
+
+
+def _shared(item: Candidate, diagnosis: Diagnosis) -> str:
+    """Name the rivals that share the probability of a candidate; often empty."""
+    rivals = " and ".join(map(effect_name, diagnosis.sharing(item)))
+    return f", shared with {rivals}" if rivals else ""
 
 
 class CandidateView:
@@ -59,26 +80,25 @@ class CandidateView:
 
     def __init__(self, desk: Desk, panels: PanelView) -> None:
         self._desk, self._panels = desk, panels
-        self._looked_at = self._pinned = ""
+        self._looked_at = ""
+        self._opened: list[str] = []
         self._drawn: tuple[object, ...] | None = None
-        self._off: frozenset[str] = frozenset()
+        self._stacked: frozenset[str] = frozenset()
         self._added = Presses()
         ui.html("Candidates", tag="h2", sanitize=False)
         self._list = ui.column().classes("w-full gap-0")
-        self._card = ui.column().classes("w-full gap-1 studio-item studio-card").props("data-mark=card")
-        self._card.visible = False
 
     def refresh(self) -> None:
         """Show the candidates on top of the present model."""
         diagnosis = self._desk.diagnosis
         session = self._desk.session
-        # An effect that is switched off is a candidate again, and the model has it already.
-        self._off = frozenset() if session is None else frozenset(session.stack.effects)
-        state = (diagnosis, self._desk.guessing, self._off)
+        self._stacked = frozenset() if session is None else frozenset(session.stack.effects)
+        state = (diagnosis, self._desk.guessing, self._stacked)
         if state == self._drawn:
             return
         self._drawn = state
-        self._pin("")
+        self._opened = []
+        self.look_at("")
         self._list.clear()
         self._list.classes(**({"add": "studio-long"} if self._desk.guessing else {"remove": "studio-long"}))
         with self._list:
@@ -86,23 +106,48 @@ class CandidateView:
                 ui.label("The candidates stand here once they are judged.").classes("studio-muted")
                 return
             shown = [item for item in diagnosis.candidates if item.status != NOT_TESTABLE]
-            if shown:
-                ui.label("Point at an effect, or tap its name, to see what it would explain.").classes("studio-muted")
-            if self._desk.guessing:
-                for item in sorted(shown, key=lambda item: item.effect):
-                    self._candidate(item, None)
-                return
             if not shown:
                 ui.label("No effect was judged on these data.").classes("studio-muted")
-            shown.sort(key=lambda item: _rank(item, diagnosis))
-            for item in shown[:FIRST]:
-                self._candidate(item, diagnosis)
-            if shown[FIRST:]:
-                words = quantity.counted(len(shown) - FIRST, "more candidate")
-                # A box of its own keeps the card beneath within sight.
-                with ui.expansion(words).classes("w-full").props("dense"), ui.column().classes("gap-0 studio-long"):
-                    for item in shown[FIRST:]:
-                        self._candidate(item, diagnosis)
+            elif self._desk.guessing:
+                ui.label(NO_FIGURES).classes("studio-muted")
+                for item in sorted(shown, key=lambda item: item.effect):
+                    self._candidate(item, None)
+            else:
+                self._judged(sorted(shown, key=lambda item: _rank(item, diagnosis)), diagnosis)
+
+    def _judged(self, shown: list[Candidate], diagnosis: Diagnosis) -> None:
+        """List the candidates, the best first; beside a fixed value that the log contradicts without their figures."""
+        if diagnosis.contradicted:
+            self._contradiction(diagnosis.contradicted)
+        else:
+            ui.label(FIGURES).classes("studio-muted")
+        figures = None if diagnosis.contradicted else diagnosis
+        for item in shown[:FIRST]:
+            self._candidate(item, figures)
+        if shown[FIRST:]:
+            words = quantity.counted(len(shown) - FIRST, "more candidate")
+            # A box of its own: the page does not grow by all of them.
+            with ui.expansion(words).classes("w-full").props("dense"), ui.column().classes("gap-0 studio-long"):
+                for item in shown[FIRST:]:
+                    self._candidate(item, figures)
+
+    def _contradiction(self, fixed: tuple[Parameter, ...]) -> None:
+        """Say which fixed values the log contradicts, and offer to estimate each."""
+        desk = self._desk
+        names = [with_symbol(parameter_name(item.effect, item.name), item.key) for item in fixed]
+        keys = f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'}"
+        with ui.element("div").classes("studio-error").props("data-mark=contradicted"):
+            ui.label(CONTRADICTED.format(keys=capital(keys))).classes("studio-muted")
+            for item in fixed:
+
+                async def free(item: Parameter = item) -> None:
+                    session = desk.session
+                    if session is not None:
+                        await desk.attempt(lambda: session.free(item.effect, item.name))
+
+                ui.button(f"Estimate {parameter_name(item.effect, item.name)}", on_click=free).props(
+                    "dense outline size=12px"
+                ).props(attribute("data-mark", f"free-{item.key}"))
 
     def _candidate(self, item: Candidate, diagnosis: Diagnosis | None) -> None:
         """Show one candidate; without a diagnosis the evidence stays hidden, as in a game."""
@@ -114,73 +159,68 @@ class CandidateView:
             .props(attribute("data-mark", f"candidate-{effect}"))
         )
         row.on("mouseenter", lambda: self.look_at(effect))
-        row.on("mouseleave", lambda: self.look_at(self._pinned))
+        row.on("mouseleave", lambda: self.look_at(self._opened[-1] if self._opened else ""))
         with row:
             with ui.element("div").classes("studio-row"):
-                name = ui.label(printable(effect, NAME)).classes("studio-id cursor-pointer")
-                name.props("tabindex=0 role=button")
-
-                def pin(event: events.GenericEventArguments) -> None:
-                    self._pin("" if self._pinned == effect else effect)
-                    # On a phone the card lies beneath the list. Beneath a mouse's pointer, no row may move.
-                    if self._pinned and event.args.get("pointerType") == TOUCH:
-                        ui.run_javascript(INTO_SIGHT.format(".studio-card"))
-
-                for event in ("click", "keydown.enter"):
-                    name.on(event, pin, ["pointerType"])
+                name = heading_of(effect).classes("cursor-pointer").props("tabindex=0 role=button aria-expanded=false")
 
                 async def add() -> None:
                     session = desk.session
                     # The second click of a double click finds the effect added, or another row beneath the pointer.
                     if session is None or effect in session.stack.effects or not self._added.counts():
                         return
-                    self._pin("")
                     client = ui.context.client
-                    client.run_javascript(INTO_SIGHT.format(".studio-fall"))
+                    client.run_javascript(BARS_INTO_SIGHT)
                     await desk.attempt(lambda: session.add(effect))
-                    # The sentence on top has another height by now, and the effect's card is gone.
-                    client.run_javascript(INTO_SIGHT.format(".studio-fall"))
+                    # The sentence on top has another height by now.
+                    client.run_javascript(BARS_INTO_SIGHT)
 
-                if effect in self._off:
+                # A candidate that stands in the stack is switched off there: the model lacks it, and can switch it on.
+                if effect in self._stacked:
                     ui.label(SWITCHED_OFF).classes("studio-muted").props(attribute("data-mark", f"off-{effect}"))
                 else:
                     ui.button("Add", on_click=add).props("dense size=12px" + ("" if named else " outline")).props(
                         attribute("data-mark", f"add-{effect}")
                     )
-            if diagnosis is None:
-                return
-            likely = f"{quantity.probability(item.probability)} probable{diagnosis.shared(item)}"
-            words = f"{likely}, held-out error {item.error_change}{_why_not(item, diagnosis)}"
-            ui.label(printable(words)).classes("studio-muted")
-            if named and item.confounded_with:
-                rivals = ", ".join(str(rival) for rival in item.confounded_with[:2])
-                ui.label(printable(f"Rivals, with correlation: {rivals}")).classes("studio-muted")
+            if diagnosis is not None:
+                _figures(item, diagnosis)
+            # The card opens in its own row: no other row moves from beneath the pointer.
+            card = ui.column().classes("w-full gap-1 studio-card").props(attribute("data-mark", f"card-{effect}"))
+            card.visible = False
 
-    def _pin(self, effect: str) -> None:
-        """Keep the card of an effect until another one is kept; a finger has no place to rest."""
-        self._pinned = effect
+        def turn() -> None:
+            self._open_or_close(effect, card)
+            name.props(f"aria-expanded={str(card.visible).lower()}")
+            if card.visible:
+                ui.run_javascript(ROW_INTO_SIGHT.format(row.html_id))
+
+        for event in ("click", "keydown.enter"):
+            name.on(event, turn)
+
+    def _open_or_close(self, effect: str, card: ui.column) -> None:
+        """Open the card of an effect, or close it; what the card opened last would explain stays drawn."""
+        card.clear()
+        card.visible = effect not in self._opened
+        if not card.visible:
+            self._opened.remove(effect)
+            return
+        self._opened.append(effect)
         self.look_at(effect)
+        with card:
+            for heading, text in [*card_of(find_effect(effect)).lines(), *self._predicted(effect)]:
+                ui.label(printable(f"{heading}: {text}")).classes("studio-muted")
 
     def look_at(self, effect: str) -> None:
-        """Show the card of an effect, and what it would explain; empty puts both away.
+        """Draw what an effect would explain; empty draws nothing of that kind.
 
         Parameters
         ----------
         effect : str
             Its id.
         """
-        if effect == self._looked_at:
-            return
-        self._looked_at = effect
-        self._card.clear()
-        self._card.visible = bool(effect)
-        if effect:
-            card = card_of(find_effect(effect))
-            with self._card:
-                ui.label(printable(f"{card.id}: {card.name}")).classes("studio-id")
-                for heading, text in [*card.lines(), *self._predicted(effect)]:
-                    ui.label(printable(f"{heading}: {text}")).classes("studio-muted")
-        self._panels.propose(effect)
+        if effect != self._looked_at:
+            self._looked_at = effect
+            self._panels.propose(effect)
 
     def _predicted(self, effect: str) -> list[tuple[str, str]]:
         """Return what the log says of the size of an effect, unless a person is to guess it."""
@@ -189,3 +229,16 @@ class CandidateView:
             return []
         found = [item for item in diagnosis.candidates if item.effect == effect and item.parameters]
         return [("predicted here", "; ".join(in_lines(item.parameters))) for item in found]
+
+
+def _figures(item: Candidate, diagnosis: Diagnosis) -> None:
+    """Write probability, error and rivals of a candidate."""
+    likely = f"{quantity.probability(item.probability)} probable{_shared(item, diagnosis)}"
+    words = f"{likely}, error of all channels {item.error_change}{_why_not(item, diagnosis)}"
+    ui.label(printable(words)).classes("studio-muted")
+    if item.effect in diagnosis.named and item.confounded_with:
+        rivals = ", ".join(
+            f"{effect_name(rival.effect)} ({quantity.number(rival.correlation, 2)})"
+            for rival in item.confounded_with[:2]
+        )
+        ui.label(f"Rivals, with correlation: {rivals}").classes("studio-muted")

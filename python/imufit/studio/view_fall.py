@@ -13,6 +13,7 @@ from imufit.studio import charts
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
 from imufit.studio.icons import bare
+from imufit.studio.names import channel_name
 from imufit.studio.session import Session, worst_channel
 
 SMALL: Final = 0.005
@@ -41,6 +42,7 @@ class FallView:
         # In a row of its own: its other words must not move Undo beneath the pointer.
         self._keep = ui.button("Keep to compare", icon="splitscreen", on_click=self._keep_second)
         self._keep.props("flat dense size=12px").props("data-mark=second")
+        ui.label("Held-out error of all channels together").classes("studio-muted")
         self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
         self._floor = Explained().classes("studio-muted").props("data-mark=floor")
@@ -61,7 +63,8 @@ class FallView:
         made = session.made()
         best = None
         if made is not None and made.diagnosis is not None and not session.can_redo and not self._desk.guessing:
-            candidate = made.diagnosis.best_candidate
+            # Beside a wrong fixed value no effect is proposed: it would explain the error of that value.
+            candidate = None if made.diagnosis.contradicted else made.diagnosis.best_candidate
             best = None if candidate is None else (candidate.effect, candidate.held_out_after)
         figure = charts.fall(
             [step.label for step in session.steps],
@@ -104,7 +107,7 @@ def _floor_words(session: Session, noise: tuple[NoisePart, ...], chosen: str | N
     floor = ", ".join(words for beyond, words in names if not beyond)
     slow = ", ".join(words for beyond, words in names if beyond)
     beside = f" Slow changes of the zero come on top: {slow} of that variance." if slow else ""
-    return f"Noise floor of {channel}: {floor or 'not known'} of its variance.{beside}"
+    return f"Noise floor of {channel_name(str(channel))}: {floor or 'not known'} of its variance.{beside}"
 
 
 def _session(desk: Desk) -> Session:

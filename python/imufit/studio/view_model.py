@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from nicegui import ui
 
 from imufit.figures import quantity
@@ -9,9 +11,15 @@ from imufit.printable import NAME, printable
 from imufit.results import Parameter
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
-from imufit.studio.icons import bare
+from imufit.studio.heading import heading_of
+from imufit.studio.icons import bare, stated
+from imufit.studio.names import capital, effect_name, parameter_name
 from imufit.studio.session import Numbers, Session
 from imufit.studio.stack import Entry
+
+ESTIMATED: Final = "estimated"
+FIXED: Final = "fixed"
+"""Words beside a value: whether the fit chooses it, or a person has fixed it."""
 
 
 class ModelView:
@@ -51,18 +59,18 @@ class ModelView:
 
     def _entry(self, entry: Entry, numbers: Numbers | None) -> None:
         desk = self._desk
-        name = printable(entry.effect, NAME)
+        name = effect_name(entry.effect)
         with ui.element("div").classes("studio-item" + ("" if entry.on else " studio-off")):
             with ui.element("div").classes("studio-row"):
                 ui.switch(
                     value=entry.on, on_change=lambda event: desk.attempt(lambda: _switch(desk, entry, event.value))
-                ).props("dense " + attribute("aria-label", f"{entry.effect} in the model")).props(
+                ).props("dense " + attribute("aria-label", f"{capital(name)} in the model")).props(
                     attribute("data-mark", f"switch-{entry.effect}")
                 )
-                ui.label(name).classes("studio-id")
+                heading_of(entry.effect)
                 bare(
                     "close",
-                    f"Remove {entry.effect}",
+                    f"Remove {name}",
                     lambda: desk.attempt(lambda: _session(desk).remove(entry.effect)),
                 ).props("size=sm")
             if not entry.on:
@@ -76,6 +84,7 @@ class ModelView:
 
     def _parameter(self, parameter: Parameter, fitted: bool) -> None:
         desk = self._desk
+        name = parameter_name(parameter.effect, parameter.name)
         with ui.element("div").classes("studio-parameter"):
             ui.label(printable(parameter.name, NAME)).classes("studio-muted")
             value = ui.label(parameter.shown).props(attribute("data-mark", f"value-{parameter.key}"))
@@ -83,32 +92,36 @@ class ModelView:
                 value.classes("studio-muted").tooltip("to first order, from the evidence")
             elif parameter.typical is not None:
                 value.tooltip(f"typical size {quantity.quantity(parameter.typical, parameter.unit)}")
-            bare("edit", f"Edit {parameter.key}", lambda: self._edit(parameter)).props("size=sm").props(
+            bare("edit", f"Edit {name}", lambda: self._edit(parameter)).props("size=sm").props(
                 attribute("data-mark", f"edit-{parameter.key}")
             )
-            pin = "lock" if parameter.fixed else "lock_open"
-            words = "Fit this parameter again" if parameter.fixed else "Fix at this value"
-            bare(pin, f"{words}: {parameter.key}", lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
-                "size=sm"
-            ).props(attribute("data-mark", f"pin-{parameter.key}"))
+            state = FIXED if parameter.fixed else ESTIMATED
+            words = f"estimate {name} again" if parameter.fixed else f"fix {name} at this value"
+            stated(state, f"{state}: {words}", lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
+                attribute("data-mark", f"pin-{parameter.key}")
+            )
 
     def _edit(self, parameter: Parameter) -> None:
-        """Ask for a value in the shown unit."""
+        """Ask for a value in the shown unit, in the digits that its standard error warrants."""
         desk = self._desk
-        factor, unit = quantity.shown_unit(parameter.unit, parameter.value)
+        shown = parameter.digits
         with ui.dialog() as dialog, ui.card():
-            ui.label(f"{printable(parameter.key, NAME)}, {unit}").classes("studio-id")
-            given = ui.number(label=f"value, {unit}", value=float(f"{factor * parameter.value:.6g}")).props(
+            name = capital(parameter_name(parameter.effect, parameter.name))
+            ui.label(f"{name}, {shown.unit}").classes("studio-name")
+            ui.label(printable(parameter.key, NAME)).classes("studio-id")
+            given = ui.number(label=f"value, {shown.unit}", value=float(shown.value)).props(
                 "data-mark=edit-value autofocus"
             )
-            ui.label("The value stays fixed until you open the lock.").classes("studio-muted")
+            ui.label(f"The value stays fixed until you press its word “{FIXED}”.").classes("studio-muted")
 
             async def take() -> None:
                 if given.value is None:
                     given.error = "Give a number."
                     return
                 dialog.close()
-                value = float(given.value) / factor
+                # A field that was left as it was fixes the value itself, not its shown digits.
+                same = given.value == float(shown.value)
+                value = parameter.value if same else float(given.value) / shown.factor
                 await desk.attempt(lambda: _session(desk).hold(parameter.effect, parameter.name, value))
 
             given.on("keydown.enter", take)

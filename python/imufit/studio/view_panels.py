@@ -12,13 +12,13 @@ from imufit.comparing.compare import MIN_SHARE
 from imufit.figures import quantity
 from imufit.fitting.passes import UNITS
 from imufit.model.catalogue import find_effect
-from imufit.printable import NAME, printable
 from imufit.results import Comparison, Diagnosis, Spectrum, Unexplained
 from imufit.results.comparison import Panel
 from imufit.studio import charts
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
 from imufit.studio.icons import bare
+from imufit.studio.names import capital, channel_name, covariate_name, effect_name, with_symbol
 from imufit.studio.session import Session, worst_channel
 from imufit.studio.stack import Stack
 
@@ -209,7 +209,7 @@ class PanelView:
         wanted = (desk.channel, None if found is None else worst_channel(found))
         channel = next((name for name in wanted if name in channels), channels[0])
         self._setting = True
-        self._channel.set_options(channels, value=channel)
+        self._channel.set_options({name: _channel(name) for name in channels}, value=channel)
         self._setting = False
         ui.timer(0, lambda: self._draw_trace(channel), once=True)
 
@@ -226,7 +226,8 @@ class PanelView:
         covariate = self._present_covariate(found, channel)
         self._setting = True
         self._channel.set_options(
-            {item.channel: f"{item.channel} ({quantity.ratio(item.ratio)})" for item in ratios}, value=channel
+            {item.channel: f"{_channel(item.channel)}, {quantity.ratio(item.ratio)} × its floor" for item in ratios},
+            value=channel,
         )
         shares = {item.covariate: item.share for item in found.where if item.channel == channel}
         self._covariate.set_options(
@@ -301,9 +302,10 @@ class PanelView:
             else charts.spectrum(spectrum, both)
         )
         level = next(item for item in found.channels if item.channel == channel)
-        rises = "" if panel is not None or covariate is None else RISES.format(cause=covariate)
+        rises = "" if panel is not None or covariate is None else RISES.format(cause=covariate_name(covariate))
         beside = _without_effect_on(self._proposed, channel)
-        self._note.set_text(f"{channel} stands at {quantity.ratio(level.ratio)} times its noise floor.{rises}{beside}")
+        alone = f"{capital(channel_name(channel))} alone: its residual stands at {quantity.ratio(level.ratio)}"
+        self._note.set_text(f"{alone} times its noise floor.{rises}{beside}")
         ui.timer(0, lambda: self._draw_trace(channel), once=True)
 
     async def _draw_cause(self, channel: str, cause: str) -> None:
@@ -384,7 +386,7 @@ class PanelView:
 
 def _with_share(covariate: str, share: float | None) -> str:
     """Return a covariate, with the share of the excess that it explains where that is worth naming."""
-    name = printable(covariate, NAME)
+    name = with_symbol(covariate_name(covariate), covariate)
     return name if share is None else f"{name} ({quantity.share(share)})"
 
 
@@ -392,7 +394,12 @@ def _without_effect_on(effect: str, channel: str) -> str:
     """Return the sentence on an effect of another sensor: with it, the channel's residual stays as it is."""
     if not effect or channel[:3] in find_effect(effect).sensors:
         return ""
-    return f" {printable(effect, NAME)} does not act on {channel}."
+    return f" {capital(effect_name(effect))} does not act on {channel_name(channel)}."
+
+
+def _channel(channel: str) -> str:
+    """Return a channel in words with its name in logs behind."""
+    return with_symbol(channel_name(channel), channel)
 
 
 def _panel_of(panels: Any, channel: str, covariate: str | None) -> Panel | None:

@@ -20,6 +20,7 @@ from imufit.studio.explained import Explained
 from imufit.studio.icons import light_or_dark, with_words
 from imufit.studio.log_file import LogFile, option_words, remedies
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING, SEEDS
+from imufit.studio.names import capital, effect_name, with_symbol
 from imufit.studio.recipe import as_python, as_shell
 from imufit.studio.saving import download_game, download_session, save_first
 from imufit.studio.session_file import LogsWantedError
@@ -27,8 +28,6 @@ from imufit.studio.view_verdict import show_verdict
 
 MOST_BYTES: Final = 4 * 2**30
 """Largest file that the browser may send: 20 million rows of 14 columns take 2.2 GB."""
-NOTES: Final = 2
-"""Notes that stand open: as many lines as the sentence over them has; the others fold away."""
 DROPS: Final = """
 const elsewhere = event => !event.target.closest || !event.target.closest('.q-uploader');
 document.addEventListener('dragover', event => { if (elsewhere(event)) event.preventDefault(); });
@@ -41,6 +40,8 @@ document.addEventListener('drop', event => {
 """Script by which a file that is dropped anywhere on the page goes to the uploader of a number."""
 PART_JUDGED: Final = "rule"
 """Icon of an adequate model where a sensor was not judged."""
+WRONG_VALUE: Final = "a fixed value contradicts the log"
+"""Verdict on a model with such a value, beside whose icon it stands: no effect can be judged there."""
 ICONS: Final = {"adequate": "check_circle", "missing": "help", "ambiguous": "call_split", "unknown": "error"}
 
 
@@ -92,7 +93,7 @@ class Head:
             return
         text = as_python(desk.files, made.way) if form == "Python" else as_shell(desk.files, made.way)
         with ui.dialog() as dialog, ui.card().style("max-width: 92vw"):
-            ui.label(f"The present model as {form}").classes("studio-id")
+            ui.label(f"The present model as {form}").classes("studio-name")
             folder = "Copied. Run it in the folder of the log"
             first = ": save the log there first." if desk.game_log() is not None else "."
             ui.label(folder + first).classes("studio-muted")
@@ -130,9 +131,7 @@ class Top:
     def _show_work(self) -> None:
         desk = self._desk
         self._busy.visible = bool(desk.busy)
-        share = "" if desk.share is None else f" {100.0 * desk.share:.0f} %"
-        share = f", pass {desk.passes + 1} over the rows" if desk.passes else share
-        self._work.set_text(f"{printable(desk.busy)}{share}" if desk.busy else "")
+        self._work.set_text(printable(desk.waiting_for))
 
     def refresh(self) -> None:
         """Show the verdict, what awaits a choice, problems and the game."""
@@ -226,14 +225,14 @@ class Top:
     def _verdict(self, diagnosis: Diagnosis) -> None:
         seen: set[str] = set()
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
-            ui.icon(_icon_of(diagnosis), size="sm").props(
-                f'role=img aria-label="{diagnosis.verdict}" title="{diagnosis.verdict}"'
-            )
+            word = WRONG_VALUE if diagnosis.contradicted else diagnosis.verdict
+            ui.icon(_icon_of(diagnosis), size="sm").props(f'role=img aria-label="{word}" title="{word}"')
             Explained(diagnosis.sentence or diagnosis.verdict, seen).classes("studio-sentence").props(
                 "data-mark=verdict"
             )
-        if diagnosis.experiment:
-            Explained(f"Next: {diagnosis.experiment}", seen).classes("studio-muted")
+        advice = tuple(dict.fromkeys(item.advice for item in diagnosis.judged if item.advice))
+        for words in filter(None, (diagnosis.experiment, *advice)):
+            Explained(f"Next: {words}", seen).classes("studio-muted").props("data-mark=next")
         for fault in diagnosis.data_faults:
             number = _number_of(self._desk, fault.file)
             with ui.element("div").classes("studio-error"):
@@ -244,13 +243,11 @@ class Top:
                     self._cure(option, number, "mend")
         for words in self._desk.joined:
             ui.label(printable(words)).classes("studio-muted").props("data-mark=joined")
-        shown, folded = diagnosis.notes[:NOTES], diagnosis.notes[NOTES:]
-        for note in shown:
-            Explained(note, seen).classes("studio-muted")
-        if folded:
-            words = f"{quantity.counted(len(folded), 'more note')} on these data"
-            with ui.expansion(words).classes("w-full").props("dense"):
-                for note in folded:
+        notes = [note for note in diagnosis.notes if note not in advice]
+        if notes:
+            words = f"{quantity.counted(len(notes), 'note')} on these data"
+            with ui.expansion(words).classes("w-full").props("dense data-mark=notes"):
+                for note in notes:
                     Explained(note, seen).classes("studio-muted")
 
     def _cure(self, option: Option, number: int, mark: str) -> None:
@@ -335,7 +332,7 @@ class Top:
                 return
             names = sorted(desk.session.start.analysis.candidates)
             choices = {NOTHING: "nothing is missing"} if level.nothing else {}
-            choices |= {name: printable(name, NAME) for name in names}
+            choices |= {name: with_symbol(capital(effect_name(name)), name) for name in names}
             with ui.row().classes("items-center"):
                 # Who added an effect has named it; another choice stays until the reveal.
                 present = (_named(desk) or None) if game.answer is None else game.answer
@@ -345,7 +342,7 @@ class Top:
                 answer.on_value_change(lambda event: setattr(game, "answer", event.value))
                 reveal = ui.button("Reveal", on_click=lambda: desk.reveal(answer.value)).props("data-mark=reveal")
                 reveal.bind_enabled_from(answer, "value", lambda chosen: chosen is not None)
-                ids = {words: effect for effect, words in choices.items()}
+                ids = {words: effect for effect, words in choices.items()} | {name: name for name in names}
 
                 def take(event: events.GenericEventArguments) -> None:
                     answer.value = ids.get(str(event.args).strip(), answer.value)
@@ -367,6 +364,8 @@ ADDED: Final = "The bars show what the effect took off the error. Reveal the tru
 
 
 def _icon_of(diagnosis: Diagnosis) -> str:
+    if diagnosis.contradicted:
+        return ICONS["unknown"]
     whole = all(item.judged for item in diagnosis.judged)
     return ICONS[diagnosis.verdict] if whole or diagnosis.verdict != "adequate" else PART_JUDGED
 

@@ -8,10 +8,10 @@ from typing import Final
 from nicegui import ui
 
 from imufit.figures import quantity
-from imufit.printable import NAME, printable
 from imufit.results.model_comparison import preferred
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
+from imufit.studio.names import channel_name, parameter_name, with_symbol
 from imufit.studio.session import Made
 
 CHANGED: Final = 0.005
@@ -87,8 +87,8 @@ def lower(second: Made, present: Made) -> str:
 def _two_models(second: Made, present: Made, factor: float | None) -> None:
     """Lay out two models: held-out error, evidence, residual of each channel that changes, parameters."""
     Explained(
-        f"Held-out error: {quantity.ratio(second.numbers.ratio)} times the noise floor with the kept model, "
-        f"{quantity.ratio(present.numbers.ratio)} with the present one. {lower(second, present)}"
+        f"Held-out error of all channels: {quantity.ratio(second.numbers.ratio)} times the noise floor with the kept "
+        f"model, {quantity.ratio(present.numbers.ratio)} with the present one. {lower(second, present)}"
     ).classes("studio-sentence").props("data-mark=two-sentence")
     if factor is not None:
         better = "kept" if factor < 0.0 else "present"
@@ -97,17 +97,23 @@ def _two_models(second: Made, present: Made, factor: float | None) -> None:
             f"The log prefers {choice}: ln Bayes factor {abs(factor):.1f} in favour of the {better} one."
         ).classes("studio-sentence").props("data-mark=two-evidence")
     rows: list[tuple[str, ...]] = [
-        ("held-out error", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))
+        ("held-out error of all channels", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))
     ]
     levels = [
         {item.channel: item.ratio for item in (made.comparison.channels if made.comparison is not None else ())}
         for made in (second, present)
     ]
     changed = [name for name in levels[0] if abs(levels[0][name] - levels[1].get(name, math.nan)) >= CHANGED]
-    rows += [(f"{name} over its floor", *(quantity.ratio(level[name]) for level in levels)) for name in changed]
+    rows += [
+        (f"{channel_name(name)} over its floor", *(quantity.ratio(level[name]) for level in levels)) for name in changed
+    ]
     values = [{item.key: item.shown for item in made.numbers.parameters} for made in (second, present)]
-    keys = dict.fromkeys([*values[0], *values[1]])
-    rows += [(printable(key, NAME), values[0].get(key, "–"), values[1].get(key, "–")) for key in keys]
+    names = {
+        item.key: with_symbol(parameter_name(item.effect, item.name), item.key)
+        for made in (second, present)
+        for item in made.numbers.parameters
+    }
+    rows += [(name, *(value.get(key, "–") for value in values)) for key, name in names.items()]
     with ui.element("table").classes("studio-table"):
         for k, row in enumerate([("", "kept model", "present model"), *rows]):
             with ui.element("tr"):

@@ -30,6 +30,7 @@ from imufit.log.columns import GROUPS, SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.results import Recording
 from imufit.studio.live.rolling import Rolling
+from imufit.studio.names import capital
 
 Array = NDArray[np.float64]
 
@@ -373,17 +374,21 @@ class Listening:
 
 
 def in_sentences(result: Calibration) -> tuple[str, ...]:
-    """Say what a calibration did, sensor by sensor, or once that none of them needs it.
+    """Say what a calibration did to each sensor that has an error, and once which sensors show none.
 
     Parameters
     ----------
     result : Calibration
         The calibration.
     """
-    if any(sensor.lowers_error for sensor in result.sensors.values()):
-        return tuple(sensor.sentence() for sensor in result.sensors.values())
-    names = ", ".join(SENSOR_NAMES[name] for name in result.sensors)
-    return (f"The model need not be used: the readings of {names} were right within the noise already.",)
+    faulty = tuple(sensor.sentence() for sensor in result.sensors.values() if sensor.shows_error)
+    right = [SENSOR_NAMES[name] for name, sensor in result.sensors.items() if not sensor.shows_error]
+    if not right:
+        return faulty
+    names = " and ".join(filter(None, (", ".join(right[:-1]), right[-1])))
+    shows = "shows no error beyond its" if len(right) == 1 else "show no error beyond their"
+    needless = "" if faulty else " The model need not be used."
+    return (*faulty, f"{capital(names)} {shows} standard errors: the readings are right as they are.{needless}")
 
 
 def in_words(recording: Recording) -> str:
