@@ -343,4 +343,7 @@ def test_a_fixed_value_that_the_log_contradicts_is_named(log):
     true = fitted.params["gyr.scale.z"]
     for away, named in ((1.0, False), (30.0, True)):
         model.params["gyr.scale.z"].set(true.value + away * true.stderr, vary=False)
-        assert ("gyr.scale.z is fixed at" in model.fit(log).diagnose().sentence) is named
+        found = model.fit(log).diagnose()
+        assert ("gyr.scale.z is fixed at" in found.sentence) is named
+        assert [item.key for item in found.contradicted] == (["gyr.scale.z"] if named else [])
+        assert found.to_dict().get("contradicted", []) == [item.key for item in found.contradicted]

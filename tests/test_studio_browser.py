@@ -6,6 +6,7 @@ import re
 import socket
 import subprocess
 import sys
+import tomllib
 import urllib.error
 import urllib.request
 from urllib.parse import urlsplit
@@ -133,7 +134,6 @@ def test_the_loop_gives_the_numbers_of_the_command_line(page, folder):
     assert "residual of" in panel["layout"]["yaxis"]["title"]["text"]
     for count, step in enumerate(ladder["steps"], 2):
         marked(page, f"candidate-{step['effect']}").hover()
-        marked(page, "card").wait_for()
         page.wait_for_function(
             """() => document.querySelector('[data-mark="panel"] .legend')
                      && document.querySelector('[data-mark="panel"]').textContent.includes('with ')"""
@@ -304,7 +304,13 @@ def test_buttons_can_be_read_in_light_and_dark_and_icons_show_their_words(page, 
     marked(page, "add-acc.bias").click()
     wait_for_bars(page, 2)
     shown = "element => getComputedStyle(element, '::after').content"
-    for words in ("Undo", "Remove acc.bias", "Edit acc.bias.x", "Fix at this value: acc.bias.x"):
+    assert marked(page, "pin-acc.bias.x").inner_text() == "estimated"
+    for words in (
+        "Undo",
+        "Remove accelerometer bias",
+        "Edit accelerometer bias x",
+        "estimated: fix accelerometer bias x at this value",
+    ):
         button = page.get_by_label(words, exact=True)
         button.hover()
         assert button.evaluate(shown) == f'"{words}"'
@@ -315,20 +321,108 @@ def test_buttons_can_be_read_in_light_and_dark_and_icons_show_their_words(page, 
         button.blur()
 
 
-def test_a_mouse_click_on_a_candidate_leaves_the_page_where_it_is(page, folder):
-    page.set_viewport_size({"width": 1280, "height": 500})
+def within(page, *elements):
+    """Whether elements lie within the window."""
+    height = page.viewport_size["height"]
+    boxes = [element.bounding_box() for element in elements]
+    return all(box["y"] >= -1.0 and box["y"] + box["height"] <= height + 1.0 for box in boxes)
+
+
+@pytest.mark.parametrize("width", [380, 1280])
+def test_the_card_of_a_candidate_opens_in_sight_where_its_name_is_pressed(page, folder, width):
+    page.set_viewport_size({"width": width, "height": 600})
     drop(page, folder / "walk.parquet")
     wait_for_bars(page, 1)
-    row = page.locator('[data-mark^="candidate-"]').nth(1)
-    effect = row.get_attribute("data-mark").removeprefix("candidate-")
-    assert row.locator(".studio-term").count() == 0
-    row.locator(".studio-id").scroll_into_view_if_needed()
-    before = page.evaluate("window.scrollY")
-    row.locator(".studio-id").click()
-    marked(page, "card").get_by_text(f"{effect}:").wait_for()
+    rows = page.locator('[data-mark^="candidate-"]')
+    for k in (1, 3):
+        row = rows.nth(k)
+        effect = row.get_attribute("data-mark").removeprefix("candidate-")
+        name, card = row.locator(".studio-name"), marked(page, f"card-{effect}")
+        # The words come first, the id behind them is smaller.
+        words, symbol = (name.locator(".nicegui-label, div").nth(i) for i in (0, 1))
+        assert (words.inner_text().lower(), symbol.inner_text()) == (imufit.explain(effect).name.lower(), effect)
+        size = "element => parseFloat(getComputedStyle(element).fontSize)"
+        assert words.evaluate(size) > symbol.evaluate(size)
+        # The name stands at the lower edge of the window: beneath it, there is no room for the card.
+        name.evaluate("element => element.scrollIntoView({block: 'end', behavior: 'instant'})")
+        name.click()
+        card.get_by_text("physics:").wait_for()
+        page.wait_for_timeout(800)
+        assert within(page, name, card)
+        assert name.get_attribute("aria-expanded") == "true"
+    # A card that was opened before stays, so that no row moved from beneath the pointer.
+    assert page.locator('[data-mark^="card-"]:visible').count() == 2
+    name.click()
+    card.wait_for(state="hidden")
+
+
+def test_a_contradicted_value_is_named_in_the_place_of_the_figures_of_candidates(page, folder):
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    marked(page, "add-gyr.scale").click()
+    wait_for_bars(page, 2)
+    assert page.get_by_text("probable").count() > 0
+    assert marked(page, "contradicted").count() == 0
+    marked(page, "edit-gyr.scale.x").click()
+    page.locator("input[data-mark=edit-value], [data-mark=edit-value] input").first.fill("25")
+    marked(page, "edit-take").click()
+    marked(page, "contradicted").wait_for()
+    idle(page)
+    assert "Gyroscope scale error x (gyr.scale.x) is fixed at a value" in marked(page, "contradicted").inner_text()
+    assert page.get_by_text("probable").count() == 0
+    assert "expected next" not in [trace["name"] for trace in figure(page, "fall")["data"] if "name" in trace]
+    assert marked(page, "pin-gyr.scale.x").inner_text() == "fixed"
+    marked(page, "free-gyr.scale.x").click()
+    marked(page, "contradicted").wait_for(state="detached")
+    wait_for_bars(page, 4)
+    assert marked(page, "pin-gyr.scale.x").inner_text() == "estimated"
+    assert page.get_by_text("probable").count() > 0
+
+
+def test_the_field_of_a_value_has_its_digits_and_leaves_the_value_as_it_is(page, folder):
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    marked(page, "add-gyr.scale").click()
+    wait_for_bars(page, 2)
+    shown = marked(page, "value-gyr.scale.x").inner_text().split(" ± ")[0]
+    marked(page, "edit-gyr.scale.x").click()
+    field = page.locator("input[data-mark=edit-value], [data-mark=edit-value] input").first
+    assert len(field.input_value()) <= len(shown)
+    assert float(field.input_value()) == float(shown)
+    marked(page, "edit-take").click()
+    wait_for_bars(page, 3)
+    with page.expect_download() as download:
+        marked(page, "save").click()
+    held = tomllib.loads(download.value.path().read_text())["steps"][-1]["stack"][0]["held"]["x"]
+    # The value itself was fixed, not its digits.
+    fitted = imufit.fit(imufit.read(folder / "walk.parquet")).add("gyr.scale").fit.params["gyr.scale.x"].value
+    assert held == fitted != float(shown) / 100.0
+
+
+def test_the_verdict_and_the_fallen_bars_are_in_one_view_on_a_phone(page, folder):
+    page.set_viewport_size({"width": 380, "height": 800})
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    for count, effect in enumerate(EFFECTS, 2):
+        marked(page, f"add-{effect}").click()
+        wait_for_bars(page, count)
+        page.wait_for_timeout(1000)
+        assert within(page, marked(page, "verdict"), marked(page, "fall"))
+
+
+def test_advice_on_a_recording_that_is_too_short_stands_with_the_verdict(page, folder):
+    log = simulate("handheld", {}, duration=8.0, rate=50.0, seed=4).to_log().with_fields(ref_q=None, ref_p=None)
+    log.write(folder / "short.parquet")
+    drop(page, folder / "short.parquet")
+    marked(page, "verdict").wait_for()
+    idle(page)
+    advice = marked(page, "next")
+    assert advice.is_visible()
+    assert "lay the sensor down in at least 8" in advice.inner_text()
+    # It is said once.
+    marked(page, "notes").click()
     page.wait_for_timeout(800)
-    assert page.evaluate("window.scrollY") == before
-    assert marked(page, "card").inner_text().startswith(f"{effect}:")
+    assert page.get_by_text("lay the sensor down in at least 8").count() == 1
 
 
 def test_a_log_does_not_replace_a_model_that_is_not_saved(page, folder):
@@ -356,14 +450,17 @@ def test_a_typed_answer_counts(page):
     assert marked(page, "reveal").is_disabled()
     assert marked(page, "unanswered").is_visible()
     answer = page.get_by_label("Your answer")
-    for key, name in (("Enter", "gyr.scale"), ("Tab", "acc.bias")):
+    for key, name, words in (
+        ("Enter", "gyr.scale", "Gyroscope scale error (gyr.scale)"),
+        ("Tab", "acc.bias", "Accelerometer bias (acc.bias)"),
+    ):
         answer.fill(name)
         answer.press(key)
         page.wait_for_timeout(800)
-        assert answer.input_value() == name
+        assert answer.input_value() == words
     assert not marked(page, "unanswered").is_visible()
     marked(page, "reveal").click()
-    assert "you named acc.bias" in marked(page, "truth").inner_text()
+    assert "you named accelerometer bias (acc.bias)" in marked(page, "truth").inner_text()
 
 
 def test_a_session_does_not_replace_a_model_that_is_not_saved(page, folder, tmp_path):
@@ -454,7 +551,7 @@ def test_a_game_is_played_and_revealed(page):
     marked(page, "truth").wait_for()
     text = page.locator('[data-mark="truth"]').all_inner_texts()
     assert len(text) == 2
-    assert "was hidden, and you named acc.bias" in text[0]
+    assert "was hidden, and you named accelerometer bias (acc.bias)" in text[0]
     assert text[1].count("probability") == 1
     rows = marked(page, "hidden-values").locator("tr").all_inner_texts()
     assert rows[0].split() == ["parameter", "hidden", "fitted", "±", "error"]
@@ -486,7 +583,7 @@ def test_a_new_game_takes_the_old_answers_away_while_it_is_made(page, folder):
     with page.expect_download() as download:
         marked(page, "save-first").click()
     assert download.value.suggested_filename == "walk-session.toml"
-    page.wait_for_function("() => document.querySelector('[data-mark=busy]')?.textContent.includes('hiding')")
+    page.wait_for_function("() => document.querySelector('[data-mark=busy]')?.textContent.includes('Hiding')")
     marked(page, "verdict").wait_for(state="detached", timeout=1000)
     marked(page, "reveal").wait_for()
     idle(page)
@@ -495,11 +592,12 @@ def test_a_new_game_takes_the_old_answers_away_while_it_is_made(page, folder):
 def test_a_candidate_of_another_sensor_says_that_it_does_not_act_on_the_channel(page, folder):
     drop(page, folder / "walk.parquet")
     wait_for_bars(page, 1)
-    channel = figure(page, "panel")["layout"]["yaxis"]["title"]["text"].split()[2].rstrip(",")
-    other = "gyr.bias" if channel.startswith("acc") else "acc.bias"
+    channel = figure(page, "panel")["layout"]["yaxis"]["title"]["text"].removeprefix("residual of ").split(",")[0]
+    other = "gyr.bias" if channel.startswith("accelerometer") else "acc.bias"
     page.get_by_text("more candidates").click()
     marked(page, f"candidate-{other}").hover()
-    page.get_by_text(f"{other} does not act on {channel}.").wait_for()
+    name = imufit.explain(other).name
+    page.get_by_text(f"{name[0].upper()}{name[1:]} does not act on {channel}.").wait_for()
 
 
 def test_the_choice_of_light_or_dark_holds_on_the_next_page(page, address):
@@ -588,7 +686,7 @@ def test_the_demonstration_leads_to_a_named_effect_and_a_fallen_error(chromium, 
         assert after < 1.1 < start
         marked(page, "reveal").click()
         marked(page, "truth").wait_for()
-        assert marked(page, "truth").inner_text() == "acc.scale was hidden."
+        assert marked(page, "truth").inner_text() == "Accelerometer scale error (acc.scale) was hidden."
         run_what_is_copied(page, folder, after)
         page.close()
 

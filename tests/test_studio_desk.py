@@ -244,3 +244,24 @@ def test_a_session_that_is_reopened_knows_the_error_of_undone_steps(log):
     ratios = [[desk.session.made(step.stack).numbers.ratio for step in desk.session.steps] for desk in (first, second)]
     assert ratios[0] == ratios[1]
     assert not second.unsaved
+
+
+def test_the_page_says_what_is_waited_for_and_how_far_it_is():
+    desk, said = Desk(), []
+    assert desk.waiting_for == ""
+
+    def work() -> None:
+        for done in (0, 25, 100, 40, 100, 10):
+            desk.progress(done, 100, "taking evidence")
+            said.append(desk.waiting_for)
+
+    asyncio.run(desk._in_thread("fitting the model to the log", work))
+    assert said == [
+        "Fitting the model to the log: 0 % of the rows are read.",
+        "Fitting the model to the log: 25 % of the rows are read.",
+        "Fitting the model to the log: all rows were read once.",
+        "Fitting the model to the log: all rows were read once, and 40 % again.",
+        "Fitting the model to the log: all rows were read 2 times.",
+        "Fitting the model to the log: all rows were read 2 times, and 10 % again.",
+    ]
+    assert desk.waiting_for == ""

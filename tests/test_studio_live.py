@@ -1,8 +1,11 @@
 """The live page in Chromium: an emulated device is followed, recorded and guided through a calibration."""
 
+import re
+
 import numpy as np
 import pytest
 from browser import WEBGL, chromium, needs_chromium
+from imufit.lab.simulate import SCENARIOS
 from imufit.log import read
 from studio_browser import studio
 from studio_watched import problems, strangers
@@ -40,7 +43,12 @@ def wait_until(page, holds):
 
 def connect(page, scenario):
     page.get_by_label("device").click()
-    page.get_by_role("option", name=f"emulate {scenario}", exact=True).click()
+    entry = page.get_by_role("option").filter(has=page.get_by_text(f"emulate {scenario}", exact=True))
+    assert SCENARIOS[scenario].description in entry.inner_text()
+    entry.click()
+    about = page.get_by_test_id("about").inner_text()
+    assert "with accelerometer, gyroscope, magnetometer and thermometer" in about
+    assert about.endswith("noise, and no other error.")
     page.get_by_role("button", name="Connect", exact=True).click()
     wait_until(page, lambda: number(page, "rows") > 50)
 
@@ -106,7 +114,7 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     wait_until(page, lambda: words(page, "gtitle") == panels)
     assert words(page, "ytitle") == ["m/s²", "deg/s", "µT", "°C"]
     wait_until(page, lambda: min(page.evaluate(DRAWN)) > 50)
-    page.get_by_text("at rest", exact=True).wait_for(timeout=PATIENCE)
+    page.get_by_text(re.compile(r"^at rest, [+-][xyz] up$")).wait_for(timeout=PATIENCE)
     angles = page.get_by_text("roll", exact=False).first
     angles.wait_for(timeout=PATIENCE)
     assert "(filter " in angles.inner_text()

@@ -4,7 +4,7 @@ import pytest
 from imufit.errors import InputError
 from imufit.figures import quantity
 from imufit.lab.simulate import hidden, unseal
-from imufit.model.catalogue import find_effect
+from imufit.model.catalogue import card_of, find_effect
 from imufit.studio.log_file import LogFile
 from imufit.studio.mystery import ALIKE, DEMO_SEED, DEMONSTRATION, DURATION, LEVELS, NOTHING, RATE, Mystery
 from imufit.studio.session import Session
@@ -25,11 +25,12 @@ def test_a_large_effect_is_named_by_the_evidence(tmp_path):
     right = game.reveal(truth, first)
     assert right.right
     assert right.truth == (truth,)
-    assert right.sentences[0] == f"Right: {truth} was hidden, and you named {truth}."
+    said = f"{card_of(find_effect(truth)).name} ({truth})"
+    assert right.sentences[0] == f"Right: {said} was hidden, and you named {said}."
     name, value = next(iter(unseal(game.log).effects[truth].items()))
     unit = next(unit for key, unit, _ in find_effect(truth).parameters if key == name)
     # One line on the probability, and the hidden values beside those of the evidence until the effect is in the model.
-    assert right.sentences[1:] == (f"You could have been sure: the evidence gives {truth} a probability of > 99.9 %.",)
+    assert right.sentences[1:] == (f"You could have been sure: the evidence gives {said} a probability of > 99.9 %.",)
     assert (right.values[0].key, right.values[0].hidden) == (f"{truth}.{name}", quantity.quantity(value, unit))
     assert right.values[0].fitted.endswith("(to first order)")
     fitted = next(item for item in first.candidates if item.effect == truth).parameters
@@ -43,7 +44,7 @@ def test_a_large_effect_is_named_by_the_evidence(tmp_path):
 def test_the_demonstration_states_the_truth_and_judges_no_answer(tmp_path):
     game, first = played(DEMONSTRATION, DEMO_SEED, tmp_path)
     (truth,) = unseal(game.log).effects
-    assert game.reveal(None, first).sentences[0] == f"{truth} was hidden."
+    assert game.reveal(None, first).sentences[0].endswith(f"({truth}) was hidden.")
 
 
 def test_level_1_hides_no_effect_that_another_one_resembles(tmp_path):

@@ -19,7 +19,7 @@ from imufit.figures.style import AXES, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
 from imufit.printable import NAME, printable
 from imufit.results import Spectrum
 from imufit.results.comparison import Panel
-from imufit.studio.names import channel_name, covariate_name, effect_name
+from imufit.studio.names import channel_name, covariate_name
 
 if TYPE_CHECKING:
     from imufit.figures.allan import ChannelLike
@@ -44,7 +44,7 @@ NOW: Final = "now"
 FALL_HEIGHT: Final = 270
 """Height of the fall of the error, px: the labels under the bars and the legend leave a third of it to the bars."""
 SMALL: Final = 11
-"""Size of the letters in the figure of the falling error, px. At this size the axis' title fits beside the plot."""
+"""Size of the letters of an axis' title and of the figure of the falling error, px: the titles fit beside the plots."""
 SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
 DECADES: Final = 6
@@ -78,8 +78,8 @@ def _figure(traces: list[dict[str, Any]], x: str, y: str, **more: Any) -> Figure
         "margin": {"l": 56, "r": 12, "t": 8, "b": 44},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "xaxis": {**axis, "title": {"text": x, "standoff": 6}, **more.pop("xaxis", {})},
-        "yaxis": {**axis, "title": {"text": y, "standoff": 6}, **more.pop("yaxis", {})},
+        "xaxis": {**axis, "title": {"text": x, "standoff": 6, "font": {"size": SMALL}}, **more.pop("xaxis", {})},
+        "yaxis": {**axis, "title": {"text": y, "standoff": 6, "font": {"size": SMALL}}, **more.pop("yaxis", {})},
         "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
         "hoverlabel": LABEL,
         "showlegend": True,
@@ -102,7 +102,7 @@ def empty(sentence: str) -> Figure:
 
 
 def residual_panel(
-    panel: Panel, after: Panel | None = None, effect: str = "", other: Panel | None = None, *, explained: bool = False
+    panel: Panel, after: Panel | None = None, other: Panel | None = None, *, explained: bool = False
 ) -> Figure:
     """Draw the residual of one channel against one covariate.
 
@@ -111,9 +111,7 @@ def residual_panel(
     panel : Panel
         With the present model.
     after : Panel, optional
-        With one effect more.
-    effect : str
-        That effect.
+        With one effect more: the one that is looked at.
     other : Panel, optional
         With the second of two models.
     explained : bool
@@ -142,8 +140,7 @@ def residual_panel(
     if other is not None:
         traces.append(_line(x_factor * other.centre, factor * other.mean, GREEN, "kept model", dash="dashdot"))
     if after is not None:
-        name = f"with {words(effect_name(effect))}"
-        traces.append(_line(x_factor * after.centre, factor * after.mean, ORANGE, name, dash="dash"))
+        traces.append(_line(x_factor * after.centre, factor * after.mean, ORANGE, "with this effect", dash="dash"))
     y_title = f"residual of {channel}, {unit}"
     return _figure([trace for part in traces for trace in part], x_title, y_title, yaxis={"range": [-limit, limit]})
 
@@ -339,7 +336,7 @@ def fall(
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
     figure["layout"]["height"] = FALL_HEIGHT
-    figure["layout"]["legend"]["font"] = figure["layout"]["yaxis"]["title"]["font"] = {"size": SMALL}
+    figure["layout"]["legend"]["font"] = {"size": SMALL}
     return figure
 
 

@@ -189,11 +189,12 @@ class Desk:
         """The present work in a sentence, and how far it is; empty where there is none."""
         if not self.busy:
             return ""
-        far = "" if self.share is None else f"{100.0 * self.share:.0f} % of the rows are read"
+        far = []
         if self.passes:
-            before = f"all rows were read {'once' if self.passes == 1 else f'{self.passes} times'}"
-            far = f"{before}, and {far} again" if far else before
-        return f"{capital(self.busy)}{f': {far}' if far else ''}."
+            far.append(f"all rows were read {'once' if self.passes == 1 else f'{self.passes} times'}")
+        if self.share is not None:
+            far.append(f"{100.0 * self.share:.0f} % {'again' if self.passes else 'of the rows are read'}")
+        return f"{capital(self.busy)}{': ' if far else ''}{', and '.join(far)}."
 
     @property
     def guessing(self) -> bool:

@@ -289,7 +289,7 @@ class PanelView:
             after = _panel_of(explained, channel, covariate)
         other = None if second is None else _panel_of(second.panels, channel, covariate)
         if panel is not None:
-            self._panel.update_figure(charts.residual_panel(panel, after, self._proposed, other))
+            self._panel.update_figure(charts.residual_panel(panel, after, other))
         elif covariate is None:
             self._panel.update_figure(charts.empty("No covariate is seen in this channel."))
         else:
@@ -320,7 +320,7 @@ class PanelView:
         self._panel.update_figure(
             charts.empty("Too few rows show this cause.")
             if panel is None
-            else charts.residual_panel(panel, after, proposed, other, explained=True)
+            else charts.residual_panel(panel, after, other, explained=True)
         )
 
     async def _draw_trace(self, channel: str) -> None:

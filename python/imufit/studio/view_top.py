@@ -224,6 +224,10 @@ class Top:
 
     def _verdict(self, diagnosis: Diagnosis) -> None:
         seen: set[str] = set()
+        if diagnosis.named and not diagnosis.contradicted:
+            ui.label(f"Missing: {' or '.join(map(effect_name, diagnosis.named))}").classes("studio-name").props(
+                "data-mark=missing"
+            )
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
             word = WRONG_VALUE if diagnosis.contradicted else diagnosis.verdict
             ui.icon(_icon_of(diagnosis), size="sm").props(f'role=img aria-label="{word}" title="{word}"')
@@ -346,6 +350,9 @@ class Top:
 
                 def take(event: events.GenericEventArguments) -> None:
                     answer.value = ids.get(str(event.args).strip(), answer.value)
+                    # The field keeps what was typed: the name of the effect takes its place, and filters nothing.
+                    if answer.value is not None:
+                        answer.run_method("updateInputValue", choices[answer.value], True)  # noqa: FBT003
 
                 # Quasar's field forgets a name that was typed and not picked.
                 for key in ("keydown.enter", "keydown.tab"):

@@ -70,7 +70,8 @@ class Emulator:
     seed : int
         Of a scenario, the jitter, and all chance.
     frame : {"NED", "ENU", "NWU"}
-        In which a scenario is simulated, so that its device lies level there.
+        In which a scenario is simulated. Its device lies level there, but that of `six_sides`, which begins with its z
+        axis up in every frame.
     start : int
         Number of the device's first start, 0 to 255.
     wait : bool, optional

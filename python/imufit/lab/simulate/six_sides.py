@@ -60,8 +60,8 @@ def _six_sides(plan: Plan) -> Trajectory:
 
 SIX_SIDES: Mapping[str, Scenario] = {
     "six_sides": Scenario(
-        "The sensor is laid on the six sides of its box on a level table, quarter turn by quarter turn, then turned "
-        "freely: a calibration.",
+        "The sensor is laid on the six sides of its box on a level table, first with its z axis up, quarter turn by "
+        "quarter turn, then turned freely: a calibration.",
         _six_sides,
         poses=True,
     ),

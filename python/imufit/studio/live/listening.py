@@ -28,6 +28,7 @@ from imufit.errors import InputError
 from imufit.log import read
 from imufit.log.columns import GROUPS, SENSOR_NAMES
 from imufit.log.metadata import Frame
+from imufit.rests.poses import SIDES
 from imufit.results import Recording
 from imufit.studio.live.rolling import Rolling
 from imufit.studio.names import capital
@@ -136,6 +137,8 @@ class Listening:
         The present rest, or the one that a movement has interrupted and may have ended; None without one.
     moving : bool
         Whether the device moves.
+    side : str or None
+        Side that points up by the readings, as the guide names it; None where none does.
     problem : str
         Why following ended by itself; empty while it runs.
     stage : Stage or None
@@ -153,6 +156,7 @@ class Listening:
         self.rests: deque[Rest] = deque(maxlen=RESTS)
         self.rest: Rest | None = None
         self.moving = True
+        self.side: str | None = None
         self.problem = ""
         self.stage: Stage | None = None
         self.calibrated: tuple[str, ...] = ()
@@ -317,6 +321,7 @@ class Listening:
             if closed is not None or not judged["open"]:
                 self.rest = None
             self.moving = judged["state"] == "moving"
+            self.side = None if judged["side"] is None else SIDES[judged["side"]]
             if not self.moving:
                 begin = t if self.rest is None else self.rest.begin
                 self.rest = Rest(begin, t, judged["state"] == "held")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import Awaitable, Callable
 from importlib.resources import files
 from pathlib import Path
@@ -16,6 +17,7 @@ from imufit import _imufit
 from imufit.calibrating import Stage
 from imufit.errors import InputError
 from imufit.lab.simulate import SCENARIOS
+from imufit.log.columns import SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.printable import printable
 from imufit.rests.poses import SIDES
@@ -32,6 +34,15 @@ WINDOWS: Final = (5, 10, 20, 60)
 """Lengths of the traces, s."""
 EMULATED: Final = "emulate "
 """Begin of the entries of the list of devices that are emulated."""
+SENSORS: Final = {**SENSOR_NAMES, "temp": "thermometer"}
+"""Sensors of an emulated device in words."""
+OPTION: Final = """
+<q-item v-bind="props.itemProps"><q-item-section>
+  <q-item-label>{{ props.opt.label }}</q-item-label>
+  <q-item-label caption style="max-width: 30rem">{{ (%s)[props.opt.label] }}</q-item-label>
+</q-item-section></q-item>
+"""
+"""Template of an entry of the list of devices: its name, and beneath it the motion of a device that is emulated."""
 RECORDS: Final = "The red button records what comes from now on."
 FIRST_CONNECT: Final = "Connect a device first."
 GUIDES: Final = "Six sides on a table, then free rotation."
@@ -112,6 +123,37 @@ def devices() -> list[str]:
     return list(dict.fromkeys([*used, *emulated, *(port.device for port in ports)]))
 
 
+def about(choice: str) -> str:
+    """Say what an emulated device is: its sensors, its motion, and its errors; empty for another device.
+
+    Parameters
+    ----------
+    choice : str
+        An entry of the list of devices.
+    """
+    scenario = SCENARIOS.get(choice.removeprefix(EMULATED)) if choice.startswith(EMULATED) else None
+    if scenario is None:
+        return ""
+    sensors = [SENSORS[sensor] for sensor in scenario.sensors]
+    listed = " and ".join(filter(None, (", ".join(sensors[:-1]), sensors[-1])))
+    return (
+        f"A simulated device that this computer plays, with {listed}. {scenario.description} "
+        "Its sensors have noise, and no other error."
+    )
+
+
+def _captions() -> dict[str, str]:
+    """Return the motion of each device that can be emulated, by its entry in the list."""
+    return {EMULATED + name: scenario.description for name, scenario in SCENARIOS.items()}
+
+
+def _lies(moving: bool, side: str | None) -> str:
+    """Say whether the device moves, and which side lies up, as the guide names it."""
+    if moving:
+        return "moving"
+    return "at rest" if side is None else f"at rest, {side} up"
+
+
 def _entry(source: Source) -> str:
     """Return the entry of the list of devices that a source was chosen by."""
     return EMULATED + source.scenario if source.scenario else source.port
@@ -165,9 +207,11 @@ class _LivePage:
                     .style("min-width: 13rem")
                     .props('data-testid="device"')
                 )
+                self._choice.add_slot("option", OPTION % json.dumps(_captions()))
                 self._frame = ui.select(FRAMES, value=LIES, label="frame").style("min-width: 13rem; flex: 1 1 20rem")
                 self._baud = ui.number("bits per second", value=115200, min=300, format="%d").style("width: 8rem")
                 self._connect = ui.button("Connect", on_click=self._connect_or_not).props("unelevated")
+            self._about = ui.label().classes("text-sm").props('data-testid="about"')
             with ui.expansion("Text without a header").props("dense").classes("w-full text-sm") as self._plain:
                 self._header = ui.input("names of the columns", placeholder="t_ms,acc_x,acc_y,acc_z").classes("w-full")
                 # Without this the placeholder is hidden by the field's own name.
@@ -322,7 +366,10 @@ class _LivePage:
         for element in (self._choice, self._frame, self._baud, self._header):
             element.set_enabled(listening is None)
         # An emulated device has neither a serial line nor lines of text.
-        self._baud.visible = self._plain.visible = not str(self._choice.value or "").startswith(EMULATED)
+        choice = str(self._choice.value or "")
+        self._about.text = about(choice)
+        self._about.visible = bool(self._about.text)
+        self._baud.visible = self._plain.visible = not choice.startswith(EMULATED)
         # A recording whose log is being written has its device no more.
         self._red.set_enabled(listening is not None)
         state = None if listening is None else listening.state
@@ -346,7 +393,7 @@ class _LivePage:
         waiting = state.trouble if state.trouble and not state.n else ""
         line = "line lost, trying again" if not state.connected else waiting
         self._name.text = ", ".join(each for each in (printable(state.device) or "device", line) if each)
-        self._rest.text = "" if not state.n else "moving" if listening.moving else "at rest"
+        self._rest.text = "" if not state.n else _lies(listening.moving, listening.side)
         self._show_readings(listening)
 
     def _show_readings(self, listening: Listening) -> None:
