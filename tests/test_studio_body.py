@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from imufit.calibrating.guide import PoseGuide
 from imufit.filters import Gyro
 from imufit.lab.simulate import simulate
 from imufit.log import Log
@@ -55,6 +56,20 @@ def test_side_to_lay_up_points_up(side):
     np.testing.assert_allclose(matrix @ UP[side], UPWARDS, atol=1e-12)
     np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(matrix) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("frame", ["NED", "NWU", "ENU"])
+def test_the_picture_of_a_device_and_the_guide_name_the_same_side(frame):
+    """The guide goes by the readings, the picture by the attitude: in every frame the side that is named points up."""
+    log = simulate("six_sides", {}, 1, duration=30.0, rate=20.0, frame=frame).to_log()
+    guide, named = PoseGuide(), []
+    for t, acc, gyr, q in zip(log.t, log.acc, log.gyr, log.ref_q, strict=True):
+        advice = guide.step(t, acc, gyr)
+        if advice.state == "held":
+            named.append(advice.side)
+            np.testing.assert_allclose(scene_rotation(q, frame) @ UP[advice.side], UPWARDS, atol=0.02)
+    assert named[0] == "+z"
+    assert len(set(named)) >= 4
 
 
 @pytest.fixture(scope="module")

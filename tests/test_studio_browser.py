@@ -361,7 +361,7 @@ def test_a_contradicted_value_is_named_in_the_place_of_the_figures_of_candidates
     wait_for_bars(page, 1)
     marked(page, "add-gyr.scale").click()
     wait_for_bars(page, 2)
-    assert page.get_by_text("probable").count() > 0
+    assert page.get_by_text("% probable").count() > 0
     assert marked(page, "contradicted").count() == 0
     marked(page, "edit-gyr.scale.x").click()
     page.locator("input[data-mark=edit-value], [data-mark=edit-value] input").first.fill("25")
@@ -369,14 +369,14 @@ def test_a_contradicted_value_is_named_in_the_place_of_the_figures_of_candidates
     marked(page, "contradicted").wait_for()
     idle(page)
     assert "Gyroscope scale error x (gyr.scale.x) is fixed at a value" in marked(page, "contradicted").inner_text()
-    assert page.get_by_text("probable").count() == 0
+    assert page.get_by_text("% probable").count() == 0
     assert "expected next" not in [trace["name"] for trace in figure(page, "fall")["data"] if "name" in trace]
     assert marked(page, "pin-gyr.scale.x").inner_text() == "fixed"
     marked(page, "free-gyr.scale.x").click()
     marked(page, "contradicted").wait_for(state="detached")
     wait_for_bars(page, 4)
     assert marked(page, "pin-gyr.scale.x").inner_text() == "estimated"
-    assert page.get_by_text("probable").count() > 0
+    assert page.get_by_text("% probable").count() > 0
 
 
 def test_the_field_of_a_value_has_its_digits_and_leaves_the_value_as_it_is(page, folder):
@@ -684,6 +684,8 @@ def test_the_demonstration_leads_to_a_named_effect_and_a_fallen_error(chromium, 
         page.get_by_role("button", name="Add", exact=True).first.click()
         after = wait_for_bars(page, 2)[-1]
         assert after < 1.1 < start
+        page.wait_for_timeout(1000)
+        assert within(page, marked(page, "verdict"), marked(page, "fall"))
         marked(page, "reveal").click()
         marked(page, "truth").wait_for()
         assert marked(page, "truth").inner_text() == "Accelerometer scale error (acc.scale) was hidden."

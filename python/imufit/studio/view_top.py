@@ -352,7 +352,7 @@ class Top:
                     answer.value = ids.get(str(event.args).strip(), answer.value)
                     # The field keeps what was typed: the name of the effect takes its place, and filters nothing.
                     if answer.value is not None:
-                        answer.run_method("updateInputValue", choices[answer.value], True)  # noqa: FBT003
+                        answer.run_method("updateInputValue", choices[answer.value], True)
 
                 # Quasar's field forgets a name that was typed and not picked.
                 for key in ("keydown.enter", "keydown.tab"):
