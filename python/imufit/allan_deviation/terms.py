@@ -17,7 +17,6 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 from scipy.special import gammaincc
 
 from imufit.results.json_value import json_value
@@ -163,6 +162,8 @@ def _fit(tau: Array, variance: Array, rows: NDArray[np.intp], freedom: Callable[
     if rows[0] > 0:
         # Behind a filter quantisation cannot be seen, and would only take up what is left of the filter's bend.
         design[:, 0] = 0.0
+    from scipy.optimize import nnls  # noqa: PLC0415 - takes 11 MB that most commands do not need
+
     model = measured.copy()
     kinds = ["white"] * len(rows)
     squares = np.array([0.0, 1.0, 0.0, 0.0])

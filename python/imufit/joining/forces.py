@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from imufit import _imufit
 from imufit.joining.course import Course, Stretches
@@ -121,6 +120,8 @@ def position_forces(t: Array, p: Array, up: Array, most: float) -> Forces:
         Largest acceleration that there can be, m/s^2. A position that takes more, and stands out of the noise of the
         others, is left out.
     """
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - takes 13 MB that logs without a position do not need
+
     tame = ~_wild(t, p, most)
     t, p = t[tame], p[tame]
     spline = CubicSpline(t, p - p.mean(axis=0)).antiderivative()

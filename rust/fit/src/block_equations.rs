@@ -6,8 +6,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::gram::Gram;
 use imufit_model::sensor::CHANNELS;
-use nalgebra::DMatrix;
 
 use crate::normal_equations::NormalEquations;
 use crate::part::Part;
@@ -26,7 +26,7 @@ struct Columns {
     /// For each channel the place among the evidence's columns of every parameter of all logs that acts on it.
     places: Vec<Vec<Option<usize>>>,
     /// For each channel the whitened Gram matrix of all blocks together.
-    total: Vec<Option<(DMatrix<f64>, usize)>>,
+    total: Vec<Option<(Gram, usize)>>,
 }
 
 impl Columns {

@@ -188,7 +188,7 @@ impl ChannelSums {
             let counts: Option<Vec<f64>> = match &self.walk {
                 Walk::Zero => of_block(k).map(|block| {
                     let quiet = 1.0 / part.loudness[self.channel][k];
-                    block.bin_count[covariate].iter().map(|n| quiet * n).collect()
+                    block.bins[covariate].count.iter().map(|n| quiet * n).collect()
                 }),
                 Walk::Vector(directions) => {
                     let (b, direction) = &directions[k];

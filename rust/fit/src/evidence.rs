@@ -15,7 +15,9 @@ use imufit_model::window::Window;
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
+use crate::bin_sums::BinSums;
 use crate::bins::Bins;
+use crate::gram::Gram;
 use crate::rests::{ChannelRows, Rests};
 use crate::whitening::Filter;
 
@@ -73,13 +75,11 @@ pub struct ChannelBlock {
     /// Number of samples.
     pub n: usize,
     /// Gram matrix (w x w).
-    pub gram: DMatrix<f64>,
+    pub gram: Gram,
     /// Sums of columns and residual.
     pub sum: DVector<f64>,
-    /// Number of samples in each bin of each covariate.
-    pub bin_count: Vec<Vec<f64>>,
-    /// Sums of columns and residual in each bin (bins x w, row by row) of each covariate.
-    pub bin_sum: Vec<Vec<f64>>,
+    /// What is summed in the bins of each covariate.
+    pub bins: Vec<BinSums>,
     /// What a zero of the three axes does, where rows are projections of a vector.
     pub axes: Option<AxisSums>,
 }
@@ -118,17 +118,12 @@ impl ChannelBlock {
     fn new(width: usize, bins: &Bins) -> Self {
         Self {
             n: 0,
-            gram: DMatrix::zeros(width, width),
+            gram: Gram::zeros(width),
             sum: DVector::zeros(width),
-            bin_count: bins
+            bins: bins
                 .edges
                 .iter()
-                .map(|e| vec![0.0; if e.is_empty() { 0 } else { e.len() + 1 }])
-                .collect(),
-            bin_sum: bins
-                .edges
-                .iter()
-                .map(|e| vec![0.0; if e.is_empty() { 0 } else { (e.len() + 1) * width }])
+                .map(|e| BinSums::zeros(if e.is_empty() { 0 } else { e.len() + 1 }, width))
                 .collect(),
             axes: None,
         }
@@ -136,29 +131,16 @@ impl ChannelBlock {
 
     fn add(&mut self, other: &Self) {
         self.n += other.n;
-        self.gram += &other.gram;
+        self.gram.add(&other.gram, 1.0);
         self.sum += &other.sum;
         match (&mut self.axes, &other.axes) {
             (Some(own), Some(other)) => own.add(other),
             (own @ None, Some(other)) => *own = Some(other.clone()),
             (_, None) => {}
         }
-        for (a, b) in self
-            .bin_count
-            .iter_mut()
-            .zip(&other.bin_count)
-            .chain(self.bin_sum.iter_mut().zip(&other.bin_sum))
-        {
-            for (x, y) in a.iter_mut().zip(b) {
-                *x += y;
-            }
+        for (own, other) in self.bins.iter_mut().zip(&other.bins) {
+            own.merge(other);
         }
-    }
-
-    /// Sum of squared residuals.
-    pub fn residual_square(&self) -> f64 {
-        let last = self.gram.nrows() - 1;
-        self.gram[(last, last)]
     }
 }
 
@@ -272,7 +254,7 @@ impl Evidence {
             let key = (rows.block[i], rows.channel);
             let target = blocks.entry(key).or_insert_with(|| ChannelBlock::new(width, bins));
             target.n += 1;
-            target.gram.ger(1.0, &row, &row, 1.0);
+            target.gram.add_row(&row);
             target.sum += &row;
             let direction = rows.direction.as_ref().map(|d| d.row(i));
             if let Some(direction) = direction {
@@ -285,13 +267,9 @@ impl Evidence {
                 if bin == usize::MAX {
                     continue;
                 }
-                target.bin_count[covariate][bin] += 1.0;
+                target.bins[covariate].add(bin, 1.0, row.as_slice());
                 if let (Some(direction), Some(axes)) = (direction, &mut target.axes) {
                     axes.bin_sum[covariate][bin] += direction;
-                }
-                let sums = &mut target.bin_sum[covariate][bin * width..(bin + 1) * width];
-                for (s, v) in sums.iter_mut().zip(row.iter()) {
-                    *s += v;
                 }
             }
         }
@@ -330,10 +308,10 @@ impl Evidence {
     }
 
     /// Gram matrix of a channel over all blocks with the number of samples, each block weighted by `weight`; `None` without any.
-    pub fn total(&self, channel: usize, weight: impl Fn(usize) -> f64) -> Option<(DMatrix<f64>, usize)> {
+    pub fn total(&self, channel: usize, weight: impl Fn(usize) -> f64) -> Option<(Gram, usize)> {
         self.of_channel(channel).fold(None, |total, (b, block)| {
-            let (mut gram, n) = total.unwrap_or_else(|| (block.gram.map(|_| 0.0), 0));
-            gram.zip_apply(&block.gram, |sum, own| *sum += weight(b) * own);
+            let (mut gram, n) = total.unwrap_or_else(|| (Gram::zeros(block.gram.columns()), 0));
+            gram.add(&block.gram, weight(b));
             Some((gram, n + block.n))
         })
     }
@@ -350,7 +328,7 @@ impl Evidence {
         let v = self.contrast(channel, step);
         let of = |b: usize| {
             self.get(b, channel)
-                .map_or((0.0, 0), |block| ((&block.gram * &v).dot(&v).max(0.0), block.n))
+                .map_or((0.0, 0), |block| (block.gram.square(&v).max(0.0), block.n))
         };
         (0..self.layout.blocks).map(of).collect()
     }
@@ -441,7 +419,7 @@ fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
                 target.n += last - first;
                 let rows = DMatrixView::from_slice(&by_row[first * width..last * width], width, last - first);
                 let columns = DMatrixView::from_slice_with_strides(&by_column[first..], last - first, width, 1, n);
-                target.gram.gemm(1.0, &rows, &columns, 1.0);
+                target.gram.add_matrix(&(rows * columns));
                 target.sum += rows.column_sum();
                 for (covariate, assigned) in assigned.iter().enumerate().filter(|(_, a)| !a.is_empty()) {
                     for i in first..last {
@@ -449,11 +427,7 @@ fn take(layout: &Layout, window: &Window) -> Result<Blocks, EffectError> {
                         if bin == usize::MAX {
                             continue;
                         }
-                        target.bin_count[covariate][bin] += 1.0;
-                        let sums = &mut target.bin_sum[covariate][bin * width..(bin + 1) * width];
-                        for (s, v) in sums.iter_mut().zip(&by_row[i * width..(i + 1) * width]) {
-                            *s += v;
-                        }
+                        target.bins[covariate].add(bin, 1.0, &by_row[i * width..(i + 1) * width]);
                     }
                 }
                 first = last;

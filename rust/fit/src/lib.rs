@@ -3,11 +3,13 @@
 //! A log is gone over in windows; everything here is additive over windows, so that a log need not fit in memory and parts of it, or logs of one
 //! sensor, can be added up.
 
+pub mod bin_sums;
 pub mod bins;
 pub mod block_equations;
 pub mod block_sums;
 pub mod bounded;
 pub mod evidence;
+pub mod gram;
 pub mod noise;
 pub mod normal_equations;
 pub mod part;

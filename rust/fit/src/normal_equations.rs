@@ -2,6 +2,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use crate::gram::Gram;
+
 /// Gram matrix, right-hand side and sum of squares of a weighted least-squares problem.
 #[derive(Clone, Debug)]
 pub struct NormalEquations {
@@ -56,18 +58,18 @@ impl NormalEquations {
     }
 
     /// Adds one channel's Gram matrix of `[columns | residual]` over `n` samples; `chosen` are pairs of a place here and one there.
-    pub fn add_channel(&mut self, gram: &DMatrix<f64>, n: usize, chosen: &[(usize, usize)], weight: f64) {
+    pub fn add_channel(&mut self, gram: &Gram, n: usize, chosen: &[(usize, usize)], weight: f64) {
         if !(weight > 0.0 && weight.is_finite()) {
             return;
         }
-        let last = gram.ncols() - 1;
+        let last = gram.columns() - 1;
         for (q, j) in chosen {
             for (p, i) in chosen {
-                self.gram[(*p, *q)] += weight * gram[(*i, *j)];
+                self.gram[(*p, *q)] += weight * gram.at(*i, *j);
             }
-            self.right[*q] += weight * gram[(*j, last)];
+            self.right[*q] += weight * gram.at(*j, last);
         }
-        self.square += weight * gram[(last, last)];
+        self.square += weight * gram.at(last, last);
         self.n += n as f64;
     }
 

@@ -57,9 +57,9 @@ pub fn panels(raw: &Evidence, step: &DVector<f64>, channel: usize, floor: f64) -
     let of_covariate = |(covariate, edges): (usize, &Vec<f64>)| {
         let in_bin = |bin: usize| {
             let of_block = |(_, block): (usize, &ChannelBlock)| {
-                let sums = &block.bin_sum[covariate][bin * v.len()..(bin + 1) * v.len()];
-                let sum: f64 = sums.iter().zip(v.iter()).map(|(a, b)| a * b).sum();
-                (sum, block.bin_count[covariate][bin])
+                let bins = &block.bins[covariate];
+                let of_sums = |sums: &[f64]| sums.iter().zip(v.iter()).map(|(a, b)| a * b).sum();
+                (bins.of(bin).map_or(0.0, of_sums), bins.count[bin])
             };
             raw.of_channel(channel).map(of_block).collect()
         };

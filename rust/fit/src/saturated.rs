@@ -49,7 +49,7 @@ fn freedom(evidence: &Evidence, fitted: &[usize], channel: usize) -> usize {
     let used: Vec<usize> = (0..active.len()).filter(|k| fitted.contains(&active[*k])).collect();
     let total = evidence.total(channel, |_| 1.0).filter(|_| evidence.layout.facts.rests);
     let Some((gram, _)) = total else { return used.len() };
-    let gram = gram.select_rows(&used).select_columns(&used);
+    let gram = gram.matrix().select_rows(&used).select_columns(&used);
     let scaled = DMatrix::from_fn(used.len(), used.len(), |i, j| {
         let size = (gram[(i, i)] * gram[(j, j)]).sqrt();
         if size > 0.0 { gram[(i, j)] / size } else { 0.0 }

@@ -96,10 +96,10 @@ pub(crate) fn covariates(problem: &Problem) -> Vec<Covariate> {
 
 /// Products of contrasts over the bins of a covariate in one block: with `[columns | residual]` (width x m), and with one another (m x m).
 fn products(block: &ChannelBlock, covariate: usize, contrasts: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
-    let counts = DVector::from_column_slice(&block.bin_count[covariate]);
-    let sums = DMatrix::from_column_slice(block.sum.len(), counts.len(), &block.bin_sum[covariate]);
+    let bins = &block.bins[covariate];
+    let counts = DVector::from_column_slice(&bins.count);
     (
-        sums * contrasts,
+        bins.matrix() * contrasts,
         contrasts.tr_mul(&(DMatrix::from_diagonal(&counts) * contrasts)),
     )
 }

@@ -175,7 +175,7 @@ impl Bandwidth {
         let mut local_fit = |at: f64, width: Smoothing| {
             let knot = reference.nearest(at, &mut hint)?;
             let near = reference.around(knot, width.half_width);
-            let values = near.within(width.half_width)?.to_vec();
+            let values = near.within(knot, width.half_width)?.to_vec();
             let fit = LocalFit::new(reference.times_around(knot, width.half_width), at, width, lowest)?;
             Some((fit, values, knot - width.half_width))
         };

@@ -13,7 +13,8 @@ const MAX_GAP: f64 = 4.5;
 pub(crate) struct Knots {
     pub(crate) t: Vec<f64>,
     pub(crate) row: Vec<usize>,
-    segment: Vec<(usize, usize)>,
+    /// Segment of each knot.
+    segments: Vec<(usize, usize)>,
     /// Samples of a packet; 1 where every sample has a stamp of its own.
     pub(crate) packet: usize,
 }
@@ -56,18 +57,18 @@ impl Knots {
             }
         }
         let widest = MAX_GAP * spacing.unwrap_or_else(|| usual_step(&t));
-        let mut segment = vec![(0, 0); t.len()];
+        let mut segments = vec![(0, 0); t.len()];
         let mut first = 0;
         for k in 0..t.len() {
             if k + 1 == t.len() || t[k + 1] - t[k] > widest {
-                segment[first..=k].fill((first, k + 1));
+                segments[first..=k].fill((first, k + 1));
                 first = k + 1;
             }
         }
         Self {
             t,
             row,
-            segment,
+            segments,
             packet,
         }
     }
@@ -89,15 +90,14 @@ impl Knots {
         if k + 1 < n && self.t[k + 1] - at < at - self.t[k] {
             k += 1;
         }
-        let (first, last) = self.segment[k];
+        let (first, last) = self.segments[k];
         // Between two segments the nearest knot may lie far away.
         let reach = 0.75 * (self.t[k + 1.min(last - 1 - k)] - self.t[k - 1.min(k - first)]);
         ((at - self.t[k]).abs() <= reach).then_some(k)
     }
 
-    /// Knots on each side of one, up to the nearer end of its segment.
-    pub(crate) fn reach(&self, knot: usize) -> usize {
-        let (first, last) = self.segment[knot];
-        (knot - first).min(last - 1 - knot)
+    /// First knot of the segment that a knot lies in, and the first one after it.
+    pub(crate) fn segment(&self, knot: usize) -> (usize, usize) {
+        self.segments[knot]
     }
 }

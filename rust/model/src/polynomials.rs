@@ -1,6 +1,6 @@
 //! Local polynomials of one reference quantity at any time: for its value, for columns, for second derivatives.
 //!
-//! What lies around a knot is worked out once, for every width and every clock.
+//! What lies around a run of knots is worked out once, for every width and every clock.
 
 use std::sync::OnceLock;
 
@@ -13,9 +13,14 @@ use crate::smoothing::{self, Derivatives, LocalFit, Smoothing, Weights};
 pub struct Polynomials {
     reference: LocalReference,
     widths: Widths,
-    /// Around each knot, for the widest polynomial.
+    /// Around the middle of each run of knots, for the widest polynomial.
     around: Vec<OnceLock<Neighbourhood>>,
 }
+
+/// Part of the reach of the widest polynomial that a run of knots reaches to each side of its middle. Rotation vectors of a run start from
+/// one attitude. An eighth keeps those of its knots below 0.35 rad of the 2.8 rad at which vectors wrap around, so that the series of
+/// [`crate::rotation_rates`] stay exact to 1e-9; half a kilobyte at most is then kept for a knot.
+const RUN: usize = 8;
 
 /// What the polynomials say of one time.
 pub struct Local {
@@ -59,9 +64,15 @@ impl Polynomials {
         }
     }
 
-    /// Numbers that these keep at most.
+    /// Knots of a run to each side of its middle.
+    fn side(&self) -> usize {
+        self.widths.widest() / RUN
+    }
+
+    /// Numbers that these keep where no gap cuts a run short.
     pub fn numbers(&self) -> usize {
-        self.around.len() * 3 * (2 * self.widths.widest() + 1)
+        let side = self.side();
+        self.around.len().div_ceil(2 * side + 1) * 3 * (2 * (self.widths.widest() + side) + 1)
     }
 
     /// For times in rising order.
@@ -90,10 +101,12 @@ impl Reader<'_> {
             around,
         } = self.of;
         let knot = reference.nearest(t, &mut self.hint)?;
-        let around = around[knot].get_or_init(|| reference.around(knot, widths.widest()));
+        let side = self.of.side();
+        let middle = reference.middle(knot, side);
+        let around = around[middle].get_or_init(|| reference.around(middle, widths.widest() + side));
         let [for_value, for_columns, for_bends] = &mut self.caches;
         let read = |smoothing: Smoothing, cache: &mut WeightCache| {
-            let values = around.within(smoothing.half_width)?;
+            let values = around.within(knot, smoothing.half_width)?;
             let times = reference.times_around(knot, smoothing.half_width);
             cache.derivatives(times, t, smoothing, values, reference.lowest())
         };
@@ -105,7 +118,7 @@ impl Reader<'_> {
         // Where the widest polynomial does not reach, the one of the columns has to do.
         let wider = Some(widths.bends).filter(|b| *b != widths.columns);
         Some(Local {
-            centre: reference.attitude_at(knot),
+            centre: reference.attitude_at(middle),
             value,
             columns,
             bends: wider.and_then(|wider| read(wider, for_bends)),

@@ -53,16 +53,16 @@ pub struct LocalReference {
 
 /// Values around a knot: rotation vectors from its attitude, rad, or positions relative to its own, m.
 pub struct Neighbourhood {
-    /// Knots on each side.
-    pub reach: usize,
+    /// Number of the first knot that has a value.
+    first: usize,
     values: Vec<[f64; 3]>,
 }
 
 impl Neighbourhood {
-    /// Values of the knot and of so many on each side, where it has these.
-    pub fn within(&self, half_width: usize) -> Option<&[[f64; 3]]> {
-        let margin = self.reach.checked_sub(half_width)?;
-        Some(&self.values[margin..self.values.len() - margin])
+    /// Values of a knot and of so many on each side, where these are known.
+    pub fn within(&self, knot: usize, half_width: usize) -> Option<&[[f64; 3]]> {
+        let begin = knot.checked_sub(self.first + half_width)?;
+        self.values.get(begin..=begin + 2 * half_width)
     }
 }
 
@@ -175,27 +175,39 @@ impl LocalReference {
 
     /// What lies around a knot, at most so many knots to each side: nothing beyond a gap, nor where a rotation vector is about to wrap around.
     pub fn around(&self, knot: usize, most: usize) -> Neighbourhood {
-        let most = most.min(self.knots.reach(knot));
-        let rows = knot - most..=knot + most;
-        let (reach, values) = match &self.samples {
+        let (begin, end) = self.knots.segment(knot);
+        let rows = knot.saturating_sub(most).max(begin)..(knot + most + 1).min(end);
+        match &self.samples {
             Samples::Attitudes(attitudes) => {
                 let back = attitudes[knot].inverse();
-                let vectors: Vec<_> = attitudes[rows].iter().map(|a| rotation_vector(&(back * a))).collect();
-                let wraps = |k: usize| vectors[k].norm_squared() > WRAPS * WRAPS;
-                let reach = (1..=most)
-                    .find(|d| wraps(most - d) || wraps(most + d))
-                    .map_or(most, |d| d - 1);
-                let kept = &vectors[most - reach..=most + reach];
-                (reach, kept.iter().map(|phi| [phi.x, phi.y, phi.z]).collect())
+                let vector = |k: usize| rotation_vector(&(back * attitudes[k]));
+                let tame = |phi: &Vector3<f64>| phi.norm_squared() <= WRAPS * WRAPS;
+                let mut before: Vec<_> = (rows.start..knot).rev().map(vector).take_while(tame).collect();
+                let first = knot - before.len();
+                before.reverse();
+                before.extend((knot..rows.end).map(vector).take_while(tame));
+                Neighbourhood {
+                    first,
+                    values: before.iter().map(|phi| [phi.x, phi.y, phi.z]).collect(),
+                }
             }
             Samples::Positions(positions) => {
                 // What is taken off so that large coordinates keep their digits does not matter to derivatives.
                 let origin = positions[knot];
                 let relative = |p: &[f64; 3]| from_fn(|axis| p[axis] - origin[axis]);
-                (most, positions[rows].iter().map(relative).collect())
+                Neighbourhood {
+                    first: rows.start,
+                    values: positions[rows].iter().map(relative).collect(),
+                }
             }
-        };
-        Neighbourhood { reach, values }
+        }
+    }
+
+    /// The knot whose neighbourhood serves this one: the middle of a run of knots, so many to each side, that no gap parts.
+    pub fn middle(&self, knot: usize, side: usize) -> usize {
+        let (begin, end) = self.knots.segment(knot);
+        let run = 2 * side + 1;
+        (begin + (knot - begin) / run * run + side).min(end - 1)
     }
 
     /// Times of a knot and of so many on each side, s.

@@ -204,7 +204,7 @@ mod tests {
         for row in (100..3900).step_by(3) {
             let knot = reference.nearest(t[row], &mut hint).expect("within the log");
             let (half, near) = (WIDTH.half_width, reference.around(knot, WIDTH.half_width));
-            let (values, first) = (near.within(half).expect("within the log"), knot - half);
+            let (values, first) = (near.within(knot, half).expect("within the log"), knot - half);
             let weights = LocalFit::new(reference.times_around(knot, half), t[row], WIDTH, 0)
                 .expect("determined")
                 .weights();

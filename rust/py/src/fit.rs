@@ -199,12 +199,14 @@ impl PyEvidence {
     fn gram<'py>(&self, py: Python<'py>, channel: usize, block: Option<usize>) -> Option<Bound<'py, PyArray2<f64>>> {
         let blocks: Vec<usize> = block.map_or_else(|| (0..self.0.layout.blocks).collect(), |b| vec![b]);
         let mut parts = blocks.into_iter().filter_map(|b| self.0.get(b, channel));
-        let first = parts.next()?.gram.clone();
-        let sum = parts.fold(first, |s, b| s + &b.gram);
-        let n = sum.nrows();
+        let mut sum = parts.next()?.gram.clone();
+        for part in parts {
+            sum.add(&part.gram, 1.0);
+        }
+        let n = sum.columns();
         Some(PyArray2::from_owned_array(
             py,
-            numpy::ndarray::Array2::from_shape_fn((n, n), |(i, j)| sum[(i, j)]),
+            numpy::ndarray::Array2::from_shape_fn((n, n), |(i, j)| sum.at(i, j)),
         ))
     }
 }
