@@ -179,6 +179,15 @@ def test_what_readings_do_not_show_is_asked_once_and_for_the_whole_file(tmp_path
     same(log, rest, "acc", "gyr")
 
 
+def test_a_shaken_accelerometer_is_proposed_in_the_unit_that_is_nearest_to_gravity(tmp_path: Path, sound: Log) -> None:
+    # Nothing rests: a centrifugal force of 8 m/s^2 stands across gravity throughout.
+    shaken = sound.acc / np.linalg.norm(sound.acc, axis=1, keepdims=True) * 12.7
+    for factor, unit in ((1.0, "m/s^2"), (1.0 / STANDARD_GRAVITY, "g"), (4096 / STANDARD_GRAVITY, "4096 LSB/g")):
+        with pytest.raises(InputError, match="do not show it") as raised:
+            read(table(tmp_path / "shaken.csv", ["t", *xyz("A*")], sound.t, shaken * factor))
+        assert f"acc_x=Ax[{unit}]" in str(raised.value.shell_remedy)
+
+
 def test_a_log_without_names_and_time_is_asked_once(tmp_path: Path, sound: Log) -> None:
     rows = np.column_stack([sound.acc, sound.gyr])
     np.savetxt(tmp_path / "a.txt", rows, fmt="%.6f")

@@ -20,7 +20,7 @@ from imufit.log.metadata import STANDARD_GRAVITY, Metadata
 from imufit.log.place import Place
 from imufit.log.time_order import counted_on
 from imufit.log.time_unit import time_unit
-from imufit.log.unit_by_data import acc_unit, gyr_unit, mag_unit, turned
+from imufit.log.unit_by_data import acc_unit, gyr_unit, likely_acc_unit, mag_unit, turned
 from imufit.log.unit_check import (
     HEAD,
     OtherUnitError,
@@ -614,7 +614,8 @@ class _Readings:
             size = np.empty(0) if field is None else np.linalg.norm(field, axis=1)
             size = size[np.isfinite(size) & (size > 0.0)]
             return f"*{_USUAL_FIELD / float(np.median(size)):.3g}" if size.size else "uT"
-        return "g"
+        acc = self._stacked("acc")
+        return "g" if acc is None else likely_acc_unit(acc)
 
 
 def _known(names: Sequence[str], given: Mapping[str, str], place: Place) -> dict[str, PlannedColumn]:

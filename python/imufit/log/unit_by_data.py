@@ -14,6 +14,8 @@ from imufit.log.unit_check import ACC_UNITS, GYR_UNITS, MAG_UNITS, field_ratio, 
 
 Array = NDArray[np.float64]
 
+_GRAVITIES: Final = ((STANDARD_GRAVITY, "m/s^2"), *((size, unit) for size, _, unit in ACC_UNITS))
+"""Gravity in each unit."""
 _NEAR: Final = 0.15
 """Relative difference up to which gravity at rest shows the unit; the units lie a factor of 2 apart."""
 _NEAR_RATE: Final = 0.25
@@ -46,8 +48,21 @@ def acc_unit(acc: Array) -> str | None:
         Readings as they stand in the file.
     """
     norm = rest_norm(acc)
-    known = ((STANDARD_GRAVITY, "", "m/s^2"), *ACC_UNITS)
-    return next((unit for size, _, unit in known if abs(norm / size - 1.0) < _NEAR), None)
+    return next((unit for size, unit in _GRAVITIES if abs(norm / size - 1.0) < _NEAR), None)
+
+
+def likely_acc_unit(acc: Array) -> str:
+    """Find the unit in which the quietest readings of an accelerometer are nearest to gravity; g where none is known.
+
+    Parameters
+    ----------
+    acc : (n, 3) array
+        Readings as they stand in the file.
+    """
+    norm = rest_norm(acc)
+    if not (np.isfinite(norm) and norm > 0.0):
+        return "g"
+    return min(_GRAVITIES, key=lambda each: abs(np.log(norm / each[0])))[1]
 
 
 def gyr_unit(t: Array, gyr: Array, vectors: list[tuple[Array, bool]], ref_q: Array | None) -> str | None:
