@@ -92,7 +92,7 @@ def test_the_ladder_tells_its_steps(tmp_path):
     log = simulate("handheld", {"gyr.bias": {"x": 0.02}}, seed=3, duration=40, rate=50).to_log()
     result = imufit.ladder(log, progress=lambda done, total, what: told.append((total, what)))
     steps = [what for total, what in told if total == 1]
-    assert steps[0].startswith("step 1: effects missing in")
+    assert steps[0].startswith("step 1: looking for effects missing in")
     assert [step.effect for step in result.steps] == ["gyr.bias"]
     assert any(what.startswith("step 1: gyr.bias against ") and what.endswith(" candidates") for what in steps)
-    assert any(what.startswith("step 2: effects missing in gyr.bias") for what in steps)
+    assert any(what.startswith("step 2: looking for effects missing in gyr.bias") for what in steps)

@@ -16,6 +16,7 @@ from imufit.errors import InputError
 from imufit.lab.simulate import simulate
 from imufit.log import Reading
 from imufit.studio.log_file import LogFile, Way, arrived, offers, option_words, remedies
+from imufit.studio.mystery import Mystery
 from imufit.studio.recipe import as_python, as_shell
 from imufit.studio.session import Session, worst_channel
 from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
@@ -93,6 +94,23 @@ def test_the_numbers_are_those_of_ladder_and_diagnose(session, folder):
     for parameter in session.numbers().parameters:
         there = ladder["parameters"][parameter.effect][parameter.name]
         assert (parameter.value, parameter.standard_error) == (there["value"], there["standard_error"])
+
+
+def test_an_effect_that_explained_the_log_as_well_is_not_forgotten(tmp_path):
+    game = Mystery.hidden(3, 0, tmp_path)
+    session = Session([LogFile(game.log, game.log.name).open()])
+    session.begin()
+    first = session.diagnose()
+    best, *rivals = first.named
+    assert rivals
+    assert session.as_likely() == {}
+    session.add(best)
+    assert session.as_likely() == {best: tuple(rivals)}
+    for rival in rivals:
+        session.add(rival)
+    assert session.as_likely() == {}
+    session.position = 0
+    assert session.as_likely() == {}
 
 
 def test_a_switch_needs_no_pass_and_is_quick(session):

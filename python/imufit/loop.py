@@ -201,7 +201,7 @@ class Fit(FittedStack):
         """
         tell = progress or silent
         fit = self.on(_opened(log), tell)
-        tell(0, 1, f"step 1: effects missing in {' + '.join(fit.model.effects) or 'the ideal sensor'}")
+        tell(0, 1, f"step 1: looking for effects missing in {' + '.join(fit.model.effects) or 'the ideal sensor'}")
         return diagnose(fit)
 
     def add(self, effect: str | Function, log: AnyLogs | None = None, progress: Progress | None = None) -> Addition:

@@ -172,7 +172,7 @@ class Climb:
     def _diagnose(self) -> Diagnosis:
         """Ask what is missing from the model so far."""
         on_top = self.steps[-1].effect if self.steps else "the model it starts from"
-        self._progress(0, 1, f"step {len(self.steps) + 1}: effects missing in {on_top}")
+        self._progress(0, 1, f"step {len(self.steps) + 1}: looking for effects missing in {on_top}")
         return diagnose(self.fit)
 
     def _add(self, effect: str, expected: float | None = None, only: Collection[str] | None = None) -> Addition:

@@ -55,7 +55,7 @@ LEVELS: Final[dict[int, Level]] = {
     DEMONSTRATION: Level(
         "Demonstration",
         "One effect is hidden in one minute of a simulated hand-held sensor. The sentence below names the effect. "
-        "Press Add beside the effect, see the error fall, then reveal the truth.",
+        "Press Add beside the effect under Candidates, see the error fall, then reveal the truth.",
         "The loop on your own log is the same: compare, name, add, and stop where the error stands at the noise floor.",
     ),
     1: Level(

@@ -11,6 +11,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -289,6 +290,26 @@ class Session:
             The stack.
         """
         return self._made.get((self.stack if stack is None else stack).model)
+
+    def as_likely(self) -> dict[str, tuple[str, ...]]:
+        """Return the effects that explained the logs as well when an effect of the present model was added.
+
+        Returns
+        -------
+        dict
+            Their ids by the id of the effect that was added; without those that the model has besides.
+        """
+        effects = self.stack.model.effects
+        found: dict[str, tuple[str, ...]] = {}
+        for before, step in pairwise(self.steps[: self.position + 1]):
+            made = self.made(before.stack)
+            if step.action is not Action.ADD or step.effect not in effects or made is None or made.diagnosis is None:
+                continue
+            item = next((item for item in made.diagnosis.candidates if item.effect == step.effect), None)
+            others = () if item is None else made.diagnosis.sharing(item)
+            if left := tuple(name for name in others if name not in effects):
+                found[step.effect] = left
+        return found
 
     def numbers(self, stack: Stack | None = None) -> Numbers | None:
         """Return error and parameters of a stack at once, without a pass over the logs.

@@ -57,7 +57,7 @@ def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
         return ""
     outdone = item.outcome == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
     if outdone and diagnosis.best is not None:
-        return f"; explains nothing beside {effect_name(diagnosis.best)}"
+        return f"; explains nothing that {effect_name(diagnosis.best)} does not"
     return f"; {item.outcome}"
 
 
@@ -103,7 +103,7 @@ class CandidateView:
         self._list.classes(**({"add": "studio-long"} if self._desk.guessing else {"remove": "studio-long"}))
         with self._list:
             if diagnosis is None:
-                ui.label("The candidates stand here once they are judged.").classes("studio-muted")
+                ui.label("The effects of the catalogue are being compared with the log.").classes("studio-muted")
                 return
             shown = [item for item in diagnosis.candidates if item.status != NOT_TESTABLE]
             if not shown:

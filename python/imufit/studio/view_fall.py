@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from nicegui import ui
 
-from imufit.figures import quantity
-from imufit.results.noise_part import NoisePart
 from imufit.studio import charts
 from imufit.studio.desk import Desk
-from imufit.studio.explained import Explained
 from imufit.studio.icons import bare
-from imufit.studio.names import channel_name
-from imufit.studio.session import Session, worst_channel
-
-SMALL: Final = 0.005
-"""Share of the noise floor's variance below which a part is not listed."""
+from imufit.studio.session import Session
 
 
 class FallView:
@@ -45,7 +37,6 @@ class FallView:
         ui.label("Held-out error of all channels together").classes("studio-muted")
         self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
-        self._floor = Explained().classes("studio-muted").props("data-mark=floor")
 
     def refresh(self) -> None:
         """Show the steps up to the present one, those that were undone paler."""
@@ -55,8 +46,7 @@ class FallView:
         self._redo.set_enabled(session is not None and begun and session.can_redo)
         self._keep.set_enabled(begun)
         if session is None or not begun:
-            self._chart.update_figure(charts.empty("Waiting for the evidence."))
-            self._floor.set_text("")
+            self._chart.update_figure(charts.empty("The log is being read."))
             return
         numbers = [session.numbers(step.stack) for step in session.steps]
         ratios = [math.nan if item is None else item.ratio for item in numbers]
@@ -75,12 +65,7 @@ class FallView:
         )
         if figure != self._chart.figure:
             self._chart.update_figure(figure)
-        self._floor.set_text(
-            ""
-            if made is None or made.diagnosis is None
-            else _floor_words(session, made.diagnosis.noise, self._desk.channel)
-        )
-        self._keep.set_text("Put the kept model away" if session.second is not None else "Keep to compare")
+        self._keep.set_text("End the comparison" if session.second is not None else "Keep to compare")
 
     async def _keep_second(self) -> None:
         """Keep the present model beside later ones, or put the kept one away."""
@@ -90,24 +75,6 @@ class FallView:
             ui.notify("The model is kept. Change the present one: both stand side by side beside the bars.")
         self._desk.changed.emit()
         await self._desk.update()
-
-
-def _floor_words(session: Session, noise: tuple[NoisePart, ...], chosen: str | None) -> str:
-    """Say which parts make the noise floor of the channel that is looked at, or of the worst one."""
-    made = session.made(session.steps[0].stack)
-    if made is None or made.comparison is None:
-        made = session.made()  # a session that was reopened begins with its last step
-    channel = chosen or (None if made is None or made.comparison is None else worst_channel(made.comparison))
-    # A missing effect passes for slow noise: parts above the white one wait for the effect.
-    parts = [part for part in noise if part.channel == channel and SMALL <= part.share <= 1.0]
-    parts.sort(key=lambda part: -part.share)
-    if not parts:
-        return ""
-    names = [(part.beyond, f"{part.component.replace('_', ' ')} {quantity.share(part.share)}") for part in parts[:4]]
-    floor = ", ".join(words for beyond, words in names if not beyond)
-    slow = ", ".join(words for beyond, words in names if beyond)
-    beside = f" Slow changes of the zero come on top: {slow} of that variance." if slow else ""
-    return f"Noise floor of {channel_name(str(channel))}: {floor or 'not known'} of its variance.{beside}"
 
 
 def _session(desk: Desk) -> Session:

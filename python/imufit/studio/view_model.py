@@ -50,7 +50,7 @@ class ModelView:
         self._list.clear()
         with self._list:
             if session is None or not begun:
-                words = "Open a log to begin." if session is None else "The evidence is being taken."
+                words = "Open a log to begin." if session is None else "The log is being read."
                 ui.label(words).classes("studio-muted")
                 return
             ui.label(_state(session, numbers)).classes("studio-muted").props("data-mark=model-state")

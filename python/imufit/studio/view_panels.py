@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -14,6 +15,7 @@ from imufit.fitting.passes import UNITS
 from imufit.model.catalogue import find_effect
 from imufit.results import Comparison, Diagnosis, Spectrum, Unexplained
 from imufit.results.comparison import Panel
+from imufit.results.noise_part import NoisePart
 from imufit.studio import charts
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
@@ -36,6 +38,8 @@ NARROWER: Final = 0.5
 """Width of the window after a press that zooms in, over that before: four presses show a sixteenth of the log."""
 ONWARD: Final = 0.5
 """Part of the window's width by which a press moves the window: half of what was seen stays in sight."""
+SMALL: Final = 0.005
+"""Share of the noise floor's variance below which a part is not listed."""
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
 
@@ -64,6 +68,7 @@ class PanelView:
             self._covariate = ui.select([], label="against", on_change=self._chosen).props("dense outlined")
             self._covariate.classes("min-w-36").props("data-mark=covariate")
         self._note = Explained().classes("studio-muted")
+        self._floor = Explained().classes("studio-muted").props("data-mark=floor")
         with ui.element("div").classes("studio-charts"):
             # The element around both is hidden: Plotly cannot resize a figure that is hidden itself.
             with ui.element("div").classes("studio-pair") as self._pair:
@@ -111,7 +116,7 @@ class PanelView:
             self._setting = False
             self._trace.update_figure(charts.empty("The rows are being read."))
             for chart in (self._panel, self._spectrum):
-                chart.update_figure(charts.empty("This stands here once the evidence is there."))
+                chart.update_figure(charts.empty("The log is being read."))
         made = session.made()
         found = None if made is None else made.comparison
         judged = session.begun and session.has_reference
@@ -211,6 +216,7 @@ class PanelView:
         self._setting = True
         self._channel.set_options({name: _channel(name) for name in channels}, value=channel)
         self._setting = False
+        self._say_floor(channel)
         ui.timer(0, lambda: self._draw_trace(channel), once=True)
 
     def _grow(self) -> None:
@@ -306,7 +312,13 @@ class PanelView:
         beside = _without_effect_on(self._proposed, channel)
         alone = f"{capital(channel_name(channel))} alone: its residual stands at {quantity.ratio(level.ratio)}"
         self._note.set_text(f"{alone} times its noise floor.{rises}{beside}")
+        self._say_floor(channel)
         ui.timer(0, lambda: self._draw_trace(channel), once=True)
+
+    def _say_floor(self, channel: str) -> None:
+        """State which parts make the noise floor of the channel that is shown."""
+        found = self._desk.diagnosis
+        self._floor.set_text("" if found is None else _floor_words(found.noise, channel))
 
     async def _draw_cause(self, channel: str, cause: str) -> None:
         """Draw the residual against the part of it that a cause without a name explains."""
@@ -400,6 +412,20 @@ def _without_effect_on(effect: str, channel: str) -> str:
 def _channel(channel: str) -> str:
     """Return a channel in words with its name in logs behind."""
     return with_symbol(channel_name(channel), channel)
+
+
+def _floor_words(noise: Sequence[NoisePart], channel: str) -> str:
+    """Say which parts make the noise floor of a channel."""
+    # A missing effect passes for slow noise: parts above the white one wait for the effect.
+    parts = [part for part in noise if part.channel == channel and SMALL <= part.share <= 1.0]
+    parts.sort(key=lambda part: -part.share)
+    if not parts:
+        return ""
+    names = [(part.beyond, f"{part.component.replace('_', ' ')} {quantity.share(part.share)}") for part in parts[:4]]
+    floor = ", ".join(words for beyond, words in names if not beyond)
+    slow = ", ".join(words for beyond, words in names if beyond)
+    added = f" Slow changes of the zero add to it: {slow} of that variance." if slow else ""
+    return f"Noise floor of {channel_name(channel)}: {floor or 'not known'} of its variance.{added}"
 
 
 def _panel_of(panels: Any, channel: str, covariate: str | None) -> Panel | None:

@@ -237,6 +237,12 @@ class Top:
         advice = tuple(dict.fromkeys(item.advice for item in diagnosis.judged if item.advice))
         for words in filter(None, (diagnosis.experiment, *advice)):
             Explained(f"Next: {words}", seen).classes("studio-muted").props("data-mark=next")
+        for effect, others in (self._desk.session.as_likely() if self._desk.session is not None else {}).items():
+            names = " and ".join(f"{effect_name(name)} ({printable(name, NAME)})" for name in others)
+            words = f"{capital(names)} explained the log as well as {effect_name(effect)} when this was added."
+            Explained(f"{words} The log does not separate them.", seen).classes("studio-muted").props(
+                "data-mark=as-likely"
+            )
         for fault in diagnosis.data_faults:
             number = _number_of(self._desk, fault.file)
             with ui.element("div").classes("studio-error"):
@@ -327,7 +333,7 @@ class Top:
         ui.label(words).classes("studio-sentence").props("data-mark=game")
         if game.verdict is None:
             if not judged:
-                ui.label("The evidence is being taken.").classes("studio-muted")
+                ui.label("The log is being read.").classes("studio-muted")
                 return
             assert desk.session is not None
             if game.level == DEMONSTRATION:
