@@ -15,6 +15,8 @@ pub(crate) struct Knots {
     pub(crate) row: Vec<usize>,
     /// Segment of each knot.
     segments: Vec<(usize, usize)>,
+    /// Usual time between knots, s.
+    spacing: f64,
     /// Samples of a packet; 1 where every sample has a stamp of its own.
     pub(crate) packet: usize,
 }
@@ -56,7 +58,8 @@ impl Knots {
                 row = samples.iter().map(|k| row[*k]).collect();
             }
         }
-        let widest = MAX_GAP * spacing.unwrap_or_else(|| usual_step(&t));
+        let spacing = spacing.unwrap_or_else(|| usual_step(&t));
+        let widest = MAX_GAP * spacing;
         let mut segments = vec![(0, 0); t.len()];
         let mut first = 0;
         for k in 0..t.len() {
@@ -69,6 +72,7 @@ impl Knots {
             t,
             row,
             segments,
+            spacing,
             packet,
         }
     }
@@ -94,6 +98,23 @@ impl Knots {
         // Between two segments the nearest knot may lie far away.
         let reach = 0.75 * (self.t[k + 1.min(last - 1 - k)] - self.t[k - 1.min(k - first)]);
         ((at - self.t[k]).abs() <= reach).then_some(k)
+    }
+
+    /// For each knot the one in the middle of its run: at most so many knots of a segment, in a cell of time so many usual steps wide. Cells
+    /// begin at t = 0, so that a knot has the same neighbours in its run in every window that holds them.
+    pub(crate) fn middles(&self, most: usize) -> Vec<usize> {
+        let cell = |k: usize| (self.t[k] / (most as f64 * self.spacing)).floor();
+        let mut middles = vec![0; self.t.len()];
+        let mut first = 0;
+        for k in 0..self.t.len() {
+            let next = k + 1;
+            let ends = next == self.segments[k].1 || next - first == most || cell(next).to_bits() != cell(k).to_bits();
+            if ends {
+                middles[first..next].fill(first + (k - first) / 2);
+                first = next;
+            }
+        }
+        middles
     }
 
     /// First knot of the segment that a knot lies in, and the first one after it.

@@ -13,7 +13,9 @@ use crate::smoothing::{self, Derivatives, LocalFit, Smoothing, Weights};
 pub struct Polynomials {
     reference: LocalReference,
     widths: Widths,
-    /// Around the middle of each run of knots, for the widest polynomial.
+    /// The middle of the run of each knot.
+    middles: Vec<usize>,
+    /// Around the middle of each run, for the widest polynomial at any of its knots.
     around: Vec<OnceLock<Neighbourhood>>,
 }
 
@@ -21,6 +23,11 @@ pub struct Polynomials {
 /// one attitude. An eighth keeps those of its knots below 0.35 rad of the 2.8 rad at which vectors wrap around, so that the series of
 /// [`crate::rotation_rates`] stay exact to 1e-9; half a kilobyte at most is then kept for a knot.
 const RUN: usize = 8;
+
+/// Knots of a run at most.
+fn run(widths: Widths) -> usize {
+    2 * (widths.widest() / RUN) + 1
+}
 
 /// What the polynomials say of one time.
 pub struct Local {
@@ -58,21 +65,17 @@ impl Polynomials {
         let mut around = Vec::new();
         around.resize_with(reference.times().len(), OnceLock::new);
         Self {
+            middles: reference.middles(run(widths)),
             reference,
             widths,
             around,
         }
     }
 
-    /// Knots of a run to each side of its middle.
-    fn side(&self) -> usize {
-        self.widths.widest() / RUN
-    }
-
     /// Numbers that these keep where no gap cuts a run short.
     pub fn numbers(&self) -> usize {
-        let side = self.side();
-        self.around.len().div_ceil(2 * side + 1) * 3 * (2 * (self.widths.widest() + side) + 1)
+        let run = run(self.widths);
+        self.around.len().div_ceil(run) * 3 * (2 * self.widths.widest() + run)
     }
 
     /// For times in rising order.
@@ -98,12 +101,12 @@ impl Reader<'_> {
         let Polynomials {
             reference,
             widths,
+            middles,
             around,
         } = self.of;
         let knot = reference.nearest(t, &mut self.hint)?;
-        let side = self.of.side();
-        let middle = reference.middle(knot, side);
-        let around = around[middle].get_or_init(|| reference.around(middle, widths.widest() + side));
+        let middle = middles[knot];
+        let around = around[middle].get_or_init(|| reference.around(middle, widths.widest() + run(*widths) / 2));
         let [for_value, for_columns, for_bends] = &mut self.caches;
         let read = |smoothing: Smoothing, cache: &mut WeightCache| {
             let values = around.within(knot, smoothing.half_width)?;

@@ -203,11 +203,9 @@ impl LocalReference {
         }
     }
 
-    /// The knot whose neighbourhood serves this one: the middle of a run of knots, so many to each side, that no gap parts.
-    pub fn middle(&self, knot: usize, side: usize) -> usize {
-        let (begin, end) = self.knots.segment(knot);
-        let run = 2 * side + 1;
-        (begin + (knot - begin) / run * run + side).min(end - 1)
+    /// For each knot the one whose neighbourhood serves it: the middle of a run of at most so many knots that no gap parts.
+    pub fn middles(&self, most: usize) -> Vec<usize> {
+        self.knots.middles(most)
     }
 
     /// Times of a knot and of so many on each side, s.
