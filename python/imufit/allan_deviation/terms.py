@@ -156,14 +156,14 @@ def fit(tau: Array, variance: Array, freedom: Callable[[str, int], float]) -> Fi
 
 def _fit(tau: Array, variance: Array, rows: NDArray[np.intp], freedom: Callable[[str, int], float]) -> Fitted:
     """Fit the terms to some of the points."""
+    from scipy.optimize import nnls  # noqa: PLC0415 - takes 11 MB that most commands do not need
+
     # In units of the largest, so that no square of a variance leaves the range of the numbers.
     level = variance[rows].max()
     design, measured = basis(tau[rows]), variance[rows] / level
     if rows[0] > 0:
         # Behind a filter quantisation cannot be seen, and would only take up what is left of the filter's bend.
         design[:, 0] = 0.0
-    from scipy.optimize import nnls  # noqa: PLC0415 - takes 11 MB that most commands do not need
-
     model = measured.copy()
     kinds = ["white"] * len(rows)
     squares = np.array([0.0, 1.0, 0.0, 0.0])

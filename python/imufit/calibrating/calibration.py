@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from imufit.log.columns import SENSOR_NAMES
 from imufit.loop import SensorModel
 from imufit.rests.poses import Pose
 from imufit.results.json_value import json_value
-from imufit.results.parameter import by_effect, parameter_frame, parameter_table
+from imufit.results.parameter import FAR, by_effect, parameter_frame, parameter_table
 from imufit.results.part import Part
 from imufit.results.result import Result
 from imufit.results.table import Table
@@ -34,11 +34,6 @@ Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
 _OFF_DIAGONAL = {row + column: (i, j) for i, row in enumerate(AXES) for j, column in enumerate(AXES) if i != j}
-
-
-BEYOND: Final = 4.0
-"""Standard errors from zero from which on a parameter is an error of the sensor: by chance, one of sixteen thousand
-values lies so far away."""
 
 
 def rms(values: Array) -> float:
@@ -231,7 +226,7 @@ class SensorCalibration(Part):
     def shows_error(self) -> bool:
         """Whether a parameter lies so far from that of an ideal sensor that chance does not account for it."""
         return any(
-            abs(value) > BEYOND * self.standard_errors[effect][name] > 0.0
+            abs(value) > FAR * self.standard_errors[effect][name] > 0.0
             for effect, values in self.effects.items()
             for name, value in values.items()
         )

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from imufit.results import Parameter
+from imufit.results.parameter import FAR
 
 if TYPE_CHECKING:
     from imufit.fitting import FittedStack
-
-FAR: Final = 4.0
-"""Standard errors between a fixed and a fitted value from which on the log contradicts the fixed one: by chance this
-happens once in 16,000."""
 
 
 def contradicted(fit: FittedStack) -> Iterator[tuple[Parameter, Parameter]]:

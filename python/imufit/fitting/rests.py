@@ -76,7 +76,7 @@ class RestReadings:
     lacking : str
         The rests that acc and gyr need to be judged, where there are too few; empty elsewhere.
     notes : tuple of str
-        What could not be used, and why; what is lacking first.
+        Readings that could not be used, each with the reason; the lacking rests come first.
     """
 
     arrays: dict[str, Any]

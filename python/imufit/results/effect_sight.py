@@ -10,6 +10,7 @@ from typing import Any, Final
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
 from imufit.results.part import Part
+from imufit.results.phrasing import listed
 from imufit.results.table import Table
 
 NEARLY: Final = 1.05
@@ -219,4 +220,4 @@ def alike(effects: Sequence[EffectSight]) -> list[str]:
         tuple(sorted((item.effect, *item.like))) for item in effects if item.like and item.shown != "no"
     )
     largest = [group for group in groups if not any(set(group) < set(other) for other in groups)]
-    return [f"The log does not separate {', '.join(group[:-1])} and {group[-1]}." for group in largest]
+    return [f"The log does not separate {listed(group)}." for group in largest]

@@ -14,6 +14,7 @@ from imufit.figures import quantity
 from imufit.log.columns import SENSOR_NAMES
 from imufit.log.origin import Origin
 from imufit.remedy import Remedy, mapped, option, when_read
+from imufit.results.phrasing import capital
 
 Array = NDArray[np.float64]
 
@@ -106,7 +107,7 @@ def quaternion(places: Sequence[int], signs: Sequence[float], origin: Origin) ->
     remedy = " and ".join(to_do)
     return (
         f"The reference attitude {', and '.join(each for each in (last, other) if each)}.",
-        f"{remedy[0].upper()}{remedy[1:]}: " + read_anew(said, origin) + ".",
+        f"{capital(remedy)}: " + read_anew(said, origin) + ".",
     )
 
 

@@ -22,7 +22,7 @@ class Judged(Part):
     reason : str or None
         Why they were not.
     advice : str
-        What a recording needs so that they can be judged; empty where this is not known or not needed.
+        Rests that the recording lacks for a judgement; empty where it lacks none.
     """
 
     sensor: str

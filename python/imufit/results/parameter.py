@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from imufit.figures import quantity
 from imufit.results.json_value import json_value
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from imufit.figures.place import Drawing, Place
 
 
+FAR: Final = 4.0
+"""Standard errors between two values of a parameter from which on chance does not account for their difference: it
+lies so far away once in 16,000 times."""
 UNTOLD = 10.0
 """A parameter whose standard error is this many typical sizes is one that the log is not informative about."""
 

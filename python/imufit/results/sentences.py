@@ -11,10 +11,7 @@ from imufit.results.disagreement import Disagreement
 from imufit.results.effect_card import EffectCard
 from imufit.results.judged import left_out
 from imufit.results.parameter import Parameter
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+from imufit.results.phrasing import capital, listed
 
 
 def leading(parameters: Sequence[Parameter]) -> Parameter | None:
@@ -34,8 +31,8 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
     """One candidate in a sentence: the physics, its size, what adding it should bring."""
     if candidate.status == NOT_TESTABLE:
         why = "no such motion or temperature, or inside the model already"
-        return f"{_capital(card.name)}: this log cannot show it ({why})."
-    text = f"{_capital(card.name)}: {card.physics}." if card.physics else f"{_capital(card.name)}."
+        return f"{capital(card.name)}: this log cannot show it ({why})."
+    text = f"{capital(card.name)}: {card.physics}." if card.physics else f"{capital(card.name)}."
     top = leading(candidate.parameters)
     if top is not None:
         text += f" Here {top.name} = {quantity.with_error(top.value, top.standard_error, top.unit)}"
@@ -92,9 +89,9 @@ def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: in
     if not missing:
         return text
     if not adequate:
-        return f"{text} {_capital(missing)}."
+        return f"{text} {capital(missing)}."
     judged = ", ".join(item.sensor for item in found.judged if item.judged)
-    return f"{judged}: nothing missing; {missing}. {text}" if judged else f"{_capital(missing)}. {text}"
+    return f"{judged}: nothing missing; {missing}. {text}" if judged else f"{capital(missing)}. {text}"
 
 
 def _adequate(found: Diagnosis, ratio: float, untold: int) -> str:
@@ -133,13 +130,8 @@ def _missing(found: Diagnosis, best: Candidate | None) -> str:
     text = f"{best.effect} is missing. {best.explanation}"
     others = [item.effect for item in found.candidates if item.status == SIGNIFICANT and item.effect != best.effect]
     if others:
-        text += f" The log shows {_listed(others)} as well."
+        text += f" The log shows {listed(others)} as well."
     return f"{text} Apart from {'these' if others else 'it'}, {left}." if left else text
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Write names with commas, and the last one with "and"."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def _nearest(found: Diagnosis) -> str:

@@ -17,9 +17,10 @@ from imufit.errors import InputError
 from imufit.log import Reading
 from imufit.remedy import Option, Remedy
 from imufit.results import Diagnosis
+from imufit.results.phrasing import capital
 from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, join_of, offers, remedies
 from imufit.studio.mystery import DEMONSTRATION, Mystery
-from imufit.studio.names import capital, fitting, model_name
+from imufit.studio.names import fitting, model_name
 from imufit.studio.session import Session
 from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
 from imufit.studio.stack import Stack, Step
@@ -27,6 +28,8 @@ from imufit.studio.traces import ModelTraces, Traces
 
 Answer = TypeVar("Answer")
 
+BEING_READ: Final = "The log is being read."
+"""Sentence in a region whose content comes with the evidence."""
 SESSION_ENDING: Final = ".toml"
 """Ending of the file of a session."""
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from nicegui import ui
 
 from imufit.printable import NAME, printable
-from imufit.studio.names import capital, effect_name
+from imufit.results.phrasing import capital
+from imufit.studio.names import effect_name
 
 
 def heading_of(effect: str) -> ui.element:

@@ -18,7 +18,8 @@ from imufit.lab.simulate.study import Study
 from imufit.lab.simulated_log import save_simulation
 from imufit.model.catalogue import units_of
 from imufit.results import Diagnosis, Parameter
-from imufit.studio.names import capital, effect_name, with_symbol
+from imufit.results.phrasing import capital
+from imufit.studio.names import effect_name, with_symbol
 
 if TYPE_CHECKING:
     from imufit.lab.simulate import Simulation, Truth

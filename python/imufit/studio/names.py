@@ -112,14 +112,3 @@ def with_symbol(words: str, symbol: str) -> str:
     """
     shown = printable(symbol, NAME)
     return words if words == shown else f"{words} ({shown})"
-
-
-def capital(text: str) -> str:
-    """Return text with a capital at its beginning.
-
-    Parameters
-    ----------
-    text : str
-        Such as the name of an effect.
-    """
-    return text[:1].upper() + text[1:]

@@ -12,10 +12,11 @@ from imufit.printable import printable
 from imufit.results import Candidate, Diagnosis, Parameter
 from imufit.results.diagnosis import NOT_SIGNIFICANT, NOT_TESTABLE, SIGNIFICANT
 from imufit.results.parameter import in_lines
+from imufit.results.phrasing import capital
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import Desk
 from imufit.studio.heading import heading_of
-from imufit.studio.names import capital, effect_name, parameter_name, with_symbol
+from imufit.studio.names import effect_name, parameter_name, with_symbol
 from imufit.studio.presses import Presses
 from imufit.studio.view_panels import PanelView
 

@@ -7,7 +7,7 @@ import math
 from nicegui import ui
 
 from imufit.studio import charts
-from imufit.studio.desk import Desk
+from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.icons import bare
 from imufit.studio.session import Session
 
@@ -46,7 +46,7 @@ class FallView:
         self._redo.set_enabled(session is not None and begun and session.can_redo)
         self._keep.set_enabled(begun)
         if session is None or not begun:
-            self._chart.update_figure(charts.empty("The log is being read."))
+            self._chart.update_figure(charts.empty(BEING_READ))
             return
         numbers = [session.numbers(step.stack) for step in session.steps]
         ratios = [math.nan if item is None else item.ratio for item in numbers]

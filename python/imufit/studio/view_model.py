@@ -9,11 +9,12 @@ from nicegui import ui
 from imufit.figures import quantity
 from imufit.printable import NAME, printable
 from imufit.results import Parameter
+from imufit.results.phrasing import capital
 from imufit.studio.attribute import attribute
-from imufit.studio.desk import Desk
+from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.heading import heading_of
 from imufit.studio.icons import bare, stated
-from imufit.studio.names import capital, effect_name, parameter_name
+from imufit.studio.names import effect_name, parameter_name
 from imufit.studio.session import Numbers, Session
 from imufit.studio.stack import Entry
 
@@ -50,7 +51,7 @@ class ModelView:
         self._list.clear()
         with self._list:
             if session is None or not begun:
-                words = "Open a log to begin." if session is None else "The log is being read."
+                words = "Open a log to begin." if session is None else BEING_READ
                 ui.label(words).classes("studio-muted")
                 return
             ui.label(_state(session, numbers)).classes("studio-muted").props("data-mark=model-state")

@@ -16,11 +16,12 @@ from imufit.model.catalogue import find_effect
 from imufit.results import Comparison, Diagnosis, Spectrum, Unexplained
 from imufit.results.comparison import Panel
 from imufit.results.noise_part import NoisePart
+from imufit.results.phrasing import capital
 from imufit.studio import charts
-from imufit.studio.desk import Desk
+from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.explained import Explained
 from imufit.studio.icons import bare
-from imufit.studio.names import capital, channel_name, covariate_name, effect_name, with_symbol
+from imufit.studio.names import channel_name, covariate_name, effect_name, with_symbol
 from imufit.studio.session import Session, worst_channel
 from imufit.studio.stack import Stack
 
@@ -116,7 +117,7 @@ class PanelView:
             self._setting = False
             self._trace.update_figure(charts.empty("The rows are being read."))
             for chart in (self._panel, self._spectrum):
-                chart.update_figure(charts.empty("The log is being read."))
+                chart.update_figure(charts.empty(BEING_READ))
         made = session.made()
         found = None if made is None else made.comparison
         judged = session.begun and session.has_reference

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -13,14 +13,15 @@ from imufit.figures import quantity
 from imufit.printable import NAME, printable
 from imufit.remedy import Option
 from imufit.results import Diagnosis
+from imufit.results.phrasing import capital
 from imufit.studio import server
 from imufit.studio.attribute import attribute
-from imufit.studio.desk import Desk
+from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.explained import Explained
 from imufit.studio.icons import light_or_dark, with_words
 from imufit.studio.log_file import LogFile, option_words, remedies
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING, SEEDS
-from imufit.studio.names import capital, effect_name, with_symbol
+from imufit.studio.names import effect_name, with_symbol
 from imufit.studio.recipe import as_python, as_shell
 from imufit.studio.saving import download_game, download_session, save_first
 from imufit.studio.session_file import LogsWantedError
@@ -141,9 +142,11 @@ class Top:
         verdict = None if desk.mystery is None else desk.mystery.verdict
         brought = tuple(item.file for item in desk.arrivals)
         answer = _named(desk) if desk.guessing else ""
+        as_likely = {} if session is None else session.as_likely()
         state = (
             session is not None and session.refused,
             diagnosis,
+            as_likely,
             desk.trouble,
             desk.in_shell,
             brought,
@@ -174,7 +177,7 @@ class Top:
             if desk.mystery is not None and not desk.mystery.closed and not desk.replacing:
                 self._game(diagnosis is not None)
             if diagnosis is not None and not desk.guessing and not desk.replacing:
-                self._verdict(diagnosis)
+                self._verdict(diagnosis, as_likely)
             waiting = session is None and not desk.busy
             if (waiting or (session is not None and session.refused)) and not desk.arrivals and desk.wanted is None:
                 self._welcome()
@@ -222,7 +225,7 @@ class Top:
         _uploader(self._desk)
         ui.button("Cancel", on_click=self._desk.forget_wanted).props("flat").props("data-mark=wanted-cancel")
 
-    def _verdict(self, diagnosis: Diagnosis) -> None:
+    def _verdict(self, diagnosis: Diagnosis, as_likely: Mapping[str, Sequence[str]]) -> None:
         seen: set[str] = set()
         if diagnosis.named and not diagnosis.contradicted:
             ui.label(f"Missing: {' or '.join(map(effect_name, diagnosis.named))}").classes("studio-name").props(
@@ -237,7 +240,7 @@ class Top:
         advice = tuple(dict.fromkeys(item.advice for item in diagnosis.judged if item.advice))
         for words in filter(None, (diagnosis.experiment, *advice)):
             Explained(f"Next: {words}", seen).classes("studio-muted").props("data-mark=next")
-        for effect, others in (self._desk.session.as_likely() if self._desk.session is not None else {}).items():
+        for effect, others in as_likely.items():
             names = " and ".join(f"{effect_name(name)} ({printable(name, NAME)})" for name in others)
             words = f"{capital(names)} explained the log as well as {effect_name(effect)} when this was added."
             Explained(f"{words} The log does not separate them.", seen).classes("studio-muted").props(
@@ -333,7 +336,7 @@ class Top:
         ui.label(words).classes("studio-sentence").props("data-mark=game")
         if game.verdict is None:
             if not judged:
-                ui.label("The log is being read.").classes("studio-muted")
+                ui.label(BEING_READ).classes("studio-muted")
                 return
             assert desk.session is not None
             if game.level == DEMONSTRATION:

@@ -75,6 +75,11 @@ impl Bins {
             .collect()
     }
 
+    /// Number of bins of each covariate; none of one that does not vary.
+    pub fn counts(&self) -> impl Iterator<Item = usize> {
+        self.edges.iter().map(|e| if e.is_empty() { 0 } else { e.len() + 1 })
+    }
+
     /// Unit of a covariate; empty for the log's own columns.
     pub fn unit(name: &str) -> &'static str {
         match name {

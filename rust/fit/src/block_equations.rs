@@ -6,9 +6,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::gram::Gram;
 use imufit_model::sensor::CHANNELS;
 
+use crate::gram::Gram;
 use crate::normal_equations::NormalEquations;
 use crate::part::Part;
 

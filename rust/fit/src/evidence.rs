@@ -97,11 +97,10 @@ pub struct AxisSums {
 
 impl AxisSums {
     fn new(width: usize, bins: &Bins) -> Self {
-        let of = |e: &Vec<f64>| vec![Vector3::zeros(); if e.is_empty() { 0 } else { e.len() + 1 }];
         Self {
             square: Matrix3::zeros(),
             sum: DMatrix::zeros(3, width),
-            bin_sum: bins.edges.iter().map(of).collect(),
+            bin_sum: bins.counts().map(|n| vec![Vector3::zeros(); n]).collect(),
         }
     }
 
@@ -120,11 +119,7 @@ impl ChannelBlock {
             n: 0,
             gram: Gram::zeros(width),
             sum: DVector::zeros(width),
-            bins: bins
-                .edges
-                .iter()
-                .map(|e| BinSums::zeros(if e.is_empty() { 0 } else { e.len() + 1 }, width))
-                .collect(),
+            bins: bins.counts().map(|n| BinSums::zeros(n, width)).collect(),
             axes: None,
         }
     }

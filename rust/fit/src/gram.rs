@@ -36,7 +36,7 @@ impl Gram {
         }
     }
 
-    /// Adds a symmetric matrix, of which the upper triangle is read.
+    /// Adds a symmetric matrix; only its upper triangle is used.
     pub fn add_matrix(&mut self, matrix: &DMatrix<f64>) {
         let mut own = self.values.iter_mut();
         for (j, column) in matrix.column_iter().enumerate() {

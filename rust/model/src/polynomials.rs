@@ -15,6 +15,7 @@ pub struct Polynomials {
     widths: Widths,
     /// The middle of the run of each knot.
     middles: Vec<usize>,
+    runs: usize,
     /// Around the middle of each run, for the widest polynomial at any of its knots.
     around: Vec<OnceLock<Neighbourhood>>,
 }
@@ -64,18 +65,19 @@ impl Polynomials {
     pub fn new(reference: LocalReference, widths: Widths) -> Self {
         let mut around = Vec::new();
         around.resize_with(reference.times().len(), OnceLock::new);
+        let middles = reference.middles(run(widths));
         Self {
-            middles: reference.middles(run(widths)),
+            runs: middles.chunk_by(|a, b| a == b).count(),
+            middles,
             reference,
             widths,
             around,
         }
     }
 
-    /// Numbers that these keep where no gap cuts a run short.
+    /// Numbers that these keep at most.
     pub fn numbers(&self) -> usize {
-        let run = run(self.widths);
-        self.around.len().div_ceil(run) * 3 * (2 * self.widths.widest() + run)
+        self.runs * 3 * (2 * self.widths.widest() + run(self.widths))
     }
 
     /// For times in rising order.
@@ -103,6 +105,7 @@ impl Reader<'_> {
             widths,
             middles,
             around,
+            ..
         } = self.of;
         let knot = reference.nearest(t, &mut self.hint)?;
         let middle = middles[knot];

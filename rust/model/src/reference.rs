@@ -182,13 +182,13 @@ impl LocalReference {
                 let back = attitudes[knot].inverse();
                 let vector = |k: usize| rotation_vector(&(back * attitudes[k]));
                 let tame = |phi: &Vector3<f64>| phi.norm_squared() <= WRAPS * WRAPS;
-                let mut before: Vec<_> = (rows.start..knot).rev().map(vector).take_while(tame).collect();
-                let first = knot - before.len();
-                before.reverse();
-                before.extend((knot..rows.end).map(vector).take_while(tame));
+                let mut vectors: Vec<_> = (rows.start..knot).rev().map(vector).take_while(tame).collect();
+                let first = knot - vectors.len();
+                vectors.reverse();
+                vectors.extend((knot..rows.end).map(vector).take_while(tame));
                 Neighbourhood {
                     first,
-                    values: before.iter().map(|phi| [phi.x, phi.y, phi.z]).collect(),
+                    values: vectors.iter().map(|phi| [phi.x, phi.y, phi.z]).collect(),
                 }
             }
             Samples::Positions(positions) => {

@@ -30,8 +30,8 @@ from imufit.log.columns import GROUPS, SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.rests.poses import SIDES
 from imufit.results import Recording
+from imufit.results.phrasing import capital, listed
 from imufit.studio.live.rolling import Rolling
-from imufit.studio.names import capital
 
 Array = NDArray[np.float64]
 
@@ -390,7 +390,7 @@ def in_sentences(result: Calibration) -> tuple[str, ...]:
     right = [SENSOR_NAMES[name] for name, sensor in result.sensors.items() if not sensor.shows_error]
     if not right:
         return faulty
-    names = " and ".join(filter(None, (", ".join(right[:-1]), right[-1])))
+    names = listed(right)
     shows = "shows no error beyond its" if len(right) == 1 else "show no error beyond their"
     needless = "" if faulty else " The model need not be used."
     return (*faulty, f"{capital(names)} {shows} standard errors: the readings are right as they are.{needless}")

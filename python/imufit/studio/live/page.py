@@ -21,6 +21,7 @@ from imufit.log.columns import SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.printable import printable
 from imufit.rests.poses import SIDES
+from imufit.results.phrasing import listed
 from imufit.studio.body import Body, angles_in_words, side_rotation
 from imufit.studio.icons import light_or_dark
 from imufit.studio.live.listening import Listening, Recorded, Source, free_name, shown_state
@@ -135,9 +136,8 @@ def about(choice: str) -> str:
     if scenario is None:
         return ""
     sensors = [SENSORS[sensor] for sensor in scenario.sensors]
-    listed = " and ".join(filter(None, (", ".join(sensors[:-1]), sensors[-1])))
     return (
-        f"A simulated device that this computer plays, with {listed}. {scenario.description} "
+        f"A simulated device that this computer plays, with {listed(sensors)}. {scenario.description} "
         "Its sensors have noise, and no other error."
     )
 
