@@ -297,6 +297,40 @@ def test_an_unknown_field_is_estimated_and_fitted_along():
     assert any("field was estimated" in note for note in fit.compare().notes)
 
 
+def carried(iron: np.ndarray, gain: np.ndarray, seed: int) -> Log:
+    """Return readings of a phone that is carried about and hardly tilted, beside a magnet; the place has an unknown field."""
+    t = np.arange(0.0, 60.0, 0.02)
+    rng = np.random.default_rng(seed)
+    angles = [0.9 * t, *(np.deg2rad(20.0) * np.sin(2.0 * np.pi * f * t + seed) for f in (0.23, 0.31))]
+    turned = Rotation.from_euler("ZYX", np.transpose(angles))
+    step = np.median(np.diff(t))
+    rates = (turned[:-1].inv() * turned[1:]).as_rotvec() / step
+    field = turned.inv().apply([0.0, 21.0, -43.0])
+    return Log.from_arrays(
+        t,
+        acc=turned.inv().apply([0.0, 0.0, 9.80665]) + 0.02 * rng.standard_normal((t.size, 3)),
+        gyr=np.vstack([rates, rates[-1:]]) + 0.002 * rng.standard_normal((t.size, 3)),
+        mag=field @ gain.T + iron + 0.3 * rng.standard_normal((t.size, 3)),
+        ref_q=turned.as_quat(scalar_first=True),
+        frame="ENU",
+    )
+
+
+def test_a_strong_magnet_in_an_unknown_field_is_not_charged_to_the_gain():
+    # The mean reading in the reference frame is mostly the magnet's: it must not be believed as the field.
+    iron, gain = np.array([60.0, -75.0, 410.0]), np.eye(3) + np.array([[0.0, 0.03, 0.0], [0.0] * 3, [0.04, 0.0, 0.0]])
+    logs = [carried(iron, gain, seed) for seed in (1, 2)]
+    params = SensorModel(["mag.hard_iron", "mag.soft_iron"]).fit(logs).params
+    for axis, truth in zip("xyz", iron, strict=True):
+        p = params[f"mag.hard_iron.{axis}"]
+        assert abs(p.value - truth) < 3.0 * p.stderr
+        assert p.stderr < 10.0
+    for row in range(3):
+        for column in range(3):
+            p = params[f"mag.soft_iron.{'xyz'[row]}{'xyz'[column]}"]
+            assert abs(p.value - (gain[row, column] - (row == column))) < min(3.0 * p.stderr, 0.1)
+
+
 def test_the_result_of_a_fit_is_json():
     fit = SensorModel(["gyr.bias"]).fit(swaying(duration=20.0, noise=1.0))
     found = json.loads(json.dumps(fit.to_dict(), allow_nan=False))

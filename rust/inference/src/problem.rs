@@ -91,6 +91,22 @@ const OPEN: f64 = 0.01;
 /// A parameter without typical size is given one at which its effect would stand out by this factor.
 const STANDING_OUT: f64 = 100.0;
 
+/// Typical size of each of `p` parameters in the log that has it, the largest where several share it; `None` if nobody can tell.
+fn typical_sizes(parts: &[Part], places: &[Vec<usize>], p: usize) -> Vec<Option<f64>> {
+    let mut sizes = vec![None; p];
+    for (part, places) in parts.iter().zip(places) {
+        let layout = &part.white.layout;
+        for slot in layout.model.slots() {
+            for k in 0..slot.parameters.len() {
+                let size: &mut Option<f64> = &mut sizes[places[slot.first + k]];
+                let own = slot.effect.typical(k, &layout.facts);
+                *size = own.map(|own| size.map_or(own, |other: f64| other.max(own)));
+            }
+        }
+    }
+    sizes
+}
+
 /// Part of the mean square that noise of the reference makes of what gains of a sensor multiply. Noise of the attitude is white, and filters
 /// that take slow noise out of the residual leave more of it than of the motion; rates are smoothed.
 fn attenuation(layout: &Layout, sensor: usize) -> [f64; 3] {
@@ -127,17 +143,18 @@ impl Problem {
         for slot in &slots {
             let parameters = &slot.effect.card().parameters;
             let searched = !slot.in_model && parameters.iter().all(|p| p.found == Found::Search);
-            for (k, card) in parameters.iter().cycle().take(slot.parameters.len()).enumerate() {
-                known[slot.first + k] = searched.then_some(slot.parameters[k]);
-                let j = slot.first + k;
-                let size = card.typical.filter(|_| !slot.effect.size_is_open());
-                typical[j] = size.is_some();
-                plausible[j] = match size {
-                    Some(typical) => PLAUSIBLE * typical,
-                    None if information[j] > 0.0 => STANDING_OUT / information[j].sqrt(),
-                    None => 0.0,
-                };
+            for (k, value) in slot.parameters.iter().enumerate() {
+                known[slot.first + k] = searched.then_some(*value);
             }
+        }
+        let sizes = typical_sizes(&parts, &places, p);
+        for (j, size) in sizes.into_iter().enumerate() {
+            typical[j] = size.is_some();
+            plausible[j] = match size {
+                Some(typical) => PLAUSIBLE * typical,
+                None if information[j] > 0.0 => STANDING_OUT / information[j].sqrt(),
+                None => 0.0,
+            };
         }
         let (fixed, bounds) = limited(&slots, limits, p);
         let mut problem = Self {

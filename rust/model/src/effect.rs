@@ -183,7 +183,7 @@ pub trait Effect: Send + Sync {
 
     /// True where it is fitted along whatever is asked, without being named: the field, if this log is all that is known of it.
     fn fitted_along(&self, facts: &LogFacts) -> bool {
-        self.card().traits.reference == Some(ReferencePart::Field) && facts.field_estimated
+        facts.field_off().is_some() && self.card().traits.reference == Some(ReferencePart::Field)
     }
 
     /// Columns d reading / d parameter of `sensor`, at the given parameter values.
@@ -254,6 +254,18 @@ pub trait Effect: Send + Sync {
     /// True if the typical size says nothing of how large it may be.
     fn size_is_open(&self) -> bool {
         false
+    }
+
+    /// Size that one of its parameters typically has in such a log, in the parameter's unit; `None` if nobody can tell.
+    fn typical(&self, parameter: usize, facts: &LogFacts) -> Option<f64> {
+        if self.card().traits.reference == Some(ReferencePart::Field)
+            && let Some(off) = facts.field_off()
+        {
+            return Some(off);
+        }
+        self.card().parameters[parameter]
+            .typical
+            .filter(|_| !self.size_is_open())
     }
 
     /// Part that noise of the reference makes of its columns, where these may cancel.

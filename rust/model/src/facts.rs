@@ -19,6 +19,10 @@ pub const LOOKBACK: usize = 128;
 /// reached. Quartz crystals are within 100 ppm of their frequency over all temperatures; ten times that is a ceramic resonator's.
 const LARGEST_SKEW: f64 = 1e-3;
 
+/// Largest magnetic field of the earth at its surface, uT (Alken et al. 2021, International Geomagnetic Reference Field: the thirteenth
+/// generation).
+const LARGEST_FIELD: f64 = 67.0;
+
 /// Facts of a log that its effects and its reference kinematics need: constants over all windows.
 #[derive(Clone, Debug)]
 #[allow(clippy::struct_excessive_bools)] // facts, not the states of a machine
@@ -172,6 +176,12 @@ impl LogFacts {
             rests: false,
             kinematics: KinematicsMemory::default(),
         }
+    }
+
+    /// How far the field may be off where it is the mean of this log's readings, uT: a magnet beside the sensor can make all of such a mean.
+    /// `None` where the field is known.
+    pub fn field_off(&self) -> Option<f64> {
+        self.field_estimated.then(|| self.field.norm().max(LARGEST_FIELD))
     }
 
     /// Facts of a log whose rests stand in for a reference: gravity (m/s^2) and the field (uT) are known by their length, and nothing of
