@@ -13,6 +13,7 @@ pub mod gram;
 pub mod noise;
 pub mod normal_equations;
 pub mod part;
+pub mod place_field;
 pub mod profile;
 pub mod reference_noise;
 pub mod reference_step;

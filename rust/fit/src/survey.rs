@@ -16,6 +16,7 @@ use imufit_model::window::Window;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::bins::{Bins, CovariateSamples, FORCES, RATES};
+use crate::place_field::PlaceField;
 use crate::reference_step::ReferenceStep;
 use crate::reference_width::{self, SampledRow, SampledRows};
 use crate::rounding::SensorSteps;
@@ -58,7 +59,7 @@ pub struct Survey {
     temperature_parts: Parts,
     gravity_parts: GravityParts,
     covariates: Vec<(f64, usize)>,
-    field: (Vector3<f64>, usize),
+    field: PlaceField,
     attitude_width: Bandwidth,
     position_width: Bandwidth,
     reference_step: ReferenceStep,
@@ -185,7 +186,7 @@ impl Survey {
             temperature_parts: Parts::new(given.n),
             gravity_parts: GravityParts::new(given.n),
             covariates: vec![(0.0, 0); given.covariates.len()],
-            field: (Vector3::zeros(), 0),
+            field: PlaceField::default(),
             attitude_width: Bandwidth::of_attitude(),
             position_width: Bandwidth::of_position(),
             reference_step: ReferenceStep::default(),
@@ -260,8 +261,7 @@ impl Survey {
                 && m.iter().all(|v| v.is_finite())
                 && let Some(q) = attitudes.nearest(window, i)
             {
-                self.field.0 += q * Vector3::new(m[0], m[1], m[2]);
-                self.field.1 += 1;
+                self.field.add(q, Vector3::new(m[0], m[1], m[2]));
             }
             let measured = window.reference_exact.is_none_or(|e| e[i] > 0.5);
             let known = attitude_at(window, i).filter(|q| measured && q.coords.iter().all(|v| v.is_finite()));
@@ -325,14 +325,9 @@ impl Survey {
     /// The facts, and samples of every covariate.
     pub fn finish(mut self) -> (LogFacts, CovariateSamples) {
         let mean = |(sum, n): (f64, usize)| if n == 0 { f64::NAN } else { sum / n as f64 };
-        let estimated = self.given.field.is_none() && self.field.1 > 0;
-        let field = self.given.field.unwrap_or_else(|| {
-            if self.field.1 > 0 {
-                self.field.0 / self.field.1 as f64
-            } else {
-                Vector3::zeros()
-            }
-        });
+        let of_readings = self.field.estimate().filter(|_| self.given.field.is_none());
+        let estimated = of_readings.is_some();
+        let field = self.given.field.or(of_readings).unwrap_or_default();
         let dt = median(&mut self.steps);
         let attitude_smoothing = reference_width::of_attitude(&self.attitude_width, &self.width_rows, self.given.n);
         let position_smoothing = self.has_position.then(|| {

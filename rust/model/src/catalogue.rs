@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::effect::Effect;
 use crate::effects::{
-    bias, covariate, current, drift, earth_rate, field, g_sensitivity, iron, lever_arm, misalignment, nonlinearity,
-    reference, reference_lowpass, rig, rounding, saturation, scale, temperature, timing, vibration, warmup,
+    bias, covariate, current, drift, earth_rate, g_sensitivity, iron, lever_arm, misalignment, nonlinearity, reference,
+    reference_lowpass, rig, rounding, saturation, scale, temperature, timing, vibration, warmup,
 };
 use crate::sensor::Sensor;
 
@@ -47,7 +47,7 @@ pub fn built_in() -> Vec<Arc<dyn Effect>> {
         Arc::new(temperature::scale_temperature(Sensor::Mag)),
         Arc::new(current::current()),
         Arc::new(timing::delay(Sensor::Mag)),
-        Arc::new(field::field_reference()),
+        Arc::new(reference::field()),
         Arc::new(reference::alignment()),
         Arc::new(reference::tilt()),
         Arc::new(reference::delay()),

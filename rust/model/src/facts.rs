@@ -178,7 +178,7 @@ impl LogFacts {
         }
     }
 
-    /// How far the field may be off where it is the mean of this log's readings, uT: a magnet beside the sensor can make all of such a mean.
+    /// How far the field may be off where it is an estimate from this log's readings, uT: in a log without turns a magnet beside the sensor makes all of these.
     /// `None` where the field is known.
     pub fn field_off(&self) -> Option<f64> {
         self.field_estimated.then(|| self.field.norm().max(LARGEST_FIELD))

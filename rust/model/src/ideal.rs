@@ -27,6 +27,8 @@ pub struct ReferenceChange {
     pub alignment: UnitQuaternion<f64>,
     /// Turns vectors of the recorded reference frame into the true one (a table that is not level).
     pub tilt: UnitQuaternion<f64>,
+    /// By how much the field differs from that of the facts, uT.
+    pub field: Vector3<f64>,
     /// By how much a one-axis rig misses its commanded angle.
     pub rig: RigError,
     /// How late and how sluggish each sensor is.
@@ -50,6 +52,7 @@ impl Default for ReferenceChange {
             smoothing: 0.0,
             alignment: UnitQuaternion::identity(),
             tilt: UnitQuaternion::identity(),
+            field: Vector3::zeros(),
             rig: RigError::default(),
             sensors: Default::default(),
         }
@@ -75,6 +78,7 @@ impl ReferenceChange {
             smoothing: self.smoothing + other.smoothing,
             alignment: self.alignment * other.alignment,
             tilt: self.tilt * other.tilt,
+            field: self.field + other.field,
             rig: self.rig.and(other.rig),
             sensors: std::array::from_fn(|s| SensorTime {
                 delay: self.sensors[s].delay + other.sensors[s].delay,
@@ -99,6 +103,8 @@ pub struct Ideal {
     pub f: Triple,
     /// Its time derivative in the body frame.
     pub f_rate: Triple,
+    /// Magnetic field in the true reference frame, uT.
+    pub field: Vector3<f64>,
     /// Magnetic flux density, uT.
     pub m: Triple,
     /// Its time derivative in the body frame.
@@ -181,7 +187,10 @@ impl Ideal {
         motion: Motion,
     ) -> Self {
         let rows = kinematics(window, facts, clock, motion);
-        let mut ideal = Self::default();
+        let mut ideal = Self {
+            field: facts.field + change.field,
+            ..Self::default()
+        };
         let mut rig = facts.rig.as_ref().map(|rig| {
             ideal.rig_axis = change.alignment.inverse_transform_vector(&rig.axis);
             let first = clock.at(window.t.get(window.begin).copied().unwrap_or_default());
@@ -356,7 +365,7 @@ impl Ideal {
         // Position and its derivatives are recorded in the frame that is not level.
         let f = attitude.inverse_transform_vector(&(change.tilt * k.acceleration - facts.gravity));
         let f_rate = attitude.inverse_transform_vector(&(change.tilt * k.jerk)) - omega.cross(&f);
-        let m = attitude.inverse_transform_vector(&facts.field);
+        let m = attitude.inverse_transform_vector(&self.field);
         self.omega.push(&omega);
         self.alpha.push(&alpha);
         self.alpha_rate

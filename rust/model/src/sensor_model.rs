@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::card::Stage;
+use crate::card::{ReferencePart, Stage};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::ideal::{Command, Ideal, ReferenceChange};
@@ -37,6 +37,13 @@ impl Slot {
     /// What a p-value of it is multiplied by, and then by the shares of all candidates, to count every chance of a false alarm.
     pub fn chances(&self) -> f64 {
         self.tried as f64 / self.effect.card().shares
+    }
+
+    /// True where its value lies in the ideal readings: what acts on these then acts on it. The field does wherever a reference gives these.
+    fn in_ideal(&self, facts: &LogFacts) -> bool {
+        let card = self.effect.card();
+        let field = card.traits.reference == Some(ReferencePart::Field);
+        matches!(card.stage, Stage::Reference | Stage::Time) || (field && !facts.rests)
     }
 
     fn columns(&self, rows: &Rows, sensor: Sensor, out: &mut Columns) -> Result<(), EffectError> {
@@ -172,11 +179,6 @@ impl<'a> Past<'a> {
             history: self.history,
         }
     }
-}
-
-/// True where the value of an effect lies in the ideal readings.
-const fn in_reference(stage: Stage) -> bool {
-    matches!(stage, Stage::Reference | Stage::Time)
 }
 
 /// A reading that is cut off does not move with any parameter.
@@ -338,11 +340,11 @@ impl SensorModel {
         Ok(())
     }
 
-    /// What the model's reference effects do to the reference.
-    pub fn reference_change(&self) -> ReferenceChange {
+    /// What the model's effects on the ideal readings do to the reference.
+    pub fn reference_change(&self, facts: &LogFacts) -> ReferenceChange {
         self.slots
             .iter()
-            .filter(|s| s.in_model && in_reference(s.effect.card().stage))
+            .filter(|s| s.in_model && s.in_ideal(facts))
             .fold(ReferenceChange::default(), |change, s| {
                 change.and(s.effect.reference_change(&s.parameters))
             })
@@ -390,7 +392,7 @@ impl SensorModel {
         // What looks back no further than the margin gets no more, whoever else is asked beside it.
         let near = whole.part(whole.begin, whole.end, self.margin(whole, facts).min(facts.margin()));
         let window = &near;
-        let ideal = Ideal::new(window, facts, &self.reference_change());
+        let ideal = Ideal::new(window, facts, &self.reference_change(facts));
         let core = window.begin..window.end;
         let temperature = held_temperature(window, facts);
         let covariates = held_covariates(window);
@@ -415,7 +417,7 @@ impl SensorModel {
             })
         };
         let seen = seen_of(&ideal);
-        let change = self.reference_change();
+        let change = self.reference_change(facts);
         let mut channels: Vec<Option<ChannelColumns>> = vec![None; CHANNELS];
         for sensor in Sensor::ALL {
             let Some(reading) = window.reading(sensor) else {
@@ -484,13 +486,13 @@ impl SensorModel {
     /// For each candidate that is tried at full size, and whose value lies in the ideal readings, what these change by per unit of the
     /// size tried.
     fn secants(&self, window: &Window, facts: &LogFacts, sensor: Sensor) -> Vec<Option<Triple>> {
-        let change = self.reference_change();
+        let change = self.reference_change(facts);
         let reading = |change: &ReferenceChange| Ideal::smooth_reading(window, facts, change, sensor);
         let now: LazyCell<Triple, _> = LazyCell::new(|| reading(&change));
         let of = |slot: &Slot| {
             let effect = &slot.effect;
             let size = slot.parameters[0];
-            let asked = !slot.in_model && effect.tried_at_full_size() && in_reference(effect.card().stage);
+            let asked = !slot.in_model && effect.tried_at_full_size() && slot.in_ideal(facts);
             if !asked || size == 0.0 || !effect.sensors().contains(&sensor) {
                 return None;
             }
@@ -586,7 +588,7 @@ impl SensorModel {
                     }
                 }
                 // The value of a reference effect is in the ideal readings already.
-                if slot.in_model && !in_reference(stage) {
+                if slot.in_model && !slot.in_ideal(rows.facts) {
                     slot.add_to(&rows, sensor, &columns, &mut after, &x)?;
                 }
                 for axis in 0..3 {

@@ -42,6 +42,7 @@ impl<'a> Table<'a> {
         let nothing = || Triple::zeros(n);
         let ideal = Ideal {
             omega: readings(window, Sensor::Gyr),
+            field: facts.field,
             alpha: unknown(),
             alpha_rate: unknown(),
             snap: unknown(),

@@ -5,7 +5,6 @@ pub mod covariate;
 pub mod current;
 pub mod drift;
 pub mod earth_rate;
-pub mod field;
 pub mod g_sensitivity;
 pub mod iron;
 pub mod lever_arm;

@@ -1,4 +1,4 @@
-//! The reference itself is off: turned against the sensor, not level, late, or ever later.
+//! The reference itself is off: turned against the sensor, not level, late, or ever later, or its field is another.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -19,6 +19,7 @@ enum Kind {
     Tilt,
     Delay,
     Skew,
+    Field,
 }
 
 /// An effect of the reference on every sensor.
@@ -87,6 +88,31 @@ pub fn tilt() -> Reference {
     }
 }
 
+/// `mag.field_reference`. The value lies in the ideal readings, so that all that acts on these acts on the true field.
+pub fn field() -> Reference {
+    let words = Words {
+        name: "wrong reference field",
+        physics: "the field at the place of the recording differs from the assumed field: buildings, another location, an old field model",
+        formula: "R^T dm",
+        signature: "a field residual that is constant in the reference frame and rotates with the attitude in the body frame",
+        mistaken_for: "mag.hard_iron if the attitude hardly changes, ref.alignment about the vertical",
+        confirm: "measure the field with a second magnetometer at the same place",
+    };
+    Reference {
+        card: words
+            .card(
+                "mag.field_reference".to_string(),
+                Stage::Input,
+                parameters(&VECTOR, "uT", 5.0),
+            )
+            .with(Traits {
+                scope: Scope::Log,
+                ..wrong(ReferencePart::Field, Reach::Reference)
+            }),
+        kind: Kind::Field,
+    }
+}
+
 /// `ref.delay`: the reference recorded at t shows the truth of t - tau.
 pub fn delay() -> Reference {
     let words = Words {
@@ -140,12 +166,14 @@ impl Effect for Reference {
     fn sensors(&self) -> &[Sensor] {
         match self.kind {
             Kind::Tilt => &[Sensor::Acc, Sensor::Mag],
+            Kind::Field => &[Sensor::Mag],
             Kind::Alignment | Kind::Delay | Kind::Skew => &Sensor::ALL,
         }
     }
 
-    fn not_testable(&self, _: &LogFacts) -> Option<String> {
-        None
+    fn not_testable(&self, facts: &LogFacts) -> Option<String> {
+        let lacking = self.kind == Kind::Field && !facts.sensors[Sensor::Mag.index()];
+        lacking.then(|| format!("the log has no {}", Sensor::Mag.name()))
     }
 
     fn columns(&self, rows: &Rows, sensor: Sensor, parameters: &[f64], out: &mut Columns) -> Result<(), EffectError> {
@@ -194,7 +222,7 @@ impl Effect for Reference {
                 let tilt = UnitQuaternion::from_scaled_axis(tau);
                 let jacobian = right_jacobian(&tau);
                 let v = match sensor {
-                    Sensor::Mag => rows.facts.field,
+                    Sensor::Mag => ideal.field,
                     Sensor::Acc | Sensor::Gyr => -rows.facts.gravity,
                 };
                 let level = tilt.inverse_transform_vector(&v);
@@ -210,6 +238,21 @@ impl Effect for Reference {
                         let column = recorded.inverse_transform_vector(&change);
                         for axis in 0..3 {
                             out.column(parameter, axis)[row] = column[axis] + known;
+                        }
+                    }
+                }
+            }
+            Kind::Field => {
+                for parameter in 0..3 {
+                    for axis in 0..3 {
+                        out.column(parameter, axis);
+                    }
+                    for row in 0..rows.len() {
+                        let v = rows
+                            .attitude(row)
+                            .inverse_transform_vector(&Vector3::ith(parameter, 1.0));
+                        for axis in 0..3 {
+                            out.column(parameter, axis)[row] = v[axis];
                         }
                     }
                 }
@@ -264,6 +307,10 @@ impl Effect for Reference {
             },
             Kind::Skew => ReferenceChange {
                 skew: parameters[0],
+                ..ReferenceChange::default()
+            },
+            Kind::Field => ReferenceChange {
+                field: Vector3::from_column_slice(parameters),
                 ..ReferenceChange::default()
             },
             Kind::Tilt => ReferenceChange {

@@ -1,0 +1,70 @@
+//! The magnetic field of the place, where only the readings show it: estimated beside an offset of the sensor, since a magnet that moves with
+//! the sensor would else be taken for a part of the field.
+
+use nalgebra::{Cholesky, Matrix3, UnitQuaternion, Vector3};
+
+/// Prior precision of the offset, over that of one reading: the field of a room varies by 2 uT (docs/recordings.md: 0.8 to 1.8 uT), which may
+/// follow the attitude, and boards have three times 20 uT of hard iron.
+const OFFSET: f64 = (2.0 / 60.0) * (2.0 / 60.0);
+
+/// Sums over rows with a reading b and an attitude R, of which `b = R^T m + h`.
+#[derive(Clone, Debug, Default)]
+pub struct PlaceField {
+    rows: usize,
+    readings: Vector3<f64>,
+    in_reference: Vector3<f64>,
+    attitudes: Matrix3<f64>,
+}
+
+impl PlaceField {
+    /// Adds a row: attitude (body to reference) and reading, uT.
+    pub fn add(&mut self, attitude: UnitQuaternion<f64>, reading: Vector3<f64>) {
+        self.rows += 1;
+        self.readings += reading;
+        self.in_reference += attitude * reading;
+        self.attitudes += attitude.to_rotation_matrix().into_inner();
+    }
+
+    /// The field m in the reference frame, uT, by least squares beside h; `None` without rows.
+    pub fn estimate(&self) -> Option<Vector3<f64>> {
+        if self.rows == 0 {
+            return None;
+        }
+        let n = self.rows as f64;
+        let (b, in_reference, mean) = (self.readings / n, self.in_reference / n, self.attitudes / n);
+        let information = Matrix3::identity() * (1.0 + OFFSET) - mean.tr_mul(&mean);
+        // |mean| <= 1, so that the prior keeps the information positive.
+        let offset = Cholesky::new(information)?.solve(&(b - mean.tr_mul(&in_reference)));
+        Some(in_reference - mean * offset)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FIELD: [f64; 3] = [0.0, 21.0, -43.0];
+
+    fn field_of(turns: impl Fn(f64) -> UnitQuaternion<f64>, iron: Vector3<f64>) -> Vector3<f64> {
+        let mut sums = PlaceField::default();
+        for k in 0..1000 {
+            let q = turns(f64::from(k) * 0.05);
+            sums.add(q, q.inverse_transform_vector(&Vector3::from(FIELD)) + iron);
+        }
+        sums.estimate().expect("rows")
+    }
+
+    #[test]
+    fn a_magnet_on_a_sensor_that_turns_is_not_a_part_of_the_field() {
+        let carried = |t: f64| UnitQuaternion::from_euler_angles(0.35 * (1.3 * t).sin(), 0.35 * (1.9 * t).sin(), t);
+        let found = field_of(carried, Vector3::new(60.0, -75.0, 410.0));
+        assert!((found - Vector3::from(FIELD)).norm() < 10.0, "{found}");
+    }
+
+    #[test]
+    fn a_sensor_that_hardly_turns_shows_the_whole_field() {
+        let still = |t: f64| UnitQuaternion::from_euler_angles(0.3, 0.001 * t.sin(), 1.0);
+        let found = field_of(still, Vector3::zeros());
+        assert!((found - Vector3::from(FIELD)).norm() < 1e-9, "{found}");
+    }
+}
