@@ -16,7 +16,7 @@ def test_steps_that_were_undone_stand_in_the_legend():
 
 
 def test_a_long_step_takes_no_room_from_the_bars():
-    name = "acc.column:temperature_of_the_left_motor.x fixed"
-    figure = charts.fall(["ideal sensor", name], [2.0, 1.0], [None, None], 1)
-    assert max(len(label) for label in figure["layout"]["xaxis"]["ticktext"]) <= charts.TICK
+    name = "influence of temperature_of_the_left_motor on the accelerometer x fixed"
+    figure = charts.fall(["ideal sensor", name], [2.0, 1.0], [None, None], 1, best=(f"+ {name}", 0.9))
+    assert figure["layout"]["xaxis"]["ticktext"] == ["0", "1", charts.NEXT]
     assert figure["data"][0]["customdata"][1] == name

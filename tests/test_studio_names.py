@@ -6,7 +6,7 @@ from imufit.studio.names import (
     channel_name,
     covariate_name,
     effect_name,
-    fitting,
+    estimating,
     model_name,
     parameter_name,
     with_symbol,
@@ -30,6 +30,7 @@ def test_effects_have_the_names_of_the_catalogue():
         ("temp*omega_norm", "temperature times size of the angular rate"),
         ("ref_px*ref_py*ref_pz", "position x times position y times position z"),
         ("supply", "supply"),
+        ("domega/dt", "change of the angular rate"),
         ("a*b", "a*b"),
         ("omega_q", "omega_q"),
         ("", ""),
@@ -46,5 +47,6 @@ def test_channels_and_models_have_words():
     assert model_name(()) == "the ideal sensor"
     assert model_name(("acc.bias",)) == "the model with accelerometer bias"
     assert (
-        fitting(("acc.bias", "gyr.scale")) == "fitting the model with 2 effects to the log, for its values and its bar"
+        estimating(("acc.bias", "gyr.scale"))
+        == "estimating the model with 2 effects from the log, for its values and its bar"
     )

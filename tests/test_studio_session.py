@@ -176,11 +176,11 @@ def test_a_fixed_value_stays_and_is_fitted_again(session):
     assert held.ratio > 2.0 * fitted.ratio
     found = session.diagnose()
     assert found.sentence.startswith("acc.bias.x is fixed at 0.500 m/s², but the data give ")
-    assert found.sentence.endswith(": fit the parameter, or correct its value.")
+    assert found.sentence.endswith(": estimate the parameter, or correct its value.")
     assert found.unexplained == ()
-    assert session.step.label == "acc.bias.x fixed"
+    assert (session.step.label, session.step.key) == ("accelerometer bias x fixed", "acc.bias.x")
     session.free("acc.bias", "x")
-    assert session.step.label == "acc.bias.x fitted"
+    assert session.step.label == "accelerometer bias x estimated"
     assert session.fit().numbers == fitted
     with pytest.raises(InputError, match="has no parameter q"):
         session.hold("acc.bias", "q", 0.5)

@@ -37,6 +37,54 @@ def cause_names(analysis: Analysis, log: int, channel: str) -> tuple[str, ...]:
     return tuple(_causes(analysis, log, channel))
 
 
+def cause_shares(analysis: Analysis, step: Array, log: int, channels: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return the part of each channel's excess that each cause explains, from the evidence alone: no row is read.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        The evidence.
+    step : ndarray
+        (p,) step of every parameter, SI units.
+    log : int
+        Number of the log.
+    channels : sequence of str
+        Channels that stand above their noise floors.
+
+    Returns
+    -------
+    dict
+        Fraction of the excess variance, 0 to 1, by channel and cause.
+    """
+    squares = _squares(analysis, step, log)
+    floors = analysis.logs[log].floors
+    moves: dict[int, tuple[list[int], Array]] = {}
+    found: dict[str, dict[str, float]] = {}
+    for channel in channels:
+        excess = squares[channel] - floors[CHANNELS.index(channel)] ** 2
+        found[channel] = {}
+        for cause, (slot, places) in _causes(analysis, log, channel).items():
+            own, full = moves[slot] if slot in moves else moves.setdefault(slot, _fitted_besides(analysis, slot))
+            chosen = [own[k] for k in places]
+            moved = step.copy()
+            moved[chosen] += full[chosen]
+            left = _squares(analysis, moved, log)[channel]
+            found[channel][cause] = min(max((squares[channel] - left) / excess, 0.0), 1.0)
+    return found
+
+
+def _squares(analysis: Analysis, step: Array, log: int) -> dict[str, float]:
+    """Return the mean square of the residual of each channel, SI units."""
+    return {item["channel"]: item["rms"] ** 2 for item in analysis.problem.residual(step, log)["channels"]}
+
+
+def _fitted_besides(analysis: Analysis, slot: int) -> tuple[list[int], Array]:
+    """Return the parameters of a slot, and the step of all parameters with the slot fitted besides the model's."""
+    along = len(analysis.problem.estimate(analysis.fitted_slots)["parameters"])
+    solved = analysis.problem.estimate([*analysis.fitted_slots, slot])
+    return solved["parameters"][along:], solved["full_step"]
+
+
 def cause_panels(
     analysis: Analysis, step: Array, log: int, channel: str, cause: str, others: Sequence[tuple[Analysis, Array]] = ()
 ) -> tuple[Panel | None, ...]:
@@ -64,11 +112,10 @@ def cause_panels(
     """
     slot, places = _causes(analysis, log, channel)[cause]
     evidence = analysis.logs[log]
-    along = len(analysis.problem.estimate(analysis.fitted_slots)["parameters"])
-    solved = analysis.problem.estimate([*analysis.fitted_slots, slot])
-    chosen = [solved["parameters"][along:][k] for k in places]
+    own, full = _fitted_besides(analysis, slot)
+    chosen = [own[k] for k in places]
     moved = step.copy()
-    moved[chosen] += solved["full_step"][chosen]
+    moved[chosen] += full[chosen]
     index = CHANNELS.index(channel)
     asked = [(analysis, step), (analysis, moved), *others]
     sources = [(each.logs[log].raw, each.own_step(log, at)) for each, at in asked]

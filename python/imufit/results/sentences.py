@@ -124,8 +124,8 @@ def _missing(found: Diagnosis, best: Candidate | None) -> str:
     if found.verdict == "ambiguous":
         rivals = " or ".join(found.ambiguous_with)
         return (
-            f"{best.effect} or {rivals} is missing: each explains this log, "
-            f"and {best.effect} adds nothing to what {rivals} explains."
+            f"{best.effect} or {rivals} is missing: each alone explains this log, "
+            f"and {best.effect} explains nothing more beside {rivals}."
         )
     text = f"{best.effect} is missing. {best.explanation}"
     others = [item.effect for item in found.candidates if item.status == SIGNIFICANT and item.effect != best.effect]
@@ -179,7 +179,9 @@ def contradicted(held: Parameter, found: Parameter) -> str:
     """Say of a fixed value how far it is from the value that the logs give."""
     value = quantity.quantity(held.value, held.unit)
     estimate = quantity.with_error(found.value, found.standard_error, found.unit)
-    return f"{held.key} is fixed at {value}, but the data give {estimate}: fit the parameter, or correct its value."
+    return (
+        f"{held.key} is fixed at {value}, but the data give {estimate}: estimate the parameter, or correct its value."
+    )
 
 
 def unshown(effect: str, reason: str) -> str:

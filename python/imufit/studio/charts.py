@@ -37,12 +37,12 @@ Array = NDArray[np.float64]
 
 HEIGHT: Final = 240
 """Height of a figure, px: two of them and the sentence fit on a laptop's screen."""
-TICK: Final = 24
-"""Characters under a bar, as many as most effects' names have: pointing at the bar shows the step in full."""
+NEXT: Final = "next"
+"""Mark under the bar of the effect that is missing."""
 NOW: Final = "now"
 """Mark over the bar of the present step."""
-FALL_HEIGHT: Final = 270
-"""Height of the fall of the error, px: the labels under the bars and the legend leave a third of it to the bars."""
+FALL_HEIGHT: Final = 200
+"""Height of the fall of the error, px: numbers under the bars and a legend of three lines leave half of it to them."""
 SMALL: Final = 11
 """Size of the letters of an axis' title and of the figure of the falling error, px: the titles fit beside the plots."""
 SLOTS: Final = 6
@@ -53,6 +53,8 @@ ROOM: Final = 1.6
 """Height of the fall's axis over its highest bar: mark and number of the present bar have 30 px of 80 px on a phone."""
 UNDONE: Final = 0.35
 """Opacity of the bar of a step that was undone: far paler than the others, and still seen."""
+UNDER: Final = 22
+"""Room under the bars for their numbers, px: the axis has no title."""
 LINE: Final = 1.6
 """Width of a line, px."""
 LOGARITHMIC_ABOVE: Final = 8.0
@@ -219,7 +221,7 @@ def allan(sensor: str, channels: Sequence[ChannelLike]) -> Figure:
         drawn += _line(channel.tau, factor * channel.deviation, colour, axis)
         fitted = channel.fitted(channel.tau)
         if fitted is not None:
-            fit = _line(channel.tau, factor * fitted, GREY, f"fit of {axis}", dash="dot")
+            fit = _line(channel.tau, factor * fitted, GREY, f"noise of four kinds, {axis}", dash="dot")
             drawn += [trace | {"showlegend": False} for trace in fit]
     return _figure(
         drawn,
@@ -246,7 +248,7 @@ def fall(
     Parameters
     ----------
     labels : sequence of str
-        (k,) steps.
+        (k,) steps, for the one who points at a bar: their numbers alone stand under the bars.
     ratios : sequence of float
         (k,) held-out error over the noise floor after each step; NaN where it is not known yet.
     expected : sequence of float or None
@@ -254,7 +256,7 @@ def fall(
     position : int
         Number of the present step; later ones were undone.
     best : (str, float), optional
-        Effect that is missing, and the error that is expected with it.
+        The step that adds the effect that is missing, and the error that is expected with it.
     """
     places = list(range(len(ratios)))
     names = [words(label) for label in labels]
@@ -292,9 +294,8 @@ def fall(
             }
         )
     if best is not None:
-        effect, value = best
+        step, value = best
         places.append(len(places))
-        labels = [*labels, f"+ {effect}?"]
         bars.append(
             {
                 "type": "bar",
@@ -306,7 +307,8 @@ def fall(
                 "cliponaxis": False,
                 "width": 0.62,
                 "marker": {"color": "rgba(0,0,0,0)", "line": {"color": ORANGE, "width": 2}},
-                "hovertemplate": "%{y:.3f} expected<extra></extra>",
+                "hovertemplate": "%{customdata}<br>%{y:.3f} expected<extra></extra>",
+                "customdata": [words(step)],
                 "showlegend": True,
             }
         )
@@ -330,12 +332,14 @@ def fall(
     # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
     edge = [-0.6, max(len(places), SLOTS) - 0.4]
     floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
-    ticks = {"tickvals": places, "ticktext": [words(printable(label, TICK)) for label in labels], "range": edge}
-    ticks |= {"fixedrange": True, "tickangle": -35, "tickfont": {"size": SMALL}}
+    under = [str(k) if k < len(ratios) else NEXT for k in places]
+    ticks = {"tickvals": places, "ticktext": under, "range": edge}
+    ticks |= {"fixedrange": True, "tickangle": 0, "tickfont": {"size": SMALL}}
     figure = _figure([*bars, *floor], "", "error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
     figure["layout"]["xaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
     figure["layout"]["height"] = FALL_HEIGHT
+    figure["layout"]["margin"]["b"] = UNDER
     figure["layout"]["legend"]["font"] = {"size": SMALL}
     return figure
 

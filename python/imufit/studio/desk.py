@@ -20,7 +20,7 @@ from imufit.results import Diagnosis
 from imufit.results.phrasing import capital
 from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, join_of, offers, remedies
 from imufit.studio.mystery import DEMONSTRATION, Mystery
-from imufit.studio.names import fitting, model_name
+from imufit.studio.names import estimating, model_name
 from imufit.studio.session import Session
 from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
 from imufit.studio.stack import Stack, Step
@@ -475,6 +475,12 @@ class Desk:
                 partial(session.diagnose, stack, self.progress),
                 judged=stack,
             )
+        if made.shares is None:
+            yield Piece(
+                f"weighing the causes of the residuals of {words}, for the list against",
+                partial(session.weigh_causes, stack, self.progress),
+                judged=stack,
+            )
         if session.has_reference:
             for model in self._models_drawn(session):
                 if model not in self.models:
@@ -496,7 +502,7 @@ class Desk:
     def _unfitted(self, session: Session, steps: Sequence[Step]) -> Iterator[Piece]:
         for step in steps:
             if session.made(step.stack) is None:
-                yield Piece(fitting(step.stack.model.effects), partial(session.fit, step.stack, self.progress))
+                yield Piece(estimating(step.stack.model.effects), partial(session.fit, step.stack, self.progress))
 
     @staticmethod
     def _models_drawn(session: Session) -> list[Stack]:

@@ -30,6 +30,19 @@ def with_words(icon: str, words: str, action: Callable[[], object] | None) -> ui
     return button.classes("studio-worded")
 
 
+def link_with_words(icon: str, words: str, address: str) -> ui.button:
+    """Return a link of a page's head that looks like its buttons.
+
+    Parameters
+    ----------
+    icon, words : str
+        Icon and words.
+    address : str
+        The page, seen from the present one.
+    """
+    return with_words(icon, words, None).props(attribute("href", address))
+
+
 def bare(icon: str, words: str, action: Callable[[], object]) -> ui.button:
     """Return a small button that shows its words while it is pointed at or focused.
 

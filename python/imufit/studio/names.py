@@ -18,6 +18,9 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "omega_norm": "size of the angular rate",
     "m": "magnetic field",
     "ref_p": "position",
+    "df/dt": "change of the specific force",
+    "domega/dt": "change of the angular rate",
+    "dm/dt": "change of the magnetic field",
 }
 """Words for the symbols of covariates, as the glossary defines them; an axis follows a symbol, such as ``_x``."""
 
@@ -46,15 +49,15 @@ def model_name(effects: Sequence[str]) -> str:
     return f"the model with {effect_name(effects[0]) if len(effects) == 1 else f'{len(effects)} effects'}"
 
 
-def fitting(effects: Sequence[str]) -> str:
-    """Return in words the work of fitting a model, and what a person gets of it.
+def estimating(effects: Sequence[str]) -> str:
+    """Return in words the work of estimating a model, and what a person gets of it.
 
     Parameters
     ----------
     effects : sequence of str
         Ids of its effects.
     """
-    return f"fitting {model_name(effects)} to the log, for its values and its bar"
+    return f"estimating {model_name(effects)} from the log, for its values and its bar"
 
 
 def parameter_name(effect: str, parameter: str) -> str:

@@ -17,17 +17,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit.comparing import cause_names, cause_panels, comparison, panels
+from imufit.comparing import cause_names, cause_panels, cause_shares, comparison, panels
 from imufit.comparing.two_models import ln_bayes_factor
 from imufit.errors import InputError
 from imufit.fitting.analysis import Analysis, pooled
+from imufit.fitting.passes import CHANNELS
 from imufit.log import LogSource
 from imufit.loop import Fit, SensorModel
 from imufit.model.catalogue import each_log_has_its_own, find_effect
 from imufit.progress import Progress, silent
 from imufit.results import Comparison, Diagnosis, Parameter
 from imufit.results.comparison import Panel
-from imufit.studio.names import fitting
+from imufit.studio.names import estimating
 from imufit.studio.stack import Action, Stack, Step
 from imufit.studio.traces import ModelTraces, Traces
 
@@ -36,6 +37,8 @@ Array = NDArray[np.float64]
 FULL: Final = 4
 """Fits that keep their evidence: the first, the present, the one before, and the second of two models. The evidence of
 two minutes at 100 Hz takes some 20 MB."""
+FAILS: Final = 1.05
+"""Residual over noise floor from which on a channel fails: below, the excess is a tenth of the noise's variance."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,12 @@ class Made:
         The fit, with or without its evidence.
     way : tuple of Stack
         Models from the ideal sensor to this one, each fitted from the one before.
+    diagnosis : Diagnosis or None
+        The effects that it lacks.
+    comparison : Comparison or None
+        Its residuals.
+    shares : dict or None
+        Part of the excess of each failing channel that each cause without a name explains, by channel and cause.
     """
 
     fit: Fit
@@ -74,6 +83,7 @@ class Made:
     numbers: Numbers = field(init=False)
     diagnosis: Diagnosis | None = None
     comparison: Comparison | None = None
+    shares: dict[str, dict[str, float]] | None = None
 
     def __post_init__(self) -> None:
         """Keep the numbers of the fit."""
@@ -364,9 +374,9 @@ class Session:
         solved = analysis.problem.estimate([*analysis.fitted_slots, *slots])
         errors = np.sqrt(np.maximum(np.diag(solved["covariance"]), 0.0))
         parameters: list[Parameter] = []
-        at = len(solved["step"]) - sum(self._count(effect) for effect in model.effects)
+        at = len(solved["step"]) - sum(self._count(effect, analysis) for effect in model.effects)
         for key in model.effects:
-            effect, count = find_effect(key), self._count(key)
+            effect, count = find_effect(key), self._count(key, analysis)
             # Logs that have their own values follow one another.
             shape = (-1, len(effect.parameters))
             part = slice(at, at + count)
@@ -378,9 +388,10 @@ class Session:
             at += count
         return Numbers(float(solved["held_out"]), tuple(parameters), False), solved["full_step"]
 
-    def _count(self, effect: str) -> int:
+    @staticmethod
+    def _count(effect: str, analysis: Analysis) -> int:
         """Return the number of parameters that an effect has in the evidence of all logs."""
-        logs = len(self.start.analysis.having(effect)) if each_log_has_its_own(effect) else 1
+        logs = len(analysis.having(effect)) if each_log_has_its_own(effect) else 1
         return logs * len(find_effect(effect).parameters)
 
     # --- work that takes passes: from a thread
@@ -438,6 +449,62 @@ class Session:
                 fit = self._with_evidence(made)
                 made.comparison = comparison(fit.analysis, fit.estimate.step, self.shown)
             return made.comparison
+
+    def weigh_causes(self, stack: Stack | None = None, progress: Progress = silent) -> dict[str, dict[str, float]]:
+        """Say how much of the excess of each failing channel each cause without a name explains.
+
+        Parameters
+        ----------
+        stack : Stack, optional
+            The stack; default the present one.
+        progress : callable
+            Called with (rows done, rows in all, what is being done).
+
+        Returns
+        -------
+        dict
+            Fraction of the excess variance by channel and cause; empty for logs without a reference.
+        """
+        with self._work:
+            made = self.fit(stack, progress)
+            found = self.compare(stack, progress)
+            if made.shares is None:
+                failing = [] if found is None else [item.channel for item in found.channels if item.ratio > FAILS]
+                fit = self._with_evidence(made)
+                made.shares = cause_shares(fit.analysis, fit.estimate.step, self.shown, failing) if failing else {}
+            return made.shares
+
+    def channel_of(self, parameter: Parameter) -> str | None:
+        """Return the channel whose residual a predicted value of a candidate changes most, in its noise floors.
+
+        Parameters
+        ----------
+        parameter : Parameter
+            One of a candidate's predicted ones.
+
+        Returns
+        -------
+        str or None
+            None where the evidence around the present model is not at hand, or has no such candidate.
+        """
+        fit = self._at_hand(self.stack)
+        if fit is None or parameter.effect not in fit.analysis.candidates:
+            return None
+        analysis, effect = fit.analysis, find_effect(parameter.effect)
+        slots = [*analysis.fitted_slots, analysis.slots.index(parameter.effect)]
+        solved = analysis.problem.estimate(slots)
+        names = [name for name, _, _ in effect.parameters]
+        own = solved["parameters"][-self._count(parameter.effect, analysis) :]
+        # Logs that have their own values follow one another.
+        chosen = own[names.index(parameter.name) :: len(names)]
+        without = solved["full_step"].copy()
+        without[chosen] = fit.estimate.step[chosen]
+        after, before = (
+            {item["channel"]: item["rms"] for item in analysis.problem.residual(step, self.shown)["channels"]}
+            for step in (solved["full_step"], without)
+        )
+        floors = dict(zip(CHANNELS, analysis.logs[self.shown].floors, strict=True))
+        return max(before, key=lambda name: (before[name] ** 2 - after[name] ** 2) / floors[name] ** 2, default=None)
 
     def weighed(self) -> float | None:
         """Return the ln Bayes factor for the present model over the second one; None before it is worked out."""
@@ -580,7 +647,7 @@ class Session:
 
     def _moved(self, base: Made, target: Stack, progress: Progress) -> Made:
         fit = self._with_evidence(base)
-        progress(0, 1, fitting(target.effects))
+        progress(0, 1, estimating(target.effects))
         return Made(moved(fit, target), (*base.way, target))
 
     def _with_evidence(self, made: Made) -> Fit:

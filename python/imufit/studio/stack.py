@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Final
+
+from imufit.studio.names import effect_name, parameter_name
 
 
 @dataclass(frozen=True)
@@ -133,6 +136,17 @@ class Action(Enum):
     FREE = "free"
 
 
+SAID: Final = {
+    Action.ADD: "+ {}",
+    Action.REMOVE: "− {}",
+    Action.ON: "{} on",
+    Action.OFF: "{} off",
+    Action.HOLD: "{} fixed",
+    Action.FREE: "{} estimated",
+}
+"""Kinds of steps in words, with the name of what they concern."""
+
+
 @dataclass(frozen=True)
 class Step:
     """One step of the history.
@@ -158,16 +172,14 @@ class Step:
     parameter: str = ""
 
     @property
+    def key(self) -> str:
+        """Id of the effect or parameter that the step concerns; empty at the start."""
+        return f"{self.effect}.{self.parameter}" if self.parameter else self.effect
+
+    @property
     def label(self) -> str:
-        """The step in few characters."""
-        key = f"{self.effect}.{self.parameter}" if self.parameter else self.effect
-        words = {
-            Action.START: "ideal sensor",
-            Action.ADD: f"+ {self.effect}",
-            Action.REMOVE: f"− {self.effect}",
-            Action.ON: f"{self.effect} on",
-            Action.OFF: f"{self.effect} off",
-            Action.HOLD: f"{key} fixed",
-            Action.FREE: f"{key} fitted",
-        }
-        return words[self.action]
+        """The step in few words."""
+        if self.action is Action.START:
+            return "ideal sensor"
+        name = parameter_name(self.effect, self.parameter) if self.parameter else effect_name(self.effect)
+        return SAID[self.action].format(name)

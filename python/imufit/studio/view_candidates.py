@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final
 
-from nicegui import ui
+from nicegui import events, ui
 
 from imufit.figures import quantity
 from imufit.model.catalogue import card_of, find_effect
 from imufit.printable import printable
-from imufit.results import Candidate, Diagnosis, Parameter
+from imufit.results import Candidate, Diagnosis
 from imufit.results.diagnosis import NOT_SIGNIFICANT, NOT_TESTABLE, SIGNIFICANT
 from imufit.results.parameter import in_lines
-from imufit.results.phrasing import capital
 from imufit.studio.attribute import attribute
+from imufit.studio.by_sensor import by_sensor
 from imufit.studio.desk import Desk
 from imufit.studio.heading import heading_of
-from imufit.studio.names import effect_name, parameter_name, with_symbol
+from imufit.studio.names import effect_name
+from imufit.studio.pointing import MARK, on_pointing
 from imufit.studio.presses import Presses
 from imufit.studio.view_panels import PanelView
 
 FIRST: Final = 5
 """Candidates that are shown at once: the best and its rivals; the others fold away."""
+MORE: Final = "more"
+"""Name of the fold of the others."""
 
 ROW_INTO_SIGHT: Final = (
     "requestAnimationFrame(() => document.getElementById('{}')"
@@ -38,8 +43,8 @@ FIGURES: Final = (
 )
 NO_FIGURES: Final = "Point at an effect to see what it would explain, or press its name for its card."
 CONTRADICTED: Final = (
-    "{keys} fixed at a value that the log contradicts. The candidates stand here without figures: whatever is added "
-    "now would make up for that value first."
+    "The candidates stand here without figures: each would make up for the fixed value that the log contradicts. "
+    "The model marks this value."
 )
 """Sentence over the candidates beside a wrong fixed value, whose error each of them would explain."""
 
@@ -58,14 +63,14 @@ def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
         return ""
     outdone = item.outcome == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
     if outdone and diagnosis.best is not None:
-        return f"; explains nothing that {effect_name(diagnosis.best)} does not"
+        return f" alone; explains nothing more beside {effect_name(diagnosis.best)}"
     return f"; {item.outcome}"
 
 
 def _shared(item: Candidate, diagnosis: Diagnosis) -> str:
-    """Name the rivals that share the probability of a candidate; often empty."""
-    rivals = " and ".join(map(effect_name, diagnosis.sharing(item)))
-    return f", shared with {rivals}" if rivals else ""
+    """Say which rivals share the probability of a candidate, and that one of them is enough; often empty."""
+    rivals = " or ".join(map(effect_name, diagnosis.sharing(item)))
+    return f" alone, explains nothing more beside {rivals}" if rivals else ""
 
 
 class CandidateView:
@@ -83,11 +88,13 @@ class CandidateView:
         self._desk, self._panels = desk, panels
         self._looked_at = ""
         self._opened: list[str] = []
+        self._unfolded: set[str] = set()
         self._drawn: tuple[object, ...] | None = None
         self._stacked: frozenset[str] = frozenset()
         self._added = Presses()
         ui.html("Candidates", tag="h2", sanitize=False)
         self._list = ui.column().classes("w-full gap-0")
+        on_pointing(lambda effect: self.look_at(effect or (self._opened[-1] if self._opened else "")))
 
     def refresh(self) -> None:
         """Show the candidates on top of the present model."""
@@ -101,7 +108,6 @@ class CandidateView:
         self._opened = []
         self.look_at("")
         self._list.clear()
-        self._list.classes(**({"add": "studio-long"} if self._desk.guessing else {"remove": "studio-long"}))
         with self._list:
             if diagnosis is None:
                 ui.label("The effects of the catalogue are being compared with the log.").classes("studio-muted")
@@ -111,44 +117,41 @@ class CandidateView:
                 ui.label("No effect was judged on these data.").classes("studio-muted")
             elif self._desk.guessing:
                 ui.label(NO_FIGURES).classes("studio-muted")
-                for item in sorted(shown, key=lambda item: item.effect):
-                    self._candidate(item, None)
+                by_effect = {item.effect: item for item in shown}
+                for part, effects in by_sensor(by_effect).items():
+                    # A list of all would lie between the sentence and the figures on a phone.
+                    with self._folded(part, quantity.counted(len(effects), "effect")):
+                        for effect in effects:
+                            self._candidate(by_effect[effect], None)
             else:
                 self._judged(sorted(shown, key=lambda item: _rank(item, diagnosis)), diagnosis)
 
     def _judged(self, shown: list[Candidate], diagnosis: Diagnosis) -> None:
         """List the candidates, the best first; beside a fixed value that the log contradicts without their figures."""
         if diagnosis.contradicted:
-            self._contradiction(diagnosis.contradicted)
+            ui.label(CONTRADICTED).classes("studio-muted").props("data-mark=without-figures")
         else:
             ui.label(FIGURES).classes("studio-muted")
         figures = None if diagnosis.contradicted else diagnosis
         for item in shown[:FIRST]:
             self._candidate(item, figures)
         if shown[FIRST:]:
-            words = quantity.counted(len(shown) - FIRST, "more candidate")
-            # A box of its own: the page does not grow by all of them.
-            with ui.expansion(words).classes("w-full").props("dense"), ui.column().classes("gap-0 studio-long"):
+            # The page scrolls, and nothing in it besides; the figures stay in sight beside the list.
+            with self._folded(MORE, quantity.counted(len(shown) - FIRST, "more candidate")):
                 for item in shown[FIRST:]:
                     self._candidate(item, figures)
 
-    def _contradiction(self, fixed: tuple[Parameter, ...]) -> None:
-        """Say which fixed values the log contradicts, and offer to estimate each."""
-        desk = self._desk
-        names = [with_symbol(parameter_name(item.effect, item.name), item.key) for item in fixed]
-        keys = f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'}"
-        with ui.element("div").classes("studio-error").props("data-mark=contradicted"):
-            ui.label(CONTRADICTED.format(keys=capital(keys))).classes("studio-muted")
-            for item in fixed:
+    @contextmanager
+    def _folded(self, name: str, count: str) -> Iterator[None]:
+        """Fold candidates away under a name and their number; what a person unfolded stays so after a step."""
 
-                async def free(item: Parameter = item) -> None:
-                    session = desk.session
-                    if session is not None:
-                        await desk.attempt(lambda: session.free(item.effect, item.name))
+        def turn(event: events.ValueChangeEventArguments[bool]) -> None:
+            (self._unfolded.add if event.value else self._unfolded.discard)(name)
 
-                ui.button(f"Estimate {parameter_name(item.effect, item.name)}", on_click=free).props(
-                    "dense outline size=12px"
-                ).props(attribute("data-mark", f"free-{item.key}"))
+        words = count if name == MORE else f"{name}: {count}"
+        fold = ui.expansion(words, value=name in self._unfolded, on_value_change=turn).classes("w-full")
+        with fold.props("dense").props(attribute("data-mark", f"fold-{name}")), ui.column().classes("w-full gap-0"):
+            yield
 
     def _candidate(self, item: Candidate, diagnosis: Diagnosis | None) -> None:
         """Show one candidate; without a diagnosis the evidence stays hidden, as in a game."""
@@ -158,9 +161,8 @@ class CandidateView:
             ui.element("div")
             .classes("studio-item" + (" studio-best" if named else ""))
             .props(attribute("data-mark", f"candidate-{effect}"))
+            .props(attribute(MARK, effect))
         )
-        row.on("mouseenter", lambda: self.look_at(effect))
-        row.on("mouseleave", lambda: self.look_at(self._opened[-1] if self._opened else ""))
         with row:
             with ui.element("div").classes("studio-row"):
                 name = heading_of(effect).classes("cursor-pointer").props("tabindex=0 role=button aria-expanded=false")

@@ -6,10 +6,12 @@ import math
 
 from nicegui import ui
 
+from imufit.printable import NAME, printable
 from imufit.studio import charts
 from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.icons import bare
 from imufit.studio.session import Session
+from imufit.studio.stack import Action, Step
 
 
 class FallView:
@@ -37,6 +39,8 @@ class FallView:
         ui.label("Held-out error of all channels together").classes("studio-muted")
         self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
+        self._named: tuple[object, ...] = ()
+        self._steps = ui.element("div").classes("studio-steps").props("data-mark=steps")
 
     def refresh(self) -> None:
         """Show the steps up to the present one, those that were undone paler."""
@@ -47,6 +51,8 @@ class FallView:
         self._keep.set_enabled(begun)
         if session is None or not begun:
             self._chart.update_figure(charts.empty(BEING_READ))
+            self._steps.clear()
+            self._named = ()
             return
         numbers = [session.numbers(step.stack) for step in session.steps]
         ratios = [math.nan if item is None else item.ratio for item in numbers]
@@ -55,17 +61,38 @@ class FallView:
         if made is not None and made.diagnosis is not None and not session.can_redo and not self._desk.guessing:
             # Beside a wrong fixed value no effect is proposed: it would explain the error of that value.
             candidate = None if made.diagnosis.contradicted else made.diagnosis.best_candidate
-            best = None if candidate is None else (candidate.effect, candidate.held_out_after)
+            if candidate is not None:
+                best = Step(Action.ADD, candidate.effect, session.stack), candidate.held_out_after
         figure = charts.fall(
             [step.label for step in session.steps],
             ratios,
             [step.expected for step in session.steps],
             session.position,
-            best=best,
+            best=None if best is None else (best[0].label, best[1]),
         )
+        self._name_steps(session, None if best is None else best[0])
         if figure != self._chart.figure:
             self._chart.update_figure(figure)
         self._keep.set_text("End the comparison" if session.second is not None else "Keep to compare")
+
+    def _name_steps(self, session: Session, proposed: Step | None) -> None:
+        """Name the steps by the numbers under their bars: words first, the id after them."""
+        named = (tuple(session.steps), session.position, proposed)
+        if named == self._named:
+            return
+        self._named = named
+        self._steps.clear()
+        steps = [(str(k), step) for k, step in enumerate(session.steps)]
+        steps += [] if proposed is None else [(charts.NEXT, proposed)]
+        with self._steps:
+            for k, (number, step) in enumerate(steps):
+                undone = session.position < k < len(session.steps)
+                with ui.element("div").classes("studio-step" + (" studio-off" if undone else "")):
+                    ui.label(number).classes("studio-muted")
+                    with ui.element("div"):
+                        ui.label(step.label).classes("inline")
+                        if step.key:
+                            ui.label(printable(step.key, NAME)).classes("studio-id inline")
 
     async def _keep_second(self) -> None:
         """Keep the present model beside later ones, or put the kept one away."""

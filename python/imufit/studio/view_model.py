@@ -20,7 +20,10 @@ from imufit.studio.stack import Entry
 
 ESTIMATED: Final = "estimated"
 FIXED: Final = "fixed"
-"""Words beside a value: whether the fit chooses it, or a person has fixed it."""
+"""Words beside a value: whether the log gives the value, or a person has fixed it."""
+CONTRADICTED: Final = "The log contradicts this value: the sentence on top gives both."
+LEAVES: Final = "A wrong fixed value leaves a residual: the standard errors of the other values grow with the residual."
+"""Why other values become less certain once one is fixed."""
 
 
 class ModelView:
@@ -36,6 +39,7 @@ class ModelView:
         self._desk = desk
         ui.html("Model", tag="h2", sanitize=False)
         self._state: tuple[object, ...] = ()
+        self._wrong: frozenset[str] = frozenset()
         self._list = ui.column().classes("w-full gap-0")
 
     def refresh(self) -> None:
@@ -43,8 +47,10 @@ class ModelView:
         session = self._desk.session
         begun = session is not None and session.begun
         numbers = session.numbers() if session is not None and begun else None
+        diagnosis = None if self._desk.guessing else self._desk.diagnosis
+        self._wrong = frozenset(item.key for item in (() if diagnosis is None else diagnosis.contradicted))
         # A list that stays as it is keeps its elements: a click never falls on one that is being replaced.
-        state = (session, begun, None if session is None else session.stack, numbers)
+        state = (session, begun, None if session is None else session.stack, numbers, self._wrong)
         if state == self._state:
             return
         self._state = state
@@ -55,6 +61,8 @@ class ModelView:
                 ui.label(words).classes("studio-muted")
                 return
             ui.label(_state(session, numbers)).classes("studio-muted").props("data-mark=model-state")
+            if session.stack.model.holds:
+                ui.label(LEAVES).classes("studio-muted").props("data-mark=holds")
             for entry in session.stack.entries:
                 self._entry(entry, numbers)
 
@@ -101,6 +109,18 @@ class ModelView:
             stated(state, f"{state}: {words}", lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
                 attribute("data-mark", f"pin-{parameter.key}")
             )
+        if parameter.key in self._wrong:
+            self._contradiction(parameter)
+
+    def _contradiction(self, parameter: Parameter) -> None:
+        """Say of a fixed value that the log contradicts it, and offer to estimate it."""
+        desk = self._desk
+        name = parameter_name(parameter.effect, parameter.name)
+        with ui.element("div").classes("studio-error").props(attribute("data-mark", f"contradicted-{parameter.key}")):
+            ui.label(CONTRADICTED).classes("studio-muted")
+            ui.button(f"Estimate {name}", on_click=lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
+                "dense outline size=12px"
+            ).props(attribute("data-mark", f"free-{parameter.key}"))
 
     def _edit(self, parameter: Parameter) -> None:
         """Ask for a value in the shown unit, in the digits that its standard error warrants."""
@@ -157,5 +177,5 @@ def _state(session: Session, numbers: Numbers | None) -> str:
     if numbers is None:
         return "A pass over the log is under way."
     if not numbers.fitted:
-        return "Values to first order, from the evidence. The fit is under way."
-    return "Fitted values ± standard errors."
+        return "Values to first order, from the evidence. The estimate is under way."
+    return "Estimated values ± standard errors."

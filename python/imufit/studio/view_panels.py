@@ -17,22 +17,23 @@ from imufit.results import Comparison, Diagnosis, Spectrum, Unexplained
 from imufit.results.comparison import Panel
 from imufit.results.noise_part import NoisePart
 from imufit.results.phrasing import capital
+from imufit.results.sentences import leading
 from imufit.studio import charts
+from imufit.studio.against import against
+from imufit.studio.attribute import attribute
 from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.explained import Explained
 from imufit.studio.icons import bare
 from imufit.studio.names import channel_name, covariate_name, effect_name, with_symbol
-from imufit.studio.session import Session, worst_channel
+from imufit.studio.session import FAILS, Session, worst_channel
 from imufit.studio.stack import Stack
 
 PIXELS: Final = 1200
 """Points of a trace: as many as a wide screen shows beside each other."""
-FAILS: Final = 1.05
-"""Residual over noise floor from which on a channel fails: below, the excess is a tenth of the noise's variance."""
 FAILS_WHERE: Final = "Where it fails"
 TIME: Final = "t"
 RISES: Final = " If {cause} is missing, the residual follows the dotted line."
-UNDER_WAY: Final = "The fit is under way: spectrum and trace are those of the model before."
+UNDER_WAY: Final = "The estimate is under way: spectrum and trace are those of the model before."
 ZOOM_BY_MOUSE: Final = "Drag over a figure to zoom, double-click to see all of it."
 ZOOM_BY_FINGER: Final = "A swipe scrolls the page. These buttons zoom the figure over time:"
 NARROWER: Final = 0.5
@@ -41,6 +42,7 @@ ONWARD: Final = 0.5
 """Part of the window's width by which a press moves the window: half of what was seen stays in sight."""
 SMALL: Final = 0.005
 """Share of the noise floor's variance below which a part is not listed."""
+SHARES: Final = "The percentages are the parts of the excess over the noise floor that each entry explains."
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
 
@@ -66,8 +68,9 @@ class PanelView:
         with ui.element("div").classes("studio-row flex-wrap"):
             self._channel = ui.select([], label="channel", on_change=self._chosen).props("dense outlined")
             self._channel.classes("min-w-28").props("data-mark=channel")
-            self._covariate = ui.select([], label="against", on_change=self._chosen).props("dense outlined")
-            self._covariate.classes("min-w-36").props("data-mark=covariate")
+            self._covariate = ui.select([], label="against", on_change=self._chosen, with_input=True)
+            self._covariate.classes("studio-against").props("dense outlined data-mark=covariate")
+            self._covariate.props(attribute("title", SHARES))
         self._note = Explained().classes("studio-muted")
         self._floor = Explained().classes("studio-muted").props("data-mark=floor")
         with ui.element("div").classes("studio-charts"):
@@ -143,8 +146,9 @@ class PanelView:
         desk = self._desk
         traced = [desk.models.get(model) for model in (Stack(), session.stack.model)]
         traced.append(None if session.second is None else desk.models.get(session.second.model))
-        diagnosis = None if made is None else made.diagnosis
-        state = (found, diagnosis, second and second.comparison, desk.channel, desk.covariate, self._proposed, *traced)
+        diagnosis, shares = (None, None) if made is None else (made.diagnosis, made.shares)
+        shown = (desk.channel, desk.covariate, self._proposed)
+        state = (found, diagnosis, shares, second and second.comparison, *shown, *traced)
         if all(a is b or a == b for a, b in zip(state, self._state, strict=False)) and len(state) == len(self._state):
             return
         self._state = state
@@ -155,21 +159,27 @@ class PanelView:
         self._draw(found, None if second is None else second.comparison, channel)
 
     def _failing(self, found: Comparison) -> str | None:
-        """Return the channel that the verdict names, or the one that fails most.
+        """Return the channel that the verdict speaks of, or the one that fails most.
 
-        Of a named effect the channels of its sensors are looked at. Where none fails any more, this is the one that
-        failed at the start.
+        Of several effects that explain the log alike the channels of the first one's sensors are looked at. Where none
+        fails any more, this is the one that failed at the start.
         """
         if (left := self._left(found)) is not None:
             return left.channel
         told = self._told()
         if told is not None and told.best is not None:
-            return worst_channel(found, find_effect(told.best).sensors)
+            return self._of_clearest_value(told) or worst_channel(found, find_effect(told.best).sensors)
         worst = worst_channel(found)
         start = self._at_start()
         if start is None or any(item.channel == worst and item.ratio > FAILS for item in found.channels):
             return worst
         return worst_channel(start)
+
+    def _of_clearest_value(self, told: Diagnosis) -> str | None:
+        """Return the channel on which the value acts that the sentence over the page states."""
+        best = told.best_candidate if told.verdict == "missing" else None
+        clearest = None if best is None else leading(best.parameters)
+        return None if clearest is None or self._session is None else self._session.channel_of(clearest)
 
     def _left(self, found: Comparison) -> Unexplained | None:
         """Return the dependence that the sentence over the page names first, where a panel shows it."""
@@ -181,11 +191,14 @@ class PanelView:
         """Return the diagnosis that the sentence over the page states; None in a game that is not over."""
         return None if self._desk.guessing else self._desk.diagnosis
 
-    def _names(self, found: Comparison, channel: str) -> list[str]:
-        """Return what a channel's residual can stand against: covariates, the worst first, then causes of findings."""
-        names = [panel.covariate for panel in found.panels if panel.channel == channel]
-        causes = () if self._session is None or not names else self._session.causes(channel)
-        return list(dict.fromkeys((*names, *causes)))
+    def _names(self, found: Comparison, channel: str) -> dict[str, str]:
+        """Return what a channel's residual can stand against, with its words in the list."""
+        session = self._session
+        if session is None:
+            return {}
+        made = session.made()
+        shares = None if made is None or made.shares is None else made.shares.get(channel, {})
+        return against(found, channel, session.causes(channel), shares)
 
     def _at_start(self) -> Comparison | None:
         """Return where the ideal sensor fails."""
@@ -236,10 +249,7 @@ class PanelView:
             {item.channel: f"{_channel(item.channel)}, {quantity.ratio(item.ratio)} × its floor" for item in ratios},
             value=channel,
         )
-        shares = {item.covariate: item.share for item in found.where if item.channel == channel}
-        self._covariate.set_options(
-            {name: _with_share(name, shares.get(name)) for name in self._names(found, channel)}, value=covariate
-        )
+        self._covariate.set_options(self._names(found, channel), value=covariate)
         self._setting = False
 
     def _present_covariate(self, found: Comparison, channel: str) -> str | None:
@@ -395,12 +405,6 @@ class PanelView:
             self._window = window
             if self._channel.value is not None:
                 await self._draw_trace(self._channel.value)
-
-
-def _with_share(covariate: str, share: float | None) -> str:
-    """Return a covariate, with the share of the excess that it explains where that is worth naming."""
-    name = with_symbol(covariate_name(covariate), covariate)
-    return name if share is None else f"{name} ({quantity.share(share)})"
 
 
 def _without_effect_on(effect: str, channel: str) -> str:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import html
+import json
 import secrets
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
 from nicegui import events, ui
 
+from imufit.errors import InputError
+from imufit.exporting import export
 from imufit.figures import quantity
 from imufit.printable import NAME, printable
 from imufit.remedy import Option
@@ -16,14 +21,17 @@ from imufit.results import Diagnosis
 from imufit.results.phrasing import capital
 from imufit.studio import server
 from imufit.studio.attribute import attribute
+from imufit.studio.by_sensor import by_sensor
 from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.explained import Explained
-from imufit.studio.icons import light_or_dark, with_words
+from imufit.studio.icons import light_or_dark, link_with_words, with_words
 from imufit.studio.log_file import LogFile, option_words, remedies
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING, SEEDS
 from imufit.studio.names import effect_name, with_symbol
 from imufit.studio.recipe import as_python, as_shell
+from imufit.studio.reserved import Reserved
 from imufit.studio.saving import download_game, download_session, save_first
+from imufit.studio.session import Made
 from imufit.studio.session_file import LogsWantedError
 from imufit.studio.view_verdict import show_verdict
 
@@ -46,6 +54,17 @@ WRONG_VALUE: Final = "a fixed value contradicts the log"
 ICONS: Final = {"adequate": "check_circle", "missing": "help", "ambiguous": "call_split", "unknown": "error"}
 
 
+HEADER: Final = "imufit_calibration.h"
+"""Name of the C header in the folder of downloads, as its guard calls it."""
+OPTION: Final = """
+<q-item-label header class="q-py-xs" v-if="(%s)[props.opt.value]">{{ (%s)[props.opt.value] }}</q-item-label>
+<q-item v-bind="props.itemProps"><q-item-section>
+  <q-item-label>{{ props.opt.label }}</q-item-label>
+</q-item-section></q-item>
+"""
+"""Template of an entry of the list of answers: the first one of a group has the name of the group above it."""
+
+
 class Head:
     """Buttons over the page.
 
@@ -65,6 +84,7 @@ class Head:
             with with_words("content_copy", "Copy the model", None).props("data-mark=copy") as self._copy, ui.menu():
                 ui.menu_item("Copy as Python", lambda: self._show("Python")).props("data-mark=copy-python")
                 ui.menu_item("Copy as shell", lambda: self._show("shell")).props("data-mark=copy-shell")
+                ui.menu_item("Copy as C header", self._show_header).props("data-mark=copy-c")
             with with_words("psychology_alt", "Mystery log", None).props("data-mark=mystery"), ui.menu():
                 for number, level in LEVELS.items():
                     if number == DEMONSTRATION:
@@ -73,7 +93,9 @@ class Head:
                         attribute("data-mark", f"level-{number}")
                     )
             for path, title in server.other_pages():
-                ui.link(title.removeprefix("imufit ").capitalize(), path).classes("studio-link")
+                link_with_words("sensors", title.removeprefix("imufit ").capitalize(), f".{path}").props(
+                    attribute("data-mark", f"page-{path.removeprefix('/')}")
+                )
             light_or_dark().props("data-mark=dark")
 
     def refresh(self) -> None:
@@ -84,30 +106,57 @@ class Head:
         for button in (self._save, self._copy):
             button.set_enabled(desk.session is not None and desk.session.begun)
 
+    def _made(self) -> Made | None:
+        """Return the present model once it is estimated; the person is asked to wait until then."""
+        session = self._desk.session
+        made = None if session is None else session.made()
+        if made is None:
+            ui.notify("The model is being estimated: copy it once that is done.")
+        return made
+
     def _show(self, form: str) -> None:
         """Show the text that makes the present model, and lay a copy in the clipboard."""
         desk = self._desk
-        session = desk.session
-        made = None if session is None else session.made()
-        if session is None or made is None:
-            ui.notify("The model is being fitted: copy it once that is done.")
+        made = self._made()
+        if made is None:
             return
         text = as_python(desk.files, made.way) if form == "Python" else as_shell(desk.files, made.way)
-        with ui.dialog() as dialog, ui.card().style("max-width: 92vw"):
-            ui.label(f"The present model as {form}").classes("studio-name")
-            folder = "Copied. Run it in the folder of the log"
-            first = ": save the log there first." if desk.game_log() is not None else "."
-            ui.label(folder + first).classes("studio-muted")
-            ui.label(text).classes("studio-copy").props("data-mark=copied")
-            with ui.row():
-                if desk.game_log() is not None:
-                    ui.button("Save the log", on_click=lambda: download_game(desk)).props("outline").props(
-                        "data-mark=save-log"
-                    )
-                ui.button("Close", on_click=dialog.close).props("flat")
-        dialog.on("hide", dialog.delete)
-        dialog.open()
-        ui.clipboard.write(text)
+        first = ": save the log there first." if desk.game_log() is not None else "."
+        with _copied(form, text, f"Copied. Run it in the folder of the log{first}"):
+            if desk.game_log() is not None:
+                ui.button("Save the log", on_click=lambda: download_game(desk)).props("outline").props(
+                    "data-mark=save-log"
+                )
+
+    def _show_header(self) -> None:
+        """Show the present model as a C header, as `imufit export --to c-header` writes it."""
+        made = self._made()
+        if made is None:
+            return
+        try:
+            text = export(made.fit.model, "c-header")
+        except InputError as error:
+            ui.notify(printable(str(error)))
+            return
+        with _copied("C header", text, "Copied. Its functions correct the readings in a program of the device."):
+            ui.button("Save the header", on_click=lambda: ui.download.content(text.encode(), HEADER)).props(
+                "outline data-mark=save-header"
+            )
+
+
+@contextmanager
+def _copied(form: str, text: str, words: str) -> Iterator[None]:
+    """Show a text that was laid in the clipboard; buttons that are made within stand beneath the text."""
+    with ui.dialog() as dialog, ui.card().style("max-width: 92vw"):
+        ui.label(f"The present model as {form}").classes("studio-name")
+        ui.label(words).classes("studio-muted")
+        ui.label(text).classes("studio-copy").props("data-mark=copied")
+        with ui.row():
+            yield
+            ui.button("Close", on_click=dialog.close).props("flat")
+    dialog.on("hide", dialog.delete)
+    dialog.open()
+    ui.clipboard.write(text)
 
 
 class Top:
@@ -122,11 +171,18 @@ class Top:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._state: tuple[object, ...] = ()
-        with ui.row().classes("w-full items-center gap-2 no-wrap").props("data-mark=busy") as self._busy:
+        with ui.element("div").classes("studio-kept-room"):
+            self._column = ui.column().classes("w-full gap-2")
+        # The line of the present work has its place whether there is work or not.
+        with (
+            ui.element("div").classes("studio-work"),
+            ui.row().classes("w-full items-start gap-2 no-wrap") as self._busy,
+        ):
             ui.spinner(size="sm")
             self._work = ui.label("").classes("studio-muted")
+        self._busy.props("data-mark=busy")
         self._busy.visible = False
-        self._column = ui.column().classes("w-full gap-2")
+        self._room = Reserved(self._column)
         ui.timer(0.2, self._show_work)
 
     def _show_work(self) -> None:
@@ -163,6 +219,7 @@ class Top:
         if state == self._state and self._state:
             return
         self._state = state
+        self._room.about(self._subject())
         self._column.clear()
         with self._column:
             if desk.trouble:
@@ -181,6 +238,14 @@ class Top:
             waiting = session is None and not desk.busy
             if (waiting or (session is not None and session.refused)) and not desk.arrivals and desk.wanted is None:
                 self._welcome()
+
+    def _subject(self) -> str:
+        """Name the occasion of the sentences: a step of the model is the same one, another log or a question is not."""
+        desk = self._desk
+        game = desk.mystery
+        over = game is not None and game.verdict is not None
+        asked = (desk.trouble, desk.arrivals, desk.kept_session, desk.wanted, over, game is not None and game.closed)
+        return f"{id(desk.session)}-{''.join(str(int(bool(each))) for each in asked)}"
 
     def _welcome(self) -> None:
         desk = self._desk
@@ -228,9 +293,10 @@ class Top:
     def _verdict(self, diagnosis: Diagnosis, as_likely: Mapping[str, Sequence[str]]) -> None:
         seen: set[str] = set()
         if diagnosis.named and not diagnosis.contradicted:
-            ui.label(f"Missing: {' or '.join(map(effect_name, diagnosis.named))}").classes("studio-name").props(
-                "data-mark=missing"
-            )
+            with ui.element("div").classes("studio-headline").props("data-mark=missing"):
+                for k, effect in enumerate(diagnosis.named):
+                    ui.label(f"{'or' if k else 'Missing:'} {effect_name(effect)}").classes("font-semibold")
+                    ui.label(printable(effect, NAME)).classes("studio-id")
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
             word = WRONG_VALUE if diagnosis.contradicted else diagnosis.verdict
             ui.icon(_icon_of(diagnosis), size="sm").props(f'role=img aria-label="{word}" title="{word}"')
@@ -343,15 +409,19 @@ class Top:
                 reveal = ui.button("Reveal the truth", on_click=lambda: desk.reveal(None))
                 reveal.props("outline").props("data-mark=reveal")
                 return
-            names = sorted(desk.session.start.analysis.candidates)
+            groups = by_sensor(desk.session.start.analysis.candidates)
+            names = [name for effects in groups.values() for name in effects]
             choices = {NOTHING: "nothing is missing"} if level.nothing else {}
             choices |= {name: with_symbol(capital(effect_name(name)), name) for name in names}
+            places = {name: k for k, name in enumerate(choices)}
+            heads = html.escape(json.dumps({places[effects[0]]: part for part, effects in groups.items()}))
             with ui.row().classes("items-center"):
                 # Who added an effect has named it; another choice stays until the reveal.
                 present = (_named(desk) or None) if game.answer is None else game.answer
                 value = present if present in choices else None
-                answer = ui.select(choices, value=value, label="Your answer", with_input=True).props("dense outlined")
-                answer.classes("min-w-56").props("data-mark=answer")
+                answer = ui.select(choices, value=value, label="Your answer: choose or type", with_input=True)
+                answer.classes("studio-answer").props("dense outlined data-mark=answer")
+                answer.add_slot("option", OPTION % (heads, heads))
                 answer.on_value_change(lambda event: setattr(game, "answer", event.value))
                 reveal = ui.button("Reveal", on_click=lambda: desk.reveal(answer.value)).props("data-mark=reveal")
                 reveal.bind_enabled_from(answer, "value", lambda chosen: chosen is not None)

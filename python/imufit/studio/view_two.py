@@ -8,12 +8,14 @@ from typing import Final
 from nicegui import ui
 
 from imufit.figures import quantity
-from imufit.results.model_comparison import preferred
+from imufit.results.model_comparison import DECISIVE, preferred
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
 from imufit.studio.names import channel_name, parameter_name, with_symbol
 from imufit.studio.session import Made
 
+MOST_ODDS: Final = 1e6
+"""Odds that are written out: beyond, the number says nothing more to a person."""
 CHANGED: Final = 0.005
 """Change of a channel's residual over its noise floor from which on the channel is listed: the last digit shown."""
 
@@ -84,6 +86,30 @@ def lower(second: Made, present: Made) -> str:
     return f"The {'kept' if second.numbers.ratio < present.numbers.ratio else 'present'} model stands lower."
 
 
+def evidence(factor: float) -> str:
+    """Say which model the log prefers, with the odds, and the odds from which on there is a preference.
+
+    Parameters
+    ----------
+    factor : float
+        Natural logarithm of the evidence for the present model over that for the kept one.
+    """
+    better = "kept" if factor < 0.0 else "present"
+    size = abs(factor)
+    odds = f"more than {_round(MOST_ODDS)}" if size > math.log(MOST_ODDS) else _round(math.exp(size))
+    shown = f"the odds are {odds} to 1 for the {better} one (ln Bayes factor {size:.1f})"
+    if preferred(factor) == "neither":
+        return f"The log prefers neither model: {shown}, and a preference needs {_round(math.exp(DECISIVE))} to 1."
+    return f"The log prefers the {better} model: {shown}."
+
+
+def _round(odds: float) -> str:
+    """Return odds in two digits from ten on, thousands apart; below in one decimal place."""
+    if odds < 10.0:
+        return f"{odds:.1f}"
+    return f"{float(f'{odds:.1e}'):,.0f}".replace(",", " ")
+
+
 def _two_models(second: Made, present: Made, factor: float | None) -> None:
     """Lay out two models: held-out error, evidence, residual of each channel that changes, parameters."""
     Explained(
@@ -91,11 +117,7 @@ def _two_models(second: Made, present: Made, factor: float | None) -> None:
         f"model, {quantity.ratio(present.numbers.ratio)} with the present one. {lower(second, present)}"
     ).classes("studio-sentence").props("data-mark=two-sentence")
     if factor is not None:
-        better = "kept" if factor < 0.0 else "present"
-        choice = "neither model" if preferred(factor) == "neither" else f"the {better} model"
-        Explained(
-            f"The log prefers {choice}: ln Bayes factor {abs(factor):.1f} in favour of the {better} one."
-        ).classes("studio-sentence").props("data-mark=two-evidence")
+        Explained(evidence(factor)).classes("studio-sentence").props("data-mark=two-evidence")
     rows: list[tuple[str, ...]] = [
         ("held-out error of all channels", quantity.ratio(second.numbers.ratio), quantity.ratio(present.numbers.ratio))
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final, cast
@@ -14,7 +14,6 @@ from nicegui import app, ui
 from numpy.typing import NDArray
 
 from imufit import _imufit
-from imufit.calibrating import Stage
 from imufit.errors import InputError
 from imufit.lab.simulate import SCENARIOS
 from imufit.log.columns import SENSOR_NAMES
@@ -23,7 +22,7 @@ from imufit.printable import printable
 from imufit.rests.poses import SIDES
 from imufit.results.phrasing import listed
 from imufit.studio.body import Body, angles_in_words, side_rotation
-from imufit.studio.icons import light_or_dark
+from imufit.studio.icons import light_or_dark, link_with_words
 from imufit.studio.live.listening import Listening, Recorded, Source, free_name, shown_state
 from imufit.studio.live.panels import groups, panel
 
@@ -147,6 +146,18 @@ def _captions() -> dict[str, str]:
     return {EMULATED + name: scenario.description for name, scenario in SCENARIOS.items()}
 
 
+def how_to_lay(side: str) -> str:
+    """Say how to turn the device so that one side lies up, by the arrows of the picture.
+
+    Parameters
+    ----------
+    side : str
+        One of ``+x -x +y -y +z -z``.
+    """
+    way = "up" if side[0] == "+" else "down"
+    return f"Turn the sensor so that the {side[1]} arrow points {way}, as in this picture."
+
+
 def _lies(moving: bool, side: str | None) -> str:
     """Say whether the device moves, and which side lies up, as the guide names it."""
     if moving:
@@ -176,7 +187,7 @@ class _LivePage:
             with ui.row().classes("w-full items-center"):
                 ui.label("Live device").classes("studio-title")
                 ui.space()
-                ui.link("Studio", "./").classes("studio-link text-sm")
+                link_with_words("insights", "Studio", "./").props("data-mark=page-studio")
                 light_or_dark().props("data-mark=dark")
             self._connection()
             with ui.element("div").classes("studio-live-columns"):
@@ -254,11 +265,12 @@ class _LivePage:
             self._made.visible = False
 
     def _guide(self) -> None:
-        with ui.column().classes("studio-region gap-2"):
+        with ui.column().classes("studio-region gap-2") as self._guided:
             with ui.row().classes("w-full items-center no-wrap gap-3"):
                 self._start = ui.button("Calibrate", on_click=self._calibrate_or_stop).props("outline")
                 self._message = ui.label(GUIDES).classes("text-sm font-medium")
-            self._progress = ui.linear_progress(0.0, show_value=False).props("rounded")
+            # Quasar's own motion of the bar takes two seconds, and would lag behind the device.
+            self._progress = ui.linear_progress(0.0, show_value=False).props("rounded instant-feedback")
             self._progress.visible = False
             with ui.row().classes("gap-1") as self._sides:
                 self._chips = {side: ui.chip(side, color="grey-6").props("dense square") for side in SIDES}
@@ -452,6 +464,8 @@ class _LivePage:
         # The guide records, too: one recording at a time.
         self._start.set_enabled(stage is not None or (listening is not None and not listening.recorded.running))
         self._progress.visible = self._sides.visible = stage is not None
+        # Guided, a person looks at the guide alone: it stands over the state and the recorder.
+        self._guided.classes(**({"add": "studio-first"} if stage is not None else {"remove": "studio-first"}))
         if stage is None:
             self._draw_side(None)
             if listening is not None and listening.calibrated:
@@ -461,13 +475,16 @@ class _LivePage:
             return
         self._message.text = stage.message
         self._progress.value = stage.progress
-        self._mark(stage)
+        assert listening is not None
+        held = listening.side if stage.progress >= 1.0 and not listening.moving else None
+        self._mark((*stage.done, held))
         self._draw_side(stage.side)
 
-    def _mark(self, stage: Stage) -> None:
+    def _mark(self, done: Sequence[str | None]) -> None:
+        """Tick the sides that are done; one that was held long enough is ticked before the device is lifted."""
         for side, chip in self._chips.items():
-            chip.props(f"color={'green-8' if side in stage.done else 'grey-6'} text-color=white")
-            chip.text = f"✓ {side}" if side in stage.done else side
+            chip.props(f"color={'green-8' if side in done else 'grey-6'} text-color=white")
+            chip.text = f"✓ {side}" if side in done else side
 
     def _draw_side(self, side: str | None) -> None:
         """Draw the way to lay the device."""
@@ -478,8 +495,9 @@ class _LivePage:
             return
         if self._wanted is None:
             with self._drawn:
-                ui.label("Lay it like this: the picture turns to the side.").classes("text-sm")
+                self._how = ui.label().classes("text-sm").props('data-testid="how"')
                 self._wanted = Body(("wanted",), compass=False)
+        self._how.text = how_to_lay(side)
         self._wanted.turn("wanted", side_rotation(side))
 
     def _show_result(self, sentences: tuple[str, ...], model: Path | None) -> None:
