@@ -170,7 +170,7 @@ def step_back_and_compare(page, ladder):
     wait_for_bars(page, len(ladder["steps"]) + 2)
     page.wait_for_function("""() => document.querySelector('[data-mark="trace"]').textContent.includes('kept model')""")
     assert "The kept model stands lower" in marked(page, "two-sentence").inner_text()
-    evidence = marked(page, "two-evidence").inner_text()
+    evidence = marked(page, "two-evidence").inner_text().replace("\u00a0", " ")
     assert "The log prefers the kept model: the odds are more than 1 000 000 to 1 for the kept one" in evidence
     marked(page, "second").click()
     marked(page, f"switch-{first}").click()
@@ -402,6 +402,106 @@ def test_the_field_of_a_value_has_its_digits_and_leaves_the_value_as_it_is(page,
     # The value itself was fixed, not its digits.
     fitted = imufit.fit(imufit.read(folder / "walk.parquet")).add("gyr.scale").fit.params["gyr.scale.x"].value
     assert held == fitted != float(shown) / 100.0
+
+
+PROPOSED = """() => [...document.querySelectorAll('[data-mark=panel] .legendtext')]
+    .some((item) => item.textContent.startsWith('with '))"""
+"""Whether the figure shows what an effect would explain."""
+
+
+def test_a_list_that_moves_under_a_resting_pointer_changes_nothing(page, folder):
+    page.set_viewport_size({"width": 1280, "height": 700})
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    row = page.locator('[data-mark^="candidate-"]').nth(1)
+    # The pointer rests on the heading of the list, where the row comes to lie once the page has moved.
+    box, heading = (item.bounding_box() for item in (row, page.get_by_role("heading", name="Candidates")))
+    pointer, down = [box["x"] + 20, heading["y"] + 5], round(box["y"] - heading["y"])
+    page.mouse.move(*pointer)
+    page.wait_for_timeout(700)
+    assert not page.evaluate(PROPOSED)
+    page.evaluate(f"window.scrollBy({{top: {down}, behavior: 'instant'}})")
+    page.wait_for_timeout(1200)
+    beneath = "([x, y]) => document.elementFromPoint(x, y).closest('[data-pointed]').dataset.mark"
+    assert page.evaluate(beneath, pointer) == row.get_attribute("data-mark")
+    assert not page.evaluate(PROPOSED)
+    page.mouse.move(pointer[0] + 3, pointer[1])
+    page.wait_for_function(PROPOSED)
+
+
+def test_what_lies_under_the_sentence_stays_in_its_place(page, folder):
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    places = [marked(page, "panel").bounding_box()["y"]]
+    for count, effect in enumerate(EFFECTS, 2):
+        marked(page, f"add-{effect}").click()
+        # While the work is under way, too.
+        places.append(page.evaluate("document.querySelector('.studio-middle').offsetTop"))
+        wait_for_bars(page, count)
+        places.append(page.evaluate("document.querySelector('.studio-middle').offsetTop"))
+    assert len(set(places[1:])) == 1
+
+
+def test_the_page_has_one_scroll_and_names_its_steps(page, folder):
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    page.get_by_text("more candidates").click()
+    page.wait_for_timeout(600)
+    scrolls = """() => [...document.querySelectorAll('main *')].filter((item) =>
+        item.scrollHeight > item.clientHeight + 1 && /auto|scroll/.test(getComputedStyle(item).overflowY)).length"""
+    assert page.evaluate(scrolls) == 0
+    # The figures stay in sight beside the last candidate.
+    page.locator('[data-mark^="candidate-"]').last.scroll_into_view_if_needed()
+    assert marked(page, "panel").bounding_box()["y"] >= 0.0
+    marked(page, "add-acc.bias").click()
+    wait_for_bars(page, 2)
+    # An unfolded list stays so.
+    assert page.locator('[data-mark^="candidate-"]').last.is_visible()
+    steps = marked(page, "steps").locator(".studio-step").all_inner_texts()
+    assert [step.split() for step in steps[:2]] == [
+        ["0", "ideal", "sensor"],
+        ["1", "+", "accelerometer", "bias", "acc.bias"],
+    ]
+    assert figure(page, "fall")["layout"]["xaxis"]["ticktext"][:2] == ["0", "1"]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_button_that_cannot_be_pressed_looks_so(page, scheme):
+    page.emulate_media(color_scheme=scheme)
+    marked(page, "mystery").click()
+    marked(page, "level-1").click()
+    reveal = marked(page, "reveal")
+    reveal.wait_for()
+    idle(page)
+    look = """element => { const look = getComputedStyle(element);
+        return [look.backgroundColor, look.cursor, getComputedStyle(element, '::before').borderTopStyle]; }"""
+    assert reveal.is_disabled()
+    assert reveal.evaluate(look) == ["rgba(0, 0, 0, 0)", "not-allowed", "dashed"]
+    answer = page.get_by_label("Your answer: choose or type")
+    answer.click()
+    # The list of answers is grouped.
+    page.get_by_role("option").first.wait_for()
+    heads = page.locator(".q-menu .q-item__label--header").all_inner_texts()
+    assert heads[:2] == ["Accelerometer", "Gyroscope"][: len(heads)]
+    assert heads
+    answer.fill("gyr.scale")
+    answer.press("Enter")
+    page.wait_for_timeout(800)
+    assert reveal.evaluate(look)[:2] != ["rgba(0, 0, 0, 0)", "not-allowed"]
+
+
+def test_the_model_is_copied_as_the_c_header_of_the_command_line(page, folder):
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    marked(page, "add-gyr.scale").click()
+    wait_for_bars(page, 2)
+    marked(page, "copy").click()
+    marked(page, "copy-c").click()
+    model = imufit.fit(imufit.read(folder / "walk.parquet")).add("gyr.scale").fit.model
+    assert marked(page, "copied").inner_text().strip() == imufit.export(model, "c-header").strip()
+    with page.expect_download() as download:
+        marked(page, "save-header").click()
+    assert download.value.suggested_filename == "imufit_calibration.h"
 
 
 def test_the_verdict_and_the_fallen_bars_are_in_one_view_on_a_phone(page, folder):
@@ -718,8 +818,7 @@ def test_a_button_applies_the_remedy_of_a_fault(page, folder):
     drop(page, folder / "frame.csv", sidecar)
     page.get_by_role("button", name="Read in frame ENU").click()
     page.wait_for_function("() => !document.querySelector('[data-mark=fault]')")
-    idle(page)
-    assert bars(page)[0] < 1.1
+    assert wait_for_bars(page, 1)[0] < 1.1
 
 
 def test_columns_that_cannot_be_guessed_are_named_in_a_field(page, folder):

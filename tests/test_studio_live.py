@@ -72,6 +72,22 @@ def the_recording_says_where_it_is(page, path, rows):
     assert download.value.path().stat().st_size == path.stat().st_size > rows
 
 
+def the_guide_shows_the_side(page):
+    """Its picture is in sight, and its words name the arrow that is to point up or down."""
+    page.get_by_test_id("how").wait_for(timeout=PATIENCE)
+    wait_until(page, lambda: page.locator(".studio-body canvas").count() == 2)
+    # Guided, a person sees the picture without scrolling, and which arrow is to point where.
+    picture = page.locator(".studio-body canvas").last.bounding_box()
+    assert picture["y"] + picture["height"] <= 900
+    how = page.get_by_test_id("how").inner_text()
+    assert re.search(r"Turn the sensor so that the [xyz] arrow points (up|down)", how)
+    # The bar follows the device at once.
+    assert (
+        page.locator(".q-linear-progress__model").first.evaluate("bar => getComputedStyle(bar).transitionDuration")
+        == "0s"
+    )
+
+
 def test_unusable_port_and_hostile_names_are_text(served):
     folder, address, browser = served
     page = browser.new_page(viewport={"width": 380, "height": 800})
@@ -92,6 +108,10 @@ def test_unusable_port_and_hostile_names_are_text(served):
     page.get_by_role("button", name="Connect", exact=True).click()
     page.get_by_text("cannot be opened").or_(page.get_by_text("does not exist")).wait_for(timeout=PATIENCE)
     assert page.title() == "imufit live"
+    # the counters stand in one row
+    tops = page.locator(".studio-live-value").evaluate_all("all => all.map(item => item.offsetTop)")
+    assert len(tops) == 5
+    assert len(set(tops)) == 1
     # nothing is wider than a phone
     assert page.evaluate("document.documentElement.scrollWidth") <= 380
     assert wrong == []
@@ -143,8 +163,7 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
 
     # the guide names a side and draws it; stopping keeps the rows
     page.get_by_role("button", name="Calibrate").click()
-    page.get_by_text("Lay it like this:").wait_for(timeout=PATIENCE)
-    wait_until(page, lambda: page.locator(".studio-body canvas").count() == 2)
+    the_guide_shows_the_side(page)
     page.get_by_role("button", name="Stop", exact=True).click()
     wait_until(page, lambda: page.locator(".studio-body canvas").count() == 1)
     wait_until(page, (folder / "calibration-1.parquet").exists)

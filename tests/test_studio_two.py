@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
-from imufit.studio.view_two import lower
+from imufit.studio.view_two import evidence, lower
 
 
 @pytest.mark.parametrize(
@@ -16,3 +16,15 @@ from imufit.studio.view_two import lower
 )
 def test_models_with_the_same_digits_stand_equally_low(kept, present, said):
     assert lower(*(SimpleNamespace(numbers=SimpleNamespace(ratio=ratio)) for ratio in (kept, present))) == said
+
+
+def test_evidence_is_given_as_odds_with_the_odds_that_a_preference_needs():
+    assert evidence(3.0) == (
+        "The log prefers neither model: the odds are 20 to 1 for the present one (ln Bayes factor 3.0), "
+        "and a preference needs 150 to 1."
+    )
+    assert evidence(-8.0) == (
+        "The log prefers the kept model: the odds are 3 000 to 1 for the kept one (ln Bayes factor 8.0)."
+    )
+    assert "more than 1 000 000 to 1" in evidence(2000.0)
+    assert "the odds are 1.6 to 1" in evidence(0.5)

@@ -90,7 +90,7 @@ class FallView:
                 with ui.element("div").classes("studio-step" + (" studio-off" if undone else "")):
                     ui.label(number).classes("studio-muted")
                     with ui.element("div"):
-                        ui.label(step.label).classes("inline")
+                        ui.label(f"{step.label} ").classes("inline")
                         if step.key:
                             ui.label(printable(step.key, NAME)).classes("studio-id inline")
 
