@@ -374,6 +374,8 @@ def test_a_contradicted_value_is_named_in_the_place_of_the_figures_of_candidates
     assert 0.0 < warning.bounding_box()["y"] - value["y"] < 40.0
     assert "standard errors of the other values grow" in marked(page, "holds").inner_text()
     assert marked(page, "without-figures").is_visible()
+    wrong = " ".join(marked(page, "wrong-value").inner_text().split())
+    assert wrong == "Wrong value: gyroscope scale error x gyr.scale.x"
     assert page.get_by_text("% probable").count() == 0
     assert "expected next" not in [trace["name"] for trace in figure(page, "fall")["data"] if "name" in trace]
     assert marked(page, "pin-gyr.scale.x").inner_text() == "fixed"

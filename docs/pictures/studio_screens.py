@@ -146,6 +146,19 @@ def edit(page: Page, folder: Path) -> None:
     page.wait_for_timeout(600)
 
 
+def contradicted(page: Page, folder: Path) -> None:
+    """Fix a value that the log contradicts."""
+    drop(page, folder / "walk.parquet")
+    marked(page, "add-gyr.scale").click()
+    marked(page, "value-gyr.scale.x").wait_for()
+    idle(page)
+    marked(page, "edit-gyr.scale.x").click()
+    page.locator("input[data-mark=edit-value], [data-mark=edit-value] input").first.fill("25")
+    marked(page, "edit-take").click()
+    marked(page, "contradicted-gyr.scale.x").wait_for()
+    idle(page)
+
+
 def copied(page: Page, folder: Path) -> None:
     """Copy the model as shell."""
     fallen(page, folder)
@@ -182,6 +195,14 @@ def live(page: Page, _folder: Path) -> None:
     page.wait_for_timeout(4000)
 
 
+def guided(page: Page, folder: Path) -> None:
+    """Be guided through a calibration."""
+    live(page, folder)
+    page.get_by_role("button", name="Calibrate").click()
+    page.get_by_test_id("how").wait_for()
+    page.wait_for_timeout(4000)
+
+
 VIEWS: dict[str, Callable[[Page, Path], None]] = {
     view.__name__: view
     for view in (
@@ -196,10 +217,12 @@ VIEWS: dict[str, Callable[[Page, Path], None]] = {
         unjudged,
         fault,
         edit,
+        contradicted,
         copied,
         guess,
         mystery,
         live,
+        guided,
     )
 }
 

@@ -21,7 +21,7 @@ from imufit.studio.stack import Entry
 ESTIMATED: Final = "estimated"
 FIXED: Final = "fixed"
 """Words beside a value: whether the log gives the value, or a person has fixed it."""
-CONTRADICTED: Final = "The log contradicts this value: the sentence on top gives both."
+CONTRADICTED: Final = "The log contradicts this value: the sentence on top gives both values."
 LEAVES: Final = "A wrong fixed value leaves a residual: the standard errors of the other values grow with the residual."
 """Why other values become less certain once one is fixed."""
 

@@ -27,7 +27,7 @@ from imufit.studio.explained import Explained
 from imufit.studio.icons import light_or_dark, link_with_words, with_words
 from imufit.studio.log_file import LogFile, option_words, remedies
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING, SEEDS
-from imufit.studio.names import effect_name, with_symbol
+from imufit.studio.names import effect_name, parameter_name, with_symbol
 from imufit.studio.recipe import as_python, as_shell
 from imufit.studio.reserved import Reserved
 from imufit.studio.saving import download_game, download_session, save_first
@@ -297,6 +297,10 @@ class Top:
                 for k, effect in enumerate(diagnosis.named):
                     ui.label(f"{'or' if k else 'Missing:'} {effect_name(effect)}").classes("font-semibold")
                     ui.label(printable(effect, NAME)).classes("studio-id")
+        for held in diagnosis.contradicted:
+            with ui.element("div").classes("studio-headline").props("data-mark=wrong-value"):
+                ui.label(f"Wrong value: {parameter_name(held.effect, held.name)}").classes("font-semibold")
+                ui.label(printable(held.key, NAME)).classes("studio-id")
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
             word = WRONG_VALUE if diagnosis.contradicted else diagnosis.verdict
             ui.icon(_icon_of(diagnosis), size="sm").props(f'role=img aria-label="{word}" title="{word}"')
