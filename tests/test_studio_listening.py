@@ -10,6 +10,7 @@ from imufit.devices.record import LiveRows, Recorder, recover
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
 from imufit.log import read
+from imufit.studio.live.guided import held_side, how_to_lay
 from imufit.studio.live.listening import Listening, Source, free_name, in_sentences, shown_state
 from imufit.studio.live.panels import groups, panel
 from imufit.studio.live.rolling import Rolling
@@ -196,3 +197,24 @@ def test_recorder_of_a_running_stream_is_as_safe_as_any(tmp_path):
     recording = recover(tmp_path / "crashed.parquet.part")
     assert recording.n == n == read(path).n
     assert recording.lost == 0
+
+
+def test_a_side_is_ticked_from_the_end_of_its_hold_until_the_device_rests_on_another():
+    seen = [
+        ("+x", 0.6, False, None),
+        ("+x", 1.0, False, "+x"),
+        # The device is lifted, and the guide has not judged yet.
+        (None, 0.0, True, "+x"),
+        ("+x", 0.1, False, "+x"),
+        ("-z", 0.1, False, None),
+        ("-z", 1.0, False, "-z"),
+    ]
+    held = None
+    for side, progress, moving, expected in seen:
+        held = held_side(held, side, progress, moving=moving)
+        assert held == expected
+
+
+@pytest.mark.parametrize(("side", "words"), [("+x", "x arrow points up"), ("-z", "z arrow points down")])
+def test_the_guide_says_which_arrow_points_where(side, words):
+    assert words in how_to_lay(side)

@@ -23,6 +23,7 @@ from imufit.rests.poses import SIDES
 from imufit.results.phrasing import listed
 from imufit.studio.body import Body, angles_in_words, side_rotation
 from imufit.studio.icons import light_or_dark, link_with_words
+from imufit.studio.live.guided import held_side, how_to_lay
 from imufit.studio.live.listening import Listening, Recorded, Source, free_name, shown_state
 from imufit.studio.live.panels import groups, panel
 
@@ -146,18 +147,6 @@ def _captions() -> dict[str, str]:
     return {EMULATED + name: scenario.description for name, scenario in SCENARIOS.items()}
 
 
-def how_to_lay(side: str) -> str:
-    """Say how to turn the device so that one side lies up, by the arrows of the picture.
-
-    Parameters
-    ----------
-    side : str
-        One of ``+x -x +y -y +z -z``.
-    """
-    way = "up" if side[0] == "+" else "down"
-    return f"Turn the sensor so that the {side[1]} arrow points {way}, as in this picture."
-
-
 def _lies(moving: bool, side: str | None) -> str:
     """Say whether the device moves, and which side lies up, as the guide names it."""
     if moving:
@@ -181,6 +170,7 @@ class _LivePage:
         self._plots: list[tuple[str, tuple[str, ...], ui.plotly]] = []
         self._body: Body | None = None
         self._wanted: Body | None = None
+        self._held: str | None = None
         self._seconds = 10
         self._figures: dict[str, ui.label] = {}
         with ui.column().classes("studio-live"):
@@ -467,6 +457,7 @@ class _LivePage:
         # Guided, a person looks at the guide alone: it stands over the state and the recorder.
         self._guided.classes(**({"add": "studio-first"} if stage is not None else {"remove": "studio-first"}))
         if stage is None:
+            self._held = None
             self._draw_side(None)
             if listening is not None and listening.calibrated:
                 self._show_result(listening.calibrated, listening.model)
@@ -476,12 +467,12 @@ class _LivePage:
         self._message.text = stage.message
         self._progress.value = stage.progress
         assert listening is not None
-        held = listening.side if stage.progress >= 1.0 and not listening.moving else None
-        self._mark((*stage.done, held))
+        self._held = held_side(self._held, listening.side, stage.progress, moving=listening.moving)
+        self._mark((*stage.done, self._held))
         self._draw_side(stage.side)
 
     def _mark(self, done: Sequence[str | None]) -> None:
-        """Tick the sides that are done; one that was held long enough is ticked before the device is lifted."""
+        """Tick the sides that are done."""
         for side, chip in self._chips.items():
             chip.props(f"color={'green-8' if side in done else 'grey-6'} text-color=white")
             chip.text = f"✓ {side}" if side in done else side
