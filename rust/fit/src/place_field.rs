@@ -7,6 +7,10 @@ use nalgebra::{Cholesky, Matrix3, UnitQuaternion, Vector3};
 /// follow the attitude, and boards have three times 20 uT of hard iron.
 const OFFSET: f64 = (2.0 / 60.0) * (2.0 / 60.0);
 
+/// Share of the field that no log is asked about as an offset: 0.05 uT of 50 uT, which is less than the standard error of hard iron in
+/// recordings (docs/recordings.md: 0.1 to 3 uT).
+const SEEN: f64 = 1e-3;
+
 /// Sums over rows with a reading b and an attitude R, of which `b = R^T m + h`.
 #[derive(Clone, Debug, Default)]
 pub struct PlaceField {
@@ -37,6 +41,22 @@ impl PlaceField {
         let offset = Cholesky::new(information)?.solve(&(b - mean.tr_mul(&in_reference)));
         Some(in_reference - mean * offset)
     }
+
+    /// Directions of the body (columns), each as long as the offset along it may seem off, over the field's length, where the attitude of the
+    /// reference has this noise, rad about each axis. What a log shows well is left out; without any such direction the result is zero.
+    pub fn unseen(&self, noise: f64) -> Matrix3<f64> {
+        let mean = self.attitudes / self.rows.max(1) as f64;
+        let turned = (Matrix3::identity() - mean.tr_mul(&mean)).symmetric_eigen();
+        // A unit vector that two angles of noise turn has this variance.
+        let by_noise = 2.0 * noise * noise;
+        let share = turned
+            .eigenvalues
+            .map(|v| if v > by_noise { by_noise / v } else { 1.0 });
+        if share.max() < SEEN {
+            return Matrix3::zeros();
+        }
+        turned.eigenvectors * Matrix3::from_diagonal(&share)
+    }
 }
 
 #[cfg(test)]
@@ -59,6 +79,20 @@ mod tests {
         let carried = |t: f64| UnitQuaternion::from_euler_angles(0.35 * (1.3 * t).sin(), 0.35 * (1.9 * t).sin(), t);
         let found = field_of(carried, Vector3::new(60.0, -75.0, 410.0));
         assert!((found - Vector3::from(FIELD)).norm() < 10.0, "{found}");
+    }
+
+    #[test]
+    fn the_offset_along_an_axis_that_only_noise_tilts_is_not_seen() {
+        let mut sums = PlaceField::default();
+        for k in 0..3000 {
+            let t = f64::from(k) * 0.05;
+            let noise = UnitQuaternion::from_scaled_axis(0.002 * Vector3::new((17.0 * t).sin(), (23.0 * t).cos(), 0.0));
+            sums.add(UnitQuaternion::from_euler_angles(0.0, 0.0, t) * noise, Vector3::zeros());
+        }
+        let unseen = sums.unseen(0.002_f64 / 2.0_f64.sqrt());
+        let size = |axis: usize| unseen.row(axis).norm();
+        assert!(size(0) < 1e-3 && size(1) < 1e-3 && size(2) > 0.9, "{unseen}");
+        assert!(sums.unseen(1e-6).norm() < f64::MIN_POSITIVE);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use imufit_model::temperature_course::{Parts, TemperatureCourse};
 use imufit_model::usual_step::usual_step;
 use imufit_model::vibration;
 use imufit_model::window::Window;
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::bins::{Bins, CovariateSamples, FORCES, RATES};
 use crate::place_field::PlaceField;
@@ -59,7 +59,7 @@ pub struct Survey {
     temperature_parts: Parts,
     gravity_parts: GravityParts,
     covariates: Vec<(f64, usize)>,
-    field: PlaceField,
+    field_of_place: PlaceField,
     attitude_width: Bandwidth,
     position_width: Bandwidth,
     reference_step: ReferenceStep,
@@ -186,7 +186,7 @@ impl Survey {
             temperature_parts: Parts::new(given.n),
             gravity_parts: GravityParts::new(given.n),
             covariates: vec![(0.0, 0); given.covariates.len()],
-            field: PlaceField::default(),
+            field_of_place: PlaceField::default(),
             attitude_width: Bandwidth::of_attitude(),
             position_width: Bandwidth::of_position(),
             reference_step: ReferenceStep::default(),
@@ -261,7 +261,7 @@ impl Survey {
                 && m.iter().all(|v| v.is_finite())
                 && let Some(q) = attitudes.nearest(window, i)
             {
-                self.field.add(q, Vector3::new(m[0], m[1], m[2]));
+                self.field_of_place.add(q, Vector3::new(m[0], m[1], m[2]));
             }
             let measured = window.reference_exact.is_none_or(|e| e[i] > 0.5);
             let known = attitude_at(window, i).filter(|q| measured && q.coords.iter().all(|v| v.is_finite()));
@@ -325,7 +325,7 @@ impl Survey {
     /// The facts, and samples of every covariate.
     pub fn finish(mut self) -> (LogFacts, CovariateSamples) {
         let mean = |(sum, n): (f64, usize)| if n == 0 { f64::NAN } else { sum / n as f64 };
-        let of_readings = self.field.estimate().filter(|_| self.given.field.is_none());
+        let of_readings = self.field_of_place.estimate().filter(|_| self.given.field.is_none());
         let estimated = of_readings.is_some();
         let field = self.given.field.or(of_readings).unwrap_or_default();
         let dt = median(&mut self.steps);
@@ -374,6 +374,11 @@ impl Survey {
             position_smoothing,
             silent_axes: self.silent_axes(attitude_columns, field),
             silent_accelerations: self.attitude_width.noisy_axes(attitude_columns),
+            offset_unseen: if estimated {
+                self.field_of_place.unseen(attitude_noise) * field.norm()
+            } else {
+                Matrix3::zeros()
+            },
             noise_shares: [
                 self.force_noise_shares(),
                 self.attitude_width.noise_shares(attitude_columns),

@@ -7,7 +7,7 @@ use imufit_model::sensor_model::Slot;
 use crate::problem::{Problem, parameters_of};
 use crate::zeros::{self, Modes, Strength};
 
-/// By so many times its part of the mean square a gain may seem off where the reference is noisy (attenuation, see [`Problem::attenuated`]).
+/// By so many times its part of the mean square a gain or an offset may seem off where the reference is noisy (attenuation, see [`Problem::attenuated`]).
 const ATTENUATION: f64 = 1.5;
 /// Less of it no log shows.
 const ATTENUATION_SEEN: f64 = 1e-5;
@@ -22,7 +22,7 @@ pub struct Criterion<'a> {
     pub modes: Vec<Modes>,
     /// Every strength of the noise.
     pub strengths: Vec<Strength>,
-    /// Gains that the noise of the reference makes uncertain, and angles that its steps do: parameter and deviation.
+    /// Gains and offsets that the noise of the reference makes uncertain, and angles that its steps do: parameter and deviation.
     pub(crate) uncertain: Vec<(usize, f64)>,
     /// Parameters of a heading of the reference that wanders by one radian.
     pub heading: Vec<usize>,
@@ -57,10 +57,13 @@ impl<'a> Criterion<'a> {
             (0..3).map(move |axis| (first + axis, shares[axis]))
         });
         let deviation = |(j, share): (usize, f64)| (j, (ATTENUATION * share).hypot(lost(problem, &total, j)));
+        let hides = |s: &&Slot| s.effect.card().traits.reference == Some(ReferencePart::Noise);
+        let hidden = parameters_of(problem.slots.iter().filter(hides)).into_iter();
         let uncertain: Vec<(usize, f64)> = gains
             .map(deviation)
             .filter(|(_, deviation)| *deviation > ATTENUATION_SEEN)
             .chain(problem.rounded())
+            .chain(hidden.map(|j| (j, ATTENUATION)))
             .collect();
         let wanders = |s: &&Slot| s.effect.card().traits.reference == Some(ReferencePart::Heading);
         let heading = parameters_of(problem.slots.iter().filter(wanders));

@@ -95,6 +95,8 @@ pub enum ReferencePart {
     Drive,
     /// Its heading, which wanders.
     Heading,
+    /// Its noise, where this hides something.
+    Noise,
 }
 
 /// Properties of an effect that others ask about instead of its name.

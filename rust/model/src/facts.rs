@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 pub use imufit_attitude::Frame;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::gravity_course::GravityCourse;
 use crate::kinematics_memory::KinematicsMemory;
@@ -85,6 +85,9 @@ pub struct LogFacts {
     /// Part that noise of the reference makes of the mean square of specific force and angular rate along each body axis, as they enter
     /// columns.
     pub noise_shares: [[f64; 3]; 2],
+    /// Directions of the body (columns), each as long as the offset of the magnetometer along it may seem off, uT: the field is unknown, and
+    /// they hardly turn beyond the noise of the reference. Zero without such a direction.
+    pub offset_unseen: Matrix3<f64>,
     /// True if the sensor is shaken more at some times than at others.
     pub shaking_varies: bool,
     /// Usual time between reference samples, s.
@@ -165,6 +168,7 @@ impl LogFacts {
             silent_axes: [[false; 3]; 3],
             silent_accelerations: [false; 3],
             noise_shares: [[0.0; 3]; 2],
+            offset_unseen: Matrix3::zeros(),
             shaking_varies: true,
             reference_dt: dt,
             reference_packet: 1,
@@ -227,6 +231,7 @@ impl LogFacts {
             silent_axes: [[false; 3]; 3],
             silent_accelerations: [false; 3],
             noise_shares: [[0.0; 3]; 2],
+            offset_unseen: Matrix3::zeros(),
             shaking_varies: true,
             reference_dt: dt,
             reference_packet: 1,

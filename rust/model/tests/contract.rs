@@ -103,6 +103,7 @@ fn every_built_in_effect_keeps_the_contract() {
         silent_axes: [[false; 3]; 3],
         silent_accelerations: [false; 3],
         noise_shares: [[0.0; 3]; 2],
+        offset_unseen: nalgebra::Matrix3::zeros(),
         shaking_varies: true,
         reference_dt: 0.01,
         reference_packet: 1,

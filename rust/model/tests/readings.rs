@@ -111,6 +111,7 @@ fn added_beside(swing: &Swing, others: &[(&str, &[f64])], id: &str, parameters: 
         silent_axes: [[false; 3]; 3],
         silent_accelerations: [false; 3],
         noise_shares: [[0.0; 3]; 2],
+        offset_unseen: nalgebra::Matrix3::zeros(),
         shaking_varies: true,
         reference_dt: 0.01,
         reference_packet: 1,

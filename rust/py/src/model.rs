@@ -111,6 +111,7 @@ impl PyEffect {
             ReferencePart::Field => "field",
             ReferencePart::Drive => "drive",
             ReferencePart::Heading => "heading",
+            ReferencePart::Noise => "noise",
         })
     }
 

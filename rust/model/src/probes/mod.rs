@@ -6,9 +6,12 @@
 
 mod columns;
 mod heading;
+mod unseen_offset;
 mod words;
 
 use std::sync::Arc;
+
+use nalgebra::Matrix3;
 
 use crate::card::Card;
 use crate::effect::{Columns, Effect, EffectError, Rows};
@@ -207,7 +210,9 @@ pub fn probes(facts: &LogFacts) -> Vec<Arc<dyn Effect>> {
     let probe = |(sensor, kind)| Arc::new(Probe::new(facts, sensor, kind)) as Arc<dyn Effect>;
     // A rig has its angle from an encoder, which does not drift.
     let wanders = (!facts.rests && facts.rig.is_none()).then(|| Arc::new(heading::Heading::new()) as Arc<dyn Effect>);
-    kinds.into_iter().map(probe).chain(wanders).collect()
+    let unseen = (facts.offset_unseen != Matrix3::zeros())
+        .then(|| Arc::new(unseen_offset::UnseenOffset::new()) as Arc<dyn Effect>);
+    kinds.into_iter().map(probe).chain(wanders).chain(unseen).collect()
 }
 
 impl Probe {
