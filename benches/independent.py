@@ -1,9 +1,9 @@
 """The ladder on logs of a second simulator (tests/independent); writes docs/independent.md.
 
 Sets: `nulls` (no sensor effect is hidden), `whole` (whole cheap sensors with five to seven errors each), `outside` (one
-disturbance that the catalogue does not hold), `unknown` (no log states the field of the place), `rows` (failures of real
-labs, one log each). Seeds of the drawn sets are
-fresh unless `--seed` is given; the rows have the seed of tests/test_independent.py.
+disturbance that the catalogue does not hold), `unknown` (no log states the field of the place), `rows` (failures of
+real labs, one log each). Seeds of the drawn sets are fresh unless `--seed` is given; the rows have the seed of
+tests/test_independent.py.
 
 Run: ``python benches/independent.py [--set NAME]... [--row NAME]... [--seed N] [--logs N] [--processes N] [--write]
 [--from FILE]... [--json FILE]``. Without `--write` the tables go to standard output only; with it they go between the
@@ -45,8 +45,8 @@ DRAWN = {"nulls": "nulls", "whole": "whole_sensor", "outside": "outside", "unkno
 
 FULL = {"nulls": 300, "whole": 60, "outside": 120, "unknown": 150, "rows": len(ROWS)}
 """Logs of a full run. No false name leaves at most 1.3 % in 300 logs and 3.1 % in 120 (upper end of Wilson's interval);
-60 whole sensors hold some 350 effects, so that a recall of 90 % is known within 3 %. 150 logs of an unknown field are six
-of each kind."""
+60 whole sensors hold some 350 effects, so that a recall of 90 % is known within 3 %. 150 logs of an unknown field are
+six of each kind."""
 
 
 @dataclass(frozen=True)
