@@ -298,7 +298,7 @@ def test_an_unknown_field_is_estimated_and_fitted_along():
 
 
 def carried(iron: np.ndarray, gain: np.ndarray, seed: int) -> Log:
-    """Return readings of a phone that is carried about and hardly tilted, beside a magnet; the place has an unknown field."""
+    """Return readings of a phone that is carried about and hardly tilted, beside a magnet, in an unknown field."""
     t = np.arange(0.0, 60.0, 0.02)
     rng = np.random.default_rng(seed)
 

@@ -10,6 +10,7 @@ import lab_failures
 import outside
 import pandas as pd
 import pytest
+import unknown_field
 import whole_sensor
 from case import Case
 from independent_answer import REFUSED, SEED, Answer, answer, false_names, faults, missed, too_far, verdict
@@ -45,6 +46,15 @@ def test_a_spring_that_creeps_is_not_taken_for_a_scale_error(seed, tmp_path):
     said = answer(case, tmp_path)
     assert not false_names(case, said), said
     assert verdict(case, said) == "unknown", said
+
+
+@pytest.mark.parametrize("seed", [6, 44, 47, 49])
+def test_iron_in_an_unknown_field_is_named_where_it_can_be_seen(seed, tmp_path):
+    """Strong iron, a tilted table, iron along the only axis of a level table, and none beside a noisy reference."""
+    case = unknown_field.draw(seed)
+    said = answer(case, tmp_path)
+    assert not false_names(case, said), said
+    assert not missed(case, said), said
 
 
 def test_page_shows_which_rows_are_open():
