@@ -170,7 +170,7 @@ def copied(page: Page, folder: Path) -> None:
 def mystery(page: Page, _folder: Path) -> None:
     """Play a game to the reveal."""
     guess(page, _folder)
-    marked(page, "answer").click()
+    page.get_by_label("Your answer: choose or type").click()
     page.get_by_role("option").nth(1).click()
     marked(page, "reveal").click()
     marked(page, "truth").wait_for()

@@ -6,7 +6,7 @@ from typing import Final
 
 from nicegui import ui
 
-TALLEST: Final = "--studio-tallest"
+TALLEST: Final = "studio-tallest"
 """Variable of the style sheet that holds the height, px; the sheet says on which screens the region keeps it."""
 SCRIPT: Final = f"""
 (() => {{
@@ -18,7 +18,7 @@ SCRIPT: Final = f"""
     about = content.dataset.about;
     width = content.offsetWidth;
     tallest = Math.max(tallest, content.scrollHeight);
-    content.parentElement.style.setProperty('{TALLEST}', tallest + 'px');
+    content.parentElement.style.setProperty('--{TALLEST}', tallest + 'px');
   }}).observe(content);
 }})();
 """
