@@ -6,6 +6,7 @@ Such a cause acts through several columns, so the residual stands against the pa
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache, partial
 from typing import Final
 
 import numpy as np
@@ -56,33 +57,25 @@ def cause_shares(analysis: Analysis, step: Array, log: int, channels: Sequence[s
     dict
         Fraction of the excess variance, 0 to 1, by channel and cause.
     """
-    squares = _squares(analysis, step, log)
+    squares = analysis.problem.mean_squares(step, log)
     floors = analysis.logs[log].floors
-    moves: dict[int, tuple[list[int], Array]] = {}
+    beside = cache(partial(analysis.problem.step_beside, analysis.fitted_slots))
     found: dict[str, dict[str, float]] = {}
     for channel in channels:
         excess = squares[channel] - floors[CHANNELS.index(channel)] ** 2
         found[channel] = {}
         for cause, (slot, places) in _causes(analysis, log, channel).items():
-            own, full = moves[slot] if slot in moves else moves.setdefault(slot, _fitted_besides(analysis, slot))
-            chosen = [own[k] for k in places]
-            moved = step.copy()
-            moved[chosen] += full[chosen]
-            left = _squares(analysis, moved, log)[channel]
+            left = analysis.problem.mean_squares(_moved(step, *beside(slot), places), log)[channel]
             found[channel][cause] = min(max((squares[channel] - left) / excess, 0.0), 1.0)
     return found
 
 
-def _squares(analysis: Analysis, step: Array, log: int) -> dict[str, float]:
-    """Return the mean square of the residual of each channel, SI units."""
-    return {item["channel"]: item["rms"] ** 2 for item in analysis.problem.residual(step, log)["channels"]}
-
-
-def _fitted_besides(analysis: Analysis, slot: int) -> tuple[list[int], Array]:
-    """Return the parameters of a slot, and the step of all parameters with the slot fitted besides the model's."""
-    along = len(analysis.problem.estimate(analysis.fitted_slots)["parameters"])
-    solved = analysis.problem.estimate([*analysis.fitted_slots, slot])
-    return solved["parameters"][along:], solved["full_step"]
+def _moved(step: Array, own: Sequence[int], fitted: Array, places: Sequence[int]) -> Array:
+    """Return the step with a cause in it: some of the parameters of its slot, as they are fitted beside the model's."""
+    chosen = [own[k] for k in places]
+    moved = step.copy()
+    moved[chosen] += fitted[chosen]
+    return moved
 
 
 def cause_panels(
@@ -112,10 +105,7 @@ def cause_panels(
     """
     slot, places = _causes(analysis, log, channel)[cause]
     evidence = analysis.logs[log]
-    own, full = _fitted_besides(analysis, slot)
-    chosen = [own[k] for k in places]
-    moved = step.copy()
-    moved[chosen] += full[chosen]
+    moved = _moved(step, *analysis.problem.step_beside(analysis.fitted_slots, slot), places)
     index = CHANNELS.index(channel)
     asked = [(analysis, step), (analysis, moved), *others]
     sources = [(each.logs[log].raw, each.own_step(log, at)) for each, at in asked]

@@ -491,20 +491,16 @@ class Session:
         if fit is None or parameter.effect not in fit.analysis.candidates:
             return None
         analysis, effect = fit.analysis, find_effect(parameter.effect)
-        slots = [*analysis.fitted_slots, analysis.slots.index(parameter.effect)]
-        solved = analysis.problem.estimate(slots)
+        problem = analysis.problem
+        own, step = problem.step_beside(analysis.fitted_slots, analysis.slots.index(parameter.effect))
         names = [name for name, _, _ in effect.parameters]
-        own = solved["parameters"][-self._count(parameter.effect, analysis) :]
         # Logs that have their own values follow one another.
         chosen = own[names.index(parameter.name) :: len(names)]
-        without = solved["full_step"].copy()
+        without = step.copy()
         without[chosen] = fit.estimate.step[chosen]
-        after, before = (
-            {item["channel"]: item["rms"] for item in analysis.problem.residual(step, self.shown)["channels"]}
-            for step in (solved["full_step"], without)
-        )
+        before, after = problem.mean_squares(without, self.shown), problem.mean_squares(step, self.shown)
         floors = dict(zip(CHANNELS, analysis.logs[self.shown].floors, strict=True))
-        return max(before, key=lambda name: (before[name] ** 2 - after[name] ** 2) / floors[name] ** 2, default=None)
+        return max(before, key=lambda name: (before[name] - after[name]) / floors[name] ** 2, default=None)
 
     def weighed(self) -> float | None:
         """Return the ln Bayes factor for the present model over the second one; None before it is worked out."""

@@ -1,5 +1,5 @@
-//! The magnetic field of the place, where only the readings show it: estimated beside an offset of the sensor, since a magnet that moves with
-//! the sensor would else be taken for a part of the field.
+//! The magnetic field of the place, from readings alone. An offset of the sensor is estimated beside the field: else a magnet that moves with
+//! the sensor is taken for a part of the field.
 
 use nalgebra::{Cholesky, Matrix3, UnitQuaternion, Vector3};
 
@@ -11,7 +11,7 @@ const OFFSET: f64 = (2.0 / 60.0) * (2.0 / 60.0);
 /// recordings (docs/recordings.md: 0.1 to 3 uT).
 const SEEN: f64 = 1e-3;
 
-/// Sums over rows with a reading b and an attitude R, of which `b = R^T m + h`.
+/// Sums over the rows that have a reading b and an attitude R. The model of a reading is `b = R^T m + h`.
 #[derive(Clone, Debug, Default)]
 pub struct PlaceField {
     rows: usize,
@@ -42,8 +42,8 @@ impl PlaceField {
         Some(in_reference - mean * offset)
     }
 
-    /// Directions of the body (columns), each as long as the offset along it may seem off, over the field's length, where the attitude of the
-    /// reference has this noise, rad about each axis. What a log shows well is left out; without any such direction the result is zero.
+    /// Directions of the body (columns). The length of each is the error that noise of the reference makes in the offset along it, as a part of
+    /// the field's length. `noise`: rad about each axis. The matrix is zero where every direction turns far more than the noise.
     pub fn unseen(&self, noise: f64) -> Matrix3<f64> {
         let mean = self.attitudes / self.rows.max(1) as f64;
         let turned = (Matrix3::identity() - mean.tr_mul(&mean)).symmetric_eigen();

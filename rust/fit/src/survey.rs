@@ -257,7 +257,8 @@ impl Survey {
                     sum.1 += 1;
                 }
             }
-            if let Some(m) = window.reading(Sensor::Mag).map(|m| &m[3 * i..3 * i + 3])
+            if self.given.field.is_none()
+                && let Some(m) = window.reading(Sensor::Mag).map(|m| &m[3 * i..3 * i + 3])
                 && m.iter().all(|v| v.is_finite())
                 && let Some(q) = attitudes.nearest(window, i)
             {
@@ -325,7 +326,7 @@ impl Survey {
     /// The facts, and samples of every covariate.
     pub fn finish(mut self) -> (LogFacts, CovariateSamples) {
         let mean = |(sum, n): (f64, usize)| if n == 0 { f64::NAN } else { sum / n as f64 };
-        let of_readings = self.field_of_place.estimate().filter(|_| self.given.field.is_none());
+        let of_readings = self.field_of_place.estimate();
         let estimated = of_readings.is_some();
         let field = self.given.field.or(of_readings).unwrap_or_default();
         let dt = median(&mut self.steps);

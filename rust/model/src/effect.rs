@@ -183,7 +183,7 @@ pub trait Effect: Send + Sync {
 
     /// True where it is fitted along whatever is asked, without being named: the field, if this log is all that is known of it.
     fn fitted_along(&self, facts: &LogFacts) -> bool {
-        facts.field_off().is_some() && self.card().traits.reference == Some(ReferencePart::Field)
+        self.card().traits.reference == Some(ReferencePart::Field) && facts.field_estimated
     }
 
     /// Columns d reading / d parameter of `sensor`, at the given parameter values.

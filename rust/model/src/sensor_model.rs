@@ -392,7 +392,8 @@ impl SensorModel {
         // What looks back no further than the margin gets no more, whoever else is asked beside it.
         let near = whole.part(whole.begin, whole.end, self.margin(whole, facts).min(facts.margin()));
         let window = &near;
-        let ideal = Ideal::new(window, facts, &self.reference_change(facts));
+        let change = self.reference_change(facts);
+        let ideal = Ideal::new(window, facts, &change);
         let core = window.begin..window.end;
         let temperature = held_temperature(window, facts);
         let covariates = held_covariates(window);
@@ -417,7 +418,6 @@ impl SensorModel {
             })
         };
         let seen = seen_of(&ideal);
-        let change = self.reference_change(facts);
         let mut channels: Vec<Option<ChannelColumns>> = vec![None; CHANNELS];
         for sensor in Sensor::ALL {
             let Some(reading) = window.reading(sensor) else {

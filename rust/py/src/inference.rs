@@ -182,6 +182,27 @@ impl PyProblem {
         Ok(out)
     }
 
+    /// Step (p,) of all parameters that fits a slot beside those of a model, and the places of the slot's own parameters: [`PyProblem::estimate`]
+    /// without its standard errors.
+    fn step_beside<'py>(
+        &self,
+        py: Python<'py>,
+        model: Vec<usize>,
+        slot: usize,
+    ) -> PyResult<(Vec<usize>, Bound<'py, PyArray1<f64>>)> {
+        let slots: Vec<usize> = model.into_iter().chain([slot]).collect();
+        self.known(&slots)?;
+        let fitted = self.0.fitted(&slots);
+        let within = compute(py, || self.0.step_within(&fitted))?;
+        let within = within.ok_or_else(|| value_error("the normal equations cannot be solved"))?;
+        let mut step = DVector::zeros(self.0.plausible.len());
+        for (j, own) in fitted.iter().zip(&within.solution) {
+            step[*j] = *own;
+        }
+        let own = parameters_of([&self.0.slots[slot]]);
+        Ok((own, PyArray1::from_slice(py, step.as_slice())))
+    }
+
     /// Which effect is missing from the model of slots `model`, among the slots `candidates`; what none of them explains is
     /// asked of the slots `probes`. `fitted` holds lists of log Bayes factors of candidates from fits in the place of one another, by slot; `refuted` those of which a fit keeps nothing; `column_noise` the share of
     /// noise in the column that a candidate reads; `seen` what rows show besides: (log or None, channel index, log Bayes factor, shape). `again` is an
@@ -290,15 +311,26 @@ impl PyProblem {
         compute(py, || revision::needless(&self.0, &model, &members))
     }
 
+    /// Mean square of the residual of each channel of one log at a step (p,) of all parameters, in the channels' units squared.
+    #[pyo3(signature = (step, log=0))]
+    fn mean_squares<'py>(&self, py: Python<'py>, step: Vec<f64>, log: usize) -> PyResult<Bound<'py, PyDict>> {
+        let (part, step) = self.stepped(step, log)?;
+        let raw = &part.raw;
+        let out = PyDict::new(py);
+        for channel in 0..CHANNELS {
+            let (square, n) = raw.square(channel, &step);
+            if n > 0 {
+                out.set_item(rest_channels::name(channel, raw.layout.facts.rests), square / n as f64)?;
+            }
+        }
+        Ok(out)
+    }
+
     /// Residual of one log at a step (p,) of all parameters: RMS and mean by channel and block, and binned panels, in the
     /// channels' units.
     #[pyo3(signature = (step, log=0))]
     fn residual<'py>(&self, py: Python<'py>, step: Vec<f64>, log: usize) -> PyResult<Bound<'py, PyDict>> {
-        if step.len() != self.0.plausible.len() {
-            return Err(value_error("step must have one number per parameter"));
-        }
-        let (part, _) = self.part(log)?;
-        let step = self.0.of_log(log, &DVector::from_vec(step));
+        let (part, step) = self.stepped(step, log)?;
         let raw = &part.raw;
         let channels = residual::channels(raw, &step);
         let out = PyDict::new(py);
@@ -354,6 +386,15 @@ impl PyProblem {
         let found = self.0.parts.get(log).zip(self.0.places.get(log));
         let (part, places) = found.ok_or_else(|| value_error("there is no such log"))?;
         Ok((part, places))
+    }
+
+    /// A log and the step of its own parameters, of a step (p,) of all.
+    fn stepped(&self, step: Vec<f64>, log: usize) -> PyResult<(&Part, DVector<f64>)> {
+        if step.len() != self.0.plausible.len() {
+            return Err(value_error("step must have one number per parameter"));
+        }
+        let (part, _) = self.part(log)?;
+        Ok((part, self.0.of_log(log, &DVector::from_vec(step))))
     }
 }
 

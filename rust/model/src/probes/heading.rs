@@ -2,7 +2,8 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-use crate::card::{Card, Found, Parameter, Reach, ReferencePart, Scope, Stage, Traits};
+use super::words::nuisance;
+use crate::card::{Card, Reach, ReferencePart, Scope, Stage, Traits};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
@@ -22,31 +23,20 @@ pub struct Heading {
 impl Heading {
     /// The effect.
     pub fn new() -> Self {
-        let parameter = |k: usize| Parameter {
-            name: format!("{k}"),
-            unit: "rad".to_string(),
-            typical: Some(1.0),
-            found: Found::Steps,
-        };
         Self {
-            card: Card {
-                id: "the heading of the reference drifts".to_string(),
-                name: "heading of the reference".to_string(),
-                stage: Stage::Input,
-                traits: Traits {
+            card: nuisance(
+                "the heading of the reference drifts",
+                "heading of the reference",
+                "random walk",
+                Stage::Input,
+                Traits {
                     scope: Scope::Log,
                     reach: Reach::Reference,
                     affine: None,
                     reference: Some(ReferencePart::Heading),
                 },
-                parameters: (0..PARTS).map(parameter).collect(),
-                physics: String::new(),
-                formula: String::new(),
-                signature: "random walk".to_string(),
-                mistaken_for: String::new(),
-                confirm: String::new(),
-                shares: 1.0,
-            },
+                (PARTS, "rad"),
+            ),
         }
     }
 }

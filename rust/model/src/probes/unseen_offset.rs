@@ -1,6 +1,7 @@
 //! The noise of the reference hides which part of a magnetometer's offset is the field's.
 
-use crate::card::{Affine, Card, Found, Parameter, Reach, ReferencePart, Scope, Stage, Traits};
+use super::words::nuisance;
+use crate::card::{Card, Reach, ReferencePart, Scope, Stage, Traits};
 use crate::effect::{Columns, Effect, EffectError, Rows};
 use crate::facts::LogFacts;
 use crate::sensor::Sensor;
@@ -17,31 +18,20 @@ pub struct UnseenOffset {
 impl UnseenOffset {
     /// The effect.
     pub fn new() -> Self {
-        let parameter = |k: usize| Parameter {
-            name: format!("{k}"),
-            unit: "1".to_string(),
-            typical: Some(1.0),
-            found: Found::Steps,
-        };
         Self {
-            card: Card {
-                id: "the noise of the reference hides a part of the offset".to_string(),
-                name: "offset along directions that hardly turn".to_string(),
-                stage: Stage::Offset,
-                traits: Traits {
+            card: nuisance(
+                "the noise of the reference hides a part of the offset",
+                "offset along directions that hardly turn",
+                "constant",
+                Stage::Offset,
+                Traits {
                     scope: Scope::Log,
                     reach: Reach::Row,
-                    affine: Some(Affine::Offset),
+                    affine: None,
                     reference: Some(ReferencePart::Noise),
                 },
-                parameters: (0..3).map(parameter).collect(),
-                physics: String::new(),
-                formula: String::new(),
-                signature: "constant".to_string(),
-                mistaken_for: String::new(),
-                confirm: String::new(),
-                shares: 1.0,
-            },
+                (3, "1"),
+            ),
         }
     }
 }

@@ -9,6 +9,36 @@ use crate::temperature_course::PASTS;
 
 use super::columns::DEGREES;
 
+/// Card of a part of the noise that is fitted beside everything, with coefficients of this unit that are normal about zero.
+pub(super) fn nuisance(
+    id: &str,
+    name: &str,
+    signature: &str,
+    stage: Stage,
+    traits: Traits,
+    (count, unit): (usize, &str),
+) -> Card {
+    let parameter = |k: usize| Parameter {
+        name: format!("{k}"),
+        unit: unit.to_string(),
+        typical: Some(1.0),
+        found: Found::Steps,
+    };
+    Card {
+        id: id.to_string(),
+        name: name.to_string(),
+        stage,
+        traits,
+        parameters: (0..count).map(parameter).collect(),
+        physics: String::new(),
+        formula: String::new(),
+        signature: signature.to_string(),
+        mistaken_for: String::new(),
+        confirm: String::new(),
+        shares: 1.0,
+    }
+}
+
 /// Card of a probe: its name is the covariate, its signature the shape.
 pub(super) fn card(facts: &LogFacts, sensor: Sensor, kind: &Kind) -> Card {
     let name = |q: Quantity| match q {
