@@ -29,8 +29,8 @@ LEAST_SHARE: Final = 0.2
 """The same, as a share of the shorter recording."""
 FASTER: Final = 1.5
 """A reference that turns this many times as fast as the fastest the sensor ever does shows a wild pose."""
-MOST_BINS: Final = 2**19
-"""Bins of the longer recording; beyond, bins are wider (seven hours at the shortest)."""
+MOST_BINS: Final = 2**18
+"""Bins of the longer recording; beyond, bins are wider (three and a half hours at the shortest)."""
 LARGEST_SKEW: Final = 0.01
 """Rate of one clock over the other, less one, up to which it is looked for: a clock of a resistor and a capacitor, or a
 rate of samples that was rounded, is off by a percent."""
@@ -125,10 +125,41 @@ def comparable(sensor: Course, reference: Course) -> bool:
 
 @dataclass(frozen=True)
 class _Lags:
-    """Sums at every lag with one skew: log likelihood ratio (lags,) and products of the rates (9, lags)."""
+    """Neighbouring lags with one skew, a bin apart, the latest first.
+
+    Attributes
+    ----------
+    skew, latest : float
+        The skew, and the lag at the first place, s.
+    gain : (k,) array
+        Log likelihood ratios.
+    shared : (9, k) or (1, k) array
+        Products of what both show.
+    """
 
     skew: float
+    latest: float
     gain: Array
+    shared: Array
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Sums over the bins that two recordings have in common, at each of k lags.
+
+    Attributes
+    ----------
+    own, other : (k,) array
+        Squares of what sensor and reference show.
+    common : (k,) array
+        Number of these bins.
+    shared : (9, k) or (1, k) array
+        Products of what both show.
+    """
+
+    own: Array
+    other: Array
+    common: Array
     shared: Array
 
 
@@ -183,11 +214,13 @@ class LagSearch:
         lags = (len(self.own.values) + len(self.other.values)) * self.step / self.independent
         return max(lags, 1.0) * len(self.skews)
 
-    def _lags(self, skew: float) -> _Lags:
-        """Compare at every lag with the reference stretched by a skew."""
-        n, size = len(self.own.values), self._size
-        other = self.other if skew == 0.0 else self._stretched(skew)
-        m = len(other.values)
+    def _reference(self, skew: float) -> Rates:
+        """Return what the reference shows, stretched by a skew."""
+        return self.other if skew == 0.0 else self._stretched(skew)
+
+    def _everywhere(self, other: Rates) -> _Sums:
+        """Sum at every lag at once, by Fourier transform."""
+        n, m, size = len(self.own.values), len(other.values), self._size
 
         def correlated(a: Transform, b: Transform) -> Array:
             """Sum over k of a[k + j] b[k], for j from -(m - 1) to n - 1, from the transforms of both."""
@@ -196,36 +229,80 @@ class LagSearch:
 
         known, squares = other.known.astype(float), np.sum(other.values**2, axis=1)
         there, rate = fft.rfft(known, size), fft.rfft(other.values.T, size)
-        # Where there is none, rounding may leave less.
-        energy = (
-            correlated(self._energy, there) - 1e-12 * self._sums[0],
-            correlated(self._known, fft.rfft(squares, size)) - 1e-12 * float(squares.sum()),
+        return _Sums(
+            correlated(self._energy, there),
+            correlated(self._known, fft.rfft(squares, size)),
+            correlated(self._known, there),
+            correlated(self._rate[:, None], rate[None]).reshape(len(self._rate) ** 2, -1),
         )
-        common = correlated(self._known, there)
-        shared = correlated(self._rate[:, None], rate[None]).reshape(len(self._rate) ** 2, -1)
-        least = max(LEAST_OVERLAP, LEAST_SHARE * min(self._sums[1], known.sum()) * self.step)
-        usable = (common * self.step >= least) & (energy[0] > 0.0) & (energy[1] > 0.0)
-        agreed = largest_agreement(shared[:, usable]) if len(shared) == 9 else shared[0, usable]
+
+    def _at_places(self, other: Rates, places: range) -> _Sums:
+        """Sum at some of the lags, bin by bin."""
+        own, n, m = self.own, len(self.own.values), len(other.values)
+        sums = []
+        for place in places:
+            ahead = place - (m - 1)
+            mine, theirs = slice(max(ahead, 0), min(n, m + ahead)), slice(max(-ahead, 0), min(m, n - ahead))
+            a, b = own.values[mine], other.values[theirs]
+            there = own.known[mine], other.known[theirs]
+            sums.append(
+                (
+                    np.sum(a[there[1]] ** 2),
+                    np.sum(b[there[0]] ** 2),
+                    np.count_nonzero(there[0] & there[1]),
+                    *(a.T @ b).ravel(),
+                )
+            )
+        table = np.array(sums, dtype=np.float64).T
+        return _Sums(table[0], table[1], table[2], table[3:])
+
+    def _at_every_lag(self) -> Iterator[_Lags]:
+        """Compare at every lag with the reference stretched by each skew."""
+        for skew in self.skews:
+            other = self._reference(float(skew))
+            yield self._scored(float(skew), self._latest(other), other, self._everywhere(other))
+
+    def _near(self, lag: float, skews: Iterable[float], bins: int) -> Candidate:
+        """Return the likeliest of some skews, at the lags that some bins hold on either side of one, s."""
+        found = []
+        for skew in skews:
+            other = self._reference(float(skew))
+            latest, last = self._latest(other), len(self.own.values) + len(other.values) - 2
+            middle = min(max(round((latest - lag) / self.step), 0), last)
+            places = range(max(middle - bins, 0), min(middle + bins, last) + 1)
+            sums = self._at_places(other, places)
+            lags = self._scored(float(skew), latest - places[0] * self.step, other, sums)
+            found.append(self._candidate(lags, int(np.argmax(lags.gain))))
+        return max(found, key=lambda each: each.gain)
+
+    def _latest(self, other: Rates) -> float:
+        """Return the lag that leaves the reference's last bin beside the sensor's first one, s."""
+        return other.start - self.own.start + (len(other.values) - 1) * self.step
+
+    def _scored(self, skew: float, latest: float, other: Rates, sums: _Sums) -> _Lags:
+        """Return the likelihood of each lag."""
+        # Where there is none, rounding may leave less.
+        energy = sums.own - 1e-12 * self._sums[0], sums.other - 1e-12 * float(np.sum(other.values**2))
+        least = max(LEAST_OVERLAP, LEAST_SHARE * min(self._sums[1], other.known.sum()) * self.step)
+        usable = (sums.common * self.step >= least) & (energy[0] > 0.0) & (energy[1] > 0.0)
+        shared = sums.shared[:, usable]
+        agreed = largest_agreement(shared) if len(shared) == 9 else shared[0]
         values = np.clip(agreed / np.sqrt(energy[0][usable] * energy[1][usable]), 0.0, 1.0 - 1e-9)
-        gain = np.zeros(n + m - 1)
+        gain = np.zeros(len(sums.common))
         # Of bins that depend on one another, as many count as are independent; only then a prior can stand beside them.
-        counted = common[usable] * self.step / self.independent
+        counted = sums.common[usable] * self.step / self.independent
         gain[usable] = -0.5 * counted * np.log1p(-(values**2)) + skew_prior(skew)
-        return _Lags(skew, gain, shared)
+        return _Lags(skew, latest, gain, sums.shared)
 
     def at(self, lag: float) -> Candidate:
         """Return what there is at a lag, s; at the nearest one that the recordings allow, with the likeliest skew."""
-        return max((self._candidate(each, self._place(each, lag)) for each in self._all()), key=lambda each: each.gain)
+        return self._near(lag, self.skews, 0)
 
     def near(self, wider: LagSearch, candidate: Candidate) -> Candidate:
         """Return the likeliest lag and skew of those that a search in wider bins takes for one candidate."""
         around = 0 if self._skew_known else round(wider.spacing / self.spacing)
         skews = candidate.skew + self.spacing * np.arange(-around, around + 1)
-        found = []
-        for lags in (self._lags(float(skew)) for skew in skews):
-            first, last = (self._place(lags, candidate.lag + side * wider.step) for side in (1.0, -1.0))
-            found.append(self._candidate(lags, first + int(np.argmax(lags.gain[first : last + 1]))))
-        return max(found, key=lambda each: each.gain)
+        return self._near(candidate.lag, skews, round(wider.step / self.step))
 
     def peaks(self, most: int = 8) -> list[Candidate]:
         """Return the likeliest maxima of the likelihood, `most` at most.
@@ -236,7 +313,7 @@ class LagSearch:
         from scipy.signal import find_peaks  # noqa: PLC0415 - costs half a second that few logs need
 
         found: list[Candidate] = []
-        for each in self._all():
+        for each in self._at_every_lag():
             places, _ = find_peaks(np.concatenate(([-1.0], each.gain, [-1.0])))
             order = sorted(places - 1, key=lambda place: -each.gain[place])[:most]
             found += [self._candidate(each, int(place)) for place in order if each.gain[place] > 0.0]
@@ -259,19 +336,9 @@ class LagSearch:
         length = self.step * len(self.other.values)
         return max(0.0, begin), min(length, begin + self.step * len(self.own.values))
 
-    def _all(self) -> Iterator[_Lags]:
-        return (self._lags(float(skew)) for skew in self.skews)
-
-    def _first(self, lags: _Lags) -> float:
-        """Lag at the first place, s."""
-        return self.other.start - self.own.start + (len(lags.gain) - len(self.own.values)) * self.step
-
-    def _place(self, lags: _Lags, lag: float) -> int:
-        return min(max(round((self._first(lags) - lag) / self.step), 0), len(lags.gain) - 1)
-
     def _candidate(self, lags: _Lags, place: int) -> Candidate:
         return Candidate(
-            self._first(lags) - place * self.step,
+            lags.latest - place * self.step,
             lags.skew,
             float(lags.gain[place]),
             turn_between(lags.shared[:, place].reshape(3, 3)) if len(lags.shared) == 9 else np.eye(3),
