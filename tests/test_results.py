@@ -154,7 +154,8 @@ def test_text_table_aligns_and_html_table_escapes():
 def test_a_small_fall_of_an_error_has_a_digit_more():
     assert quantity.change(1.0044, 1.0021) == "1.004 → 1.002"
     assert quantity.fall(1.0044, 1.0021) == "from 1.004 to 1.002 times the noise floor"
-    assert quantity.change(1.0021, 1.0044) == "rises to 1.004"
+    assert quantity.change(1.0021, 1.0044) == "stays at 1.00"
+    assert quantity.change(1.0021, 1.0144) == "rises to 1.01"
     assert quantity.change(1.00441, 1.00442) == "stays at 1.00"
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 from imufit.results.sentences import leading
-from imufit.studio.against import SMALL, UNKNOWN, against
+from imufit.studio.against import SMALL, UNKNOWN, against, opens_on
 from imufit.studio.log_file import LogFile
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, Mystery
 from imufit.studio.session import Session, worst_channel
@@ -35,6 +35,19 @@ def test_a_cause_that_explains_the_residual_leads_the_list(late):
     order = [known[name] for name in listed]
     assert order == sorted(order, reverse=True)
     assert any(words.endswith(f"({SMALL})") for words in listed.values())
+
+
+def test_the_figure_opens_on_a_cause_where_no_covariate_shows_half_as_much(late):
+    found = late.compare()
+    channel = worst_channel(found)
+    shares = late.weigh_causes()[channel]
+    best = max(item.share for item in found.panels if item.channel == channel)
+    assert shares["domega/dt"] > 2.0 * best
+    assert opens_on(found, channel, shares) == "domega/dt"
+    # A covariate stands in the figure until the causes are weighed, and where it shows nearly as much.
+    covariate = max((item for item in found.panels if item.channel == channel), key=lambda item: item.share).covariate
+    assert opens_on(found, channel, None) == covariate
+    assert opens_on(found, channel, {"domega/dt": 1.5 * best}) == covariate
 
 
 def test_a_cause_without_a_share_yet_says_so(late):

@@ -131,7 +131,8 @@ def change(before: float, after: float) -> str:
     before, after : float
         The ratios.
     """
-    first, last = _apart(before, after)
+    # A rise in the third digit is chance: only a fall is followed that far.
+    first, last = (ratio(before), ratio(after)) if after >= before else _apart(before, after)
     if last == first:
         return f"stays at {first}"
     return f"{first} → {last}" if after < before else f"rises to {last}"

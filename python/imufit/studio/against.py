@@ -17,6 +17,9 @@ from imufit.studio.session import FAILS
 
 SMALL: Final = f"< {100.0 * MIN_SHARE:.0f} %"
 """Words for a share that chance gives as well."""
+IN_WORDS: Final = 2.0
+"""Share of a cause over that of the best covariate from which on the figure opens on the cause: a covariate's figure
+needs fewer words, but where it shows half as much it misleads."""
 UNKNOWN: Final = "being weighed"
 """Words for the share of a cause until the evidence has given it."""
 
@@ -52,6 +55,22 @@ def against(
         return names
     largest_first = sorted(known.items(), key=lambda item: -(item[1] or 0.0))
     return {name: f"{names[name]} ({_share(share)})" for name, share in largest_first}
+
+
+def opens_on(found: Comparison, channel: str, shares: Mapping[str, float] | None) -> str | None:
+    """Return the covariate or the cause that the figure of a channel shows first; None where none is worth showing.
+
+    Parameters
+    ----------
+    found, channel, shares
+        As for `against`.
+    """
+    known = (item for item in found.panels if item.channel == channel and item.share >= MIN_SHARE)
+    top = max(known, key=lambda item: item.share, default=None)
+    cause, share = max((shares or {}).items(), key=lambda item: item[1], default=("", 0.0))
+    if share >= MIN_SHARE and share > IN_WORDS * (0.0 if top is None else top.share):
+        return cause
+    return None if top is None else top.covariate
 
 
 def _share(share: float | None) -> str:

@@ -187,7 +187,7 @@ def spectrum(found: Spectrum, other: Spectrum | None = None) -> Figure:
     lines += _line(ends, np.full(2, factor * math.sqrt(found.floor)), GREY, "noise floor", dash="dash")
     # Decades alone carry numbers: the others would lie upon one another on a phone.
     ticks = {"type": "log", "dtick": 1, "tickformat": "~g"}
-    title = f"residual of {words(channel_name(found.channel))}, {unit}/√Hz"
+    title = f"residual of {words(channel_name(found.channel))} about its mean, {unit}/√Hz"
     return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=_logarithmic(lines))
 
 

@@ -36,7 +36,9 @@ ROW_INTO_SIGHT: Final = (
 BARS_INTO_SIGHT: Final = "document.querySelector('.studio-fall').scrollIntoView({block: 'end', behavior: 'smooth'})"
 """Script that lays the bars at the lower edge of the window: the sentence on top stands over them."""
 
-SWITCHED_OFF: Final = "switched off in the model"
+ADD: Final = "Add"
+SWITCH_ON: Final = "Switch on"
+"""Word on the button of a candidate that stands in the model, switched off."""
 FIGURES: Final = (
     "Point at an effect to see what it would explain, or press its name for its card. Each line gives the probability, "
     "and the held-out error of all channels without and with the effect."
@@ -48,19 +50,30 @@ CONTRADICTED: Final = (
 )
 """Sentence over the candidates beside a wrong fixed value, whose error each of them would explain."""
 
+ALIKE: Final = 2
+"""Effects that are named as those that look most like another one."""
+HELPS: Final = " alone; lowers the error beside the other missing effects"
+
 LOWERS: Final = 0.99
 """Held-out error with a candidate over that without from which on the candidate lowers it for the eye."""
 
 
-def _rank(item: Candidate, diagnosis: Diagnosis) -> tuple[bool, bool, float]:
-    """Return what candidates are sorted by: those that are named, then by the probability that stands beside them."""
-    return item.effect not in diagnosis.named, item.status != SIGNIFICANT, -item.probability
+def _rank(item: Candidate, diagnosis: Diagnosis) -> tuple[bool, bool, bool, float]:
+    """Return what candidates are sorted by: those that are named, then what looks like them, then by probability."""
+    named, alike = item.effect in diagnosis.named, item.effect in _alike(diagnosis)
+    return not named, item.status != SIGNIFICANT, not alike, -item.probability
+
+
+def _alike(diagnosis: Diagnosis) -> set[str]:
+    """Return the effects that look most like a named one: they stand beside it, with the reason why they are not it."""
+    named = (item for item in diagnosis.candidates if item.effect in diagnosis.named)
+    return {rival.effect for item in named for rival in item.confounded_with[:ALIKE]}
 
 
 def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
     """Return in words why a candidate is not there; empty where it is."""
     if item.status == SIGNIFICANT:
-        return ""
+        return "" if item.held_out_after < item.held_out_before else HELPS
     outdone = item.outcome == NOT_SIGNIFICANT and item.held_out_after < LOWERS * item.held_out_before
     if outdone and diagnosis.best is not None:
         return f" alone; explains nothing more beside {effect_name(diagnosis.best)}"
@@ -101,7 +114,7 @@ class CandidateView:
         diagnosis = self._desk.diagnosis
         session = self._desk.session
         self._stacked = frozenset() if session is None else frozenset(session.stack.effects)
-        state = (diagnosis, self._desk.guessing, self._stacked)
+        state = (diagnosis, self._desk.guessing, self._stacked, self._desk.replacing)
         if state == self._drawn:
             return
         self._drawn = state
@@ -109,6 +122,10 @@ class CandidateView:
         self.look_at("")
         self._list.clear()
         with self._list:
+            # While another log is loaded, nothing can be added to the model of the present one.
+            if self._desk.replacing:
+                ui.label("Another log is being opened.").classes("studio-muted")
+                return
             if diagnosis is None:
                 ui.label("The effects of the catalogue are being compared with the log.").classes("studio-muted")
                 return
@@ -170,7 +187,7 @@ class CandidateView:
                 async def add() -> None:
                     session = desk.session
                     # The second click of a double click finds the effect added, or another row beneath the pointer.
-                    if session is None or effect in session.stack.effects or not self._added.counts():
+                    if session is None or effect in session.stack.model.effects or not self._added.counts():
                         return
                     client = ui.context.client
                     client.run_javascript(BARS_INTO_SIGHT)
@@ -178,13 +195,11 @@ class CandidateView:
                     # The sentence on top has another height by now.
                     client.run_javascript(BARS_INTO_SIGHT)
 
-                # A candidate that stands in the stack is switched off there: the model lacks it, and can switch it on.
-                if effect in self._stacked:
-                    ui.label(SWITCHED_OFF).classes("studio-muted").props(attribute("data-mark", f"off-{effect}"))
-                else:
-                    ui.button("Add", on_click=add).props("dense size=12px" + ("" if named else " outline")).props(
-                        attribute("data-mark", f"add-{effect}")
-                    )
+                # A candidate that stands in the stack is switched off there: to add it is to switch it on.
+                words = SWITCH_ON if effect in self._stacked else ADD
+                ui.button(words, on_click=add).props("dense size=12px" + ("" if named else " outline")).props(
+                    attribute("data-mark", f"add-{effect}")
+                )
             if diagnosis is not None:
                 _figures(item, diagnosis)
             # The card opens in its own row: no other row moves from beneath the pointer.
@@ -241,7 +256,7 @@ def _figures(item: Candidate, diagnosis: Diagnosis) -> None:
     ui.label(printable(words)).classes("studio-muted")
     if item.effect in diagnosis.named and item.confounded_with:
         rivals = ", ".join(
-            f"{effect_name(rival.effect)} ({quantity.number(rival.correlation, 2)})"
-            for rival in item.confounded_with[:2]
+            f"{effect_name(rival.effect)} (correlation {quantity.number(rival.correlation, 2)})"
+            for rival in item.confounded_with[:ALIKE]
         )
-        ui.label(f"Rivals, with correlation: {rivals}").classes("studio-muted")
+        ui.label(f"Looks most like: {rivals}").classes("studio-muted")

@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 from nicegui import events, run, ui
 
-from imufit.comparing.compare import MIN_SHARE
 from imufit.figures import quantity
 from imufit.fitting.passes import UNITS
 from imufit.model.catalogue import find_effect
@@ -19,7 +18,7 @@ from imufit.results.noise_part import NoisePart
 from imufit.results.phrasing import capital
 from imufit.results.sentences import leading
 from imufit.studio import charts
-from imufit.studio.against import against
+from imufit.studio.against import against, opens_on
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.explained import Explained
@@ -32,7 +31,7 @@ PIXELS: Final = 1200
 """Points of a trace: as many as a wide screen shows beside each other."""
 FAILS_WHERE: Final = "Where it fails"
 TIME: Final = "t"
-RISES: Final = " If {cause} is missing, the residual follows the dotted line."
+RISES: Final = " If the cause is {cause}, the residual follows the dotted line."
 UNDER_WAY: Final = "The estimate is under way: spectrum and trace are those of the model before."
 ZOOM_BY_MOUSE: Final = "Drag over a figure to zoom, double-click to see all of it."
 ZOOM_BY_FINGER: Final = "A swipe scrolls the page. These buttons zoom the figure over time:"
@@ -61,6 +60,7 @@ class PanelView:
         self._proposed = ""
         self._session: Session | None = None
         self._window: tuple[float, float] | None = None
+        self._shown = ""
         self._kind = RESIDUAL
         self._state: tuple[Any, ...] = ()
         self._setting = False
@@ -113,7 +113,7 @@ class PanelView:
         if session is None:
             return
         if session is not self._session:
-            self._session, self._window, self._state = session, None, ()
+            self._session, self._window, self._state, self._shown = session, None, (), ""
             self._setting = True
             for choice in (self._channel, self._covariate):
                 choice.set_options([], value=None)
@@ -155,6 +155,7 @@ class PanelView:
         channel = desk.channel or self._failing(found)
         if channel is None:
             return
+        self._shown = channel
         self._offer(found, channel)
         self._draw(found, None if second is None else second.comparison, channel)
 
@@ -162,7 +163,7 @@ class PanelView:
         """Return the channel that the verdict speaks of, or the one that fails most.
 
         Of several effects that explain the log alike the channels of the first one's sensors are looked at. Where none
-        fails any more, this is the one that failed at the start.
+        fails any more, the one that was looked at stays, so that the residual is seen gone.
         """
         if (left := self._left(found)) is not None:
             return left.channel
@@ -170,10 +171,9 @@ class PanelView:
         if told is not None and told.best is not None:
             return self._of_clearest_value(told) or worst_channel(found, find_effect(told.best).sensors)
         worst = worst_channel(found)
-        start = self._at_start()
-        if start is None or any(item.channel == worst and item.ratio > FAILS for item in found.channels):
+        if any(item.channel == worst and item.ratio > FAILS for item in found.channels):
             return worst
-        return worst_channel(start)
+        return self._shown or worst_channel(self._at_start() or found)
 
     def _of_clearest_value(self, told: Diagnosis) -> str | None:
         """Return the channel on which the value acts that the sentence over the page states."""
@@ -196,9 +196,12 @@ class PanelView:
         session = self._session
         if session is None:
             return {}
-        made = session.made()
-        shares = None if made is None or made.shares is None else made.shares.get(channel, {})
-        return against(found, channel, session.causes(channel), shares)
+        return against(found, channel, session.causes(channel), self._shares(channel))
+
+    def _shares(self, channel: str) -> dict[str, float] | None:
+        """Return the part of a channel's excess that each cause without a name explains; None until this is known."""
+        made = None if self._session is None else self._session.made()
+        return None if made is None or made.shares is None else made.shares.get(channel, {})
 
     def _at_start(self) -> Comparison | None:
         """Return where the ideal sensor fails."""
@@ -265,10 +268,10 @@ class PanelView:
             return left.covariate
         fails = any(item.channel == channel and item.ratio > FAILS for item in found.channels)
         judged = found if fails else self._at_start() or found
-        top = next((panel for panel in judged.panels if panel.channel == channel), None)
+        opens = opens_on(judged, channel, self._shares(channel) if fails else {})
+        if opens in names:
+            return opens
         # Where no covariate explains a part worth naming, time shows what is constant and what is not.
-        if top is not None and top.share >= MIN_SHARE and top.covariate in names:
-            return top.covariate
         return TIME if TIME in names else next(iter(names), None)
 
     def _chosen(self) -> None:
@@ -329,7 +332,9 @@ class PanelView:
     def _say_floor(self, channel: str) -> None:
         """State which parts make the noise floor of the channel that is shown."""
         found = self._desk.diagnosis
-        self._floor.set_text("" if found is None else _floor_words(found.noise, channel))
+        # As long as an effect is missing, its part of the residual passes for a random walk of the zero.
+        slow = found is not None and found.verdict == "adequate"
+        self._floor.set_text("" if found is None else _floor_words(found.noise, channel, slow=slow))
 
     async def _draw_cause(self, channel: str, cause: str) -> None:
         """Draw the residual against the part of it that a cause without a name explains."""
@@ -419,17 +424,16 @@ def _channel(channel: str) -> str:
     return with_symbol(channel_name(channel), channel)
 
 
-def _floor_words(noise: Sequence[NoisePart], channel: str) -> str:
-    """Say which parts make the noise floor of a channel."""
-    # A missing effect passes for slow noise: parts above the white one wait for the effect.
-    parts = [part for part in noise if part.channel == channel and SMALL <= part.share <= 1.0]
+def _floor_words(noise: Sequence[NoisePart], channel: str, *, slow: bool) -> str:
+    """Say which parts make the noise floor of a channel, and which slow changes of the zero stand beside it."""
+    parts = [part for part in noise if part.channel == channel and part.share >= SMALL and (slow or not part.beyond)]
     parts.sort(key=lambda part: -part.share)
     if not parts:
         return ""
     names = [(part.beyond, f"{part.component.replace('_', ' ')} {quantity.share(part.share)}") for part in parts[:4]]
     floor = ", ".join(words for beyond, words in names if not beyond)
-    slow = ", ".join(words for beyond, words in names if beyond)
-    added = f" Slow changes of the zero add to it: {slow} of that variance." if slow else ""
+    beside = ", ".join(words for beyond, words in names if beyond)
+    added = f" Slow changes of the zero add to it: {beside} of that variance." if beside else ""
     return f"Noise floor of {channel_name(channel)}: {floor or 'not known'} of its variance.{added}"
 
 
