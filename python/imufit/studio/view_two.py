@@ -16,6 +16,8 @@ from imufit.studio.session import Made
 
 MOST_ODDS: Final = 1e6
 """Odds that are written out: beyond, the number says nothing more to a person."""
+LARGE: Final = 1e5
+"""Logarithm of the odds from which on its power of ten stands in its place: the digits say nothing more."""
 CHANGED: Final = 0.005
 """Change of a channel's residual over its noise floor from which on the channel is listed: the last digit shown."""
 
@@ -96,8 +98,9 @@ def evidence(factor: float) -> str:
     """
     better = "kept" if factor < 0.0 else "present"
     size = abs(factor)
+    shown_size = f"{size:.1f}" if size < LARGE else quantity.large(size)
     odds = f"more than {_round(MOST_ODDS)}" if size > math.log(MOST_ODDS) else _round(math.exp(size))
-    shown = f"the odds are {odds} to 1 for the {better} one (ln Bayes factor {size:.1f})"
+    shown = f"the odds are {odds} to 1 for the {better} one (ln Bayes factor {shown_size})"
     if preferred(factor) == "neither":
         return f"The log prefers neither model: {shown}, and a preference needs {_round(math.exp(DECISIVE))} to 1."
     return f"The log prefers the {better} model: {shown}."
