@@ -290,6 +290,20 @@ def mean(value: float | None, unit: str, standard_error: float) -> str:
     return f"{0.0:.{places}f} {shown}"
 
 
+def chosen(value: float, unit: str) -> Digits:
+    """Return a value that a person has chosen, in the shown unit: in six digits, without zeros at the end.
+
+    Parameters
+    ----------
+    value : float
+        In `unit`.
+    unit : str
+        SI unit.
+    """
+    factor, shown = shown_unit(unit, value)
+    return Digits(f"{factor * value:.6g}", "", factor, shown)
+
+
 def quantity(value: float | None, unit: str) -> str:
     """Value in the shown unit, e.g. ``0.573 deg/s``; a dash without a value."""
     if value is None or not math.isfinite(value):
