@@ -316,7 +316,6 @@ def test_buttons_can_be_read_in_light_and_dark_and_icons_show_their_words(page, 
         "Undo",
         "Remove accelerometer bias",
         "Edit accelerometer bias x",
-        "fixed: fix accelerometer bias x at this value",
     ):
         button = page.get_by_label(words, exact=True)
         button.hover()

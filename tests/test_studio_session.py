@@ -201,6 +201,18 @@ def test_a_value_is_held_apart_where_the_log_gave_another_one(session):
         assert session.held_apart() is apart
 
 
+def test_the_values_of_an_effect_stand_while_a_pass_is_under_way(session):
+    session.add("acc.bias")
+    before = session.fit().numbers.parameters
+    session.hold("acc.bias", "y", 0.0625)
+    assert session.numbers() is None
+    x, y, z = session.latest_parameters(session.stack.entry("acc.bias"))
+    assert (x, z) == (before[0], before[2])
+    assert (y.value, y.fixed) == (0.0625, True)
+    session.fit()
+    assert session.latest_parameters(session.stack.entry("acc.bias")) == session.numbers().parameters
+
+
 def test_a_value_far_above_those_of_such_sensors_is_doubted():
     parameter = Parameter("gyr.scale", "x", 0.02, 0.001, "1", 0.02)
     assert unusual(parameter, 2.0) == unusual(parameter, -19.0) == unusual(parameter, None) == ""

@@ -92,7 +92,8 @@ def _figure(traces: list[dict[str, Any]], x: str, y: str, **more: Any) -> Figure
         "showlegend": True,
         **more,
     }
-    return {"data": traces, "layout": layout, "config": {"displaylogo": False, "responsive": True}}
+    # The page says how to zoom: Plotly's own hint would lie over what stands beside the figure.
+    return {"data": traces, "layout": layout, "config": {"displaylogo": False, "responsive": True, "showTips": False}}
 
 
 def empty(sentence: str) -> Figure:
@@ -204,7 +205,7 @@ def _logarithmic(lines: Sequence[Figure]) -> Figure:
     decades = math.log10(max(seen) / min(seen)) if seen else 0.0
     if decades >= DECADES / 2:
         # Plotly writes out what is short, and the power of the others.
-        return {"type": "log", "dtick": 1}
+        return {"type": "log", "dtick": math.ceil(decades / DECADES)}
     # In a window shorter than two of the steps 1, 2, 5, Plotly's even steps name more than one number.
     return {"type": "log", "tickformat": "~g", **({} if decades < TWO_STEPS else {"dtick": "D2"})}
 

@@ -76,7 +76,7 @@ def one_of_two(states: tuple[str, str], present: str, words: str, action: Callab
             if state == present:
                 ui.label(state).classes("studio-present").props("aria-current=true")
             else:
-                button = ui.button(state, on_click=action).props("flat dense size=12px").classes("studio-bare")
+                button = ui.button(state, on_click=action).props("flat dense size=12px")
                 button.props(attribute("aria-label", f"{state}: {words}"))
     return both
 

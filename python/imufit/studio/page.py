@@ -41,19 +41,21 @@ def page_of(desk: Desk) -> Callable[[], None]:
         with ui.element("main").classes("studio") as main:
             with _region("top"):
                 top = Top(desk)
-            with _region("middle") as middle:
-                panels = PanelView(desk)
-                noise = NoiseView(desk)
-                body = BodyView(desk)
+            with ui.element("div").classes("studio-figures"):
+                with _region("two") as beside:
+                    two = TwoView(desk)
+                with _region("middle") as middle:
+                    panels = PanelView(desk)
+                    noise = NoiseView(desk)
+                    body = BodyView(desk)
             with _region("right") as right:
                 candidates = CandidateView(desk, panels)
             with _region("fall") as steps:
                 fall = FallView(desk)
             with _region("left") as left:
                 model = ModelView(desk)
+                fall.lay_names()
                 vocabulary = WordsView(desk)
-            with _region("two") as beside:
-                two = TwoView(desk)
 
         def numbers() -> None:
             middle.visible = desk.session is not None
@@ -64,9 +66,6 @@ def page_of(desk: Desk) -> Callable[[], None]:
             for view in (head, model, fall, two):
                 view.refresh()
             beside.visible = two.kept
-            # Nothing is to be compared while both are the same: a line stands in the place of the table.
-            for name, on in (("studio-kept", two.differs), ("studio-same", two.kept and not two.differs)):
-                main.classes(**({"add": name} if on else {"remove": name}))
 
         def pictures() -> None:
             for view in (top, candidates, panels, vocabulary):

@@ -10,7 +10,7 @@ import math
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final
 
@@ -30,7 +30,7 @@ from imufit.results import Comparison, Diagnosis, Parameter
 from imufit.results.comparison import Panel
 from imufit.results.parameter import FAR
 from imufit.studio.names import estimating
-from imufit.studio.stack import Action, Stack, Step
+from imufit.studio.stack import Action, Entry, Stack, Step
 from imufit.studio.traces import ModelTraces, Traces
 
 Array = NDArray[np.float64]
@@ -362,6 +362,32 @@ class Session:
                 if (item.effect, item.name, item.fixed) == (effect, name, False):
                     return abs(item.value - value) <= FAR * item.standard_error
         return False
+
+    def latest_parameters(self, entry: Entry) -> tuple[Parameter, ...]:
+        """Return the parameters of an effect of the present stack, at once.
+
+        Parameters
+        ----------
+        entry : Entry
+            The effect.
+
+        Returns
+        -------
+        tuple of Parameter
+            Those of `numbers`. Where these take a pass, they are those of the last model that has them, with the values
+            that are fixed now; empty where none has them.
+        """
+        for step in self.steps[self.position :: -1]:
+            numbers = self.numbers(step.stack)
+            own = () if numbers is None else tuple(item for item in numbers.parameters if item.effect == entry.effect)
+            if own and step.stack.model == self.stack.model:
+                return own
+            if own:
+                held = dict(entry.held)
+                return tuple(
+                    replace(item, value=held.get(item.name, item.value), fixed=item.name in held) for item in own
+                )
+        return ()
 
     def panels_at_once(self) -> list[Panel]:
         """Return the residuals of the present stack to first order, without a pass; empty where a pass is needed."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from nicegui import ui
@@ -63,12 +64,13 @@ class ModelView:
                 ui.label(words).classes("studio-muted")
                 return
             ui.label(_state(session, numbers)).classes("studio-muted").props("data-mark=model-state")
+            for entry in session.stack.entries:
+                self._entry(entry, session.latest_parameters(entry), fitted=numbers is not None and numbers.fitted)
+            # Under the values: its coming and going moves none of them beneath the pointer.
             if session.held_apart():
                 ui.label(LEAVES).classes("studio-muted").props("data-mark=holds")
-            for entry in session.stack.entries:
-                self._entry(entry, numbers)
 
-    def _entry(self, entry: Entry, numbers: Numbers | None) -> None:
+    def _entry(self, entry: Entry, parameters: Sequence[Parameter], *, fitted: bool) -> None:
         desk = self._desk
         name = effect_name(entry.effect)
         with ui.element("div").classes("studio-item" + ("" if entry.on else " studio-off")):
@@ -86,14 +88,12 @@ class ModelView:
                 ).props("size=sm")
             if not entry.on:
                 return
-            if numbers is None:
+            if not parameters:
                 ui.label("This effect takes a pass over the log.").classes("studio-muted")
-                return
-            for parameter in numbers.parameters:
-                if parameter.effect == entry.effect:
-                    self._parameter(parameter, numbers.fitted)
+            for parameter in parameters:
+                self._parameter(parameter, fitted=fitted)
 
-    def _parameter(self, parameter: Parameter, fitted: bool) -> None:
+    def _parameter(self, parameter: Parameter, *, fitted: bool) -> None:
         desk = self._desk
         name = parameter_name(parameter.effect, parameter.name)
         with ui.element("div").classes("studio-parameter"):
@@ -102,7 +102,7 @@ class ModelView:
             shown = f"{parameter.digits.value} {parameter.digits.unit}" if parameter.fixed else parameter.shown
             value = ui.label(shown).props(attribute("data-mark", f"value-{parameter.key}"))
             if not fitted:
-                value.classes("studio-muted").tooltip("to first order, from the evidence")
+                value.classes("studio-muted").tooltip("not estimated yet")
             elif parameter.typical is not None:
                 value.tooltip(f"typical size {quantity.quantity(parameter.typical, parameter.unit)}")
             bare("edit", f"Edit {name}", lambda: self._edit(parameter)).props("size=sm").props(
@@ -110,9 +110,9 @@ class ModelView:
             )
             present = FIXED if parameter.fixed else ESTIMATED
             words = f"estimate {name} again" if parameter.fixed else f"fix {name} at this value"
-            one_of_two(
-                (ESTIMATED, FIXED), present, words, lambda: desk.attempt(lambda: _pin(desk, parameter))
-            ).props(attribute("data-mark", f"pin-{parameter.key}"))
+            one_of_two((ESTIMATED, FIXED), present, words, lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
+                attribute("data-mark", f"pin-{parameter.key}")
+            )
         if parameter.key in self._wrong:
             self._contradiction(parameter)
 
@@ -199,7 +199,7 @@ def _state(session: Session, numbers: Numbers | None) -> str:
     if not session.stack.entries:
         return "The ideal sensor: no effect yet."
     if numbers is None:
-        return "A pass over the log is under way."
+        return "Values so far: a pass is under way."
     if not numbers.fitted:
-        return "Values to first order, from the evidence. The estimate is under way."
+        return "To first order: the estimate is under way."
     return "Estimated values ± standard errors."

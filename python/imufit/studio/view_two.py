@@ -12,6 +12,7 @@ from imufit.results.model_comparison import DECISIVE, preferred
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
 from imufit.studio.names import channel_name, parameter_name, with_symbol
+from imufit.studio.reserved import FRAME, Reserved
 from imufit.studio.session import Made
 
 MOST_ODDS: Final = 1e6
@@ -43,7 +44,9 @@ class TwoView:
         self.kept = self.differs = False
         self._shown: tuple[object, ...] = ()
         self._heading = ui.html("Two models", tag="h2", sanitize=False)
-        self._two = ui.column().classes("w-full gap-1").props("data-mark=two")
+        with ui.element("div").classes(FRAME):
+            self._two = ui.column().classes("w-full gap-1").props("data-mark=two")
+        self._room = Reserved(self._two)
 
     def refresh(self) -> None:
         """Lay out the kept model and the present one beside each other, where one is kept."""
@@ -63,6 +66,7 @@ class TwoView:
         if state == self._shown:
             return
         self._shown = state
+        self._room.about(f"{id(session)}-{self.differs}")
         self._two.clear()
         with self._two:
             if not self.differs:
