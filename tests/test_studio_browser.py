@@ -242,6 +242,16 @@ def open_the_noise(page, folder):
     assert drawn["y"] == pytest.approx(quantity.shown_unit(channel.unit)[0] * channel.deviation)
 
 
+def test_two_tabs_say_that_they_show_one_session(chromium, page, address):
+    assert not marked(page, "tabs").is_visible()
+    other = chromium.new_page()
+    other.goto(address)
+    for tab in (page, other):
+        tab.get_by_text("This studio is open in two tabs. Both show the same session.").wait_for()
+    other.close()
+    marked(page, "tabs").wait_for(state="hidden")
+
+
 def test_the_fall_stands_in_sight_beside_the_candidates(page, folder):
     drop(page, folder / "walk.parquet")
     wait_for_bars(page, 1)
@@ -449,6 +459,54 @@ def test_what_lies_under_the_sentence_stays_in_its_place(page, folder):
         wait_for_bars(page, count)
         places.append(page.evaluate("document.querySelector('.studio-middle').offsetTop"))
     assert len(set(places[1:])) == 1
+
+
+def test_a_switch_stays_beneath_the_pointer_while_two_models_are_compared(page, folder):
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    marked(page, "add-gyr.scale").click()
+    wait_for_bars(page, 2)
+    marked(page, "second").click()
+    marked(page, "two").get_by_text("The kept model is the present one.").wait_for()
+    place = marked(page, "pin-gyr.scale.z").bounding_box()
+    for count, axis in enumerate("xy", 3):
+        marked(page, f"pin-gyr.scale.{axis}").get_by_text("fixed").click()
+        wait_for_bars(page, count)
+        assert marked(page, "pin-gyr.scale.z").bounding_box() == place
+    # A value that is fixed where the log has it leaves no residual.
+    assert marked(page, "holds").count() == 0
+    # A dialog leaves the figures in their place, those that stay in sight while the page scrolls, too.
+    page.evaluate("window.scrollTo({top: 400, behavior: 'instant'})")
+    top = marked(page, "panel").bounding_box()
+    marked(page, "edit-gyr.scale.z").click()
+    marked(page, "edit-take").wait_for()
+    assert marked(page, "panel").bounding_box() == top
+
+
+def test_room_on_top_is_given_back_under_the_pointer(page, folder):
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    height = "document.querySelector('.studio-top').offsetHeight"
+    before = page.evaluate(height)
+    notes = marked(page, "notes").get_by_role("button").first
+    if marked(page, "notes").count() == 0:
+        pytest.skip("the log has no notes")
+    for _ in range(2):
+        notes.click()
+        page.wait_for_timeout(600)
+    assert page.evaluate(height) == before
+
+
+@pytest.mark.parametrize("width", [900, 1000])
+def test_candidates_and_their_figure_are_in_sight_together(page, folder, width):
+    page.set_viewport_size({"width": width, "height": 800})
+    drop(page, folder / "walk.parquet")
+    wait_for_bars(page, 1)
+    page.locator('[data-mark^="candidate-"]').first.scroll_into_view_if_needed()
+    figure_box, row = (item.bounding_box() for item in (marked(page, "panel"), marked(page, "candidate-acc.bias")))
+    assert figure_box["y"] >= 0.0
+    assert figure_box["y"] + figure_box["height"] <= 800
+    assert row["x"] + row["width"] < figure_box["x"]
 
 
 def test_the_page_has_one_scroll_and_names_its_steps(page, folder):

@@ -10,6 +10,7 @@ from typing import Final
 from nicegui import ui
 
 from imufit.studio.desk import Desk
+from imufit.studio.tabs import Tabs
 from imufit.studio.view_body import BodyView
 from imufit.studio.view_candidates import CandidateView
 from imufit.studio.view_fall import FallView
@@ -24,20 +25,24 @@ AHEAD_S: Final = 0.02
 """Time that the server has for sending the numbers of a change, s."""
 
 
-def page_of(desk: Desk) -> Callable[[], None]:
+def page_of(desk: Desk, sign: Callable[[], None]) -> Callable[[], None]:
     """Return what builds the page of a desk for one browser.
 
     Parameters
     ----------
     desk : Desk
         The state that all pages share.
+    sign : callable
+        Lays the sign of what runs on another page.
     """
+    tabs = Tabs()
     style = files("imufit.studio").joinpath("studio.css").read_text(encoding="utf-8")
 
     def build() -> None:
         ui.add_css(style)
         takes_drops(desk)
-        head = Head(desk)
+        head = Head(desk, sign)
+        tabs.lay_notice()
         with ui.element("main").classes("studio") as main:
             with _region("top"):
                 top = Top(desk)

@@ -74,13 +74,16 @@ class Head:
     ----------
     desk : Desk
         The state that they change.
+    sign : callable
+        Lays the sign of what runs on another page.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, sign: Callable[[], None]) -> None:
         self._desk = desk
         with ui.element("header").classes("studio-head"):
             ui.label("imufit").classes("studio-title")
             self._logs = ui.label("").classes("studio-log").props("data-mark=logs")
+            sign()
             with_words("folder_open", "Open a log", lambda: _upload(desk)).props("data-mark=open")
             self._save = with_words("save", "Save the session", lambda: download_session(desk)).props("data-mark=save")
             with with_words("content_copy", "Copy the model", None).props("data-mark=copy") as self._copy, ui.menu():
