@@ -929,6 +929,8 @@ def a_swipe_scrolls_and_buttons_zoom(context, page):
     page.wait_for_function("place => Math.abs(scrollY - place) > 50", arg=place)
     assert page.evaluate(spans) == before
     assert not marked(page, "zoom-mouse").is_visible()
+    assert page.get_by_text("Tap an effect").is_visible()
+    assert not page.get_by_text("Point at an effect").is_visible()
     marked(page, "zoom-finger").get_by_label("Zoom in").tap()
     middle, half = 0.5 * sum(before), 0.25 * (before[1] - before[0])
     page.wait_for_function(

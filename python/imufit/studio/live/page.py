@@ -6,7 +6,7 @@ import json
 from collections.abc import Awaitable, Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from nicegui import ui
@@ -26,6 +26,9 @@ from imufit.studio.live.device import device
 from imufit.studio.live.guided import held_side, how_to_lay
 from imufit.studio.live.listening import Listening, Recorded, Source, free_name, shown_state
 from imufit.studio.live.panels import groups, panel
+
+if TYPE_CHECKING:
+    from serial.tools.list_ports_common import ListPortInfo
 
 Array = NDArray[np.float64]
 
@@ -52,6 +55,8 @@ CONNECTING: Final = (
     "per second.",
 )
 """Steps from the sensor to its readings, as the README of the firmware has them."""
+NOTHING_THERE: Final = "This computer knows of nothing on this port."
+"""Caption of a port that stands last in the list."""
 RECORDS: Final = "The red button records what comes from now on."
 FIRST_CONNECT: Final = "Connect a device first."
 GUIDES: Final = "Six sides on a table, then free rotation."
@@ -88,11 +93,16 @@ def page_with(opener: Opener) -> Callable[[], None]:
     return build
 
 
-def devices() -> list[str]:
-    """Return the serial ports with something on them, the devices that can be emulated, and the other ports."""
+def _ports() -> list[ListPortInfo]:
+    """Return the serial ports by name."""
     from serial.tools import list_ports  # noqa: PLC0415 - only this page needs it
 
-    ports = sorted(list_ports.comports(), key=lambda port: port.device)
+    return sorted(list_ports.comports(), key=lambda port: port.device)
+
+
+def devices() -> list[str]:
+    """Return the serial ports with something on them, the devices that can be emulated, and the other ports."""
+    ports = _ports()
     used = [port.device for port in ports if port.hwid != "n/a"]
     emulated = (EMULATED + name for name in (FIRST, *SCENARIOS))
     return list(dict.fromkeys([*used, *emulated, *(port.device for port in ports)]))
@@ -117,8 +127,10 @@ def about(choice: str) -> str:
 
 
 def _captions() -> dict[str, str]:
-    """Return the motion of each device that can be emulated, by its entry in the list."""
-    return {EMULATED + name: scenario.description for name, scenario in SCENARIOS.items()}
+    """Return the motion of each device that can be emulated, and which ports are empty, by their entries in the list."""
+    emulated = {EMULATED + name: scenario.description for name, scenario in SCENARIOS.items()}
+    # No caption is a device's own text: the list's template would run what this text holds.
+    return {port.device: NOTHING_THERE for port in _ports() if port.hwid == "n/a"} | emulated
 
 
 def _lies(moving: bool, side: str | None) -> str:
