@@ -1,4 +1,4 @@
-"""Tabs of the studio: a person is told of more than one."""
+"""Tabs of the studio: each one says so where there are more."""
 
 import pytest
 from imufit.studio.tabs import notice_of

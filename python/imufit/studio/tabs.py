@@ -1,4 +1,4 @@
-"""Tabs of the browser that show the one session: a person is told of more than one."""
+"""Tabs of the browser that show the one session: each one says so where there are more."""
 
 from __future__ import annotations
 

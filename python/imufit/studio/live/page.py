@@ -127,7 +127,7 @@ def about(choice: str) -> str:
 
 
 def _captions() -> dict[str, str]:
-    """Return the motion of each device that can be emulated, and which ports are empty, by their entries in the list."""
+    """Return the motion of each device that can be emulated, and which ports are empty, by entry of the list."""
     emulated = {EMULATED + name: scenario.description for name, scenario in SCENARIOS.items()}
     # No caption is a device's own text: the list's template would run what this text holds.
     return {port.device: NOTHING_THERE for port in _ports() if port.hwid == "n/a"} | emulated
