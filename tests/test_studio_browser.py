@@ -484,13 +484,11 @@ def test_a_switch_stays_beneath_the_pointer_while_two_models_are_compared(page, 
 
 
 def test_room_on_top_is_given_back_under_the_pointer(page, folder):
-    drop(page, folder / "walk.parquet")
+    drop(page, folder / "late.parquet")
     wait_for_bars(page, 1)
     height = "document.querySelector('.studio-top').offsetHeight"
     before = page.evaluate(height)
     notes = marked(page, "notes").get_by_role("button").first
-    if marked(page, "notes").count() == 0:
-        pytest.skip("the log has no notes")
     for _ in range(2):
         notes.click()
         page.wait_for_timeout(600)
@@ -953,7 +951,7 @@ def test_a_finger_finds_everything_that_is_tapped(chromium, address, folder):
     idle(page)
     assert page.evaluate(TARGETS) == []
     # The icons of the head stand in one row.
-    places = page.locator(".studio-head button").evaluate_all("(all) => all.map((item) => item.offsetTop)")
+    places = page.locator(".studio-head button:visible").evaluate_all("(all) => all.map((item) => item.offsetTop)")
     assert len(places) > 3
     assert len(set(places)) == 1
     a_swipe_scrolls_and_buttons_zoom(context, page)

@@ -77,7 +77,7 @@ def the_guide_shows_the_side(page):
     page.get_by_test_id("how").wait_for(timeout=PATIENCE)
     wait_until(page, lambda: page.locator(".studio-body canvas").count() == 2)
     # Guided, a person sees the picture without scrolling, and which arrow is to point where.
-    picture = page.locator(".studio-body canvas").last.bounding_box()
+    picture = page.locator(".studio-body canvas").first.bounding_box()
     assert picture["y"] + picture["height"] <= 900
     how = page.get_by_test_id("how").inner_text()
     assert re.search(r"[+-][xyz] is up when the [xyz] arrow points (up|down)", how)

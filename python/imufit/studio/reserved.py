@@ -21,7 +21,7 @@ SCRIPT: Final = f"""
     if (content.dataset.about !== about || content.offsetWidth !== width || frame.matches(':hover')) tallest = 0;
     about = content.dataset.about;
     width = content.offsetWidth;
-    tallest = Math.max(tallest, content.scrollHeight);
+    tallest = Math.max(tallest, content.getBoundingClientRect().height);
     frame.style.setProperty('--{TALLEST}', tallest + 'px');
   }};
   new ResizeObserver(keep).observe(content);

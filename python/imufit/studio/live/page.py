@@ -201,7 +201,7 @@ class _LivePage:
                 self._baud = ui.number("bits per second", value=115200, min=300, format="%d").style("width: 8rem")
                 self._connect = ui.button("Connect", on_click=self._connect_or_not).props("unelevated")
             self._about = ui.label().classes("text-sm").props('data-testid="about"')
-            with ui.expansion("How to connect an MPU6050").props("dense data-testid=how-to").classes("w-full text-sm"):
+            with ui.expansion("How to connect an MPU6050").props("dense").classes("w-full text-sm"):
                 for words in CONNECTING:
                     ui.label(words)
             with ui.expansion("Text without a header").props("dense").classes("w-full text-sm") as self._plain:
