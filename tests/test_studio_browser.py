@@ -911,7 +911,7 @@ TARGETS = """() => [...document.querySelectorAll(
 
 
 def a_swipe_scrolls_and_buttons_zoom(context, page):
-    """A finger that moves over the trace scrolls the page and leaves the window as it is."""
+    """A finger that moves down over the trace, the last figure, scrolls the page up and leaves the window as it is."""
     spans = "() => document.querySelector('[data-mark=trace]')._fullLayout.xaxis.range.map(Number)"
     marked(page, "trace").scroll_into_view_if_needed()
     page.wait_for_timeout(800)  # the page may still be on its way to the bars
@@ -921,7 +921,7 @@ def a_swipe_scrolls_and_buttons_zoom(context, page):
     x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.4 * box["height"]
     finger.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
     for k in range(11):
-        finger.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [{"x": x, "y": y - 20 * k}]})
+        finger.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [{"x": x, "y": y + 12 * k}]})
         page.wait_for_timeout(30)
     finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     page.wait_for_function("place => Math.abs(scrollY - place) > 50", arg=place)
