@@ -1,5 +1,6 @@
 """A device followed for the studio: rolling rows, rests, recordings of a running stream, the guide."""
 
+import asyncio
 import time
 
 import numpy as np
@@ -10,6 +11,7 @@ from imufit.devices.record import LiveRows, Recorder, recover
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
 from imufit.log import read
+from imufit.studio.live.device import Device
 from imufit.studio.live.guided import held_side, how_to_lay
 from imufit.studio.live.listening import Listening, Source, free_name, in_sentences, shown_state
 from imufit.studio.live.panels import groups, panel
@@ -213,6 +215,25 @@ def test_a_side_is_ticked_from_the_end_of_its_hold_until_the_device_rests_on_ano
     for side, progress, moving, expected in seen:
         held = held_side(held, side, progress, moving=moving)
         assert held == expected
+
+
+def test_a_device_is_seen_from_other_pages_and_ended_there(tmp_path):
+    async def follow() -> None:
+        device = Device()
+        assert device.state == ""
+        await device.connect(Source(scenario="six_sides", speed=20.0))
+        assert device.state == "Live: listening"
+        device.listening.record(tmp_path / "walk.parquet")
+        assert device.state == "Live: recording"
+        until(lambda: device.recorded.rows > 0)
+        # The recording ends first, and the device stays.
+        await device.end()
+        until(lambda: not device.recorded.running)
+        assert device.state == "Live: listening"
+        await device.end()
+        assert device.state == ""
+
+    asyncio.run(follow())
 
 
 @pytest.mark.parametrize(("side", "words"), [("+x", "x arrow points up"), ("-z", "z arrow points down")])

@@ -77,15 +77,26 @@ def the_guide_shows_the_side(page):
     page.get_by_test_id("how").wait_for(timeout=PATIENCE)
     wait_until(page, lambda: page.locator(".studio-body canvas").count() == 2)
     # Guided, a person sees the picture without scrolling, and which arrow is to point where.
-    picture = page.locator(".studio-body canvas").last.bounding_box()
+    picture = page.locator(".studio-body canvas").first.bounding_box()
     assert picture["y"] + picture["height"] <= 900
     how = page.get_by_test_id("how").inner_text()
-    assert re.search(r"Turn the sensor so that the [xyz] arrow points (up|down)", how)
+    assert re.search(r"[+-][xyz] is up when the [xyz] arrow points (up|down)", how)
     # The bar follows the device at once.
     assert (
         page.locator(".q-linear-progress__model").first.evaluate("bar => getComputedStyle(bar).transitionDuration")
         == "0s"
     )
+
+
+def the_guide_begins_and_ends_in_its_place(page):
+    """Neither its begin nor its end moves its button beneath the pointer."""
+    start = page.get_by_role("button", name="Calibrate")
+    place = start.bounding_box()
+    start.click()
+    the_guide_shows_the_side(page)
+    page.get_by_role("button", name="Stop", exact=True).click()
+    wait_until(page, lambda: page.locator(".studio-body canvas").count() == 1)
+    assert (start.bounding_box()["x"], start.bounding_box()["y"]) == (place["x"], place["y"])
 
 
 def test_unusable_port_and_hostile_names_are_text(served):
@@ -162,16 +173,15 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     assert len(set(edges)) == 1
 
     # the guide names a side and draws it; stopping keeps the rows
-    page.get_by_role("button", name="Calibrate").click()
-    the_guide_shows_the_side(page)
-    page.get_by_role("button", name="Stop", exact=True).click()
-    wait_until(page, lambda: page.locator(".studio-body canvas").count() == 1)
+    the_guide_begins_and_ends_in_its_place(page)
     wait_until(page, (folder / "calibration-1.parquet").exists)
 
     # the recording opens in the studio, and the device stays connected
     page.get_by_test_id("look").click()
     page.wait_for_function("() => document.querySelector('[data-mark=logs]')?.textContent === 'calibration-1.parquet'")
     wait_until(page, lambda: max(page.evaluate(DRAWN), default=0) > 50)
+    # The studio shows that the device is followed.
+    assert page.locator("[data-mark=live-sign]").inner_text().split("\n")[0] == "Live: listening"
     page.goto(f"{address}live")
     part_from_the_device(page)
 
@@ -179,6 +189,7 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     page.reload()
     page.get_by_test_id("look").click()
     page.wait_for_function("() => document.querySelector('[data-mark=logs]')?.textContent === 'calibration-1.parquet'")
+    page.locator("[data-mark=live-sign]").wait_for(state="hidden")
     assert asked == []
     assert wrong == []
     page.close()

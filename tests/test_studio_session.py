@@ -15,12 +15,14 @@ from cli_stand_in import strict_json
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
 from imufit.log import Reading
+from imufit.results import Parameter
 from imufit.studio.log_file import LogFile, Way, arrived, offers, option_words, remedies
 from imufit.studio.mystery import Mystery
 from imufit.studio.recipe import as_python, as_shell
 from imufit.studio.session import Session, worst_channel
 from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
 from imufit.studio.stack import Action, Stack
+from imufit.studio.view_model import unusual
 
 EFFECTS = {"acc.bias": None, "gyr.scale": None}
 
@@ -173,6 +175,7 @@ def test_a_fixed_value_stays_and_is_fitted_again(session):
     held = session.fit().numbers
     x = held.parameters[0]
     assert (x.value, x.fixed, x.standard_error) == (0.5, True, 0.0)
+    assert x.shown == "0.5 m/s² (fixed)"
     assert held.ratio > 2.0 * fitted.ratio
     found = session.diagnose()
     assert found.sentence.startswith("acc.bias.x is fixed at 0.500 m/s², but the data give ")
@@ -182,8 +185,40 @@ def test_a_fixed_value_stays_and_is_fitted_again(session):
     session.free("acc.bias", "x")
     assert session.step.label == "accelerometer bias x estimated"
     assert session.fit().numbers == fitted
+    session.hold("acc.bias", "x", fitted.parameters[0].value)
+    assert session.fit().numbers.parameters[0].shown == f"{fitted.parameters[0].value:.6g} m/s² (fixed)"
     with pytest.raises(InputError, match="has no parameter q"):
         session.hold("acc.bias", "q", 0.5)
+
+
+def test_a_value_is_held_apart_where_the_log_gave_another_one(session):
+    session.add("acc.bias")
+    x = session.fit().numbers.parameters[0]
+    assert not session.held_apart()
+    for value, apart in ((x.value, False), (x.value + 2.0 * x.standard_error, False), (0.5, True)):
+        session.hold("acc.bias", "x", value)
+        session.fit()
+        assert session.held_apart() is apart
+
+
+def test_the_values_of_an_effect_stand_while_a_pass_is_under_way(session):
+    session.add("acc.bias")
+    before = session.fit().numbers.parameters
+    session.hold("acc.bias", "y", 0.0625)
+    assert session.numbers() is None
+    x, y, z = session.latest_parameters(session.stack.entry("acc.bias"))
+    assert (x, z) == (before[0], before[2])
+    assert (y.value, y.fixed) == (0.0625, True)
+    session.fit()
+    assert session.latest_parameters(session.stack.entry("acc.bias")) == session.numbers().parameters
+
+
+def test_a_value_far_above_those_of_such_sensors_is_doubted():
+    parameter = Parameter("gyr.scale", "x", 0.02, 0.001, "1", 0.02)
+    assert unusual(parameter, 2.0) == unusual(parameter, -19.0) == unusual(parameter, None) == ""
+    assert unusual(parameter, -1e9) == (
+        "This is more than 10 times the typical size, 2.00 %. Check the number and its unit."
+    )
 
 
 def test_an_effect_is_refused_with_the_reason(session):

@@ -27,4 +27,5 @@ def test_evidence_is_given_as_odds_with_the_odds_that_a_preference_needs():
         "The log prefers the kept model: the odds are 3 000 to 1 for the kept one (ln Bayes factor 8.0)."
     )
     assert "more than 1 000 000 to 1" in evidence(2000.0)
+    assert "(ln Bayes factor 1.4×10¹⁸)" in evidence(1.430960927139741184e18)
     assert "the odds are 1.6 to 1" in evidence(0.5)

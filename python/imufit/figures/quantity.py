@@ -11,6 +11,7 @@ _GRAVITY = 9.80665
 _PARTS = re.compile(r"(?P<head>\([^()]*\)|rad/s\^2|rad/s|m/s\^2|[^/ ()]+)(?:(?P<over>/| per )(?P<tail>.+))?")
 _SHORT = {"s": ((1e-4, 1e6, "µs"), (0.1, 1e3, "ms")), "m": ((0.1, 1e3, "mm"),)}
 """Times and lengths below so many s or m are shown in a smaller unit: no zero stands before the first digit."""
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _SPELLING = (("^2", "²"), ("^3", "³"), ("degC", "°C"), ("uT", "µT"), ("sqrt(Hz)", "√Hz"), ("sqrt(s)", "√s"))
 
 
@@ -102,12 +103,18 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:.{digits - 1}e}"
 
 
+def large(value: float) -> str:
+    """Return a large number in two digits with a power of ten, e.g. ``9.3×10⁸``."""
+    digits, _, power = f"{value:.1e}".partition("e")
+    return f"{digits}×10{str(int(power)).translate(_RAISED)}"
+
+
 def ratio(value: float | None) -> str:
-    """Residual over noise floor, e.g. ``1.04``, ``23.1`` or ``1240``."""
+    """Residual over noise floor, e.g. ``1.04``, ``23.1``, ``1240`` or ``9.3×10⁸``."""
     if value is None or not math.isfinite(value):
         return "-"
     if abs(value) >= 1e5:
-        return f"{value:.2e}"
+        return large(value)
     return f"{value:.2f}" if abs(value) < 10.0 else f"{value:.1f}" if abs(value) < 100.0 else f"{value:.0f}"
 
 
@@ -282,6 +289,20 @@ def mean(value: float | None, unit: str, standard_error: float) -> str:
     factor, shown = shown_unit(unit, standard_error)
     places = max(0, -math.floor(math.log10(factor * standard_error))) if standard_error > 0.0 else 0
     return f"{0.0:.{places}f} {shown}"
+
+
+def chosen(value: float, unit: str) -> Digits:
+    """Return a value that a person has chosen, in the shown unit: in six digits, without zeros at the end.
+
+    Parameters
+    ----------
+    value : float
+        In `unit`.
+    unit : str
+        SI unit.
+    """
+    factor, shown = shown_unit(unit, value)
+    return Digits(f"{factor * value:.6g}", "", factor, shown)
 
 
 def quantity(value: float | None, unit: str) -> str:

@@ -98,14 +98,16 @@ class Parameter(Plotted, Part):
     def shown(self) -> str:
         """Value and standard error in the shown unit."""
         if self.fixed:
-            return f"{quantity.quantity(self.value, self.unit)} (fixed)"
+            return f"{self.digits.value} {self.digits.unit} (fixed)"
         if self.at_bound is not None:
             return f"{quantity.quantity(self.value, self.unit)} (at its {self.at_bound})"
         return quantity.with_error(self.value, self.standard_error, self.unit) if self.told else "not determined"
 
     @property
     def digits(self) -> quantity.Digits:
-        """The value in the digits in which it is shown."""
+        """The value in the digits in which it is shown; a fixed one in those that a person chose."""
+        if self.fixed:
+            return quantity.chosen(self.value, self.unit)
         return quantity.digits_of(self.value, self.standard_error, self.unit)
 
     def to_dict(self) -> dict[str, Any]:

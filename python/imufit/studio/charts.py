@@ -47,10 +47,15 @@ SMALL: Final = 11
 """Size of the letters of an axis' title and of the figure of the falling error, px: the titles fit beside the plots."""
 SLOTS: Final = 6
 """Bars that have room in the fall of the error at least: as many steps as most logs take."""
+WRITTEN_OUT: Final = 1e5
+"""Number of an axis from which on its power stands in its place."""
+TWO_STEPS: Final = math.log10(5.0)
+"""Decades that hold two of the numbers 1, 2, 5, 10 at least: from 2 to 5 and from 5 to 10 is the longest way."""
 DECADES: Final = 6
 """Numbers that the logarithmic axis of the fall has room for."""
 ROOM: Final = 1.6
-"""Height of the fall's axis over its highest bar: mark and number of the present bar have 30 px of 80 px on a phone."""
+"""Length of the fall's axis over that of its highest bar: mark and number of the present bar have 30 px of 80 px on a
+phone, whether the axis is logarithmic or not."""
 UNDONE: Final = 0.35
 """Opacity of the bar of a step that was undone: far paler than the others, and still seen."""
 UNDER: Final = 22
@@ -87,7 +92,8 @@ def _figure(traces: list[dict[str, Any]], x: str, y: str, **more: Any) -> Figure
         "showlegend": True,
         **more,
     }
-    return {"data": traces, "layout": layout, "config": {"displaylogo": False, "responsive": True}}
+    # The page says how to zoom: Plotly's own hint would lie over what stands beside the figure.
+    return {"data": traces, "layout": layout, "config": {"displaylogo": False, "responsive": True, "showTips": False}}
 
 
 def empty(sentence: str) -> Figure:
@@ -147,8 +153,10 @@ def residual_panel(
     return _figure([trace for part in traces for trace in part], x_title, y_title, yaxis={"range": [-limit, limit]})
 
 
-def _line(x: Array, y: Array, colour: str, name: str, *, mode: str = "lines", dash: str = "solid") -> list[Figure]:
-    line = {"color": colour, "width": LINE, "dash": dash}
+def _line(
+    x: Array, y: Array, colour: str, name: str, *, mode: str = "lines", dash: str = "solid", width: float = LINE
+) -> list[Figure]:
+    line = {"color": colour, "width": width, "dash": dash}
     points = {"x": _numbers(x), "y": _numbers(y), "mode": mode, "name": name}
     shown = {"hovertemplate": HOVER}
     return [{"type": "scatter", **points, **shown, "line": line, "marker": {"color": colour, "size": 5}}]
@@ -195,9 +203,11 @@ def _logarithmic(lines: Sequence[Figure]) -> Figure:
     """Return a logarithmic axis whose numbers are written out and do not touch: at 1, 2 and 5, or at decades."""
     seen = [value for line in lines for value in line["y"] if value is not None and value > 0.0]
     decades = math.log10(max(seen) / min(seen)) if seen else 0.0
-    # Within a third of a decade Plotly's even steps name more than one number.
-    steps = {} if decades < 1 / 3 else {"dtick": "D2" if decades < DECADES / 2 else 1}
-    return {"type": "log", "tickformat": "~g", **steps}
+    if decades >= DECADES / 2:
+        # Plotly writes out what is short, and the power of the others.
+        return {"type": "log", "dtick": math.ceil(decades / DECADES)}
+    # In a window shorter than two of the steps 1, 2, 5, Plotly's even steps name more than one number.
+    return {"type": "log", "tickformat": "~g", **({} if decades < TWO_STEPS else {"dtick": "D2"})}
 
 
 def allan(sensor: str, channels: Sequence[ChannelLike]) -> Figure:
@@ -272,7 +282,7 @@ def fall(
             "width": 0.62,
             "marker": {"color": colours, "opacity": [1.0 if k <= position else UNDONE for k in places]},
             "hovertemplate": "%{customdata}<br>%{y:.3f} times the noise floor<extra></extra>",
-            "customdata": names,
+            "customdata": [*names],
             "showlegend": False,
         }
     ]
@@ -281,6 +291,12 @@ def fall(
         mark = {"symbol": "square", "size": 11, "color": BLUE, "opacity": UNDONE}
         bars.append({"type": "scatter", "mode": "markers", "name": "undone", "x": [None], "y": [None], "marker": mark})
     known = [(k, value) for k, value in enumerate(expected) if value is not None]
+    if best is not None:
+        # One mark for what is expected, of a step that was made and of the next one.
+        places.append(len(ratios))
+        known.append((len(ratios), best[1]))
+        names.append(words(best[0]))
+        texts.append(quantity.ratio(best[1]))
     if known:
         bars.append(
             {
@@ -290,45 +306,29 @@ def fall(
                 "x": [k for k, _ in known],
                 "y": [value for _, value in known],
                 "marker": {"symbol": "diamond-open", "size": 11, "color": ORANGE, "line": {"width": 2}},
-                "hovertemplate": "expected %{y:.3f}<extra></extra>",
-            }
-        )
-    if best is not None:
-        step, value = best
-        places.append(len(places))
-        bars.append(
-            {
-                "type": "bar",
-                "name": "expected next",
-                "x": places[-1:],
-                "y": [value],
-                "text": [quantity.ratio(value)],
-                "textposition": "outside",
-                "cliponaxis": False,
-                "width": 0.62,
-                "marker": {"color": "rgba(0,0,0,0)", "line": {"color": ORANGE, "width": 2}},
                 "hovertemplate": "%{customdata}<br>%{y:.3f} expected<extra></extra>",
-                "customdata": [words(step)],
-                "showlegend": True,
+                "customdata": [names[k] for k, _ in known],
             }
         )
-    tops = [
-        max(value, mark or 0.0) if math.isfinite(value) else 0.0 for value, mark in zip(ratios, expected, strict=True)
-    ]
+    marks = dict(known)
+    heights = [*ratios, *([] if best is None else [best[1]])]
+    tops = [max(value, marks.get(k, 0.0)) if math.isfinite(value) else 0.0 for k, value in enumerate(heights)]
     # The number stands over the bar and over its diamond.
-    above = {"x": places[: len(ratios)], "y": tops, "text": texts, "textposition": "top center", "showlegend": False}
+    above = {"x": places, "y": tops, "text": texts, "textposition": "top center", "showlegend": False}
     unseen = {"size": 13, "opacity": 0.0}
     above["cliponaxis"] = False
     bars.append({"type": "scatter", "mode": "markers+text", **above, "marker": unseen, "hoverinfo": "skip"})
-    heights = [value for value in [*ratios, *(value for _, value in known)] if math.isfinite(value) and value > 0.0]
-    heights += [] if best is None else [best[1]]
-    top, low = max([*heights, 1.0]), min([*heights, 1.0])
+    drawn = [value for value in [*ratios, *marks.values()] if math.isfinite(value) and value > 0.0]
+    top, low = max([*drawn, 1.0]), min([*drawn, 1.0])
     logarithmic = top / low > LOGARITHMIC_ABOVE
-    scale: dict[str, Any] = (
-        {"type": "log", "range": [math.log10(0.6 * low), math.log10(5.0 * top)], "tickvals": _decades(low, top)}
-        if logarithmic
-        else {"range": [0.0, ROOM * top]}
-    )
+    scale: dict[str, Any] = {"range": [0.0, ROOM * top]}
+    if logarithmic:
+        # The bars stand on the noise floor: one that reaches it has no height left.
+        begin, end = math.log10(low), math.log10(top)
+        ticks_at = _decades(low, top)
+        shown = [f"{value:g}" if value < WRITTEN_OUT else f"10<sup>{math.log10(value):.0f}</sup>" for value in ticks_at]
+        scale = {"type": "log", "range": [begin, begin + ROOM * (end - begin)]}
+        scale |= {"tickvals": ticks_at, "ticktext": shown}
     # A bar is never wider than a sixth of the figure, so that the next ones do not change its look.
     edge = [-0.6, max(len(places), SLOTS) - 0.4]
     floor = _line(np.array(edge), np.ones(2), GREY, "noise floor", dash="dash")
@@ -336,7 +336,8 @@ def fall(
     ticks = {"tickvals": places, "ticktext": under, "range": edge}
     ticks |= {"fixedrange": True, "tickangle": 0, "tickfont": {"size": SMALL}}
     figure = _figure([*bars, *floor], "", "error / noise floor", xaxis=ticks, yaxis={**scale, "fixedrange": True})
-    figure["layout"]["xaxis"]["showgrid"] = False
+    # Numbers stand over the bars: lines of a grid would cross them.
+    figure["layout"]["xaxis"]["showgrid"] = figure["layout"]["yaxis"]["showgrid"] = False
     figure["layout"]["bargap"] = 0.3
     figure["layout"]["height"] = FALL_HEIGHT
     figure["layout"]["margin"]["b"] = UNDER
@@ -352,8 +353,14 @@ def _decades(low: float, top: float) -> list[float]:
     return [10.0**power for power in range(first, last + 1, -(-(last - first) // DECADES))]
 
 
-LOOKS: Final = {"kept model": (GREEN, "dashdot"), "now": (BLUE, "solid"), "predicted": (BLUE, "dash")}
-"""Looks of the lines of a trace by name, the others grey: dashes let the line beneath be seen where two agree."""
+LOOKS: Final = {
+    "kept model": (GREEN, "dashdot", LINE),
+    "now": (BLUE, "solid", LINE),
+    "measured": (GREY, "solid", 2.0 * LINE),
+    "predicted": (BLUE, "dot", 0.6 * LINE),
+}
+"""Looks of the lines of a trace by name, the others grey: dashes let the line beneath be seen where two agree, and a
+prediction is a third as wide as the reading beneath."""
 
 
 def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:
@@ -371,6 +378,6 @@ def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *,
     factor, shown = quantity.shown_unit(unit)
     drawn: list[Figure] = []
     for name, t, values in lines:
-        colour, dash = LOOKS.get(name, (GREY, "solid"))
-        drawn += _line(t, factor * values, colour, name, dash=dash)
+        colour, dash, width = LOOKS.get(name, (GREY, "solid", LINE))
+        drawn += _line(t, factor * values, colour, name, dash=dash, width=width)
     return _figure(drawn, "time, s", f"{title} of {words(channel_name(channel))}, {shown}")

@@ -57,20 +57,28 @@ def bare(icon: str, words: str, action: Callable[[], object]) -> ui.button:
     return button.classes("studio-bare")
 
 
-def stated(state: str, words: str, action: Callable[[], object]) -> ui.button:
-    """Return a small button with the present state written on it, which changes the state.
+def one_of_two(states: tuple[str, str], present: str, words: str, action: Callable[[], object]) -> ui.element:
+    """Return two states side by side: the present one stands out, and the other one is a button.
 
     Parameters
     ----------
-    state : str
-        The state in one word.
+    states : (str, str)
+        Each state in one word.
+    present : str
+        The present one.
     words : str
-        The state, and what a press does; they may hold names from files.
+        What a press on the other one does; they may hold names from files.
     action : callable
-        The action.
+        Changes to the other one.
     """
-    button = ui.button(state, on_click=action).props("flat dense size=12px " + attribute("aria-label", words))
-    return button.classes("studio-bare studio-state")
+    with ui.element("div").classes("studio-two-states").props("role=group") as both:
+        for state in states:
+            if state == present:
+                ui.label(state).classes("studio-present").props("aria-current=true")
+            else:
+                button = ui.button(state, on_click=action).props("flat dense size=12px")
+                button.props(attribute("aria-label", f"{state}: {words}"))
+    return both
 
 
 def light_or_dark() -> ui.button:

@@ -10,6 +10,7 @@ from typing import Final
 from nicegui import ui
 
 from imufit.studio.desk import Desk
+from imufit.studio.tabs import Tabs
 from imufit.studio.view_body import BodyView
 from imufit.studio.view_candidates import CandidateView
 from imufit.studio.view_fall import FallView
@@ -24,36 +25,42 @@ AHEAD_S: Final = 0.02
 """Time that the server has for sending the numbers of a change, s."""
 
 
-def page_of(desk: Desk) -> Callable[[], None]:
+def page_of(desk: Desk, sign: Callable[[], None]) -> Callable[[], None]:
     """Return what builds the page of a desk for one browser.
 
     Parameters
     ----------
     desk : Desk
         The state that all pages share.
+    sign : callable
+        Lays the sign of what runs on another page.
     """
+    tabs = Tabs()
     style = files("imufit.studio").joinpath("studio.css").read_text(encoding="utf-8")
 
     def build() -> None:
         ui.add_css(style)
         takes_drops(desk)
-        head = Head(desk)
+        head = Head(desk, sign)
+        tabs.lay_notice()
         with ui.element("main").classes("studio") as main:
             with _region("top"):
                 top = Top(desk)
-            with _region("middle") as middle:
-                panels = PanelView(desk)
-                noise = NoiseView(desk)
-                body = BodyView(desk)
+            with ui.element("div").classes("studio-figures"):
+                with _region("two") as beside:
+                    two = TwoView(desk)
+                with _region("middle") as middle:
+                    panels = PanelView(desk)
+                    noise = NoiseView(desk)
+                    body = BodyView(desk)
             with _region("right") as right:
                 candidates = CandidateView(desk, panels)
             with _region("fall") as steps:
                 fall = FallView(desk)
             with _region("left") as left:
                 model = ModelView(desk)
+                fall.lay_names()
                 vocabulary = WordsView(desk)
-            with _region("two") as beside:
-                two = TwoView(desk)
 
         def numbers() -> None:
             middle.visible = desk.session is not None
@@ -64,9 +71,6 @@ def page_of(desk: Desk) -> Callable[[], None]:
             for view in (head, model, fall, two):
                 view.refresh()
             beside.visible = two.kept
-            # Nothing is to be compared while both are the same: a line stands in the place of the table.
-            for name, on in (("studio-kept", two.differs), ("studio-same", two.kept and not two.differs)):
-                main.classes(**({"add": name} if on else {"remove": name}))
 
         def pictures() -> None:
             for view in (top, candidates, panels, vocabulary):

@@ -8,18 +8,24 @@ from nicegui import ui
 
 TALLEST: Final = "studio-tallest"
 """Variable of the style sheet that holds the height, px; the sheet says on which screens the region keeps it."""
+FRAME: Final = "studio-kept-room"
+"""Class of the element that keeps the height."""
 SCRIPT: Final = f"""
 (() => {{
   const content = document.getElementById('CONTENT');
+  const frame = content.parentElement;
   let about = '', width = 0, tallest = 0;
-  new ResizeObserver(() => {{
-    // Other content, or the same in another width, needs another height.
-    if (content.dataset.about !== about || content.offsetWidth !== width) tallest = 0;
+  const keep = () => {{
+    // Other content, or the same in another width, needs another height. While the pointer is in the frame itself,
+    // no press can go astray below, and room that stands empty is given back.
+    if (content.dataset.about !== about || content.offsetWidth !== width || frame.matches(':hover')) tallest = 0;
     about = content.dataset.about;
     width = content.offsetWidth;
-    tallest = Math.max(tallest, content.scrollHeight);
-    content.parentElement.style.setProperty('--{TALLEST}', tallest + 'px');
-  }}).observe(content);
+    tallest = Math.max(tallest, content.getBoundingClientRect().height);
+    frame.style.setProperty('--{TALLEST}', tallest + 'px');
+  }};
+  new ResizeObserver(keep).observe(content);
+  frame.addEventListener('pointerenter', keep);
 }})();
 """
 
@@ -30,7 +36,7 @@ class Reserved:
     Parameters
     ----------
     column : ui.column
-        The column.
+        The column, alone in an element that `FRAME` names.
     """
 
     def __init__(self, column: ui.column) -> None:

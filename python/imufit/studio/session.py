@@ -10,7 +10,7 @@ import math
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final
 
@@ -28,8 +28,9 @@ from imufit.model.catalogue import each_log_has_its_own, find_effect
 from imufit.progress import Progress, silent
 from imufit.results import Comparison, Diagnosis, Parameter
 from imufit.results.comparison import Panel
+from imufit.results.parameter import FAR
 from imufit.studio.names import estimating
-from imufit.studio.stack import Action, Stack, Step
+from imufit.studio.stack import Action, Entry, Stack, Step
 from imufit.studio.traces import ModelTraces, Traces
 
 Array = NDArray[np.float64]
@@ -344,6 +345,49 @@ class Session:
                 return None
             self._quick[model] = self._first_order(model)
         return self._quick[model][0]
+
+    def held_apart(self) -> bool:
+        """Return whether a parameter of the present model stays at another value than the log gave before."""
+        return any(
+            not self._held_as_estimated(entry.effect, name, value)
+            for entry in self.stack.model.entries
+            for name, value in entry.held
+        )
+
+    def _held_as_estimated(self, effect: str, name: str, value: float) -> bool:
+        """Return whether a value is that of the last model in which it was estimated, within its standard error."""
+        for step in self.steps[self.position :: -1]:
+            made = self.made(step.stack)
+            for item in () if made is None else made.numbers.parameters:
+                if (item.effect, item.name, item.fixed) == (effect, name, False):
+                    return abs(item.value - value) <= FAR * item.standard_error
+        return False
+
+    def latest_parameters(self, entry: Entry) -> tuple[Parameter, ...]:
+        """Return the parameters of an effect of the present stack, at once.
+
+        Parameters
+        ----------
+        entry : Entry
+            The effect.
+
+        Returns
+        -------
+        tuple of Parameter
+            Those of `numbers`. Where these take a pass, they are those of the last model that has them, with the values
+            that are fixed now; empty where none has them.
+        """
+        for step in self.steps[self.position :: -1]:
+            numbers = self.numbers(step.stack)
+            own = () if numbers is None else tuple(item for item in numbers.parameters if item.effect == entry.effect)
+            if own and step.stack.model == self.stack.model:
+                return own
+            if own:
+                held = dict(entry.held)
+                return tuple(
+                    replace(item, value=held.get(item.name, item.value), fixed=item.name in held) for item in own
+                )
+        return ()
 
     def panels_at_once(self) -> list[Panel]:
         """Return the residuals of the present stack to first order, without a pass; empty where a pass is needed."""

@@ -11,6 +11,7 @@ from imufit.log import Reading
 from imufit.studio import server
 from imufit.studio.desk import SESSION_ENDING, Desk
 from imufit.studio.live import page as live
+from imufit.studio.live.device import sign
 from imufit.studio.log_file import LogFile
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION
 from imufit.studio.page import page_of
@@ -38,7 +39,7 @@ def start(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, read
         The port is taken.
     """
     desk = Desk()
-    server.add_page("/", page_of(desk))
+    server.add_page("/", page_of(desk, sign))
 
     async def look_at(path: Path) -> None:
         here = Path.cwd()

@@ -39,11 +39,9 @@ BARS_INTO_SIGHT: Final = "document.querySelector('.studio-fall').scrollIntoView(
 ADD: Final = "Add"
 SWITCH_ON: Final = "Switch on"
 """Word on the button of a candidate that stands in the model, switched off."""
-FIGURES: Final = (
-    "Point at an effect to see what it would explain, or press its name for its card. Each line gives the probability, "
-    "and the held-out error of all channels without and with the effect."
-)
-NO_FIGURES: Final = "Point at an effect to see what it would explain, or press its name for its card."
+BY_MOUSE: Final = "Point at an effect to see what it would explain, or press its name for its card."
+BY_FINGER: Final = "Tap an effect to see what it would explain, or its name for its card."
+FIGURES: Final = "Each line gives the probability, and the held-out error of all channels without and with the effect."
 CONTRADICTED: Final = (
     "The candidates stand here without figures: each would make up for the fixed value that the log contradicts. "
     "The model marks this value."
@@ -133,7 +131,7 @@ class CandidateView:
             if not shown:
                 ui.label("No effect was judged on these data.").classes("studio-muted")
             elif self._desk.guessing:
-                ui.label(NO_FIGURES).classes("studio-muted")
+                _how_to_look()
                 by_effect = {item.effect: item for item in shown}
                 for part, effects in by_sensor(by_effect).items():
                     # A list of all would lie between the sentence and the figures on a phone.
@@ -148,6 +146,7 @@ class CandidateView:
         if diagnosis.contradicted:
             ui.label(CONTRADICTED).classes("studio-muted").props("data-mark=without-figures")
         else:
+            _how_to_look()
             ui.label(FIGURES).classes("studio-muted")
         figures = None if diagnosis.contradicted else diagnosis
         for item in shown[:FIRST]:
@@ -247,6 +246,12 @@ class CandidateView:
             return []
         found = [item for item in diagnosis.candidates if item.effect == effect and item.parameters]
         return [("predicted here", "; ".join(in_lines(item.parameters))) for item in found]
+
+
+def _how_to_look() -> None:
+    """Say how an effect is looked at, in the gestures of a mouse or of a finger."""
+    for words, pointer in ((BY_MOUSE, "studio-mouse"), (BY_FINGER, "studio-finger")):
+        ui.label(words).classes(f"studio-muted {pointer}")
 
 
 def _figures(item: Candidate, diagnosis: Diagnosis) -> None:

@@ -1,4 +1,4 @@
-"""Region over the model: the fall of the error step by step, undo and redo."""
+"""Region over the model: the fall of the error step by step, undo and redo; the names of the steps stand apart."""
 
 from __future__ import annotations
 
@@ -40,6 +40,10 @@ class FallView:
         self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
         self._named: tuple[object, ...] = ()
+
+    def lay_names(self) -> None:
+        """Give the names of the steps their place: under what they must not move when one more comes."""
+        ui.html("Steps", tag="h2", sanitize=False).classes("studio-under")
         self._steps = ui.element("div").classes("studio-steps").props("data-mark=steps")
 
     def refresh(self) -> None:
@@ -98,8 +102,6 @@ class FallView:
         """Keep the present model beside later ones, or put the kept one away."""
         session = _session(self._desk)
         session.second = None if session.second is not None else session.stack
-        if session.second is not None:
-            ui.notify("The model is kept. Change the present one: both stand side by side beside the bars.")
         self._desk.changed.emit()
         await self._desk.update()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from nicegui import ui
@@ -13,7 +14,7 @@ from imufit.results.phrasing import capital
 from imufit.studio.attribute import attribute
 from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.heading import heading_of
-from imufit.studio.icons import bare, stated
+from imufit.studio.icons import bare, one_of_two
 from imufit.studio.names import effect_name, parameter_name
 from imufit.studio.session import Numbers, Session
 from imufit.studio.stack import Entry
@@ -22,6 +23,8 @@ ESTIMATED: Final = "estimated"
 FIXED: Final = "fixed"
 """Words beside a value: whether the log gives the value, or a person has fixed it."""
 CONTRADICTED: Final = "The log contradicts this value: the sentence on top gives both values."
+UNUSUAL: Final = 10.0
+"""Typical sizes from which on a value that a person gives is unusual: the best and the worst sensors lie within."""
 LEAVES: Final = "A wrong fixed value leaves a residual: the standard errors of the other values grow with the residual."
 """Why other values become less certain once one is fixed."""
 
@@ -61,12 +64,13 @@ class ModelView:
                 ui.label(words).classes("studio-muted")
                 return
             ui.label(_state(session, numbers)).classes("studio-muted").props("data-mark=model-state")
-            if session.stack.model.holds:
-                ui.label(LEAVES).classes("studio-muted").props("data-mark=holds")
             for entry in session.stack.entries:
-                self._entry(entry, numbers)
+                self._entry(entry, session.latest_parameters(entry), fitted=numbers is not None and numbers.fitted)
+            # Under the values: its coming and going moves none of them beneath the pointer.
+            if session.held_apart():
+                ui.label(LEAVES).classes("studio-muted").props("data-mark=holds")
 
-    def _entry(self, entry: Entry, numbers: Numbers | None) -> None:
+    def _entry(self, entry: Entry, parameters: Sequence[Parameter], *, fitted: bool) -> None:
         desk = self._desk
         name = effect_name(entry.effect)
         with ui.element("div").classes("studio-item" + ("" if entry.on else " studio-off")):
@@ -84,29 +88,29 @@ class ModelView:
                 ).props("size=sm")
             if not entry.on:
                 return
-            if numbers is None:
+            if not parameters:
                 ui.label("This effect takes a pass over the log.").classes("studio-muted")
-                return
-            for parameter in numbers.parameters:
-                if parameter.effect == entry.effect:
-                    self._parameter(parameter, numbers.fitted)
+            for parameter in parameters:
+                self._parameter(parameter, fitted=fitted)
 
-    def _parameter(self, parameter: Parameter, fitted: bool) -> None:
+    def _parameter(self, parameter: Parameter, *, fitted: bool) -> None:
         desk = self._desk
         name = parameter_name(parameter.effect, parameter.name)
         with ui.element("div").classes("studio-parameter"):
             ui.label(printable(parameter.name, NAME)).classes("studio-muted")
-            value = ui.label(parameter.shown).props(attribute("data-mark", f"value-{parameter.key}"))
+            # Beside the state, the word after a fixed value would stand there twice.
+            shown = f"{parameter.digits.value} {parameter.digits.unit}" if parameter.fixed else parameter.shown
+            value = ui.label(shown).props(attribute("data-mark", f"value-{parameter.key}"))
             if not fitted:
-                value.classes("studio-muted").tooltip("to first order, from the evidence")
+                value.classes("studio-muted").tooltip("not estimated yet")
             elif parameter.typical is not None:
                 value.tooltip(f"typical size {quantity.quantity(parameter.typical, parameter.unit)}")
             bare("edit", f"Edit {name}", lambda: self._edit(parameter)).props("size=sm").props(
                 attribute("data-mark", f"edit-{parameter.key}")
             )
-            state = FIXED if parameter.fixed else ESTIMATED
+            present = FIXED if parameter.fixed else ESTIMATED
             words = f"estimate {name} again" if parameter.fixed else f"fix {name} at this value"
-            stated(state, f"{state}: {words}", lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
+            one_of_two((ESTIMATED, FIXED), present, words, lambda: desk.attempt(lambda: _pin(desk, parameter))).props(
                 attribute("data-mark", f"pin-{parameter.key}")
             )
         if parameter.key in self._wrong:
@@ -133,7 +137,9 @@ class ModelView:
             given = ui.number(label=f"value, {shown.unit}", value=float(shown.value)).props(
                 "data-mark=edit-value autofocus"
             )
-            ui.label(f"The value stays fixed until you press its word “{FIXED}”.").classes("studio-muted")
+            ui.label(f"The value stays fixed until you press “{ESTIMATED}” beside it.").classes("studio-muted")
+            doubt = ui.label().classes("studio-muted").props("data-mark=edit-doubt aria-live=polite")
+            given.on_value_change(lambda event: doubt.set_text(unusual(parameter, event.value)))
 
             async def take() -> None:
                 if given.value is None:
@@ -151,6 +157,24 @@ class ModelView:
                 ui.button("Cancel", on_click=dialog.close).props("flat")
         dialog.on("hide", dialog.delete)
         dialog.open()
+
+
+def unusual(parameter: Parameter, given: float | None) -> str:
+    """Return a sentence that doubts a value far above those of such sensors; empty for any other value.
+
+    Parameters
+    ----------
+    parameter : Parameter
+        The parameter.
+    given : float or None
+        The value, in the shown unit.
+    """
+    if given is None or not parameter.typical:
+        return ""
+    if abs(given / parameter.digits.factor) <= UNUSUAL * parameter.typical:
+        return ""
+    size = quantity.quantity(parameter.typical, parameter.unit)
+    return f"This is more than {UNUSUAL:.0f} times the typical size, {size}. Check the number and its unit."
 
 
 def _session(desk: Desk) -> Session:
@@ -175,7 +199,7 @@ def _state(session: Session, numbers: Numbers | None) -> str:
     if not session.stack.entries:
         return "The ideal sensor: no effect yet."
     if numbers is None:
-        return "A pass over the log is under way."
+        return "Values so far: a pass is under way."
     if not numbers.fitted:
-        return "Values to first order, from the evidence. The estimate is under way."
+        return "To first order: the estimate is under way."
     return "Estimated values ± standard errors."

@@ -29,7 +29,7 @@ from imufit.studio.log_file import LogFile, option_words, remedies
 from imufit.studio.mystery import DEMO_SEED, DEMONSTRATION, LEVELS, NOTHING, SEEDS
 from imufit.studio.names import effect_name, parameter_name, with_symbol
 from imufit.studio.recipe import as_python, as_shell
-from imufit.studio.reserved import Reserved
+from imufit.studio.reserved import FRAME, Reserved
 from imufit.studio.saving import download_game, download_session, save_first
 from imufit.studio.session import Made
 from imufit.studio.session_file import LogsWantedError
@@ -63,6 +63,8 @@ OPTION: Final = """
 </q-item-section></q-item>
 """
 """Template of an entry of the list of answers: the first one of a group has the name of the group above it."""
+NO_OPTION: Final = "<q-item><q-item-section>No effect has this in its name.</q-item-section></q-item>"
+"""Template of the list of answers where none has the letters that were typed."""
 
 
 class Head:
@@ -72,13 +74,16 @@ class Head:
     ----------
     desk : Desk
         The state that they change.
+    sign : callable
+        Lays the sign of what runs on another page.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, sign: Callable[[], None]) -> None:
         self._desk = desk
         with ui.element("header").classes("studio-head"):
             ui.label("imufit").classes("studio-title")
             self._logs = ui.label("").classes("studio-log").props("data-mark=logs")
+            sign()
             with_words("folder_open", "Open a log", lambda: _upload(desk)).props("data-mark=open")
             self._save = with_words("save", "Save the session", lambda: download_session(desk)).props("data-mark=save")
             with with_words("content_copy", "Copy the model", None).props("data-mark=copy") as self._copy, ui.menu():
@@ -171,18 +176,18 @@ class Top:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._state: tuple[object, ...] = ()
-        with ui.element("div").classes("studio-kept-room"):
+        with ui.element("div").classes(FRAME), ui.column().classes("w-full gap-0") as kept:
             self._column = ui.column().classes("w-full gap-2")
-        # The line of the present work has its place whether there is work or not.
-        with (
-            ui.element("div").classes("studio-work"),
-            ui.row().classes("w-full items-start gap-2 no-wrap") as self._busy,
-        ):
-            ui.spinner(size="sm")
-            self._work = ui.label("").classes("studio-muted")
+            # The line of the present work has its place under the sentences whether there is work or not.
+            with (
+                ui.element("div").classes("studio-work"),
+                ui.row().classes("w-full items-start gap-2 no-wrap") as self._busy,
+            ):
+                ui.spinner(size="sm")
+                self._work = ui.label("").classes("studio-muted")
         self._busy.props("data-mark=busy")
         self._busy.visible = False
-        self._room = Reserved(self._column)
+        self._room = Reserved(kept)
         ui.timer(0.2, self._show_work)
 
     def _show_work(self) -> None:
@@ -215,6 +220,7 @@ class Top:
             bool(desk.busy) and session is None,
             desk.replacing,
             desk.mystery is not None and desk.mystery.closed,
+            session is not None and session.begun,
         )
         if state == self._state and self._state:
             return
@@ -406,7 +412,9 @@ class Top:
         ui.label(words).classes("studio-sentence").props("data-mark=game")
         if game.verdict is None:
             if not judged:
-                ui.label(BEING_READ).classes("studio-muted")
+                # Later the line of the present work says what is under way.
+                if desk.session is None or not desk.session.begun:
+                    ui.label(BEING_READ).classes("studio-muted")
                 return
             assert desk.session is not None
             if game.level == DEMONSTRATION:
@@ -419,13 +427,14 @@ class Top:
             choices |= {name: with_symbol(capital(effect_name(name)), name) for name in names}
             places = {name: k for k, name in enumerate(choices)}
             heads = html.escape(json.dumps({places[effects[0]]: part for part, effects in groups.items()}))
-            with ui.row().classes("items-center"):
+            with ui.row().classes("w-full items-center"):
                 # Who added an effect has named it; another choice stays until the reveal.
                 present = (_named(desk) or None) if game.answer is None else game.answer
                 value = present if present in choices else None
                 answer = ui.select(choices, value=value, label="Your answer: choose or type", with_input=True)
                 answer.classes("studio-answer").props("dense outlined data-mark=answer")
                 answer.add_slot("option", OPTION % (heads, heads))
+                answer.add_slot("no-option", NO_OPTION)
                 answer.on_value_change(lambda event: setattr(game, "answer", event.value))
                 reveal = ui.button("Reveal", on_click=lambda: desk.reveal(answer.value)).props("data-mark=reveal")
                 reveal.bind_enabled_from(answer, "value", lambda chosen: chosen is not None)

@@ -12,10 +12,13 @@ from imufit.results.model_comparison import DECISIVE, preferred
 from imufit.studio.desk import Desk
 from imufit.studio.explained import Explained
 from imufit.studio.names import channel_name, parameter_name, with_symbol
+from imufit.studio.reserved import FRAME, Reserved
 from imufit.studio.session import Made
 
 MOST_ODDS: Final = 1e6
 """Odds that are written out: beyond, the number says nothing more to a person."""
+LARGE: Final = 1e5
+"""Logarithm of the odds from which on its power of ten stands in its place: the digits say nothing more."""
 CHANGED: Final = 0.005
 """Change of a channel's residual over its noise floor from which on the channel is listed: the last digit shown."""
 
@@ -41,7 +44,9 @@ class TwoView:
         self.kept = self.differs = False
         self._shown: tuple[object, ...] = ()
         self._heading = ui.html("Two models", tag="h2", sanitize=False)
-        self._two = ui.column().classes("w-full gap-1").props("data-mark=two")
+        with ui.element("div").classes(FRAME):
+            self._two = ui.column().classes("w-full gap-1").props("data-mark=two")
+        self._room = Reserved(self._two)
 
     def refresh(self) -> None:
         """Lay out the kept model and the present one beside each other, where one is kept."""
@@ -61,6 +66,7 @@ class TwoView:
         if state == self._shown:
             return
         self._shown = state
+        self._room.about(f"{id(session)}-{self.differs}")
         self._two.clear()
         with self._two:
             if not self.differs:
@@ -96,8 +102,9 @@ def evidence(factor: float) -> str:
     """
     better = "kept" if factor < 0.0 else "present"
     size = abs(factor)
+    shown_size = f"{size:.1f}" if size < LARGE else quantity.large(size)
     odds = f"more than {_round(MOST_ODDS)}" if size > math.log(MOST_ODDS) else _round(math.exp(size))
-    shown = f"the odds are {odds} to 1 for the {better} one (ln Bayes factor {size:.1f})"
+    shown = f"the odds are {odds} to 1 for the {better} one (ln Bayes factor {shown_size})"
     if preferred(factor) == "neither":
         return f"The log prefers neither model: {shown}, and a preference needs {_round(math.exp(DECISIVE))} to 1."
     return f"The log prefers the {better} model: {shown}."

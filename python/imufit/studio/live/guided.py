@@ -12,7 +12,7 @@ def how_to_lay(side: str) -> str:
         One of ``+x -x +y -y +z -z``.
     """
     way = "up" if side[0] == "+" else "down"
-    return f"Turn the sensor so that the {side[1]} arrow points {way}, as in this picture."
+    return f"{side} is up when the {side[1]} arrow points {way}, as in this picture."
 
 
 def held_side(before: str | None, side: str | None, progress: float, *, moving: bool) -> str | None:

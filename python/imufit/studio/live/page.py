@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 from collections.abc import Awaitable, Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
-from nicegui import app, ui
+from nicegui import ui
 from numpy.typing import NDArray
 
 from imufit import _imufit
@@ -23,9 +22,13 @@ from imufit.rests.poses import SIDES
 from imufit.results.phrasing import listed
 from imufit.studio.body import Body, angles_in_words, side_rotation
 from imufit.studio.icons import light_or_dark, link_with_words
+from imufit.studio.live.device import device
 from imufit.studio.live.guided import held_side, how_to_lay
 from imufit.studio.live.listening import Listening, Recorded, Source, free_name, shown_state
 from imufit.studio.live.panels import groups, panel
+
+if TYPE_CHECKING:
+    from serial.tools.list_ports_common import ListPortInfo
 
 Array = NDArray[np.float64]
 
@@ -44,6 +47,16 @@ OPTION: Final = """
 </q-item-section></q-item>
 """
 """Template of an entry of the list of devices: its name, and beneath it the motion of a device that is emulated."""
+CONNECTING: Final = (
+    "1. Wire the sensor to an Arduino Uno: VCC to 5V, GND to GND, SDA to A4, SCL to A5.",
+    "2. Write the program uno_mpu6050 of the project's folder firmware onto the Uno. The README of this folder has the "
+    "commands.",
+    "3. Choose the Uno's port in the list above, such as /dev/ttyACM0, /dev/ttyUSB0 or COM3. Its line has 115200 bits "
+    "per second.",
+)
+"""Steps from the sensor to its readings, as the README of the firmware has them."""
+NOTHING_THERE: Final = "This computer knows of nothing on this port."
+"""Caption of a port that stands last in the list."""
 RECORDS: Final = "The red button records what comes from now on."
 FIRST_CONNECT: Final = "Connect a device first."
 GUIDES: Final = "Six sides on a table, then free rotation."
@@ -59,40 +72,6 @@ LIES: Final[Frame] = "NWU"
 
 FIRST: Final = "six_sides"
 """Emulated device that is offered first: its motion is that of a calibration, so that each button of the page works."""
-
-
-class _Device:
-    """The one device of the server: a page that is loaded again finds the recording running."""
-
-    def __init__(self) -> None:
-        self.listening: Listening | None = None
-        self._last = Recorded()
-
-    @property
-    def recorded(self) -> Recorded:
-        """The present recording, or the last one: it is there to be opened after its device has gone."""
-        own = None if self.listening is None else self.listening.recorded
-        return self._last if own is None or own.path is None else own
-
-    async def connect(self, source: Source) -> None:
-        """Follow a device."""
-        await self.disconnect()
-        made = Listening(source)
-        await asyncio.to_thread(made.open)
-        self.listening = made
-
-    async def disconnect(self) -> None:
-        """Let go of the device."""
-        held, self.listening = self.listening, None
-        if held is not None:
-            await asyncio.to_thread(held.close)
-            if held.recorded.path is not None:
-                self._last = held.recorded
-
-
-_device = _Device()
-# The end of the server ends a recording, and makes the log of it.
-app.on_shutdown(_device.disconnect)
 
 
 Opener = Callable[[Path], Awaitable[None]]
@@ -114,11 +93,16 @@ def page_with(opener: Opener) -> Callable[[], None]:
     return build
 
 
-def devices() -> list[str]:
-    """Return the serial ports with something on them, the devices that can be emulated, and the other ports."""
+def _ports() -> list[ListPortInfo]:
+    """Return the serial ports by name."""
     from serial.tools import list_ports  # noqa: PLC0415 - only this page needs it
 
-    ports = sorted(list_ports.comports(), key=lambda port: port.device)
+    return sorted(list_ports.comports(), key=lambda port: port.device)
+
+
+def devices() -> list[str]:
+    """Return the serial ports with something on them, the devices that can be emulated, and the other ports."""
+    ports = _ports()
     used = [port.device for port in ports if port.hwid != "n/a"]
     emulated = (EMULATED + name for name in (FIRST, *SCENARIOS))
     return list(dict.fromkeys([*used, *emulated, *(port.device for port in ports)]))
@@ -143,8 +127,10 @@ def about(choice: str) -> str:
 
 
 def _captions() -> dict[str, str]:
-    """Return the motion of each device that can be emulated, by its entry in the list."""
-    return {EMULATED + name: scenario.description for name, scenario in SCENARIOS.items()}
+    """Return the motion of each device that can be emulated, and which ports are empty, by entry of the list."""
+    emulated = {EMULATED + name: scenario.description for name, scenario in SCENARIOS.items()}
+    # No caption is a device's own text: the list's template would run what this text holds.
+    return {port.device: NOTHING_THERE for port in _ports() if port.hwid == "n/a"} | emulated
 
 
 def _lies(moving: bool, side: str | None) -> str:
@@ -182,9 +168,10 @@ class _LivePage:
             self._connection()
             with ui.element("div").classes("studio-live-columns"):
                 with ui.column().classes("gap-3 min-w-0"):
+                    # The guide is on top: its picture and its result are in sight, and its end moves nothing.
+                    self._guide()
                     self._status()
                     self._recorder()
-                    self._guide()
                 with ui.column().classes("gap-3 min-w-0"):
                     self._traces()
         self._timer = ui.timer(EVERY, self._refresh)
@@ -194,7 +181,7 @@ class _LivePage:
     def _connection(self) -> None:
         with ui.column().classes("studio-region gap-2"):
             with ui.row().classes("w-full items-end gap-3"):
-                held = None if _device.listening is None else _entry(_device.listening.source)
+                held = None if device.listening is None else _entry(device.listening.source)
                 choices = list(dict.fromkeys([*devices(), *filter(None, [held])]))
                 self._choice = (
                     ui.select(
@@ -209,10 +196,14 @@ class _LivePage:
                     .props('data-testid="device"')
                 )
                 self._choice.add_slot("option", OPTION % json.dumps(_captions()))
+                self._choice.on("popup-show", self._look_for_devices)
                 self._frame = ui.select(FRAMES, value=LIES, label="frame").style("min-width: 13rem; flex: 1 1 20rem")
                 self._baud = ui.number("bits per second", value=115200, min=300, format="%d").style("width: 8rem")
                 self._connect = ui.button("Connect", on_click=self._connect_or_not).props("unelevated")
             self._about = ui.label().classes("text-sm").props('data-testid="about"')
+            with ui.expansion("How to connect an MPU6050").props("dense").classes("w-full text-sm"):
+                for words in CONNECTING:
+                    ui.label(words)
             with ui.expansion("Text without a header").props("dense").classes("w-full text-sm") as self._plain:
                 self._header = ui.input("names of the columns", placeholder="t_ms,acc_x,acc_y,acc_z").classes("w-full")
                 # Without this the placeholder is hidden by the field's own name.
@@ -255,7 +246,7 @@ class _LivePage:
             self._made.visible = False
 
     def _guide(self) -> None:
-        with ui.column().classes("studio-region gap-2") as self._guided:
+        with ui.column().classes("studio-region gap-2"):
             with ui.row().classes("w-full items-center no-wrap gap-3"):
                 self._start = ui.button("Calibrate", on_click=self._calibrate_or_stop).props("outline")
                 self._message = ui.label(GUIDES).classes("text-sm font-medium")
@@ -289,12 +280,12 @@ class _LivePage:
     # --- what a person does
 
     async def _connect_or_not(self) -> None:
-        if _device.listening is not None:
-            await _device.disconnect()
+        if device.listening is not None:
+            await device.disconnect()
             return
         self._connect.disable()
         try:
-            await _device.connect(self._source())
+            await device.connect(self._source())
             self._problem.text = ""
             if not self._plots:
                 self._ask_for_rows("The readings stand here once the device sends some.")
@@ -322,24 +313,24 @@ class _LivePage:
         )
 
     def _record_or_stop(self) -> None:
-        listening = _device.listening
+        listening = device.listening
         if listening is None:
             return
-        if _device.recorded.running:
+        if device.recorded.running:
             listening.stop()
         else:
             listening.record(self._path("recording"))
 
     async def _look_at(self) -> None:
         """Go to the studio with the log that was recorded last."""
-        path = _device.recorded.path
+        path = device.recorded.path
         if path is None:
             return
         ui.navigate.to("./")
         await self._opener(path)
 
     def _download(self) -> None:
-        path = _device.recorded.path
+        path = device.recorded.path
         if path is not None:
             ui.download.file(path)
 
@@ -349,7 +340,7 @@ class _LivePage:
         return Path.cwd() / named if named else free_name(Path.cwd(), stem)
 
     def _calibrate_or_stop(self) -> None:
-        listening = _device.listening
+        listening = device.listening
         if listening is None:
             return
         if listening.stage is not None:
@@ -363,7 +354,7 @@ class _LivePage:
     # --- pictures
 
     def _refresh(self) -> None:
-        listening = _device.listening
+        listening = device.listening
         self._connect.text = "Connect" if listening is None else "Disconnect"
         for element in (self._choice, self._frame, self._baud, self._header):
             element.set_enabled(listening is None)
@@ -379,7 +370,7 @@ class _LivePage:
         if listening is not None or not self._plots:
             for key, words in shown_state(state).items():
                 self._figures[key].text = words
-        self._show_recording(_device.recorded)
+        self._show_recording(device.recorded)
         self._show_guide(listening)
         if listening is None:
             self._name.text = "Not connected"
@@ -434,7 +425,7 @@ class _LivePage:
         self._file.set_enabled(not recorded.running)
         self._made.visible = recorded.made
         if recorded.path is None:
-            self._recorded.text = FIRST_CONNECT if _device.listening is None else RECORDS
+            self._recorded.text = FIRST_CONNECT if device.listening is None else RECORDS
             return
         name = printable(recorded.path.name)
         if recorded.running:
@@ -454,8 +445,6 @@ class _LivePage:
         # The guide records, too: one recording at a time.
         self._start.set_enabled(stage is not None or (listening is not None and not listening.recorded.running))
         self._progress.visible = self._sides.visible = stage is not None
-        # Guided, a person looks at the guide alone: it stands over the state and the recorder.
-        self._guided.classes(**({"add": "studio-first"} if stage is not None else {"remove": "studio-first"}))
         if stage is None:
             self._held = None
             self._draw_side(None)
