@@ -14,7 +14,7 @@ from imufit.errors import InputError
 from imufit.log.clock import Clock, clocks_of
 from imufit.log.clock_text import ORDERS, seconds_from_cells
 from imufit.log.columns import CONTRACT, EULER, GROUPS, LARGEST_COVARIATE, SENSOR_NAMES, SENSORS, WHOLE_TURN
-from imufit.log.foreign import PlannedColumn, resolve
+from imufit.log.foreign import ROW, PlannedColumn, bracket, resolve
 from imufit.log.makers import Maker, maker_of
 from imufit.log.metadata import STANDARD_GRAVITY, Metadata
 from imufit.log.place import Place
@@ -695,11 +695,22 @@ def _notes(
     units: Mapping[str, str | None],
     warm: Mapping[str, str],
 ) -> tuple[str, ...]:
-    parts = [f"t from {text[:-1].replace('[', ' in ')}" for text in timed.values()]
-    parts += [f"{group} from {' '.join(each.columns)} in {units[group]}" for group, each in chosen.items()]
-    parts += [f"temp from {text[:-1].replace('[', ' in ')}" for text in warm.values()]
+    parts = [f"t from {_source(text)}" for text in timed.values()]
+    parts += [f"{group} from {_quoted(each.columns)} in {units[group]}" for group, each in chosen.items()]
+    parts += [f"temp from {_source(text)}" for text in warm.values()]
     taken = ", ".join(parts)
     if not taken:
         return ()
     layout = f"taken for {maker.name}: " if maker is not None else "taken "
     return (f"{place.name}: {layout}{taken}",)
+
+
+def _source(text: str) -> str:
+    """Word a source with its unit behind it; a rate in hertz counts rows."""
+    name, unit = bracket(text)
+    return f"{'the row number' if name == ROW else _quoted([name])} {'at' if unit.endswith('Hz') else 'in'} {unit}"
+
+
+def _quoted(columns: Iterable[str]) -> str:
+    """Quote names of columns: they may hold blanks and units, and the quotes show where each one ends."""
+    return " ".join(f"'{column}'" for column in columns)
