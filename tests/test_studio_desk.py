@@ -11,7 +11,7 @@ from imufit.lab.simulated_log import save_simulation
 from imufit.log import read
 from imufit.progress import silent
 from imufit.studio.desk import Desk
-from imufit.studio.log_file import LogFile, Way
+from imufit.studio.log_file import LogFile, Way, option_words
 from imufit.studio.session import Session
 
 
@@ -265,3 +265,35 @@ def test_the_page_says_what_is_waited_for_and_how_far_it_is():
         "Fitting the model to the log: all rows were read 2 times, and 10 % again.",
     ]
     assert desk.waiting_for == ""
+
+
+@pytest.fixture
+def undeclared(tmp_path):
+    """A log that never turns, so that nothing shows the unit of its gyroscope."""
+    path = tmp_path / "mystery.csv"
+    rows = [f"{0.01 * k:.2f},0,0,{9.8 + 0.01 * (k % 3)},{0.1 * (k % 4)},0.2,{0.1 * (k % 5)}" for k in range(400)]
+    path.write_text("time,ax,ay,az,gx,gy,gz\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return LogFile(path, path.name)
+
+
+def test_an_open_unit_has_one_answer_for_each_unit_that_names_its_columns(undeclared):
+    desk = Desk()
+    asyncio.run(desk.bring([undeclared]))
+    words = [f"Read the gyroscope from gx gy gz in {unit}" for unit in ("rad/s", "deg/s")]
+    assert [option_words(option) for option in desk.cures] == words
+    asyncio.run(desk.mend(desk.cures[1]))
+    assert desk.files[0].reading.mapping == {f"gyr_{axis}": f"g{axis}[deg/s]" for axis in "xyz"}
+
+
+@pytest.mark.parametrize("typed", ["deg/s", "gyr_x=gx[furlong],gyr_y=gy,gyr_z=gz"])
+def test_a_mapping_that_does_not_read_the_file_leaves_the_question_and_what_was_typed(undeclared, typed):
+    async def both() -> None:
+        await desk.bring([undeclared])
+        asked.append((desk.trouble, desk.cures, desk.unmapped))
+        await desk.remap(undeclared, typed)
+
+    desk, asked = Desk(), []
+    asyncio.run(both())
+    assert [(desk.trouble, desk.cures, desk.unmapped)] == asked
+    assert desk.typed == typed
+    assert desk.mistyped.startswith("In mystery.csv: ")

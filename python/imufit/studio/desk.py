@@ -143,6 +143,10 @@ class Desk:
         The file that gave the last problem.
     cures : list of Option
         Options of reading that the problem's remedy names.
+    typed : str
+        The mapping that a person typed and that does not read the file; empty where there is none.
+    mistyped : str
+        The problem with it.
     changed : Event
         Fires when something of this is new.
     """
@@ -166,6 +170,7 @@ class Desk:
         self.trouble = ""
         self.in_shell = ""
         self.cures: list[Option] = []
+        self.typed = self.mistyped = ""
         self.changed: Event[[]] = Event()
         self._folder = tempfile.TemporaryDirectory(prefix="imufit-")
         self._working = False
@@ -357,6 +362,7 @@ class Desk:
 
     def _no_trouble(self) -> None:
         self.trouble, self.in_shell, self.cures, self.troubled = "", "", [], None
+        self.typed = self.mistyped = ""
 
     def forget_trouble(self) -> None:
         """Put the last problem away."""
@@ -366,6 +372,7 @@ class Desk:
     def forget_arrivals(self) -> None:
         """Put away the files that await a choice: the present session stays."""
         self.arrivals, self.kept_session = [], None
+        self.typed = self.mistyped = ""
         self.changed.emit()
 
     def forget_wanted(self) -> None:
@@ -632,6 +639,8 @@ class Desk:
     async def remap(self, file: LogFile, text: str) -> None:
         """Read a file that was brought anew, with a mapping of its columns.
 
+        A mapping that does not read the file leaves the question as it was, with the text that was typed.
+
         Parameters
         ----------
         file : LogFile
@@ -639,13 +648,23 @@ class Desk:
         text : str
             Such as ``acc_x=AccX[g],acc_y=AccY[g]``.
         """
+        asked = self.trouble, self.in_shell, self.cures, self.troubled
         try:
             mapping = Reading.of_texts([text], None, [], []).mapping or {}
         except InputError as error:
-            self._note(error.statement, [], file)
+            self.typed, self.mistyped = text, f"In {file.name}: {error}"
             self.changed.emit()
             return
-        await self.bring([file.mended(("mapping", mapping))])
+        mended = file.mended(("mapping", mapping))
+        await self.bring([mended])
+        if self.troubled != mended or mended in self.files:
+            return
+        # A question about other columns takes the place of the one that was answered.
+        if not self.in_shell:
+            self.mistyped = f"In {self.trouble}"
+            self.trouble, self.in_shell, self.cures, self.troubled = asked
+        self.typed = text
+        self.changed.emit()
 
     async def reopen(self, path: Path) -> None:
         """Take up a session that was saved: its logs, its way, its models.

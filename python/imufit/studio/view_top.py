@@ -47,6 +47,8 @@ document.addEventListener('drop', event => {
 });
 """
 """Script by which a file that is dropped anywhere on the page goes to the uploader of a number."""
+EXAMPLE: Final = {"acc_x": "AccX[g]", "acc_y": "AccY[g]", "acc_z": "AccZ[g]"}
+"""Mapping that shows how columns are named, where nothing is known of those in question."""
 PART_JUDGED: Final = "rule"
 """Icon of an adequate model where a sensor was not judged."""
 WRONG_VALUE: Final = "a fixed value contradicts the log"
@@ -205,6 +207,8 @@ class Top:
             as_likely,
             desk.trouble,
             desk.in_shell,
+            desk.typed,
+            desk.mistyped,
             brought,
             desk.kept_session,
             desk.wanted,
@@ -352,11 +356,13 @@ class Top:
                 ui.label(f"The page still shows {shown}.").classes("studio-muted")
             if desk.unmapped is not None:
                 self._mapping(desk.unmapped)
-                ui.label(f"In a shell: {printable(desk.in_shell)}").classes("studio-muted").props("data-mark=in-shell")
             with ui.row():
                 for option in desk.cures:
                     self._cure(option, 0, "cure")
                 ui.button("Dismiss", on_click=desk.forget_trouble).props("dense flat size=12px")
+            if desk.in_shell:
+                with ui.expansion("In a shell").classes("w-full").props("dense data-mark=in-shell"):
+                    ui.label(printable(desk.in_shell)).classes("studio-muted")
 
     def _mapping(self, file: LogFile) -> None:
         """Take names for the columns of a file."""
@@ -365,9 +371,15 @@ class Top:
             await self._desk.remap(file, given.value)
 
         with ui.row().classes("w-full items-center"):
-            given = ui.input("columns, such as acc_x=AccX[g],acc_y=AccY[g]").props("dense outlined")
+            given = ui.input(f"columns, such as {self._example()}", value=self._desk.typed).props("dense outlined")
             given.classes("grow").props("data-mark=mapping").on("keydown.enter", read)
+            given.error = printable(self._desk.mistyped) or None
             ui.button("Read", on_click=read).props("dense outline")
+
+    def _example(self) -> str:
+        """Show the mapping of a sensor: of the one in question where that is known."""
+        first = next((value for name, value in self._desk.cures if name == "mapping"), EXAMPLE)
+        return printable(",".join(f"{target}={source}" for target, source in first.items()))
 
     def _choice(self) -> None:
         desk = self._desk
