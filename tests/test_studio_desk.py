@@ -1,6 +1,7 @@
 """The state of the studio: rows are shown before the evidence, and a bad log leaves what was there."""
 
 import asyncio
+import re
 import threading
 import time
 
@@ -8,11 +9,12 @@ import numpy as np
 import pytest
 from imufit.lab.simulate import simulate
 from imufit.lab.simulated_log import save_simulation
-from imufit.log import read
+from imufit.log import Log, read
 from imufit.progress import silent
 from imufit.studio.desk import Desk
 from imufit.studio.log_file import LogFile, Way, option_words
 from imufit.studio.session import Session
+from imufit.studio.standstill import standstill
 
 
 @pytest.fixture(scope="module")
@@ -41,18 +43,48 @@ def test_rows_can_be_drawn_before_the_evidence_is_taken(log):
     assert seen[-1] == (True, True)
 
 
-def test_a_log_without_evidence_leaves_the_session_before_it(log, spoilt):
+def test_a_log_that_cannot_be_judged_opens_and_says_why(log, spoilt):
+    async def both() -> None:
+        await desk.open([log])
+        await desk.open([spoilt])
+
+    desk = Desk()
+    asyncio.run(both())
+    assert desk.files == (spoilt,)
+    assert desk.trouble == ""
+    assert desk.session.refused
+    assert "no reference attitude" in desk.session.refusal.problem
+    assert "lying still" in str(desk.session.refusal.remedy)
+    t, values = desk.traces.window(["acc_x"], *desk.traces.span, 100)["acc_x"].line()
+    assert t.size == values.size > 100
+
+
+def test_a_log_that_cannot_be_read_leaves_the_session_before_it(log, tmp_path):
+    broken = tmp_path / "broken.csv"
+    broken.write_text("t,acc_x,acc_y,acc_z\n0,0,0,9.8\n0.01,0,oops,9.8\n", encoding="utf-8")
+
     async def both() -> None:
         await desk.open([log])
         before.append((desk.session, desk.files, desk.traces, desk.models))
-        await desk.open([spoilt])
+        await desk.open([LogFile(broken, broken.name)])
 
     desk, before = Desk(), []
     asyncio.run(both())
-    assert spoilt.name in desk.trouble
+    assert broken.name in desk.trouble
     assert [(desk.session, desk.files, desk.traces, desk.models)] == before
-    t, values = desk.traces.window(["acc_x"], *desk.traces.span, 100)["acc_x"].line()
-    assert t.size == values.size > 100
+
+
+def test_the_mean_rate_of_a_log_at_rest_is_that_of_its_gyroscope(tmp_path):
+    noise = np.random.default_rng(1)
+    t = np.arange(2000) * 0.01
+    bias = np.radians([0.3, -0.2, 0.1])
+    acc = noise.normal([0.1, 0.0, 9.81], 0.02, (2000, 3))
+    rest = Log.from_arrays(t, acc=acc, gyr=bias + noise.normal(0.0, 0.002, (2000, 3)))
+    said = standstill(rest)
+    assert said.startswith("The log rests once")
+    values = [float(text) for text in re.findall(r"[xyz] (-?[\d.]+) ±", said)]
+    np.testing.assert_allclose(values, np.degrees(bias), atol=0.02)
+    assert standstill(Log.from_arrays(t, acc=acc)) .startswith("The log rests once")
 
 
 def test_another_log_does_not_wait_for_the_work_on_the_one_before(log, tmp_path, monkeypatch):
@@ -157,13 +189,12 @@ def test_rows_of_a_first_log_without_evidence_are_drawn_and_a_reference_can_be_j
 
 
 def test_a_reference_is_joined_to_the_log_that_is_shown(log, spoilt, reference):
-    async def all_three() -> None:
+    async def both() -> None:
         await desk.open([log])
-        await desk.bring([spoilt])
         await desk.bring([reference])
 
     desk = Desk()
-    asyncio.run(all_three())
+    asyncio.run(both())
     assert desk.files == (log,)
     assert [offer.files for offer in desk.offers] == [(log.joined(reference),)]
 

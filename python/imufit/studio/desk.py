@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -89,13 +90,13 @@ class _FailedError(Exception):
 
     Parameters
     ----------
-    unusable : bool
-        Whether the person's input is the reason.
+    problem : InputError or None
+        What is wrong with the person's input, where that is the reason.
     """
 
-    def __init__(self, *, unusable: bool) -> None:
+    def __init__(self, problem: InputError | None = None) -> None:
         super().__init__()
-        self.unusable = unusable
+        self.problem = problem
 
 
 class _SupersededError(Exception):
@@ -216,6 +217,13 @@ class Desk:
         session = self.session
         made = None if session is None or not session.begun else session.made()
         return None if made is None else made.diagnosis
+
+    @property
+    def ratio(self) -> float:
+        """Held-out error of the present model over the noise; NaN while it is not there."""
+        session = self.session
+        made = None if session is None or not session.begun else session.made()
+        return math.nan if made is None else made.numbers.ratio
 
     def reveal(self, answer: str | None) -> None:
         """End the game with an answer.
@@ -341,17 +349,17 @@ class Desk:
                 self.in_shell = advice.shell
             else:
                 self._note(str(error), remedies(advice), file)
-            raise _FailedError(unusable=True) from error
+            raise _FailedError(error) from error
         except (OSError, MemoryError) as error:
             self._note(f"{type(error).__name__}: {error}", [], file)
-            raise _FailedError(unusable=False) from error
+            raise _FailedError from error
         except _SupersededError:
             raise
         except Exception as error:
             # A fault of the program must not end the page: the person may save the session.
             logging.getLogger(__name__).exception("the studio's work failed")
             self._note(f"internal error: {type(error).__name__}: {error}", [], file)
-            raise _FailedError(unusable=False) from error
+            raise _FailedError from error
         finally:
             self.busy, self.share = "", None
             self.changed.emit()
@@ -412,7 +420,7 @@ class Desk:
                         return
                 except _FailedError as failed:
                     if session is self.session:
-                        self._give_up(unusable=failed.unusable)
+                        self._give_up(failed.problem)
                         return
         finally:
             self._working = False
@@ -423,18 +431,20 @@ class Desk:
             return True
         return piece.judged is not None and session.stack.model != piece.judged.model
 
-    def _give_up(self, *, unusable: bool) -> None:
-        """Return to the step before one whose model cannot be fitted, or to the session before one without evidence.
+    def _give_up(self, problem: InputError | None) -> None:
+        """Return to the step before one whose model cannot be fitted, or to the session before one without rows.
 
-        The rows of a first log without evidence stay, to be looked at.
+        The rows of a log without evidence stay, to be looked at, with the reason why nothing is judged.
         """
         session = self.session
         if session is None or session.made() is not None:
             return
         if session.begun:
             session.give_up()
-        elif unusable and self._before is None and self.traces is not None and self.traces.built:
-            session.refused = True
+        elif problem is not None and self.traces is not None and self.traces.built:
+            session.refusal = problem
+            self._no_trouble()
+            self._forget_before()
         else:
             self._show(self._before or Shown(None, ()))
             self._before = None
@@ -451,9 +461,8 @@ class Desk:
                 partial(session.begin, self.progress),
                 self.files[0],
             )
-        elif self._before is not None:
-            before, self._before = self._before, None
-            self._close(before.traces)
+        else:
+            self._forget_before()
 
     def _pending(self) -> Iterator[Piece]:
         """List the pieces of work that are to be done for the present model, in order."""
@@ -609,6 +618,12 @@ class Desk:
         self.session, self.files, self.mystery, self.joined = shown.session, shown.files, shown.mystery, shown.joined
         self.traces, self.models = shown.traces, shown.models
         self.channel = self.covariate = None
+
+    def _forget_before(self) -> None:
+        """Close the session before: the present one stays."""
+        if self._before is not None:
+            before, self._before = self._before, None
+            self._close(before.traces)
 
     def _close(self, traces: Traces | None) -> None:
         """Close traces that are not those of the session before."""

@@ -19,6 +19,7 @@ from imufit.printable import NAME, printable
 from imufit.remedy import Option
 from imufit.results import Diagnosis
 from imufit.results.phrasing import capital
+from imufit.results.sentences import OFF_FLOOR
 from imufit.studio import server
 from imufit.studio.attribute import attribute
 from imufit.studio.by_sensor import by_sensor
@@ -50,7 +51,7 @@ document.addEventListener('drop', event => {
 EXAMPLE: Final = {"acc_x": "AccX[g]", "acc_y": "AccY[g]", "acc_z": "AccZ[g]"}
 """Mapping that shows how columns are named, where nothing is known of those in question."""
 PART_JUDGED: Final = "rule"
-"""Icon of an adequate model where a sensor was not judged."""
+"""Icon of an adequate model where a sensor was not judged, or a residual is left; and of a log that was not judged."""
 WRONG_VALUE: Final = "a fixed value contradicts the log"
 """Verdict on a model with such a value, beside whose icon it stands: no effect can be judged there."""
 ICONS: Final = {"adequate": "check_circle", "missing": "help", "ambiguous": "call_split", "unknown": "error"}
@@ -232,6 +233,8 @@ class Top:
                 self._wanted(desk.wanted)
             if desk.kept_session is not None:
                 self._session(desk.kept_session)
+            if session is not None and session.refusal is not None:
+                self._unjudged(session.refusal)
             if desk.arrivals:
                 self._choice()
             # While another log is loaded, the answers on the present one would pass for answers on it.
@@ -307,7 +310,8 @@ class Top:
                 ui.label(printable(held.key, NAME)).classes("studio-id")
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
             word = WRONG_VALUE if diagnosis.contradicted else diagnosis.verdict
-            ui.icon(_icon_of(diagnosis), size="sm").props(f'role=img aria-label="{word}" title="{word}"')
+            icon = ui.icon(_icon_of(diagnosis, self._desk.ratio), size="sm")
+            icon.props(f'role=img aria-label="{word}" title="{word}"')
             Explained(diagnosis.sentence or diagnosis.verdict, seen).classes("studio-sentence").props(
                 "data-mark=verdict"
             )
@@ -336,6 +340,23 @@ class Top:
             with ui.expansion(words).classes("w-full").props("dense data-mark=notes"):
                 for note in notes:
                     Explained(note, seen).classes("studio-muted")
+
+    def _unjudged(self, refusal: InputError) -> None:
+        """Say that nothing was judged, why, and what to record."""
+        with ui.row().classes("w-full items-start gap-2 no-wrap"):
+            ui.icon(PART_JUDGED, size="sm").props('role=img aria-label="not judged" title="not judged"')
+            words = printable(f"Nothing was judged: {refusal.problem}.")
+            ui.label(words).classes("studio-sentence").props("data-mark=unjudged")
+        advice = refusal.advice
+        if advice is None:
+            return
+        for option in remedies(advice):
+            self._cure(option, 0, "cure")
+        if advice.python == advice.shell:
+            ui.label(printable(f"Next: {advice}")).classes("studio-muted").props("data-mark=next")
+        else:
+            with ui.expansion("To be recorded, or run in a shell").classes("w-full").props("dense data-mark=next"):
+                ui.label(printable(advice.shell)).classes("studio-muted")
 
     def _cure(self, option: Option, number: int, mark: str) -> None:
         """Offer an option of a remedy."""
@@ -465,10 +486,11 @@ ADDED: Final = "The bars show what the effect took off the error. Reveal the tru
 """Task of the demonstration once an effect is added."""
 
 
-def _icon_of(diagnosis: Diagnosis) -> str:
+def _icon_of(diagnosis: Diagnosis, ratio: float) -> str:
     if diagnosis.contradicted:
         return ICONS["unknown"]
-    whole = all(item.judged for item in diagnosis.judged)
+    # A residual that stands above its noise is no more a sign of a whole model than a sensor that was not judged.
+    whole = all(item.judged for item in diagnosis.judged) and ratio <= OFF_FLOOR
     return ICONS[diagnosis.verdict] if whole or diagnosis.verdict != "adequate" else PART_JUDGED
 
 
