@@ -209,7 +209,7 @@ def test_second_sensor_is_not_a_slip(tmp_path: Path) -> None:
 def test_capital_letters_in_time(tmp_path: Path) -> None:
     log = read(save(frame().rename(columns={"t": "Time"}), tmp_path / "a.csv"))
     assert log.t.tolist() == frame()["t"].tolist()
-    assert log.notes == ("a.csv: taken t from Time in s",)
+    assert log.notes == ("a.csv: taken t from 'Time' in s",)
 
 
 def test_sensor_that_is_partly_there(tmp_path: Path, suffix: str) -> None:

@@ -54,7 +54,7 @@ def test_original_of_a_nine_axis_log() -> None:
     path = recording("nine_axis_no_reference/xio_sensor_data.csv")
     log = read(path)
     close(log, "nine_axis_no_reference/xio_sensor_data.parquet")
-    assert log.notes[0].startswith("xio_sensor_data.csv: taken for x-io: t from Time (s) in s, acc from")
+    assert log.notes[0].startswith("xio_sensor_data.csv: taken for x-io: t from 'Time (s)' in s, acc from")
 
 
 COUNTS = [f"acc_{a}=a{a}[16384 LSB/g],gyr_{a}=g{a}[131 LSB/(deg/s)]" for a in "xyz"]

@@ -170,6 +170,13 @@ def test_dates_and_days_as_time(sound: Log, tmp_path: Path) -> None:
     assert read(tmp_path / "excel.csv").duration == pytest.approx(sound.duration, rel=1e-3)
 
 
+def test_the_note_on_what_was_taken_quotes_names_that_hold_units(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]\n0,0,0,9.8\n0.01,0,0.1,9.8\n", encoding="utf-8")
+    acc = " ".join(f"'acc_{axis} [m/s^2]'" for axis in "xyz")
+    assert read(path).notes == (f"a.csv: taken t from 't [s]' in s, acc from {acc} in m/s^2",)
+
+
 def test_what_readings_do_not_show_is_asked_once_and_for_the_whole_file(tmp_path: Path, sound: Log) -> None:
     rest = Log.from_arrays(sound.t, acc=np.tile([0.0, 0.0, STANDARD_GRAVITY], (sound.n, 1)), gyr=0.01 * sound.mag)
     path = counts(tmp_path / "a.csv", rest)
@@ -355,7 +362,7 @@ def test_a_temperature_without_a_unit_is_taken_where_it_reads_as_degrees_celsius
         log = read(path)
         assert log.temp is not None
         np.testing.assert_allclose(log.temp, taken)
-        assert any(f"temp from {name} in degC" in note for note in log.notes)
+        assert any(f"temp from '{name}' in degC" in note for note in log.notes)
 
 
 @pytest.mark.parametrize(("name", "value"), [("temperature", 298.0), ("temperature", 77.0), ("motor_temp", 25.0)])

@@ -1,6 +1,7 @@
 """The state of the studio: rows are shown before the evidence, and a bad log leaves what was there."""
 
 import asyncio
+import re
 import threading
 import time
 
@@ -8,11 +9,12 @@ import numpy as np
 import pytest
 from imufit.lab.simulate import simulate
 from imufit.lab.simulated_log import save_simulation
-from imufit.log import read
+from imufit.log import Log, read
 from imufit.progress import silent
 from imufit.studio.desk import Desk
-from imufit.studio.log_file import LogFile, Way
+from imufit.studio.log_file import LogFile, Way, option_words
 from imufit.studio.session import Session
+from imufit.studio.standstill import standstill
 
 
 @pytest.fixture(scope="module")
@@ -41,18 +43,48 @@ def test_rows_can_be_drawn_before_the_evidence_is_taken(log):
     assert seen[-1] == (True, True)
 
 
-def test_a_log_without_evidence_leaves_the_session_before_it(log, spoilt):
+def test_a_log_that_cannot_be_judged_opens_and_says_why(log, spoilt):
+    async def both() -> None:
+        await desk.open([log])
+        await desk.open([spoilt])
+
+    desk = Desk()
+    asyncio.run(both())
+    assert desk.files == (spoilt,)
+    assert desk.trouble == ""
+    assert desk.session.refused
+    assert "no reference attitude" in desk.session.refusal.problem
+    assert "lying still" in str(desk.session.refusal.remedy)
+    t, values = desk.traces.window(["acc_x"], *desk.traces.span, 100)["acc_x"].line()
+    assert t.size == values.size > 100
+
+
+def test_a_log_that_cannot_be_read_leaves_the_session_before_it(log, tmp_path):
+    broken = tmp_path / "broken.csv"
+    broken.write_text("t,acc_x,acc_y,acc_z\n0,0,0,9.8\n0.01,0,oops,9.8\n", encoding="utf-8")
+
     async def both() -> None:
         await desk.open([log])
         before.append((desk.session, desk.files, desk.traces, desk.models))
-        await desk.open([spoilt])
+        await desk.open([LogFile(broken, broken.name)])
 
     desk, before = Desk(), []
     asyncio.run(both())
-    assert spoilt.name in desk.trouble
+    assert broken.name in desk.trouble
     assert [(desk.session, desk.files, desk.traces, desk.models)] == before
-    t, values = desk.traces.window(["acc_x"], *desk.traces.span, 100)["acc_x"].line()
-    assert t.size == values.size > 100
+
+
+def test_the_mean_rate_of_a_log_at_rest_is_that_of_its_gyroscope(tmp_path):
+    noise = np.random.default_rng(1)
+    t = np.arange(2000) * 0.01
+    bias = np.radians([0.3, -0.2, 0.1])
+    acc = noise.normal([0.1, 0.0, 9.81], 0.02, (2000, 3))
+    rest = Log.from_arrays(t, acc=acc, gyr=bias + noise.normal(0.0, 0.002, (2000, 3)))
+    said = standstill(rest)
+    assert said.startswith("The log rests once")
+    values = [float(text) for text in re.findall(r"[xyz] (-?[\d.]+) ±", said)]
+    np.testing.assert_allclose(values, np.degrees(bias), atol=0.02)
+    assert standstill(Log.from_arrays(t, acc=acc)) .startswith("The log rests once")
 
 
 def test_another_log_does_not_wait_for_the_work_on_the_one_before(log, tmp_path, monkeypatch):
@@ -157,13 +189,12 @@ def test_rows_of_a_first_log_without_evidence_are_drawn_and_a_reference_can_be_j
 
 
 def test_a_reference_is_joined_to_the_log_that_is_shown(log, spoilt, reference):
-    async def all_three() -> None:
+    async def both() -> None:
         await desk.open([log])
-        await desk.bring([spoilt])
         await desk.bring([reference])
 
     desk = Desk()
-    asyncio.run(all_three())
+    asyncio.run(both())
     assert desk.files == (log,)
     assert [offer.files for offer in desk.offers] == [(log.joined(reference),)]
 
@@ -265,3 +296,35 @@ def test_the_page_says_what_is_waited_for_and_how_far_it_is():
         "Fitting the model to the log: all rows were read 2 times, and 10 % again.",
     ]
     assert desk.waiting_for == ""
+
+
+@pytest.fixture
+def undeclared(tmp_path):
+    """A log that never turns, so that nothing shows the unit of its gyroscope."""
+    path = tmp_path / "mystery.csv"
+    rows = [f"{0.01 * k:.2f},0,0,{9.8 + 0.01 * (k % 3)},{0.1 * (k % 4)},0.2,{0.1 * (k % 5)}" for k in range(400)]
+    path.write_text("time,ax,ay,az,gx,gy,gz\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return LogFile(path, path.name)
+
+
+def test_an_open_unit_has_one_answer_for_each_unit_that_names_its_columns(undeclared):
+    desk = Desk()
+    asyncio.run(desk.bring([undeclared]))
+    words = [f"Read the gyroscope from gx gy gz in {unit}" for unit in ("rad/s", "deg/s")]
+    assert [option_words(option) for option in desk.cures] == words
+    asyncio.run(desk.mend(desk.cures[1]))
+    assert desk.files[0].reading.mapping == {f"gyr_{axis}": f"g{axis}[deg/s]" for axis in "xyz"}
+
+
+@pytest.mark.parametrize("typed", ["deg/s", "gyr_x=gx[furlong],gyr_y=gy,gyr_z=gz"])
+def test_a_mapping_that_does_not_read_the_file_leaves_the_question_and_what_was_typed(undeclared, typed):
+    async def both() -> None:
+        await desk.bring([undeclared])
+        asked.append((desk.trouble, desk.cures, desk.unmapped))
+        await desk.remap(undeclared, typed)
+
+    desk, asked = Desk(), []
+    asyncio.run(both())
+    assert [(desk.trouble, desk.cures, desk.unmapped)] == asked
+    assert desk.typed == typed
+    assert desk.mistyped.startswith("In mystery.csv: ")

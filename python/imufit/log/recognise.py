@@ -14,7 +14,7 @@ from imufit.errors import InputError
 from imufit.log.clock import Clock, clocks_of
 from imufit.log.clock_text import ORDERS, seconds_from_cells
 from imufit.log.columns import CONTRACT, EULER, GROUPS, LARGEST_COVARIATE, SENSOR_NAMES, SENSORS, WHOLE_TURN
-from imufit.log.foreign import PlannedColumn, resolve
+from imufit.log.foreign import ROW, PlannedColumn, bracket, resolve
 from imufit.log.makers import Maker, maker_of
 from imufit.log.metadata import STANDARD_GRAVITY, Metadata
 from imufit.log.place import Place
@@ -22,6 +22,7 @@ from imufit.log.time_order import counted_on
 from imufit.log.time_unit import time_unit
 from imufit.log.unit_by_data import acc_unit, gyr_unit, likely_acc_unit, mag_unit, turned
 from imufit.log.unit_check import (
+    GYR_UNITS,
     HEAD,
     OtherUnitError,
     check_rate,
@@ -34,7 +35,7 @@ from imufit.log.unit_check import (
 from imufit.log.units import Conversion, conversion, lookup
 from imufit.log.words import Words, meant, sensor_of, strange, time_columns, unit_of, words_of
 from imufit.printable import NAME, printable
-from imufit.remedy import Remedy, mapped, option, reading
+from imufit.remedy import Option, Remedy, mapped, option, reading
 
 Array = NDArray[np.float64]
 
@@ -170,7 +171,7 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place,
     complete = {**given, **timed, **warm, **_mapping(chosen, readings.proposed(units), maker)}
     others = _left_out(found, several, stem)
     timeless = "t" in wanted and clock is None and not counted
-    left_open = _Open(lacking, tuple(asked), tuple(several), timeless, others)
+    left_open = _Open(lacking, tuple(asked), tuple(several), timeless, others, readings.possible(units))
     if left_open:
         at = {group: each.columns[0] for group, each in chosen.items()} | ({"t": clock.column} if clock else {})
         raise left_open.error(complete, at, bool(chosen) or _has_any(names, given), place)
@@ -402,6 +403,8 @@ class _Open:
         Whether the time is missing.
     others : dict
         Other candidates for each group, which the proposed mapping leaves out.
+    rates : tuple of str
+        Units that the gyroscope may be in where that is open, the proposed one first.
     """
 
     lacking: dict[str, dict[str, str]]
@@ -409,6 +412,7 @@ class _Open:
     several: tuple[str, ...]
     timeless: bool
     others: dict[str, list[_Candidate]]
+    rates: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.lacking) or self._mappable
@@ -438,10 +442,32 @@ class _Open:
             remedy = self._without(mapping, place) if sound else "Add the missing columns."
         else:
             column = "t" if self.timeless else at[(self.asked or self.several)[0]]
-            remedy = _remedy(mapping, place)
+            remedy = replace(_remedy(mapping, place), options=self._options(mapping))
+        more = []
+        if mapping and len(self.rates) > 1:
+            units = " or ".join(f"[{unit}]" for unit in self.rates[1:])
+            more.append(f"If the gyroscope is in another unit, write {units} behind its columns.")
         if mapping and self.others:
-            remedy = Remedy.of(remedy) + f". So {_also(self.others)}: to take them instead, write them in the mapping."
+            more.append(f"So {_also(self.others)}: to take them instead, write them in the mapping.")
+        if more:
+            remedy = Remedy.of(remedy) + f"{' ' if self.lacking else '. '}{' '.join(more)}"
         return place.error(self._question(), column=column, remedy=remedy)
+
+    def _options(self, mapping: Mapping[str, str]) -> tuple[Option, ...]:
+        """List the answers to what is asked: one for each unit that the gyroscope may be in, of its columns alone."""
+        groups = [*self.asked, *self.several, *(["t"] if self.timeless else [])]
+        wanted = {column for group in groups for column in GROUPS.get(group, (group,))}
+        asked = {target: source for target, source in mapping.items() if target in wanted}
+        return tuple(
+            (
+                "mapping",
+                {
+                    target: source.replace(f"[{self.rates[0]}]", f"[{unit}]") if target in GROUPS["gyr"] else source
+                    for target, source in asked.items()
+                },
+            )
+            for unit in self.rates
+        ) or (("mapping", asked),)
 
     def _without(self, mapping: Mapping[str, str], place: Place) -> Remedy:
         """Say how the file is read without the sensors that lack an axis."""
@@ -603,6 +629,19 @@ class _Readings:
         """Propose a unit for each group: the one that was found, or the likeliest where nothing shows it."""
         return {group: unit or self.likely(group, units) for group, unit in units.items()}
 
+    def possible(self, units: Mapping[str, str | None]) -> tuple[str, ...]:
+        """List the units that a gyroscope may be in whose unit nothing shows, the proposed one first; else none."""
+        rates = self._stacked("gyr") if "gyr" in units and units["gyr"] is None else None
+        if rates is None:
+            return ()
+        first = self.likely("gyr", units)
+        if "LSB" in first:
+            alike = [unit for _, _, unit in GYR_UNITS if "LSB" in unit]
+        else:
+            # A rate that no sensor reaches in rad/s shows that it is in a smaller unit.
+            alike = ["deg/s"] if rate_unit_by_size(rates)[1] is not None else ["rad/s", "deg/s"]
+        return tuple(dict.fromkeys([first, *alike]))
+
     def likely(self, group: str, units: Mapping[str, str | None]) -> str:
         """Propose a unit where nothing shows it."""
         if group == "gyr":
@@ -695,11 +734,22 @@ def _notes(
     units: Mapping[str, str | None],
     warm: Mapping[str, str],
 ) -> tuple[str, ...]:
-    parts = [f"t from {text[:-1].replace('[', ' in ')}" for text in timed.values()]
-    parts += [f"{group} from {' '.join(each.columns)} in {units[group]}" for group, each in chosen.items()]
-    parts += [f"temp from {text[:-1].replace('[', ' in ')}" for text in warm.values()]
+    parts = [f"t from {_source(text)}" for text in timed.values()]
+    parts += [f"{group} from {_quoted(each.columns)} in {units[group]}" for group, each in chosen.items()]
+    parts += [f"temp from {_source(text)}" for text in warm.values()]
     taken = ", ".join(parts)
     if not taken:
         return ()
     layout = f"taken for {maker.name}: " if maker is not None else "taken "
     return (f"{place.name}: {layout}{taken}",)
+
+
+def _source(text: str) -> str:
+    """Word a source with its unit behind it; a rate in hertz counts rows."""
+    name, unit = bracket(text)
+    return f"{'the row number' if name == ROW else _quoted([name])} {'at' if unit.endswith('Hz') else 'in'} {unit}"
+
+
+def _quoted(columns: Iterable[str]) -> str:
+    """Quote names of columns: they may hold blanks and units, and the quotes show where each one ends."""
+    return " ".join(f"'{column}'" for column in columns)

@@ -91,21 +91,23 @@ def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: in
     if not adequate:
         return f"{text} {capital(missing)}."
     judged = ", ".join(item.sensor for item in found.judged if item.judged)
-    return f"{judged}: nothing missing; {missing}. {text}" if judged else f"{capital(missing)}. {text}"
+    return f"{judged}: judged; {missing}. {text}" if judged else f"{capital(missing)}. {text}"
 
 
 def _adequate(found: Diagnosis, ratio: float, untold: int) -> str:
     """Say that nothing is missing, as far as the logs show."""
-    if "rests" in found.evidence:
-        text = "Nothing that this log can show without a reference attitude is missing"
-        if ratio > OFF_FLOOR:
-            return f"{text}: the residual stands at {ratio:.1f} times the noise, but no effect lowers it for certain."
-        return f"{text}. This log cannot show {untold} effects." if untold else f"{text}."
+    rests = "rests" in found.evidence
     if ratio > OFF_FLOOR:
         return (
-            f"No effect is missing for certain, but the residual stands at {ratio:.2f} times the noise: the noise is "
-            "stronger or more coloured than stated, or the log does not contain the cause of the residual."
+            f"{'Without a reference attitude no' if rests else 'No'} effect is missing for certain, but the residual "
+            f"stands at {ratio:.2f} times the noise: the noise is stronger or more coloured than stated, or the log "
+            "does not contain the cause of the residual."
         )
+    if rests:
+        text = "Nothing that this log can show without a reference attitude is missing."
+        # Of sensors that were not judged no effect was shown: a count of the others would pass for all of them.
+        counted = untold and not left_out(found.judged)
+        return f"{text} A reference would also show {quantity.counted(untold, 'effect')}." if counted else text
     return "Nothing that this log can show is missing: the residual is at its noise floor."
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -89,13 +90,13 @@ class _FailedError(Exception):
 
     Parameters
     ----------
-    unusable : bool
-        Whether the person's input is the reason.
+    problem : InputError or None
+        What is wrong with the person's input, where that is the reason.
     """
 
-    def __init__(self, *, unusable: bool) -> None:
+    def __init__(self, problem: InputError | None = None) -> None:
         super().__init__()
-        self.unusable = unusable
+        self.problem = problem
 
 
 class _SupersededError(Exception):
@@ -143,6 +144,10 @@ class Desk:
         The file that gave the last problem.
     cures : list of Option
         Options of reading that the problem's remedy names.
+    typed : str
+        The mapping that a person typed and that does not read the file; empty where there is none.
+    mistyped : str
+        The problem with it.
     changed : Event
         Fires when something of this is new.
     """
@@ -166,6 +171,7 @@ class Desk:
         self.trouble = ""
         self.in_shell = ""
         self.cures: list[Option] = []
+        self.typed = self.mistyped = ""
         self.changed: Event[[]] = Event()
         self._folder = tempfile.TemporaryDirectory(prefix="imufit-")
         self._working = False
@@ -211,6 +217,13 @@ class Desk:
         session = self.session
         made = None if session is None or not session.begun else session.made()
         return None if made is None else made.diagnosis
+
+    @property
+    def ratio(self) -> float:
+        """Held-out error of the present model over the noise; NaN while it is not there."""
+        session = self.session
+        made = None if session is None or not session.begun else session.made()
+        return math.nan if made is None else made.numbers.ratio
 
     def reveal(self, answer: str | None) -> None:
         """End the game with an answer.
@@ -336,17 +349,17 @@ class Desk:
                 self.in_shell = advice.shell
             else:
                 self._note(str(error), remedies(advice), file)
-            raise _FailedError(unusable=True) from error
+            raise _FailedError(error) from error
         except (OSError, MemoryError) as error:
             self._note(f"{type(error).__name__}: {error}", [], file)
-            raise _FailedError(unusable=False) from error
+            raise _FailedError from error
         except _SupersededError:
             raise
         except Exception as error:
             # A fault of the program must not end the page: the person may save the session.
             logging.getLogger(__name__).exception("the studio's work failed")
             self._note(f"internal error: {type(error).__name__}: {error}", [], file)
-            raise _FailedError(unusable=False) from error
+            raise _FailedError from error
         finally:
             self.busy, self.share = "", None
             self.changed.emit()
@@ -357,6 +370,7 @@ class Desk:
 
     def _no_trouble(self) -> None:
         self.trouble, self.in_shell, self.cures, self.troubled = "", "", [], None
+        self.typed = self.mistyped = ""
 
     def forget_trouble(self) -> None:
         """Put the last problem away."""
@@ -366,6 +380,7 @@ class Desk:
     def forget_arrivals(self) -> None:
         """Put away the files that await a choice: the present session stays."""
         self.arrivals, self.kept_session = [], None
+        self.typed = self.mistyped = ""
         self.changed.emit()
 
     def forget_wanted(self) -> None:
@@ -405,7 +420,7 @@ class Desk:
                         return
                 except _FailedError as failed:
                     if session is self.session:
-                        self._give_up(unusable=failed.unusable)
+                        self._give_up(failed.problem)
                         return
         finally:
             self._working = False
@@ -416,18 +431,20 @@ class Desk:
             return True
         return piece.judged is not None and session.stack.model != piece.judged.model
 
-    def _give_up(self, *, unusable: bool) -> None:
-        """Return to the step before one whose model cannot be fitted, or to the session before one without evidence.
+    def _give_up(self, problem: InputError | None) -> None:
+        """Return to the step before one whose model cannot be fitted, or to the session before one without rows.
 
-        The rows of a first log without evidence stay, to be looked at.
+        The rows of a log without evidence stay, to be looked at, with the reason why nothing is judged.
         """
         session = self.session
         if session is None or session.made() is not None:
             return
         if session.begun:
             session.give_up()
-        elif unusable and self._before is None and self.traces is not None and self.traces.built:
-            session.refused = True
+        elif problem is not None and self.traces is not None and self.traces.built:
+            session.refusal = problem
+            self._no_trouble()
+            self._forget_before()
         else:
             self._show(self._before or Shown(None, ()))
             self._before = None
@@ -444,9 +461,8 @@ class Desk:
                 partial(session.begin, self.progress),
                 self.files[0],
             )
-        elif self._before is not None:
-            before, self._before = self._before, None
-            self._close(before.traces)
+        else:
+            self._forget_before()
 
     def _pending(self) -> Iterator[Piece]:
         """List the pieces of work that are to be done for the present model, in order."""
@@ -603,6 +619,12 @@ class Desk:
         self.traces, self.models = shown.traces, shown.models
         self.channel = self.covariate = None
 
+    def _forget_before(self) -> None:
+        """Close the session before: the present one stays."""
+        if self._before is not None:
+            before, self._before = self._before, None
+            self._close(before.traces)
+
     def _close(self, traces: Traces | None) -> None:
         """Close traces that are not those of the session before."""
         if traces is not None and (self._before is None or traces is not self._before.traces):
@@ -632,6 +654,8 @@ class Desk:
     async def remap(self, file: LogFile, text: str) -> None:
         """Read a file that was brought anew, with a mapping of its columns.
 
+        A mapping that does not read the file leaves the question as it was, with the text that was typed.
+
         Parameters
         ----------
         file : LogFile
@@ -639,13 +663,23 @@ class Desk:
         text : str
             Such as ``acc_x=AccX[g],acc_y=AccY[g]``.
         """
+        asked = self.trouble, self.in_shell, self.cures, self.troubled
         try:
             mapping = Reading.of_texts([text], None, [], []).mapping or {}
         except InputError as error:
-            self._note(error.statement, [], file)
+            self.typed, self.mistyped = text, f"In {file.name}: {error}"
             self.changed.emit()
             return
-        await self.bring([file.mended(("mapping", mapping))])
+        mended = file.mended(("mapping", mapping))
+        await self.bring([mended])
+        if self.troubled != mended or mended in self.files:
+            return
+        # A question about other columns takes the place of the one that was answered.
+        if not self.in_shell:
+            self.mistyped = f"In {self.trouble}"
+            self.trouble, self.in_shell, self.cures, self.troubled = asked
+        self.typed = text
+        self.changed.emit()
 
     async def reopen(self, path: Path) -> None:
         """Take up a session that was saved: its logs, its way, its models.

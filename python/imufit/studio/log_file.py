@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
@@ -10,8 +10,10 @@ from typing import Any, Final
 
 from imufit.errors import InputError
 from imufit.log import LogSource, LogStream, Reading, contents, open_log
-from imufit.log.columns import SENSOR_NAMES
+from imufit.log.columns import GROUPS, SENSOR_NAMES
+from imufit.log.foreign import bracket
 from imufit.remedy import Option, Remedy
+from imufit.results.phrasing import listed
 
 READING: Final = ("mapping", "frame", "noise", "drop")
 """Options of reading a log."""
@@ -131,14 +133,30 @@ def option_words(option: Option) -> str:
     """
     name, value = option
     if isinstance(value, Mapping):
-        shown = ", ".join(f"{column} = {source}" for column, source in list(value.items())[:3])
-        return f"Read {shown}{' …' if len(value) > 3 else ''}"
+        return f"Read {listed(list(_sources(value)))}"
     words = {
         "frame": f"Read in frame {value}",
         "lag": f"Shift the reference by {value} s",
         "drop": f"Leave out {value}",
     }
     return words.get(name, f"Apply {name} = {value}")
+
+
+def _sources(mapping: Mapping[str, str]) -> Iterator[str]:
+    """Word where a mapping takes each sensor from, and in which unit; columns of a part of a sensor stand alone."""
+    left = dict(mapping)
+    for sensor, name in SENSOR_NAMES.items():
+        parts = [bracket(left[column]) for column in GROUPS[sensor] if column in left]
+        if len(parts) == len(GROUPS[sensor]) and len({unit for _, unit in parts}) == 1:
+            yield f"the {name} from {' '.join(column for column, _ in parts)}{_in_unit(parts[0][1])}"
+            left = {target: source for target, source in left.items() if target not in GROUPS[sensor]}
+    for target, source in left.items():
+        column, unit = bracket(source)
+        yield f"{target} from {column}{_in_unit(unit)}"
+
+
+def _in_unit(unit: str) -> str:
+    return f" in {unit}" if unit else ""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,8 @@ def download_session(desk: Desk) -> None:
     name = f"{Path(desk.files[0].name).stem}-session.toml"
     ui.download.content(text.encode(), name)
     log = desk.game_log()
-    ui.notify(f"Saved {printable(name, NAME)}" + ("." if log is None else f", and the log {log.name}."))
+    files = printable(name, NAME) if log is None else f"{printable(name, NAME)} and {log.name}"
+    ui.notify(f"The browser saved {files} in its folder of downloads.")
     download_game(desk)
 
 

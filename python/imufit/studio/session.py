@@ -109,8 +109,8 @@ class Session:
         Number of the present step.
     second : Stack or None
         The other of two models side by side.
-    refused : bool
-        Whether the logs cannot be judged: their rows are drawn, and nothing can be fitted.
+    refusal : InputError or None
+        Why the logs cannot be judged: their rows are drawn, and nothing can be fitted.
     """
 
     def __init__(self, logs: Sequence[LogSource]) -> None:
@@ -118,7 +118,7 @@ class Session:
         self.steps = [Step(Action.START, "", Stack())]
         self.position = 0
         self.second: Stack | None = None
-        self.refused = False
+        self.refusal: InputError | None = None
         self._made: dict[Stack, Made] = {}
         self._full: OrderedDict[Stack, None] = OrderedDict()
         self._weighed: dict[tuple[Stack, Stack], float] = {}
@@ -149,6 +149,11 @@ class Session:
     def begun(self) -> bool:
         """Whether the evidence is there."""
         return self._start is not None
+
+    @property
+    def refused(self) -> bool:
+        """Whether the logs cannot be judged."""
+        return self.refusal is not None
 
     @property
     def start(self) -> Fit:

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from nicegui import ui
 
+from imufit.log.columns import SENSOR_NAMES
 from imufit.printable import NAME, printable
+from imufit.results import Diagnosis
+from imufit.results.phrasing import listed
 from imufit.studio import charts
 from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.icons import bare
 from imufit.studio.session import Session
 from imufit.studio.stack import Action, Step
+
+OF_ALL: Final = "Held-out error of all channels together"
 
 
 class FallView:
@@ -36,7 +42,7 @@ class FallView:
         # In a row of its own: its other words must not move Undo beneath the pointer.
         self._keep = ui.button("Keep to compare", icon="splitscreen", on_click=self._keep_second)
         self._keep.props("flat dense size=12px").props("data-mark=second")
-        ui.label("Held-out error of all channels together").classes("studio-muted")
+        self._judged = ui.label(OF_ALL).classes("studio-muted").props("data-mark=judged")
         self._chart = ui.plotly(charts.empty("Open a log to begin.")).classes("studio-chart")
         self._chart.props("data-mark=fall")
         self._named: tuple[object, ...] = ()
@@ -58,6 +64,7 @@ class FallView:
             self._steps.clear()
             self._named = ()
             return
+        self._judged.set_text(_of_judged(self._desk.diagnosis))
         numbers = [session.numbers(step.stack) for step in session.steps]
         ratios = [math.nan if item is None else item.ratio for item in numbers]
         made = session.made()
@@ -104,6 +111,14 @@ class FallView:
         session.second = None if session.second is not None else session.stack
         self._desk.changed.emit()
         await self._desk.update()
+
+
+def _of_judged(diagnosis: Diagnosis | None) -> str:
+    """Say whose error the bars are."""
+    if diagnosis is None or all(item.judged for item in diagnosis.judged):
+        return OF_ALL
+    names = [SENSOR_NAMES[item.sensor] for item in diagnosis.judged if item.judged]
+    return f"Held-out error of the {listed(names)} alone" if names else OF_ALL
 
 
 def _session(desk: Desk) -> Session:

@@ -1,4 +1,4 @@
-"""The noise of the sensors at rest, as Allan deviation, worked out when a person opens the region."""
+"""The sensors at rest: mean rate and Allan deviation, worked out when the region opens."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from imufit.log.columns import SENSOR_NAMES
 from imufit.printable import printable
 from imufit.studio import charts
 from imufit.studio.desk import Desk
+from imufit.studio.standstill import standstill
 from imufit.verbs import allan
 
 
@@ -27,12 +28,16 @@ class NoiseView:
         self._desk = desk
         self._log: LogSource | None = None
         with ui.expansion("Noise at rest", on_value_change=self.refresh).classes("w-full").props("dense") as opened:
+            self._rate = ui.label("").classes("studio-muted").props("data-mark=standstill")
             self._note = ui.label("Open a log to begin.").classes("studio-muted").props("data-mark=allan-note")
             self._place = ui.element("div").classes("studio-charts")
         self._opened = opened.props("data-mark=noise")
 
     def renew(self) -> None:
-        """Show the noise of the present log, in the background."""
+        """Show the noise of the present log, in the background; the region opens where nothing else is judged."""
+        session = self._desk.session
+        if session is not None and session.refused and session.logs[session.shown] is not self._log:
+            self._opened.open()
         if self._opened.value:
             background_tasks.create(self.refresh(), name="noise at rest")
 
@@ -46,13 +51,18 @@ class NoiseView:
             return
         self._log = log
         self._place.clear()
+        self._rate.set_text("")
         self._note.set_text("The longest rest is being looked for.")
+        said = await run.io_bound(standstill, log)
+        if said is None or log is not self._log:
+            return  # another log was opened meanwhile
+        self._rate.set_text(printable(said))
         try:
             found: Allan | None = await run.io_bound(allan, log)
         except InputError as error:
             found, words = None, printable(str(error))
         if log is not self._log:
-            return  # another log was opened meanwhile
+            return
         if found is None:
             self._note.set_text(words)
             return

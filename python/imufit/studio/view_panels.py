@@ -41,6 +41,10 @@ ONWARD: Final = 0.5
 """Part of the window's width by which a press moves the window: half of what was seen stays in sight."""
 SMALL: Final = 0.005
 """Share of the noise floor's variance below which a part is not listed."""
+NO_RESIDUAL: Final = (
+    "The log has no reference attitude, which a residual over time needs: the readings are drawn. The notes name what "
+    "judged the log."
+)
 SHARES: Final = "The percentages are the parts of the excess over the noise floor that each entry explains."
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
@@ -131,7 +135,7 @@ class PanelView:
         self._pair.visible = session.has_reference and not session.refused
         if not judged:
             if session.begun:
-                words = "The log has no reference: the rests are judged, and the readings are drawn."
+                words = NO_RESIDUAL
             elif session.refused:
                 words = "The log cannot be judged: the readings alone are drawn."
             else:

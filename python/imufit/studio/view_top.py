@@ -19,6 +19,7 @@ from imufit.printable import NAME, printable
 from imufit.remedy import Option
 from imufit.results import Diagnosis
 from imufit.results.phrasing import capital
+from imufit.results.sentences import OFF_FLOOR
 from imufit.studio import server
 from imufit.studio.attribute import attribute
 from imufit.studio.by_sensor import by_sensor
@@ -47,8 +48,10 @@ document.addEventListener('drop', event => {
 });
 """
 """Script by which a file that is dropped anywhere on the page goes to the uploader of a number."""
+EXAMPLE: Final = {"acc_x": "AccX[g]", "acc_y": "AccY[g]", "acc_z": "AccZ[g]"}
+"""Mapping that shows how columns are named, where nothing is known of those in question."""
 PART_JUDGED: Final = "rule"
-"""Icon of an adequate model where a sensor was not judged."""
+"""Icon of an adequate model where a sensor was not judged, or a residual is left; and of a log that was not judged."""
 WRONG_VALUE: Final = "a fixed value contradicts the log"
 """Verdict on a model with such a value, beside whose icon it stands: no effect can be judged there."""
 ICONS: Final = {"adequate": "check_circle", "missing": "help", "ambiguous": "call_split", "unknown": "error"}
@@ -210,6 +213,8 @@ class Top:
             as_likely,
             desk.trouble,
             desk.in_shell,
+            desk.typed,
+            desk.mistyped,
             brought,
             desk.kept_session,
             desk.wanted,
@@ -234,6 +239,8 @@ class Top:
                 self._wanted(desk.wanted)
             if desk.kept_session is not None:
                 self._session(desk.kept_session)
+            if session is not None and session.refusal is not None:
+                self._unjudged(session.refusal)
             if desk.arrivals:
                 self._choice()
             # While another log is loaded, the answers on the present one would pass for answers on it.
@@ -309,7 +316,8 @@ class Top:
                 ui.label(printable(held.key, NAME)).classes("studio-id")
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
             word = WRONG_VALUE if diagnosis.contradicted else diagnosis.verdict
-            ui.icon(_icon_of(diagnosis), size="sm").props(f'role=img aria-label="{word}" title="{word}"')
+            icon = ui.icon(_icon_of(diagnosis, self._desk.ratio), size="sm")
+            icon.props(f'role=img aria-label="{word}" title="{word}"')
             Explained(diagnosis.sentence or diagnosis.verdict, seen).classes("studio-sentence").props(
                 "data-mark=verdict"
             )
@@ -339,6 +347,23 @@ class Top:
                 for note in notes:
                     Explained(note, seen).classes("studio-muted")
 
+    def _unjudged(self, refusal: InputError) -> None:
+        """Say that nothing was judged, why, and what to record."""
+        with ui.row().classes("w-full items-start gap-2 no-wrap"):
+            ui.icon(PART_JUDGED, size="sm").props('role=img aria-label="not judged" title="not judged"')
+            words = printable(f"Nothing was judged: {refusal.problem}.")
+            ui.label(words).classes("studio-sentence").props("data-mark=unjudged")
+        advice = refusal.advice
+        if advice is None:
+            return
+        for option in remedies(advice):
+            self._cure(option, 0, "cure")
+        if advice.python == advice.shell:
+            ui.label(printable(f"Next: {advice}")).classes("studio-muted").props("data-mark=next")
+        else:
+            with ui.expansion("To be recorded, or run in a shell").classes("w-full").props("dense data-mark=next"):
+                ui.label(printable(advice.shell)).classes("studio-muted")
+
     def _cure(self, option: Option, number: int, mark: str) -> None:
         """Offer an option of a remedy."""
 
@@ -358,11 +383,13 @@ class Top:
                 ui.label(f"The page still shows {shown}.").classes("studio-muted")
             if desk.unmapped is not None:
                 self._mapping(desk.unmapped)
-                ui.label(f"In a shell: {printable(desk.in_shell)}").classes("studio-muted").props("data-mark=in-shell")
             with ui.row():
                 for option in desk.cures:
                     self._cure(option, 0, "cure")
                 ui.button("Dismiss", on_click=desk.forget_trouble).props("dense flat size=12px")
+            if desk.in_shell:
+                with ui.expansion("In a shell").classes("w-full").props("dense data-mark=in-shell"):
+                    ui.label(printable(desk.in_shell)).classes("studio-muted")
 
     def _mapping(self, file: LogFile) -> None:
         """Take names for the columns of a file."""
@@ -371,9 +398,15 @@ class Top:
             await self._desk.remap(file, given.value)
 
         with ui.row().classes("w-full items-center"):
-            given = ui.input("columns, such as acc_x=AccX[g],acc_y=AccY[g]").props("dense outlined")
+            given = ui.input(f"columns, such as {self._example()}", value=self._desk.typed).props("dense outlined")
             given.classes("grow").props("data-mark=mapping").on("keydown.enter", read)
+            given.error = printable(self._desk.mistyped) or None
             ui.button("Read", on_click=read).props("dense outline")
+
+    def _example(self) -> str:
+        """Show the mapping of a sensor: of the one in question where that is known."""
+        first = next((value for name, value in self._desk.cures if name == "mapping"), EXAMPLE)
+        return printable(",".join(f"{target}={source}" for target, source in first.items()))
 
     def _choice(self) -> None:
         desk = self._desk
@@ -462,10 +495,11 @@ ADDED: Final = "The bars show what the effect took off the error. Reveal the tru
 """Task of the demonstration once an effect is added."""
 
 
-def _icon_of(diagnosis: Diagnosis) -> str:
+def _icon_of(diagnosis: Diagnosis, ratio: float) -> str:
     if diagnosis.contradicted:
         return ICONS["unknown"]
-    whole = all(item.judged for item in diagnosis.judged)
+    # A residual that stands above its noise is no more a sign of a whole model than a sensor that was not judged.
+    whole = all(item.judged for item in diagnosis.judged) and ratio <= OFF_FLOOR
     return ICONS[diagnosis.verdict] if whole or diagnosis.verdict != "adequate" else PART_JUDGED
 
 
