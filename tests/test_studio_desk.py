@@ -84,7 +84,7 @@ def test_the_mean_rate_of_a_log_at_rest_is_that_of_its_gyroscope(tmp_path):
     assert said.startswith("The log rests once")
     values = [float(text) for text in re.findall(r"[xyz] (-?[\d.]+) ±", said)]
     np.testing.assert_allclose(values, np.degrees(bias), atol=0.02)
-    assert standstill(Log.from_arrays(t, acc=acc)) .startswith("The log rests once")
+    assert standstill(Log.from_arrays(t, acc=acc)).startswith("The log rests once")
 
 
 def test_another_log_does_not_wait_for_the_work_on_the_one_before(log, tmp_path, monkeypatch):
