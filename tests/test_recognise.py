@@ -426,3 +426,22 @@ def test_a_quaternion_beside_the_readings_is_offered_where_a_reference_is_missin
     mapped = read(path, mapping)
     same(mapped, sound, "acc", "gyr")
     assert mapped.ref_q is not None
+
+
+def test_text_among_the_numbers_is_said_beside_the_question_and_the_first_column_first(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = [f"{0.01 * k:.2f},0,0,9.8,0.1,0.2,0.1" for k in range(400)]
+    rows[300] = "3.00,hello,0,9.8,not,0.2,0.1"
+    path.write_text("time,ax,ay,az,gx,gy,gz\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    first = "a.csv: row 300 (line 302), column ax: 'hello' is not a number"
+    with pytest.raises(InputError, match="does not state the unit of the gyroscope") as asked:
+        read(path)
+    assert str(asked.value).startswith(f"{first}; column gx: ")
+    (mapping,) = shell_mappings(str(asked.value.shell_remedy))
+    with pytest.raises(InputError) as answered:
+        read(path, parse_mapping(mapping))
+    assert str(answered.value).startswith(f"{first}.")
+    gyroscope = {f"gyr_{axis}": f"g{axis}[deg/s]" for axis in "xyz"}
+    with pytest.raises(InputError) as answered:
+        read(path, gyroscope)
+    assert str(answered.value).startswith(f"{first}.")

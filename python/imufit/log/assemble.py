@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from imufit.errors import InputError
 from imufit.log.check import (
     check_poses,
     checked_attitude,
     checked_labels,
+    first_of,
     numbers_from_text,
     truth_value,
 )
@@ -96,6 +98,7 @@ def fields_of(
     """
     numbers: dict[str, NDArray[np.float64]] = {}
     text: dict[str, NDArray[np.object_]] = {}
+    faults = []
     for column in plan.columns:
         if column.target == "t":
             continue
@@ -110,7 +113,12 @@ def fields_of(
         ):
             text[column.target] = checked_labels(raw)
         else:
-            numbers[column.target] = _numbers(column, block, start, rows, place)
+            try:
+                numbers[column.target] = _numbers(column, block, start, rows, place)
+            except InputError as error:
+                faults.append(error)
+    if (fault := first_of(faults)) is not None:
+        raise fault
     names = {column.target: column.name or column.target for column in plan.columns}
     numbers = unmeasured.left_out(numbers, names, start)
     t = repair.apply(time_of(plan, block, start, rows, place), start)

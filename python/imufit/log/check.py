@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -79,6 +80,39 @@ def numbers_from_text(cells: NDArray[np.object_], column: str, start: int, place
                 raise truth_value(text, column, start + i, place) from None
             raise place.error(f"{shown!r} is not a number", row=start + i, column=column, remedy=remedy) from None
     return values
+
+
+def first_of(faults: Iterable[InputError]) -> InputError | None:
+    """Return the fault that stands first in the file, of one row in the first column; None without faults.
+
+    Parameters
+    ----------
+    faults : iterable of InputError
+        One for each column, in the order of the file.
+    """
+    return min(faults, key=lambda fault: fault.row or 0, default=None)
+
+
+def text_for_number(cells: Mapping[str, NDArray[Any]], start: int, place: Place) -> InputError | None:
+    """Return the error for the first cell of some columns that is not a number; None where all are.
+
+    Parameters
+    ----------
+    cells : mapping
+        Rows of the columns, each (n,), in the order of the file.
+    start : int
+        Row of the log at which they begin.
+    place : Place
+        To name the file in the error.
+    """
+    faults = []
+    for column, values in cells.items():
+        if values.dtype == object:
+            try:
+                numbers_from_text(values, column, start, place)
+            except InputError as error:
+                faults.append(error)
+    return first_of(faults)
 
 
 def checked_attitude(q: NDArray[np.float64], start: int, place: Place) -> NDArray[np.float64]:

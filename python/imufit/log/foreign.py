@@ -192,7 +192,8 @@ def plan_columns(
     unused = [shown[n] for n in names if n not in {*used, *dropped, *computed}]
     if not rest:
         kept = [column for column in kept if column.target in CONTRACT]
-    columns = [*mapped, *kept]
+    at = {name: k for k, name in enumerate(names)}
+    columns = sorted([*mapped, *kept], key=lambda column: at.get(column.name or "", -1))
     _check_complete([column.target for column in columns], unused, place, bare)
     notes = tuple(f"{place.name}: column {name} left out: the mapping gives that name to another" for name in lost)
     notes += tuple(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imufit.errors import InputError
+from imufit.log.check import text_for_number
 from imufit.log.clock import Clock, clocks_of
 from imufit.log.clock_text import ORDERS, seconds_from_cells
 from imufit.log.columns import CONTRACT, EULER, GROUPS, LARGEST_COVARIATE, SENSOR_NAMES, SENSORS, WHOLE_TURN
@@ -174,13 +175,27 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place,
     left_open = _Open(lacking, tuple(asked), tuple(several), timeless, others, readings.possible(units))
     if left_open:
         at = {group: each.columns[0] for group, each in chosen.items()} | ({"t": clock.column} if clock else {})
-        raise left_open.error(complete, at, bool(chosen) or _has_any(names, given), place)
+        raise _with_text(
+            left_open.error(complete, at, bool(chosen) or _has_any(names, given), place), source, chosen, place
+        )
     second = {group: candidates[0] for group, candidates in others.items()}
     if second:
         theirs = _Readings.of(source, clock, {**chosen, **second}, given, place)
         told = (*told, _instead(others, _mapping(second, theirs.proposed(theirs.units()), maker), mapping, place))
     notes = (*told, *_notes(place, maker, timed or counted, chosen, units, warm))
     return Recognised(complete, notes, tuple(column for each in computed for column in each.columns))
+
+
+def _with_text(question: InputError, source: Readable, chosen: Mapping[str, _Candidate], place: Place) -> InputError:
+    """Say before a question which cell of the sensors is not a number: an answer would only lead to that cell."""
+    wanted = [name for name in source.names if any(name in each.columns for each in chosen.values())]
+    for start, _, block in source.scan(wanted):
+        fault = text_for_number({name: block[name] for name in wanted}, start, place)
+        if fault is not None:
+            problem = f"{fault.problem}; {question.where}: {question.problem}"
+            remedy = f"{fault.remedy} " + (question.advice or Remedy.of(""))
+            return place.error(problem, row=fault.row, column=fault.column, remedy=remedy)
+    return question
 
 
 def _without_gravity(computed: Sequence[_Candidate], place: Place) -> Iterator[str]:
