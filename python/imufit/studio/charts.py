@@ -195,8 +195,8 @@ def spectrum(found: Spectrum, other: Spectrum | None = None) -> Figure:
     lines += _line(ends, np.full(2, factor * math.sqrt(found.floor)), GREY, "noise floor", dash="dash")
     # Decades alone carry numbers: the others would lie upon one another on a phone.
     ticks = {"type": "log", "dtick": 1, "tickformat": "~g"}
-    title = f"residual of {words(channel_name(found.channel))} about its mean, {unit}/√Hz"
-    return _figure(lines, "frequency, Hz", title, xaxis=ticks, yaxis=_logarithmic(lines))
+    title = f"residual of {words(channel_name(found.channel))}, {unit}/√Hz"
+    return _figure(lines, "frequency, Hz, of the residual less its mean", title, xaxis=ticks, yaxis=_logarithmic(lines))
 
 
 def _logarithmic(lines: Sequence[Figure]) -> Figure:
@@ -306,6 +306,7 @@ def fall(
                 "x": [k for k, _ in known],
                 "y": [value for _, value in known],
                 "marker": {"symbol": "diamond-open", "size": 11, "color": ORANGE, "line": {"width": 2}},
+                "cliponaxis": False,
                 "hovertemplate": "%{customdata}<br>%{y:.3f} expected<extra></extra>",
                 "customdata": [names[k] for k, _ in known],
             }
