@@ -1,6 +1,8 @@
 """Effects far beyond their typical size: named if they explain everything, and not if something is left."""
 
+import imufit
 import numpy as np
+import pandas as pd
 import pytest
 from imufit import Log, SensorModel
 from imufit.lab import simulate
@@ -45,3 +47,21 @@ def test_beside_what_cannot_be_so_large_no_effect_of_another_sensor_is_named():
     answer = SensorModel().fit(simulate.simulate("handheld", effects, 4, 60.0).to_log()).diagnose()
     assert (answer.verdict, answer.best) == ("unknown", None)
     assert not [candidate.effect for candidate in answer.candidates if candidate.status == "significant"]
+
+
+def test_readings_without_any_noise_have_an_answer(tmp_path):
+    # Three attitudes, each held to the last digit: the magnetometer's noise is that of rounding.
+    poses = pd.DataFrame(
+        {
+            **{"acc_x": [-5.365, -6.996, 1.26], "acc_y": [-7.025, -6.884, 6.755], "acc_z": [-4.318, -0.227, -7.015]},
+            **{"gyr_x": [-0.001, 1.098, 0.001], "gyr_y": [0.001, 0.0, -0.001], "gyr_z": [0.0, 0.001, -2.45]},
+            **{"mag_x": [39.933, 19.042, 2.893], "mag_y": [19.234, 42.541, -44.35], "mag_z": [18.769, 11.833, 19.081]},
+            **{"ref_qw": [0.807, -0.08, 0.763], "ref_qx": [0.5, 0.441, -0.345]},
+            **{"ref_qy": [-0.176, 0.542, -0.154], "ref_qz": [0.261, 0.711, 0.525], "temp": [25.746, 26.858, 26.323]},
+        }
+    )
+    held = poses.loc[np.repeat([0, 1, 2], [100, 100, 40])].reset_index(drop=True)
+    held.insert(0, "t", 0.05 * np.arange(len(held)))
+    held.to_csv(tmp_path / "held.csv", index=False)
+    (tmp_path / "held.toml").write_text('frame = "NED"\nmag_reference = [20.0, 0.0, 44.0]\n')
+    assert imufit.diagnose(tmp_path / "held.csv").sentence

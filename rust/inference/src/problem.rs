@@ -86,6 +86,9 @@ pub struct Question {
 
 /// Plausible sizes are this many times the typical ones.
 const PLAUSIBLE: f64 = 3.0;
+/// Largest square of an effect over that of the noise, 1: numbers hold sixteen digits, and what is left of two such squares must be known to a
+/// hundredth of the prior's information, which is 1. A log whose readings have no noise at all has 1e21.
+const DIGITS: f64 = 1e14;
 /// Part of the prior precision of other questions that an estimate has for a parameter without typical size.
 const OPEN: f64 = 0.01;
 /// A parameter without typical size is given one at which its effect would stand out by this factor.
@@ -107,6 +110,28 @@ fn typical_sizes(parts: &[Part], places: &[Vec<usize>], p: usize) -> Vec<Option<
     sizes
 }
 
+/// Gives each channel at least so much noise that what an effect of plausible size does to all of its rows stays within [`DIGITS`].
+fn keep_within_digits(part: &mut Part) {
+    let layout = &part.white.layout;
+    for (channel, variance) in part.variance.iter_mut().enumerate() {
+        let mut largest = 0.0_f64;
+        for (k, j) in layout.model.active()[channel].iter().enumerate() {
+            let slots = layout.model.slots();
+            let slot = slots
+                .iter()
+                .find(|s| (s.first..s.first + s.parameters.len()).contains(j));
+            let typical = slot.and_then(|s| s.effect.typical(j - s.first, &layout.facts));
+            let square: f64 = part
+                .white
+                .of_channel(channel)
+                .map(|(_, block)| block.gram.at(k, k))
+                .sum();
+            largest = largest.max(square * (PLAUSIBLE * typical.unwrap_or(0.0)).powi(2));
+        }
+        *variance = variance.max(largest / DIGITS);
+    }
+}
+
 /// Part of the mean square that noise of the reference makes of what gains of a sensor multiply. Noise of the attitude is white, and filters
 /// that take slow noise out of the residual leave more of it than of the motion; rates are smoothed.
 fn attenuation(layout: &Layout, sensor: usize) -> [f64; 3] {
@@ -126,7 +151,8 @@ fn attenuation(layout: &Layout, sensor: usize) -> [f64; 3] {
 impl Problem {
     /// From the evidence of one log or of several; `own` tells which of all logs' slots each log has for itself, `limits` what the user
     /// allows parameters of the model.
-    pub fn new(parts: Vec<Part>, own: &[bool], limits: &[Limited]) -> Self {
+    pub fn new(mut parts: Vec<Part>, own: &[bool], limits: &[Limited]) -> Self {
+        parts.iter_mut().for_each(keep_within_digits);
         let (slots, places) = part::joined(&parts, own);
         let p = slots.last().map_or(0, |s| s.first + s.parameters.len());
         let parts: Arc<[Part]> = parts.into();
