@@ -41,12 +41,14 @@ def test_what_only_looks_like_it_is_not(seed):
     assert answer.best != "acc.scale_temperature"
 
 
-def test_beside_what_cannot_be_so_large_no_effect_of_another_sensor_is_named():
-    # A heading of the reference that wanders would carry the accelerometer's error to the gyroscope.
+def test_beside_what_cannot_be_so_large_the_effect_of_another_sensor_is_named_and_none_besides():
     effects = {"acc.scale": {"x": 0.6, "y": 0.5}, "mag.hard_iron": {"x": 15.0, "y": -10.0, "z": 20.0}}
-    answer = SensorModel().fit(simulate.simulate("handheld", effects, 4, 60.0).to_log()).diagnose()
-    assert (answer.verdict, answer.best) == ("unknown", None)
-    assert not [candidate.effect for candidate in answer.candidates if candidate.status == "significant"]
+    found = imufit.ladder(simulate.simulate("handheld", effects, 4, 60.0).to_log())
+    assert (found.verdict, [step.effect for step in found.steps]) == ("unknown", ["mag.hard_iron"])
+    # The rest is stated by the effect that it looks like, and on the channels of the accelerometer.
+    assert "acc.scale is larger than sensors have it" in found.sentence
+    first = found.diagnosis.unexplained[0]
+    assert (first.channel, first.covariate) in {(f"acc_{axis}", f"f_{axis}") for axis in "xyz"}
 
 
 def test_readings_without_any_noise_have_an_answer(tmp_path):

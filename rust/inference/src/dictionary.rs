@@ -15,7 +15,7 @@ use crate::bins::{self, Covariate};
 use crate::courses;
 use crate::criterion::Criterion;
 use crate::problem::Problem;
-use crate::search::Search;
+use crate::search::{Plausible, Search, Weighed};
 use crate::stack::Stack;
 
 /// What the covariates are called that hold the quantities that sensors measure, up to the axis.
@@ -29,6 +29,8 @@ type Bound = (usize, Arc<Covariate>);
 pub enum Origin {
     /// A probe, by its slot.
     Probe(usize),
+    /// What an effect of the catalogue describes, by its slot, where it would have to be larger than sensors have it.
+    Outsize(usize),
     /// Bins of a covariate of each of some channels of a sensor.
     Bins(Vec<Bound>),
     /// A course in time of some channels, by their places among the sums.
@@ -71,6 +73,24 @@ pub fn fixed(criterion: &Criterion, probes: &[usize]) -> Vec<Unnamed> {
     of_probes.chain(single).chain(of_sensors).collect()
 }
 
+/// What the candidates of a search describe, for where they would have to be larger than sensors have them.
+pub fn outsize(search: &Search) -> Vec<Unnamed> {
+    let cause = |slot: &usize| Unnamed {
+        origin: Origin::Outsize(*slot),
+        asked: Asked::slot(search.criterion, *slot),
+    };
+    search.candidates.iter().map(cause).collect()
+}
+
+/// Log Bayes factor of an unnamed cause beside a stack.
+pub fn ln_bayes(search: &Search, stack: &Stack, unnamed: &Unnamed) -> f64 {
+    let too_large = |w: &Weighed| w.plausible == Plausible::TooLarge;
+    match unnamed.origin {
+        Origin::Outsize(slot) => search.weigh(stack, slot).filter(too_large).map_or(0.0, |w| w.ln_bayes),
+        _ => stack.ln_bayes(&unnamed.asked),
+    }
+}
+
 /// What all axes of a sensor have, as effects of the catalogue do: each depends on the same covariate, or each on its own quantity.
 fn of_sensors(of_bins: &[(Bound, Asked)]) -> Vec<Unnamed> {
     let mut groups: BTreeMap<_, Vec<&(Bound, Asked)>> = BTreeMap::new();
@@ -103,7 +123,9 @@ pub fn contrasts(problem: &Problem, covariate: &Covariate) -> Option<DMatrix<f64
 /// Log Bayes factor of what an unnamed cause has in common in all blocks beside some members, where it may vary from block to block.
 pub fn varying(search: &Search, stack: &Stack, members: &[usize], unnamed: &Unnamed) -> f64 {
     match &unnamed.origin {
-        Origin::Probe(slot) => search.varying_beside(stack, members, *slot, &unnamed.asked).common,
+        Origin::Probe(slot) | Origin::Outsize(slot) => {
+            search.varying_beside(stack, members, *slot, &unnamed.asked).common
+        }
         Origin::Bins(parts) => {
             let columns = search.beside(stack, members);
             let columns: Vec<usize> = columns.iter().map(|(j, _)| *j).collect();

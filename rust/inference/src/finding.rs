@@ -46,8 +46,8 @@ pub fn strongest(findings: Vec<Finding>) -> Vec<Finding> {
     kept
 }
 
-/// An unnamed cause in words, channel by channel.
-pub fn told(problem: &Problem, stack: &Stack, unnamed: &Unnamed, ln_bayes: f64) -> Vec<Finding> {
+/// An unnamed cause in words, channel by channel; `all` are all of them, the likeliest first.
+pub fn told(problem: &Problem, stack: &Stack, unnamed: &Unnamed, ln_bayes: f64, all: &[&Unnamed]) -> Vec<Finding> {
     let several = problem.parts.len() > 1;
     let sums = &problem.sums;
     let mut channels: Vec<usize> = unnamed.asked.sums.iter().map(|(c, _)| sums[*c].channel).collect();
@@ -79,6 +79,20 @@ pub fn told(problem: &Problem, stack: &Stack, unnamed: &Unnamed, ln_bayes: f64) 
                 )
             };
             return showing(stack, unnamed, places).into_iter().map(in_words).collect();
+        }
+        Origin::Outsize(slot) => {
+            let effect = &problem.slots[*slot].effect;
+            // The covariate that shows it best says where to look.
+            let shown = |other: &&Unnamed| match &other.origin {
+                Origin::Bins(parts) => parts.iter().find(|(channel, _)| channels.contains(channel)).cloned(),
+                _ => None,
+            };
+            let (channel, covariate) = all.iter().find_map(shown).map_or_else(
+                || (channels.first().copied().unwrap_or_default(), "t".to_string()),
+                |(channel, covariate)| (channel, covariate.name.clone()),
+            );
+            let shape = format!("what looks like {} is larger than sensors have it", effect.card().id);
+            common(channel, covariate, None, shape)
         }
         Origin::Probe(slot) => {
             let equations = stack.equations(&unnamed.asked);

@@ -92,8 +92,6 @@ pub struct Named {
     unexplained: Vec<Unexplained>,
     /// Effects of the model, of these or of the catalogue whose coefficient drifts or switches, by slot, and the log Bayes factors of that.
     varying: Vec<(usize, f64)>,
-    /// True if what explains most cannot be so large.
-    too_large: bool,
 }
 
 /// An unnamed cause beside the named effects.
@@ -176,7 +174,7 @@ impl Inquiry<'_> {
             if most < least {
                 most
             } else {
-                stack.ln_bayes(&unnamed.asked)
+                dictionary::ln_bayes(&self.search, stack, unnamed)
             }
         };
         self.unnamed.par_iter().map(of).collect()
@@ -209,6 +207,7 @@ pub fn decide(
     } else {
         dictionary::fixed(&criterion, probes)
             .into_iter()
+            .chain(dictionary::outsize(&search))
             .map(Arc::new)
             .collect()
     };
@@ -223,14 +222,13 @@ pub fn decide(
     let earlier = known.named.as_ref().filter(|named| named.is_of(&inquiry));
     let named = match earlier {
         Some(named) => named.clone(),
-        None => named(&inquiry, &alone, &weighed)?,
+        None => named(&inquiry, &alone)?,
     };
     let Named {
         mut members,
         before,
         unexplained,
         varying,
-        too_large,
     } = named.clone();
     let search = &inquiry.search;
     let stack = search.stack(&members)?;
@@ -284,16 +282,13 @@ pub fn decide(
         rivals.retain(|r| found.ln_of(*r).is_none());
         rivals.extend(&found.rivals);
     }
-    let impossible = too_large
-        || (search.weigh_all(&stack, &members).iter())
-            .any(|w| w.plausible == Plausible::TooLarge && search.explains(w));
     let disagreements = disagreements(search, &members, &weighed);
     // What one log has alone spoils the answer only if there is no other. Of two logs nobody can say which is wrong.
     let spoilt = (disagreements.first())
         .is_some_and(|d| d.wild && (problem.parts.len() == 2 || best.is_none_or(|b| b == d.slot)));
     let kind = match best {
         _ if spoilt => Kind::Unknown,
-        None if members.is_empty() && left.is_empty() && known.seen.is_empty() && !impossible => Kind::Adequate,
+        None if members.is_empty() && left.is_empty() && known.seen.is_empty() => Kind::Adequate,
         None => Kind::Unknown,
         Some(first) if unclear.iter().any(|s| acts(first, s)) => Kind::Unknown,
         Some(_) if rivals.is_empty() => Kind::Missing,
@@ -303,7 +298,8 @@ pub fn decide(
     let correlations = correlations(problem, model, best, &candidates);
     // Where something is left, the cause that describes it best is stated first, whichever has shown that it is there.
     let stated = unexplained.iter().filter(|_| !left.is_empty());
-    let found = stated.flat_map(|cause| finding::told(problem, &stack, &cause.unnamed, cause.ln_bayes));
+    let all: Vec<&Unnamed> = unexplained.iter().map(|cause| cause.unnamed.as_ref()).collect();
+    let found = stated.flat_map(|cause| finding::told(problem, &stack, &cause.unnamed, cause.ln_bayes, &all));
     let differing = varying.iter().map(|(slot, ln)| finding::differs(problem, *slot, *ln));
     let mut findings: Vec<Finding> = known.seen.iter().cloned().chain(found).chain(differing).collect();
     findings.sort_by(|a, b| b.ln_bayes.total_cmp(&a.ln_bayes));
@@ -359,27 +355,10 @@ fn unclear(inquiry: &Inquiry, members: &[usize], instead: &[Shown], left: &[Show
     Sensor::ALL.iter().filter(of).copied().collect()
 }
 
-/// True if the candidate with most evidence would have to be larger than sensors have it.
-fn outdone(weighed: &[Weighed]) -> bool {
-    let can = |w: &&Weighed| w.testable && matches!(w.plausible, Plausible::Yes | Plausible::TooLarge);
-    let most = weighed
-        .iter()
-        .filter(can)
-        .max_by(|a, b| a.ln_bayes.total_cmp(&b.ln_bayes));
-    most.is_some_and(|w| w.plausible == Plausible::TooLarge)
-}
-
-/// What the evidence names; `alone` is the stack of the model, beside which `weighed` are all candidates.
-fn named(inquiry: &Inquiry, alone: &Stack, weighed: &[Weighed]) -> Option<Named> {
+/// What the evidence names; `alone` is the stack of the model.
+fn named(inquiry: &Inquiry, alone: &Stack) -> Option<Named> {
     let before = inquiry.beside(alone);
-    // What explains most, and cannot be so large, has a cause that nobody knows: a lesser effect in its place would be a wrong name, and what
-    // all sensors share, such as the heading of the reference, carries it to the others.
-    let too_large = outdone(weighed);
-    let (members, left) = if too_large {
-        (Vec::new(), before.clone())
-    } else {
-        beside_unnamed(inquiry)?
-    };
+    let (members, left) = beside_unnamed(inquiry)?;
     let stack = inquiry.search.stack(&members)?;
     let unexplained = unexplained(inquiry, &members, &stack, &left);
     let definite = unexplained.iter().any(|left| inquiry.holds(left));
@@ -389,7 +368,6 @@ fn named(inquiry: &Inquiry, alone: &Stack, weighed: &[Weighed]) -> Option<Named>
         before,
         unexplained,
         varying,
-        too_large,
     })
 }
 
@@ -499,7 +477,7 @@ fn stands_in(inquiry: &Inquiry, members: &[usize], stack: &Stack, left: &[f64]) 
         let sensors = problem.slots[*member].effect.sensors();
         let instead = inquiry.exceeding(&without, least, sensors);
         // Bins of one log among several show no property of the sensor.
-        let common = |k: usize| matches!(inquiry.unnamed[k].origin, Origin::Probe(_)) || problem.parts.len() == 1;
+        let common = |k: usize| !matches!(inquiry.unnamed[k].origin, Origin::Bins(_)) || problem.parts.len() == 1;
         // A cause that only fluctuates from block to block takes no place.
         let fixed = (0..left.len()).filter(|k| replaced(instead[*k], left[*k])).any(|k| {
             let steady = dictionary::varying(search, &without, &others, &inquiry.unnamed[k]).min(instead[k]);
@@ -563,7 +541,7 @@ fn same_but_noise(search: &Search, others: &[usize], best: &Weighed, slot: usize
 /// Sensors whose readings show an unnamed cause.
 fn sensors_of(problem: &Problem, origin: &Origin) -> Vec<Sensor> {
     match origin {
-        Origin::Probe(slot) => problem.slots[*slot].effect.sensors().to_vec(),
+        Origin::Probe(slot) | Origin::Outsize(slot) => problem.slots[*slot].effect.sensors().to_vec(),
         Origin::Bins(parts) => vec![Sensor::ALL[parts[0].0 / 3]],
         Origin::Course(places, _) => vec![Sensor::ALL[problem.sums[places[0]].channel / 3]],
     }
