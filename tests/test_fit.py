@@ -260,7 +260,7 @@ def test_a_moving_log_without_reference_is_judged_by_the_length_of_the_field_alo
     log = replace(swaying(duration=20.0, noise=1.0), ref_q=None, ref_p=None)
     answer = ladder(log).diagnosis
     assert {each.sensor: each.judged for each in answer.judged} == {"acc": False, "gyr": False, "mag": True}
-    assert answer.sentence.startswith("mag: judged; acc, gyr: not judged")
+    assert answer.sentence.startswith("mag: nothing missing; acc, gyr: not judged")
 
 
 def test_an_effect_on_a_sensor_without_samples_cannot_be_fitted():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -187,15 +188,19 @@ def recognise(source: Readable, mapping: Mapping[str, str] | None, place: Place,
 
 
 def _with_text(question: InputError, source: Readable, chosen: Mapping[str, _Candidate], place: Place) -> InputError:
-    """Say before a question which cell of the sensors is not a number: an answer would only lead to that cell."""
+    """Say before a question which cell of the sensors is not a number: an answer would only lead to that cell.
+
+    The first block is looked at. Who brings a file of gigabytes is asked at once.
+    """
     wanted = [name for name in source.names if any(name in each.columns for each in chosen.values())]
-    for start, _, block in source.scan(wanted):
-        fault = text_for_number({name: block[name] for name in wanted}, start, place)
-        if fault is not None:
-            problem = f"{fault.problem}; {question.where}: {question.problem}"
-            remedy = f"{fault.remedy} " + (question.advice or Remedy.of(""))
-            return place.error(problem, row=fault.row, column=fault.column, remedy=remedy)
-    return question
+    blocks = islice(source.scan(wanted), 1)
+    faults = (text_for_number({name: block[name] for name in wanted}, start, place) for start, _, block in blocks)
+    fault = next(faults, None)
+    if fault is None:
+        return question
+    problem = f"{fault.problem}; {question.where}: {question.problem}"
+    remedy = f"{fault.remedy} " + (question.advice or Remedy.of(""))
+    return place.error(problem, row=fault.row, column=fault.column, remedy=remedy)
 
 
 def _without_gravity(computed: Sequence[_Candidate], place: Place) -> Iterator[str]:

@@ -91,7 +91,8 @@ def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: in
     if not adequate:
         return f"{text} {capital(missing)}."
     judged = ", ".join(item.sensor for item in found.judged if item.judged)
-    return f"{judged}: judged; {missing}. {text}" if judged else f"{capital(missing)}. {text}"
+    outcome = "judged" if ratio > OFF_FLOOR else "nothing missing"
+    return f"{judged}: {outcome}; {missing}. {text}" if judged else f"{capital(missing)}. {text}"
 
 
 def _adequate(found: Diagnosis, ratio: float, untold: int) -> str:
