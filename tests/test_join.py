@@ -169,6 +169,9 @@ def test_a_phone_and_cameras_in_their_native_files_become_one_log(
     found = read(out)
     assert found.metadata.extra["lag"] == pytest.approx(0.952, abs=0.005)
     assert found.ref_q is not None
+    # The phone was held flat, within three degrees: neither units nor axes explain its 400 uT of iron.
+    answer = imufit.diagnose(found[: found.n // 2])
+    assert (answer.best, answer.data_faults) == ("mag.hard_iron", ())
 
 
 @pytest.mark.parametrize("kind", ["scalar last", "inverse", "degrees"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,14 @@ def _part(chunk: Mapping[str, Any], begin: int, end: int, margin: int) -> dict[s
         "begin": begin - low,
         "end": end - low,
     }
+
+
+SURE_TURNS: Final = 1e-3
+"""Mean square of turns, rad^2, that show the size of the field beside iron on the body: two degrees. Steel in a room, a
+few uT of 50, is as much as smaller turns show."""
+SEEN_TURNS: Final = 1e-5
+"""The same for the course of the readings, which any field that fits shows: turns by more than the noise of a
+reference, 0.2 degrees. A phone that was held flat had 377 uT of iron; half of that passed for field."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,13 +140,15 @@ class Samples:
         """Return the samples with other readings of some sensors, (n, 3) each."""
         return Samples({**self.readings, **readings}, self.ideal, self.attitude)
 
-    def own_field(self, matrix: Array | None = None) -> Array:
+    def own_field(self, matrix: Array | None = None, least: float = SURE_TURNS) -> Array:
         """Return the field (3,) in the reference frame that fits the magnetometer best, iron on the body beside it.
 
         Parameters
         ----------
         matrix : ndarray, optional
             (3, 3) map M from true vectors to readings, which is undone first.
+        least : float
+            Mean square of the turns, rad^2, from which on they separate field and iron.
         """
         readings = self.readings["mag"] if matrix is None else self.readings["mag"] @ np.linalg.inv(matrix).T
         known = np.isfinite(readings).all(axis=1)
@@ -150,7 +160,7 @@ class Samples:
         normal = np.block([[np.eye(3), mean], [mean.T, np.eye(3)]])
         right = np.concatenate([np.einsum("nij,nj->ni", turned, readings).mean(axis=0), readings.mean(axis=0)])
         # Where the turns do not separate field and iron, the smallest of both.
-        return np.asarray(np.linalg.lstsq(normal, right, rcond=1e-3)[0][:3])
+        return np.asarray(np.linalg.lstsq(normal, right, rcond=least)[0][:3])
 
     def with_own_field(self, matrix: Array) -> Samples:
         """Return the samples of the magnetometer, its axes corrected, with the field that its readings then give.
@@ -161,7 +171,7 @@ class Samples:
             (3, 3) map M: the reading is M times the true vector.
         """
         readings = self.readings["mag"] @ np.linalg.inv(matrix).T
-        return Samples({"mag": readings}, {"mag": self.own_field(matrix) @ self.attitude}, self.attitude)
+        return Samples({"mag": readings}, {"mag": self.own_field(matrix, SEEN_TURNS) @ self.attitude}, self.attitude)
 
 
 def samples(parts: Iterable[Mapping[str, Any]], facts: _imufit.Facts) -> Samples:
@@ -199,6 +209,6 @@ def samples(parts: Iterable[Mapping[str, Any]], facts: _imufit.Facts) -> Samples
     )
     if "mag" in facts.sensors and facts.field_estimated:
         # The mean over a log that does not turn evenly takes iron on the body for a part of the field.
-        field = np.where(np.isfinite(found.ideal["mag"]), found.own_field() @ found.attitude, np.nan)
+        field = np.where(np.isfinite(found.ideal["mag"]), found.own_field(least=SEEN_TURNS) @ found.attitude, np.nan)
         return Samples(found.readings, {**found.ideal, "mag": field}, found.attitude)
     return found
