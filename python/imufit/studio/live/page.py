@@ -196,7 +196,6 @@ class _LivePage:
                     .props('data-testid="device"')
                 )
                 self._choice.add_slot("option", OPTION % json.dumps(_captions()))
-                self._choice.on("popup-show", self._look_for_devices)
                 self._frame = ui.select(FRAMES, value=LIES, label="frame").style("min-width: 13rem; flex: 1 1 20rem")
                 self._baud = ui.number("bits per second", value=115200, min=300, format="%d").style("width: 8rem")
                 self._connect = ui.button("Connect", on_click=self._connect_or_not).props("unelevated")
@@ -293,12 +292,6 @@ class _LivePage:
             self._problem.text = printable(str(error))
         finally:
             self._connect.enable()
-
-    def _look_for_devices(self) -> None:
-        named = [self._choice.value] if self._choice.value else []
-        choices = list(dict.fromkeys([*devices(), *named]))
-        if set(choices) != set(self._choice.options):
-            self._choice.set_options(choices)
 
     def _source(self) -> Source:
         choice = str(self._choice.value or "").strip()
