@@ -73,7 +73,7 @@ def sign() -> None:
     """Show on a page that a device is followed, with a button that ends this."""
     with ui.element("div").classes("studio-sign").props("data-mark=live-sign") as shown:
         words = ui.label()
-        bare("stop", STOPS, device.end).props("size=sm data-mark=live-stop")
+        bare("stop", STOPS, device.end).props(f'size=sm data-mark=live-stop title="{STOPS}"')
 
     def look() -> None:
         shown.visible = bool(device.state)
