@@ -371,11 +371,16 @@ def test_the_card_of_a_candidate_opens_in_sight_where_its_name_is_pressed(page, 
     card.wait_for(state="hidden")
 
 
-def test_a_contradicted_value_is_named_in_the_place_of_the_figures_of_candidates(page, folder):
+def add_gyr_scale(page, folder):
+    """Open the log and add the first of its two effects."""
     drop(page, folder / "walk.parquet")
     wait_for_bars(page, 1)
     marked(page, "add-gyr.scale").click()
     wait_for_bars(page, 2)
+
+
+def test_a_contradicted_value_is_named_in_the_place_of_the_figures_of_candidates(page, folder):
+    add_gyr_scale(page, folder)
     assert page.get_by_text("% probable").count() > 0
     assert marked(page, "contradicted-gyr.scale.x").count() == 0
     assert marked(page, "holds").count() == 0
@@ -403,10 +408,7 @@ def test_a_contradicted_value_is_named_in_the_place_of_the_figures_of_candidates
 
 
 def test_the_field_of_a_value_has_its_digits_and_leaves_the_value_as_it_is(page, folder):
-    drop(page, folder / "walk.parquet")
-    wait_for_bars(page, 1)
-    marked(page, "add-gyr.scale").click()
-    wait_for_bars(page, 2)
+    add_gyr_scale(page, folder)
     shown = marked(page, "value-gyr.scale.x").inner_text().split(" ± ")[0]
     marked(page, "edit-gyr.scale.x").click()
     field = page.locator("input[data-mark=edit-value], [data-mark=edit-value] input").first
@@ -461,10 +463,7 @@ def test_what_lies_under_the_sentence_stays_in_its_place(page, folder):
 
 
 def test_a_switch_stays_beneath_the_pointer_while_two_models_are_compared(page, folder):
-    drop(page, folder / "walk.parquet")
-    wait_for_bars(page, 1)
-    marked(page, "add-gyr.scale").click()
-    wait_for_bars(page, 2)
+    add_gyr_scale(page, folder)
     marked(page, "second").click()
     marked(page, "two").get_by_text("The kept model is the present one.").wait_for()
     place = marked(page, "pin-gyr.scale.z").bounding_box()
@@ -555,10 +554,7 @@ def test_a_button_that_cannot_be_pressed_looks_so(page, scheme):
 
 
 def test_the_model_is_copied_as_the_c_header_of_the_command_line(page, folder):
-    drop(page, folder / "walk.parquet")
-    wait_for_bars(page, 1)
-    marked(page, "add-gyr.scale").click()
-    wait_for_bars(page, 2)
+    add_gyr_scale(page, folder)
     marked(page, "copy").click()
     marked(page, "copy-c").click()
     model = imufit.fit(imufit.read(folder / "walk.parquet")).add("gyr.scale").fit.model

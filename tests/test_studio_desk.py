@@ -24,13 +24,17 @@ def log(tmp_path_factory):
     return LogFile(path, path.name)
 
 
+def written(path, names, rows):
+    """A file of comma-separated rows."""
+    path.write_text("\n".join([names, *rows]) + "\n", encoding="utf-8")
+    return LogFile(path, path.name)
+
+
 @pytest.fixture
 def spoilt(tmp_path):
     """A log that moves all the time, with neither a reference nor a rest."""
-    path = tmp_path / "bare.csv"
     rows = [f"{0.01 * k:.2f},{5 + k % 7},{k % 5},{9 - k % 3},{k % 4},{2 - k % 9},{k % 11}" for k in range(3000)]
-    path.write_text("t,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    return LogFile(path, path.name)
+    return written(tmp_path / "bare.csv", "t,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z", rows)
 
 
 def test_rows_can_be_drawn_before_the_evidence_is_taken(log):
@@ -301,10 +305,8 @@ def test_the_page_says_what_is_waited_for_and_how_far_it_is():
 @pytest.fixture
 def undeclared(tmp_path):
     """A log that never turns, so that nothing shows the unit of its gyroscope."""
-    path = tmp_path / "mystery.csv"
     rows = [f"{0.01 * k:.2f},0,0,{9.8 + 0.01 * (k % 3)},{0.1 * (k % 4)},0.2,{0.1 * (k % 5)}" for k in range(400)]
-    path.write_text("time,ax,ay,az,gx,gy,gz\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    return LogFile(path, path.name)
+    return written(tmp_path / "mystery.csv", "time,ax,ay,az,gx,gy,gz", rows)
 
 
 def test_an_open_unit_has_one_answer_for_each_unit_that_names_its_columns(undeclared):

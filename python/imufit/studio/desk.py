@@ -22,7 +22,7 @@ from imufit.results.phrasing import capital
 from imufit.studio.log_file import Arrival, LogFile, Offer, Way, arrived, join_of, offers, remedies
 from imufit.studio.mystery import DEMONSTRATION, Mystery
 from imufit.studio.names import estimating, model_name
-from imufit.studio.session import Session
+from imufit.studio.session import Made, Session
 from imufit.studio.session_file import Kept, LogsWantedError, as_toml, read_session
 from imufit.studio.stack import Stack, Step
 from imufit.studio.traces import ModelTraces, Traces
@@ -91,7 +91,7 @@ class _FailedError(Exception):
     Parameters
     ----------
     problem : InputError or None
-        What is wrong with the person's input, where that is the reason.
+        The fault of the person's input, where it is the reason.
     """
 
     def __init__(self, problem: InputError | None = None) -> None:
@@ -214,16 +214,20 @@ class Desk:
     @property
     def diagnosis(self) -> Diagnosis | None:
         """Diagnosis on top of the present model; None while it is not there."""
-        session = self.session
-        made = None if session is None or not session.begun else session.made()
+        made = self._made
         return None if made is None else made.diagnosis
 
     @property
     def ratio(self) -> float:
         """Held-out error of the present model over the noise; NaN while it is not there."""
-        session = self.session
-        made = None if session is None or not session.begun else session.made()
+        made = self._made
         return math.nan if made is None else made.numbers.ratio
+
+    @property
+    def _made(self) -> Made | None:
+        """Return what was worked out of the present model; None while that is not there."""
+        session = self.session
+        return None if session is None or not session.begun else session.made()
 
     def reveal(self, answer: str | None) -> None:
         """End the game with an answer.

@@ -67,7 +67,7 @@ def one_of_two(states: tuple[str, str], present: str, words: str, action: Callab
     present : str
         The present one.
     words : str
-        What a press on the other one does; they may hold names from files.
+        The work of a press on the other one; may hold names from files.
     action : callable
         Changes to the other one.
     """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Final
 
@@ -56,16 +56,16 @@ LOWERS: Final = 0.99
 """Held-out error with a candidate over that without from which on the candidate lowers it for the eye."""
 
 
-def _rank(item: Candidate, diagnosis: Diagnosis) -> tuple[bool, bool, bool, float]:
-    """Return what candidates are sorted by: those that are named, then what looks like them, then by probability."""
-    named, alike = item.effect in diagnosis.named, item.effect in _alike(diagnosis)
-    return not named, item.status != SIGNIFICANT, not alike, -item.probability
+def _ranked(shown: Sequence[Candidate], diagnosis: Diagnosis) -> list[Candidate]:
+    """Sort candidates: those that are named, then what looks most like them, then by probability."""
+    named = [item for item in diagnosis.candidates if item.effect in diagnosis.named]
+    alike = {rival.effect for item in named for rival in item.confounded_with[:ALIKE]}
 
+    def rank(item: Candidate) -> tuple[bool, bool, bool, float]:
+        is_named = item.effect in diagnosis.named
+        return not is_named, item.status != SIGNIFICANT, item.effect not in alike, -item.probability
 
-def _alike(diagnosis: Diagnosis) -> set[str]:
-    """Return the effects that look most like a named one: they stand beside it, with the reason why they are not it."""
-    named = (item for item in diagnosis.candidates if item.effect in diagnosis.named)
-    return {rival.effect for item in named for rival in item.confounded_with[:ALIKE]}
+    return sorted(shown, key=rank)
 
 
 def _why_not(item: Candidate, diagnosis: Diagnosis) -> str:
@@ -139,7 +139,7 @@ class CandidateView:
                         for effect in effects:
                             self._candidate(by_effect[effect], None)
             else:
-                self._judged(sorted(shown, key=lambda item: _rank(item, diagnosis)), diagnosis)
+                self._judged(_ranked(shown, diagnosis), diagnosis)
 
     def _judged(self, shown: list[Candidate], diagnosis: Diagnosis) -> None:
         """List the candidates, the best first; beside a fixed value that the log contradicts without their figures."""

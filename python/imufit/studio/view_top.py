@@ -498,7 +498,7 @@ ADDED: Final = "The bars show what the effect took off the error. Reveal the tru
 def _icon_of(diagnosis: Diagnosis, ratio: float) -> str:
     if diagnosis.contradicted:
         return ICONS["unknown"]
-    # A residual that stands above its noise is no more a sign of a whole model than a sensor that was not judged.
+    # The tick is for a whole model: every sensor was judged, and no residual stands above its noise.
     whole = all(item.judged for item in diagnosis.judged) and ratio <= OFF_FLOOR
     return ICONS[diagnosis.verdict] if whole or diagnosis.verdict != "adequate" else PART_JUDGED
 

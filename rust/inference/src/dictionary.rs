@@ -75,11 +75,11 @@ pub fn fixed(criterion: &Criterion, probes: &[usize]) -> Vec<Unnamed> {
 
 /// What the candidates of a search describe, for where they would have to be larger than sensors have them.
 pub fn outsize(search: &Search) -> Vec<Unnamed> {
-    let cause = |slot: &usize| Unnamed {
-        origin: Origin::Outsize(*slot),
-        asked: Asked::slot(search.criterion, *slot),
+    let cause = |(slot, asked): (usize, &Asked)| Unnamed {
+        origin: Origin::Outsize(slot),
+        asked: asked.clone(),
     };
-    search.candidates.iter().map(cause).collect()
+    search.asked().map(cause).collect()
 }
 
 /// Log Bayes factor of an unnamed cause beside a stack.

@@ -16,6 +16,8 @@ use imufit_model::sensor::Sensor;
 use imufit_model::sensor_model::Slot;
 use nalgebra::DVector;
 
+use crate::stack::ROUNDING;
+
 /// Evidence in the form that every question is asked of: the blocks of all logs, one log after the other.
 pub struct Problem {
     /// The logs.
@@ -86,9 +88,6 @@ pub struct Question {
 
 /// Plausible sizes are this many times the typical ones.
 const PLAUSIBLE: f64 = 3.0;
-/// Largest square of an effect over that of the noise, 1: numbers hold sixteen digits, and what is left of two such squares must be known to a
-/// hundredth of the prior's information, which is 1. A log whose readings have no noise at all has 1e21.
-const DIGITS: f64 = 1e14;
 /// Part of the prior precision of other questions that an estimate has for a parameter without typical size.
 const OPEN: f64 = 0.01;
 /// A parameter without typical size is given one at which its effect would stand out by this factor.
@@ -110,25 +109,22 @@ fn typical_sizes(parts: &[Part], places: &[Vec<usize>], p: usize) -> Vec<Option<
     sizes
 }
 
-/// Gives each channel at least so much noise that what an effect of plausible size does to all of its rows stays within [`DIGITS`].
+/// Gives each channel at least so much noise that [`ROUNDING`] of what an effect of plausible size does to all of its rows is less than the
+/// noise. Readings without any noise would make the former 1e7 times the prior's information.
 fn keep_within_digits(part: &mut Part) {
     let layout = &part.white.layout;
+    let sizes: Vec<f64> = (layout.model.slots().iter())
+        .flat_map(|slot| (0..slot.parameters.len()).map(|k| slot.effect.typical(k, &layout.facts).unwrap_or(0.0)))
+        .map(|typical| PLAUSIBLE * typical)
+        .collect();
     for (channel, variance) in part.variance.iter_mut().enumerate() {
-        let mut largest = 0.0_f64;
-        for (k, j) in layout.model.active()[channel].iter().enumerate() {
-            let slots = layout.model.slots();
-            let slot = slots
-                .iter()
-                .find(|s| (s.first..s.first + s.parameters.len()).contains(j));
-            let typical = slot.and_then(|s| s.effect.typical(j - s.first, &layout.facts));
-            let square: f64 = part
-                .white
-                .of_channel(channel)
-                .map(|(_, block)| block.gram.at(k, k))
-                .sum();
-            largest = largest.max(square * (PLAUSIBLE * typical.unwrap_or(0.0)).powi(2));
+        if let Some((gram, _)) = part.white.total(channel, |_| 1.0) {
+            let active = layout.model.active()[channel].iter().enumerate();
+            let largest = active
+                .map(|(k, j)| gram.at(k, k) * sizes[*j].powi(2))
+                .fold(0.0, f64::max);
+            *variance = variance.max(ROUNDING * largest);
         }
-        *variance = variance.max(largest / DIGITS);
     }
 }
 

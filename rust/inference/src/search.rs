@@ -147,6 +147,13 @@ impl<'a> Search<'a> {
         Stack::new(self.criterion, &others)
     }
 
+    /// The candidates with their columns.
+    pub fn asked(&self) -> impl Iterator<Item = (usize, &Asked)> {
+        self.candidates
+            .iter()
+            .filter_map(|slot| Some((*slot, self.asked.get(slot)?)))
+    }
+
     /// One candidate beside a stack.
     pub fn weigh(&self, stack: &Stack, slot: usize) -> Option<Weighed> {
         let asked = self.asked.get(&slot)?;

@@ -129,7 +129,7 @@ pub struct Beside {
 
 /// Part of the information about a parameter that rounding may leave when noise takes all of it, some fifty times the precision of a number.
 /// Of rests that read the same value in every row a part below 1e-15 was left, and negative.
-const ROUNDING: f64 = 1e-14;
+pub(crate) const ROUNDING: f64 = 1e-14;
 
 impl<'a> Stack<'a> {
     /// Of the parameters given, each with its prior deviation.
