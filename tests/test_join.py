@@ -172,6 +172,9 @@ def test_a_phone_and_cameras_in_their_native_files_become_one_log(
     # The phone was held flat, within three degrees: neither units nor axes explain its 400 uT of iron.
     answer = imufit.diagnose(found[: found.n // 2])
     assert (answer.best, answer.data_faults) == ("mag.hard_iron", ())
+    # Without the frame the joined log says that gravity shows another one.
+    assert main(["join", str(folder), str(folder / "qualisys.mat"), "-o", str(out)]) == 0
+    assert "state --frame ENU" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize("kind", ["scalar last", "inverse", "degrees"])

@@ -10,22 +10,19 @@ from typing import Final
 import numpy as np
 
 from imufit.errors import InputError
+from imufit.joining.gravity import UPRIGHT, mean_force
 from imufit.joining.join import join
 from imufit.joining.joined import Joined
 from imufit.joining.reference import KINDS, with_attitude
 from imufit.log import Log
 from imufit.log.attitude_columns import quaternions_named
 from imufit.log.columns import WHOLE_TURN
-from imufit.log.scalar_first import rotation_from_quaternions
 from imufit.remedy import Remedy, option
 
 _NUMBERED: Final = re.compile(r"(?P<base>.*?)(?:\[(?P<index>\d)\]|_?(?P<digit>\d))")
 _ATTITUDE: Final = re.compile(r"q|quat|orient|rot|att|dcm|\br$", re.IGNORECASE)
 _ANGLE: Final = re.compile(r"(?P<base>.*?)(?P<part>roll|pitch|yaw).*", re.IGNORECASE)
 _ENCODER: Final = re.compile(r"angle|encoder|theta|joint", re.IGNORECASE)
-_UPRIGHT: Final = 0.35
-"""Largest angle between the mean specific force and the vertical, rad: 20 degrees; of readings that differ by an
-exchange of axes the wrong ones are 90 degrees off, or lie anywhere."""
 _WORSE: Final = 1.5
 """A way that leaves this many times as much of the rates (square) as the best one is another attitude: ways that are
 the same but for constant turns leave the same."""
@@ -112,7 +109,7 @@ def join_as_found(log: Log, reference: Log, lag: float | None, skew: float | Non
         raise refused[0]
     least = min(joined.traces.left for _, joined in found)
     alike = [each for each in found if each[1].traces.left <= _WORSE * least]
-    upright = [each for each in alike if _off_vertical(each[1].log) < _UPRIGHT] if len(alike) > 1 else alike
+    upright = [each for each in alike if _off_vertical(each[1].log) < UPRIGHT] if len(alike) > 1 else alike
     if len(upright) != 1:
         raise InputError(
             "rates and gravity do not show how the columns are to be read as an attitude",
@@ -130,13 +127,8 @@ def _off_vertical(log: Log) -> float:
     A quaternion with its scalar misplaced is, up to constant turns of body and frame, the inverse of the right one (an
     orthogonal map of determinant -1): the rates are the same, and only gravity separates them.
     """
-    if log.acc is None or log.ref_q is None:
-        return float("nan")
-    known = np.isfinite(log.acc).all(axis=1) & log.has_reference
-    if not known.any():
-        return float("nan")
-    mean = rotation_from_quaternions(log.ref_q[known]).apply(log.acc[known]).mean(axis=0)
-    return float(np.arccos(np.clip(np.abs(mean[2]) / max(float(np.linalg.norm(mean)), 1e-30), 0.0, 1.0)))
+    force = mean_force(log)
+    return float(np.arccos(np.clip(np.abs(force[2]) / np.linalg.norm(force), 0.0, 1.0)))
 
 
 def _ways(reference: Log) -> Iterator[Way]:

@@ -32,6 +32,10 @@ UPRIGHT: Final = 0.35
 the stated one the angle is 90 degrees or 180."""
 
 
+STEADY: Final = 0.8
+"""Mean specific force in a level frame over its mean length, 1, from which on it shows the vertical."""
+
+
 @dataclass(frozen=True, eq=False)
 class Mount:
     """A turn from the reference body's axes to the sensor's.
@@ -59,6 +63,29 @@ class Mount:
 def vertical(frame: str) -> Array:
     """Return the unit vector upwards in a frame, (3,)."""
     return np.array([0.0, 0.0, -1.0 if frame == "NED" else 1.0])
+
+
+def mean_force(log: Log) -> Array:
+    """Return the mean specific force in the reference frame over its mean length, (3,); NaN where it is not steady.
+
+    Its length is 1 for a log at rest in frames that are right. Of an axis that is not where it was taken to be the
+    forces of a half turn cancel to two thirds.
+    """
+    unknown = np.full(3, np.nan)
+    if log.acc is None or log.ref_q is None:
+        return unknown
+    known = np.isfinite(log.acc).all(axis=1) & log.has_reference
+    if not known.any():
+        return unknown
+    force = rotation_from_quaternions(log.ref_q[known]).apply(log.acc[known])
+    mean = np.asarray(force.mean(axis=0) / max(float(np.linalg.norm(force, axis=1).mean()), 1e-30))
+    return mean if np.linalg.norm(mean) >= STEADY else unknown
+
+
+def upside_down(log: Log) -> bool:
+    """Return whether the mean specific force points down in the stated frame: the frame, or its sign, is another."""
+    force = mean_force(log)
+    return bool(force @ vertical(log.metadata.frame) < -np.cos(UPRIGHT) * np.linalg.norm(force))
 
 
 def mounted(common: CommonRates, aligned: Aligned, log: Log, reference: Log, rows: NDArray[np.intp]) -> Mount:

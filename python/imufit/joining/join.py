@@ -13,7 +13,7 @@ from imufit.errors import InputError
 from imufit.joining.by_force import likeliest_by_force
 from imufit.joining.course import Course, Stretches, reference_course
 from imufit.joining.forces import position_forces, sensor_forces
-from imufit.joining.gravity import mounted, vertical
+from imufit.joining.gravity import mean_force, mounted, upside_down, vertical
 from imufit.joining.joined import Compared, Joined, RateTrace
 from imufit.joining.likeliest import Likeliest, Placed, likeliest_of_all_widths, placed
 from imufit.joining.mount import SMALL, nearest_square_turn, turned
@@ -28,9 +28,6 @@ Array = NDArray[np.float64]
 
 TOUCHING: Final = 1e-6
 """Samples of the reference this near to a row of the sensor stand in that row, s."""
-STEADY: Final = 0.8
-"""Mean specific force in a level frame over its mean length, 1, from which on it shows the vertical: of an
-axis that is not where it was taken to be the forces of a half turn cancel to two thirds."""
 LEAST_POSITIONS: Final = 60
 """Positions with which a search by force begins: two to a mean, thirty means."""
 RIG_AXES: Final[tuple[Literal["x", "y", "z"], ...]] = ("x", "y", "z")
@@ -107,9 +104,7 @@ def _join_angle(log: Log, reference: Log, lag: float | None, skew: float | None)
     axis = found.mount[:, 0]
     turns = Rotation.from_matrix(found.mount) * rotation_from_quaternions(found.log.ref_q)
     level = _levelling(found.log, turns)
-    ref_q = quaternions_from_rotation(turns if level is None else level * turns)
-    ref_q[~found.log.has_reference] = np.nan
-    joined = found.log.with_fields(ref_q=ref_q)
+    joined = _with_turns(found.log, turns if level is None else level * turns)
     along = int(np.argmax(np.abs(axis)))
     if abs(axis[along]) > 1.0 - 1e-9:
         rows = np.flatnonzero(np.isfinite(reference.ref_angle))
@@ -117,19 +112,20 @@ def _join_angle(log: Log, reference: Log, lag: float | None, skew: float | None)
         angle = np.sign(axis[along]) * np.interp(joined.t, aligned_t, np.unwrap(reference.ref_angle[rows]))
         metadata = replace(joined.metadata, rig_axis=RIG_AXES[along])
         joined = replace(joined, ref_angle=np.where(joined.has_reference, angle, np.nan), metadata=metadata)
-    return replace(found, log=joined, axis=axis, by_gravity=level is not None)
+    return replace(found, log=joined, axis=axis, by_gravity=level is not None, upside_down=False)
+
+
+def _with_turns(log: Log, turns: Rotation) -> Log:
+    """Return the log with another attitude where it has one."""
+    ref_q = quaternions_from_rotation(turns)
+    ref_q[~log.has_reference] = np.nan
+    return log.with_fields(ref_q=ref_q)
 
 
 def _levelling(log: Log, turns: Rotation) -> Rotation | None:
     """Turn that takes the mean specific force upwards; None where its direction in the frame is not steady."""
-    if log.acc is None:
-        return None
-    known = np.isfinite(log.acc).all(axis=1) & log.has_reference
-    if not known.any():
-        return None
-    force = turns[known].apply(log.acc[known])
-    mean = force.mean(axis=0)
-    if np.linalg.norm(mean) < STEADY * np.linalg.norm(force, axis=1).mean():
+    mean = mean_force(_with_turns(log, turns))
+    if not np.isfinite(mean).all():
         return None
     return Rotation.align_vectors(vertical(log.metadata.frame)[None], mean[None])[0]
 
@@ -185,6 +181,7 @@ def _result(log: Log, best: Placed, rival: float) -> Joined:
         attitude_error=aligned.attitude_error,
         rival=rival,
         traces=traces,
+        upside_down=upside_down(log),
     )
 
 

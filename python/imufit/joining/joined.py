@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from imufit.figures import quantity
 from imufit.joining.mount import OPEN, SMALL, axis_words, words
 from imufit.log import Log
+from imufit.remedy import option
 from imufit.results.part import Part
 from imufit.results.plotted import Plotted
 from imufit.results.result import Result
@@ -115,6 +116,8 @@ class Joined(Plotted, Result):
         Share of the rates (square) that is left at this lag over that at the next likeliest one; 0 without one.
     traces : RateTrace
         Rates, for the figure.
+    upside_down : bool
+        True if the specific force points down in the frame of the reference: the frame is another, or the sign.
     axis : (3,) array or None
         Unit vector, in the sensor, of the axis of an encoder; None for other references.
     """
@@ -133,6 +136,7 @@ class Joined(Plotted, Result):
     attitude_error: float
     rival: float
     traces: RateTrace
+    upside_down: bool = False
     axis: Array | None = None
 
     @property
@@ -144,9 +148,23 @@ class Joined(Plotted, Result):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Further notes for the reader."""
+        on_frame = (self._on_the_frame(),) if self.upside_down else ()
         if self.traces.compared is not Compared.RATES:
-            return self._on_the_mount()
-        return (*self._on_the_mount(), "The lag includes a delay of the gyroscope: two clocks do not show it apart.")
+            return (*on_frame, *self._on_the_mount())
+        return (
+            *on_frame,
+            *self._on_the_mount(),
+            "The lag includes a delay of the gyroscope: two clocks do not show it apart.",
+        )
+
+    def _on_the_frame(self) -> str:
+        """Return a note on a frame that has the vertical the other way."""
+        up = self.frame == "NED"
+        other = option("frame", "ENU" if up else "NED")
+        return (
+            f"By gravity the z axis of the reference points {'up' if up else 'down'}, and that of frame {self.frame} "
+            f"{'down' if up else 'up'}: state {other}, or mend the sign of the accelerometer."
+        )
 
     def _on_the_mount(self) -> tuple[str, ...]:
         """Return notes on how the sensor is turned."""
