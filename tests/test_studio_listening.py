@@ -118,6 +118,17 @@ def test_device_is_followed_and_recorded_while_the_stream_runs_on(followed, tmp_
     assert all(rest.end - rest.begin > 1.0 for rest in listening.rests if rest.good)
 
 
+def test_recording_stopped_before_its_first_row_has_ended(followed, tmp_path):
+    listening = followed(Source(scenario="six_sides", speed=5.0))
+    path = tmp_path / "none.parquet"
+    listening.record(path)
+    listening.stop()
+    until(lambda: not listening.recorded.running)
+    until(lambda: listening.state is not None and listening.state.n > 100)
+    assert not listening.recorded.running
+    assert not path.exists() or listening.recorded.made
+
+
 def test_guide_leads_through_six_sides_to_a_saved_model(followed, tmp_path):
     listening = followed(Source(scenario="six_sides", speed=25.0))
     until(lambda: listening.rolling is not None)

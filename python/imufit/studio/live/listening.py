@@ -214,6 +214,7 @@ class Listening:
                 self._refused = error
         finally:
             self._opened.set()
+            self._want_no_more()
             self._stop_recorder(None)
             if self._emulator is not None:
                 self._emulator.__exit__(None, None, None)
@@ -304,8 +305,7 @@ class Listening:
         if wizard is not None:
             self.stage = wizard.feed(batch)
             if wizard.complete:
-                with self._lock:
-                    self._wanted = None
+                self._want_no_more()
 
     def _judge_rests(self, batch: Mapping[str, Array]) -> None:
         sensors = sensors_in(tuple(batch))
@@ -348,8 +348,14 @@ class Listening:
     def stop(self) -> None:
         """End the recording, and make the log of it."""
         self._wizard = self.stage = None
+        self._want_no_more()
+
+    def _want_no_more(self) -> None:
+        """Take no more rows; a recording without any has ended, and the others end with the next look at the line."""
         with self._lock:
-            self._wanted = None
+            wanted, self._wanted = self._wanted, None
+        if wanted is not None and self._recorder is None:
+            self._recorded = Recorded(wanted, message="stopped before the first row")
 
     def guide(self, path: Path) -> None:
         """Guide through a calibration, which is recorded; at its end the log is calibrated and the model saved beside.

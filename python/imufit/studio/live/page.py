@@ -100,12 +100,13 @@ def _ports() -> list[ListPortInfo]:
     return sorted(list_ports.comports(), key=lambda port: port.device)
 
 
-def devices() -> list[str]:
-    """Return the serial ports with something on them, the devices that can be emulated, and the other ports."""
+def devices() -> dict[str, str]:
+    """Return the captions of the list of devices: ports with something on them, emulated devices, the other ports."""
     ports = _ports()
-    used = [port.device for port in ports if port.hwid != "n/a"]
-    emulated = (EMULATED + name for name in (FIRST, *SCENARIOS))
-    return list(dict.fromkeys([*used, *emulated, *(port.device for port in ports)]))
+    used = {port.device: "" for port in ports if port.hwid != "n/a"}
+    emulated = {EMULATED + name: SCENARIOS[name].description for name in (FIRST, *SCENARIOS)}
+    # No caption is a device's own text: the list's template would run what this text holds.
+    return used | emulated | {port.device: NOTHING_THERE for port in ports if port.hwid == "n/a"}
 
 
 def about(choice: str) -> str:
@@ -124,13 +125,6 @@ def about(choice: str) -> str:
         f"A simulated device that this computer plays, with {listed(sensors)}. {scenario.description} "
         "Its sensors have noise, and no other error."
     )
-
-
-def _captions() -> dict[str, str]:
-    """Return the motion of each device that can be emulated, and which ports are empty, by entry of the list."""
-    emulated = {EMULATED + name: scenario.description for name, scenario in SCENARIOS.items()}
-    # No caption is a device's own text: the list's template would run what this text holds.
-    return {port.device: NOTHING_THERE for port in _ports() if port.hwid == "n/a"} | emulated
 
 
 def _lies(moving: bool, side: str | None) -> str:
@@ -182,7 +176,8 @@ class _LivePage:
         with ui.column().classes("studio-region gap-2"):
             with ui.row().classes("w-full items-end gap-3"):
                 held = None if device.listening is None else _entry(device.listening.source)
-                choices = list(dict.fromkeys([*devices(), *filter(None, [held])]))
+                captions = devices()
+                choices = list(dict.fromkeys([*captions, *filter(None, [held])]))
                 self._choice = (
                     ui.select(
                         choices,
@@ -195,7 +190,7 @@ class _LivePage:
                     .style("min-width: 13rem")
                     .props('data-testid="device"')
                 )
-                self._choice.add_slot("option", OPTION % json.dumps(_captions()))
+                self._choice.add_slot("option", OPTION % json.dumps(captions))
                 self._frame = ui.select(FRAMES, value=LIES, label="frame").style("min-width: 13rem; flex: 1 1 20rem")
                 self._baud = ui.number("bits per second", value=115200, min=300, format="%d").style("width: 8rem")
                 self._connect = ui.button("Connect", on_click=self._connect_or_not).props("unelevated")
