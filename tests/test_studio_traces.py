@@ -147,6 +147,25 @@ def test_rows_that_an_excerpt_leaves_out_have_a_residual_in_a_narrow_window(log,
     np.testing.assert_allclose(narrow.low[inside], exact[(log.t >= 20.0) & (log.t <= 22.0)], rtol=0.0, atol=1e-9)
 
 
+def test_window_with_few_judged_rows_shows_rows_from_all_over_it(log, monkeypatch):
+    exact = SensorModel().fit(log).residuals("acc")[:, 1]
+    monkeypatch.setattr("imufit.log.excerpt.MOST_ROWS", 1200)
+    monkeypatch.setattr(module, "EVALUATED", 1280)
+    fit = SensorModel().fit(log)
+    traces = Traces(log)
+    traces.build()
+    model = ModelTraces(traces, fit.analysis.logs[0], fit.analysis.own_step(0, fit.estimate.step))
+    model.build()
+    begin, end = 15.0, 35.0
+    found, _ = model.window(["acc_y"], begin, end, 2000)["acc_y"]
+    seen = np.isfinite(found.low)
+    assert seen.sum() > 400  # the few judged rows are four blocks
+    shown = found.t[seen]
+    assert np.ptp(np.histogram(shown, bins=4, range=(begin, end))[0]) < 40  # all over the window
+    rows = np.searchsorted(log.t, shown - 1e-9)
+    np.testing.assert_allclose(found.low[seen], exact[rows], rtol=0.0, atol=1e-9)
+
+
 def test_model_of_a_log_without_reference_is_refused_in_words():
     log = simulate("six_sides", {}, 1, 60.0).to_log().with_fields(ref_q=None)
     fit = SensorModel().fit(log)

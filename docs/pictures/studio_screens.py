@@ -22,6 +22,8 @@ ARGUMENTS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--ena
 """Root has no sandbox; the bodies in three dimensions need WebGL, which a machine without a screen computes."""
 SLOW_MS = 90_000
 """Longest wait for a piece of work, ms."""
+ROTATES_MS = 240_000
+"""Longest wait for the free rotation of the emulated device, ms: its six sides take a minute and a half."""
 SIZES = {1280: 900, 380: 800}
 """Height of the window by its width, px: a laptop and a phone."""
 EFFECTS = {"acc.bias": {"x": 0.08, "y": -0.05, "z": 0.03}, "gyr.scale": {"x": 0.03, "y": -0.02, "z": 0.02}}
@@ -203,6 +205,13 @@ def guided(page: Page, folder: Path) -> None:
     page.wait_for_timeout(4000)
 
 
+def rotating(page: Page, folder: Path) -> None:
+    """Turn the device freely, for the magnetometer."""
+    guided(page, folder)
+    page.get_by_text("Turn the device until").wait_for(timeout=ROTATES_MS)
+    page.wait_for_timeout(6000)
+
+
 VIEWS: dict[str, Callable[[Page, Path], None]] = {
     view.__name__: view
     for view in (
@@ -223,6 +232,7 @@ VIEWS: dict[str, Callable[[Page, Path], None]] = {
         mystery,
         live,
         guided,
+        rotating,
     )
 }
 

@@ -32,6 +32,21 @@ class FreeTurning:
     def __init__(self) -> None:
         self._kept: list[Array] = []
         self._seen: frozenset[int] = frozenset()
+        self._middle: Array | None = None
+        self._last: Array | None = None
+
+    @property
+    def open(self) -> tuple[int, ...]:
+        """Rows of `DIRECTIONS` in which the field has not pointed yet."""
+        return tuple(k for k in range(len(DIRECTIONS)) if k not in self._seen)
+
+    @property
+    def field(self) -> tuple[float, ...] | None:
+        """Unit vector of the field in the body by the last reading; None while its middle is not known."""
+        if self._middle is None or self._last is None:
+            return None
+        away = self._last - self._middle
+        return tuple((away / max(float(np.linalg.norm(away)), 1e-30)).tolist())
 
     @property
     def seen(self) -> int:
@@ -59,11 +74,12 @@ class FreeTurning:
         # A middle that moves later must not ask for directions again.
         if self.complete or not np.isfinite(mag).all():
             return
+        self._last = np.array(mag, dtype=np.float64)
         if self._kept:
             away = float(np.linalg.norm(mag - self._kept[-1]))
             if away < NEW * float(np.linalg.norm(mag)):
                 return
-        self._kept.append(np.array(mag, dtype=np.float64))
+        self._kept.append(self._last)
         if len(self._kept) % AGAIN == 0:
             self._look()
 
@@ -73,7 +89,8 @@ class FreeTurning:
         found = _imufit.sphere(readings)
         if found is None:
             return
-        away = readings - np.array(found[0])
+        self._middle = np.array(found[0])
+        away = readings - self._middle
         length = np.linalg.norm(away, axis=1)
         # Readings of a rotation about one axis lie on a circle, through which there are many spheres.
         fits = np.abs(length - found[1]) < 0.3 * found[1]

@@ -44,6 +44,8 @@ class Stage:
         Time of the last one, s.
     side : str or None
         Side to lay up next; None where no side is wanted.
+    turning : FreeTurning or None
+        The free rotation, while it is what is wanted.
     """
 
     message: str
@@ -54,6 +56,7 @@ class Stage:
     rows: int
     t: float
     side: str | None
+    turning: FreeTurning | None = None
 
 
 class Wizard:
@@ -173,4 +176,5 @@ class Wizard:
             self._rows,
             self._t,
             None if self.sides_known else self._side,
+            self._turning if self.sides_known and self._has_mag and not self.complete else None,
         )

@@ -45,6 +45,8 @@ class ParquetSource:
         try:
             with pq.ParquetFile(path) as file:
                 self._schema = file.schema_arrow
+                # Read once: that of 600 row groups takes 14 ms.
+                self._footer = file.metadata
                 self.n: int = file.metadata.num_rows
                 self._check_text(file)
                 sizes = [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)]
@@ -140,6 +142,7 @@ class ParquetSource:
         try:
             with pq.ParquetFile(
                 self._path,
+                metadata=self._footer,
                 pre_buffer=False,
                 buffer_size=1 << 16,
                 page_checksum_verification=True,

@@ -75,9 +75,11 @@ class Body:
         Of ``measured``, ``predicted``, ``reference``, ``wanted``.
     compass : bool
         Whether north and east are named, which a filter without a magnetometer does not know.
+    ground : bool
+        Whether the ground is drawn.
     """
 
-    def __init__(self, names: Sequence[str], *, compass: bool = True) -> None:
+    def __init__(self, names: Sequence[str], *, compass: bool = True, ground: bool = True) -> None:
         self.rotations: dict[str, Array | None] = dict.fromkeys(names)
         self._hidden: set[str] = set()
         self._bodies: dict[str, Object3D] = {}
@@ -89,7 +91,7 @@ class Body:
         scene.on("init", lambda: ui.run_javascript(f"getElement({scene.id})?.renderer?.setClearColor(0xffffff, 0)"))
         self.scene = scene
         with scene:
-            for k in range(-GROUND, GROUND + 1):
+            for k in range(-GROUND, GROUND + 1) if ground else ():
                 scene.line([k, -GROUND, 0], [k, GROUND, 0]).material(GREY, 0.6)
                 scene.line([-GROUND, k, 0], [GROUND, k, 0]).material(GREY, 0.6)
             if compass:
@@ -98,7 +100,9 @@ class Body:
             for name in names:
                 self._bodies[name] = self._body(name)
         ui.label(TURNS).classes("studio-muted")
-        scene.move_camera(x=-3.3, y=-5.6, z=5.05, look_at_x=0.0, look_at_y=0.0, look_at_z=0.6, duration=0.0)
+        scene.move_camera(
+            x=-3.3, y=-5.6, z=5.05, look_at_x=0.0, look_at_y=0.0, look_at_z=0.6 if ground else HEIGHT, duration=0.0
+        )
 
     def _body(self, name: str) -> Object3D:
         """Make the body of one attitude: a plate with a nose to its x axis, and the three axes with their names."""

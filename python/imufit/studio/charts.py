@@ -364,6 +364,10 @@ LOOKS: Final = {
 prediction is a third as wide as the reading beneath."""
 
 
+LEFT: Final = 72
+"""Margin for the name of the value's axis and for seven characters beside each tick, px."""
+
+
 def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:
     """Draw quantities of one channel over time.
 
@@ -381,4 +385,9 @@ def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *,
     for name, t, values in lines:
         colour, dash, width = LOOKS.get(name, (GREY, "solid", LINE))
         drawn += _line(t, factor * values, colour, name, dash=dash, width=width)
-    return _figure(drawn, "time, s", f"{title} of {words(channel_name(channel))}, {shown}")
+    figure = _figure(drawn, "time, s", f"{title} of {words(channel_name(channel))}, {shown}")
+    # Margins that follow the labels may call for other labels, and these for other margins, without an end.
+    for name in ("xaxis", "yaxis"):
+        figure["layout"][name] |= {"automargin": False, "tickangle": 0}
+    figure["layout"]["margin"]["l"] = LEFT
+    return figure

@@ -41,6 +41,9 @@ BLOCK: Final = 64
 takes a tenth of a second. The pyramid of 20 million rows of 14 columns then takes 150 MB."""
 EVALUATED: Final = 8_192
 """Rows of which the model's readings are computed anew for a window: at 5 us a row a twentieth of a second."""
+STRETCHES: Final = 8
+"""Stretches that a window is drawn from of which too few rows are judged, half of these rows together: each is read
+from the log, in 6 ms."""
 EVALUATED_BLOCK: Final = 16
 """Rows of a block of the pyramid of a model's readings: 512 blocks in the narrowest window that is drawn from them. The
 pyramid of 2 million judged rows then takes 36 MB."""
@@ -194,6 +197,7 @@ class Traces:
         names = [channel.name for channel in self.channels]
         self._columns = _Columns(gaps_of(samples, names), BLOCK)
         self._read_again = _RowsRead(self._read)
+        self._around: dict[tuple[int, int, int], Chunk] = {}
         self.built = False
 
     @property
@@ -306,6 +310,23 @@ class Traces:
         rows = log.rows(low, high) if isinstance(log, Log) else log.rows(low, high, columns)
         return Chunk(rows, first, first - low, min(stop, self.log.n) - low)
 
+    def rows_for_models(self, first: int, stop: int, margin: int) -> Chunk:
+        """Read rows with all columns; those of one picture are read once for all of its models.
+
+        Parameters
+        ----------
+        first, stop, margin : int
+            As for `rows_around`.
+        """
+        place = (first, stop, margin)
+        chunk = self._around.get(place)
+        if chunk is None:
+            chunk = self.rows_around(first, stop, margin)
+            if len(self._around) >= STRETCHES:
+                self._around = {}
+            self._around[place] = chunk
+        return chunk
+
     def _read(self, first: int, stop: int, names: Sequence[str]) -> tuple[Array, Table]:
         core = self.rows_around(first, stop, columns=names).core
         return core.t, core.table()
@@ -360,7 +381,8 @@ class ModelTraces:
     def build(self) -> None:
         """Make the pass over the judged rows, which wide windows are drawn from.
 
-        Of a log of more than 2 million rows those of its excerpt are judged: a wide window shows the stretches.
+        Of a log of more than 2 million rows those of its excerpt are judged: a wide window shows the stretches. Where
+        a window has too few of them, rows all over the window are evaluated.
         """
         if self.built:
             return
@@ -394,16 +416,30 @@ class ModelTraces:
         first, stop = self._traces.rows_between(begin, end)
         if self._traces.rows <= EVALUATED:
             first, stop = 0, self._traces.rows  # once for every window
+        judged_first, judged_stop = self._columns.pyramid.rows_between(begin, end)
         if stop - first <= EVALUATED:
             rows = self._read_again.rows(first, stop, wanted)
             found = self._columns.of_rows(rows, wanted, begin, end, pixels)
+        elif judged_stop - judged_first < EVALUATED:
+            found = self._columns.of_rows(self._spread(first, stop), wanted, begin, end, pixels)
         else:
             found = self._columns.window(wanted, begin, end, pixels)
         return {name: (found[f"residual:{name}"], found[f"predicted:{name}"]) for name in names}
 
+    def _spread(self, first: int, stop: int) -> tuple[Array, Table]:
+        """Compute the model's readings of stretches all over some rows."""
+        size = EVALUATED // 2 // STRETCHES
+        starts = np.linspace(first, stop - size, STRETCHES).astype(int).tolist()
+        parts = [self._read(start, start + size, ()) for start in starts]
+        names = parts[0][1]
+        return (
+            np.concatenate([t for t, _ in parts]),
+            {name: np.concatenate([table[name] for _, table in parts]) for name in names},
+        )
+
     def _read(self, first: int, stop: int, _names: Sequence[str]) -> tuple[Array, Table]:
         """Compute the model's readings anew."""
-        chunk = self._traces.rows_around(first, stop, self._margin)
+        chunk = self._traces.rows_for_models(first, stop, self._margin)
         table: dict[str, Array] = {}
         for channel, residual in residuals_of_chunk(self._evidence, self._step, chunk).items():
             if channel[:3] in self.sensors:

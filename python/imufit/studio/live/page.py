@@ -23,12 +23,15 @@ from imufit.results.phrasing import listed
 from imufit.studio.body import Body, angles_in_words, side_rotation
 from imufit.studio.icons import light_or_dark, link_with_words
 from imufit.studio.live.device import device
+from imufit.studio.live.directions import Directions
 from imufit.studio.live.guided import held_side, how_to_lay
 from imufit.studio.live.listening import Listening, Recorded, Source, free_name, shown_state
 from imufit.studio.live.panels import groups, panel
 
 if TYPE_CHECKING:
     from serial.tools.list_ports_common import ListPortInfo
+
+    from imufit.calibrating import Stage
 
 Array = NDArray[np.float64]
 
@@ -150,6 +153,7 @@ class _LivePage:
         self._plots: list[tuple[str, tuple[str, ...], ui.plotly]] = []
         self._body: Body | None = None
         self._wanted: Body | None = None
+        self._directions: Directions | None = None
         self._held: str | None = None
         self._seconds = 10
         self._figures: dict[str, ui.label] = {}
@@ -435,7 +439,7 @@ class _LivePage:
         self._progress.visible = self._sides.visible = stage is not None
         if stage is None:
             self._held = None
-            self._draw_side(None)
+            self._draw(None)
             if listening is not None and listening.calibrated:
                 self._show_result(listening.calibrated, listening.model)
             else:
@@ -446,7 +450,7 @@ class _LivePage:
         assert listening is not None
         self._held = held_side(self._held, listening.side, stage.progress, moving=listening.moving)
         self._mark((*stage.done, self._held))
-        self._draw_side(stage.side)
+        self._draw(stage)
 
     def _mark(self, done: Sequence[str | None]) -> None:
         """Tick the sides that are done."""
@@ -454,19 +458,24 @@ class _LivePage:
             chip.props(f"color={'green-8' if side in done else 'grey-6'} text-color=white")
             chip.text = f"✓ {side}" if side in done else side
 
-    def _draw_side(self, side: str | None) -> None:
-        """Draw the way to lay the device."""
-        if side is None:
-            if self._wanted is not None:
-                self._drawn.clear()
-                self._wanted = None
-            return
-        if self._wanted is None:
-            with self._drawn:
-                self._how = ui.label().classes("text-sm").props('data-testid="how"')
-                self._wanted = Body(("wanted",), compass=False)
-        self._how.text = how_to_lay(side)
-        self._wanted.turn("wanted", side_rotation(side))
+    def _draw(self, stage: Stage | None) -> None:
+        """Draw the way to lay the device, or the directions that the field has still to point in."""
+        side, turning = (None, None) if stage is None else (stage.side, stage.turning)
+        if (side is None and self._wanted is not None) or (turning is None and self._directions is not None):
+            self._drawn.clear()
+            self._wanted = self._directions = None
+        if side is not None:
+            if self._wanted is None:
+                with self._drawn:
+                    self._how = ui.label().classes("text-sm").props('data-testid="how"')
+                    self._wanted = Body(("wanted",), compass=False)
+            self._how.text = how_to_lay(side)
+            self._wanted.turn("wanted", side_rotation(side))
+        elif turning is not None:
+            if self._directions is None:
+                with self._drawn:
+                    self._directions = Directions()
+            self._directions.show(turning.open, turning.field)
 
     def _show_result(self, sentences: tuple[str, ...], model: Path | None) -> None:
         shown = tuple(child.text for child in self._result.default_slot.children if isinstance(child, ui.label))
