@@ -260,6 +260,28 @@ def test_the_residual_stands_against_every_cause_that_a_finding_names(late):
     assert session.against_cause("acc_x", "dm/dt") == (None, None, None)
 
 
+def test_a_log_without_a_reference_shows_where_its_rests_fail():
+    log = simulate("six_sides", {"acc.scale": {"x": 0.02, "y": -0.01, "z": 0.03}}, 4, duration=90.0, rate=50.0).to_log()
+    bare = imufit.Log(log.t, acc=log.acc, gyr=log.gyr, mag=log.mag)
+    session = Session([bare])
+    session.begin()
+    found = session.compare()
+    assert not session.has_reference
+    levels = {item.channel: (item.ratio, item.unit) for item in found.channels}
+    assert {"acc_norm", "gyr_x", "mag_norm"} <= set(levels)
+    assert levels["acc_norm"][1] == "m/s^2"
+    assert worst_channel(found) == "acc_norm"
+    assert {panel.covariate for panel in found.panels if panel.channel == "acc_norm"} >= {"f_x", "f_y", "f_z"}
+    # z reads 3 % too much: the length at rest rises with |f_z|, by as much as the sensor's scale says.
+    along_z = next(panel for panel in found.panels if (panel.channel, panel.covariate) == ("acc_norm", "f_z"))
+    assert max(along_z.mean) == pytest.approx(0.03 * 9.81, rel=0.2)
+    explained = session.explained("acc.scale")
+    after = next(panel for panel in explained if (panel.channel, panel.covariate) == ("acc_norm", "f_z"))
+    assert np.nanmax(np.abs(after.mean)) < 0.1 * max(along_z.mean)
+    assert session.causes("acc_norm") == ()
+    assert session.weigh_causes() == {name: {} for name, (ratio, _) in levels.items() if ratio > 1.05}
+
+
 def test_few_fits_keep_their_evidence(session):
     for effect in ("acc.bias", "gyr.bias", "mag.hard_iron", "acc.scale", "gyr.scale"):
         session.add(effect)

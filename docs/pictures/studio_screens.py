@@ -111,6 +111,14 @@ def reading(page: Page, folder: Path) -> None:
     idle(page)
 
 
+def rests(page: Page, folder: Path) -> None:
+    """Open a log without a reference, which its rests judge, and look at what is missing."""
+    drop(page, folder / "rests.csv")
+    marked(page, "candidate-acc.scale").locator(".studio-name").click()
+    marked(page, "card-acc.scale").wait_for()
+    page.wait_for_timeout(900)
+
+
 def files(page: Page, folder: Path) -> None:
     """Bring two files that belong together."""
     drop(page, folder / "sensor.csv", folder / "mocap.csv")
@@ -220,6 +228,7 @@ VIEWS: dict[str, Callable[[Page, Path], None]] = {
         fallen,
         two,
         reading,
+        rests,
         files,
         broken,
         columns,
@@ -247,6 +256,9 @@ def make_logs(folder: Path) -> None:
     moving.write(folder / "moving.csv")
     (folder / "columns.csv").write_text("t,U,V,W\n" + "".join(f"{0.01 * k},0,0,9.8\n" for k in range(200)))
     (folder / "broken.csv").write_text("t,acc_x,acc_y,acc_z\n0,1,2,9\n1,1,no,9\n")
+    sides = imufit.simulate("six_sides", {"acc.scale": {"x": 0.02, "y": -0.01, "z": 0.03}}, duration=90.0, seed=4)
+    laid = sides.to_log()
+    imufit.Log(laid.t, acc=laid.acc, gyr=laid.gyr, mag=laid.mag).write(folder / "rests.csv")
     turned = imufit.simulate("handheld", {}, duration=60.0, rate=50.0, seed=6, frame="ENU").to_log()
     turned.write(folder / "frame.csv")
     (folder / "frame.toml").write_text((folder / "frame.toml").read_text().replace('"ENU"', '"NED"'))

@@ -58,11 +58,11 @@ def cause_shares(analysis: Analysis, step: Array, log: int, channels: Sequence[s
         Fraction of the excess variance, 0 to 1, by channel and cause.
     """
     squares = analysis.problem.mean_squares(step, log)
-    floors = analysis.logs[log].floors
+    evidence = analysis.logs[log]
     beside = cache(partial(analysis.problem.step_beside, analysis.fitted_slots))
     found: dict[str, dict[str, float]] = {}
     for channel in channels:
-        excess = squares[channel] - floors[CHANNELS.index(channel)] ** 2
+        excess = squares[channel] - evidence.floors[evidence.passes.channels.index(channel)] ** 2
         found[channel] = {}
         for cause, (slot, places) in _causes(analysis, log, channel).items():
             left = analysis.problem.mean_squares(_moved(step, *beside(slot), places), log)[channel]
@@ -128,8 +128,10 @@ def cause_panels(
 def _causes(analysis: Analysis, log: int, channel: str) -> dict[str, tuple[int, list[int]]]:
     """Return the slot of every cause of a channel, and which of the slot's parameters are the cause's, by its name."""
     evidence = analysis.logs[log]
-    sensor, axis = channel.split("_")
     found: dict[str, tuple[int, list[int]]] = {}
+    if evidence.at_rest:
+        return found  # causes act on single rows
+    sensor, axis = channel.split("_")
     for slot in analysis.probe_slots:
         key = analysis.slots[slot]
         probe = evidence.surveyed.probes.get(key)

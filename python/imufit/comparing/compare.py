@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imufit import _imufit
 from imufit.comparing.attitude import attitude_comparison
 from imufit.comparing.notes import notes
 from imufit.comparing.traces import Held
@@ -18,7 +17,6 @@ from imufit.errors import InputError
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS, UNITS
-from imufit.fitting.rest_passes import RestPasses
 from imufit.fitting.row_residuals import residual_chunks
 from imufit.log.attitude_columns import attitude_offered
 from imufit.log.segments import is_gap
@@ -113,7 +111,7 @@ def compare_held(held: Held, model: EffectStack, progress: Progress) -> Comparis
 def _refuse_rests(analysis: Analysis) -> None:
     """Refuse logs without a reference: every sample is needed."""
     for each in analysis.logs:
-        if isinstance(each.passes, RestPasses):
+        if each.at_rest:
             raise InputError(
                 "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz), which a comparison needs",
                 file=each.surveyed.log.path,
@@ -154,7 +152,13 @@ def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
         name, floor = item["channel"], floors[item["index"]]
         channels.append(
             ChannelResidual(
-                name, item["rms"], _rounded(item["mean"], floor), floor, item["rms"] / floor, UNITS[name[:3]], item["n"]
+                name,
+                item["rms"],
+                _rounded(item["mean"], floor),
+                floor,
+                item["rms"] / floor,
+                evidence.passes.units[name],
+                item["n"],
             )
         )
         excess = item["rms"] ** 2 - floor**2
@@ -213,7 +217,7 @@ def panels(analysis: Analysis, step: Array, log: int = 0) -> list[Panel]:
 
 
 def _panels(result: Mapping[str, Any], evidence: LogEvidence) -> list[Panel]:
-    return [_panel(item, evidence.floors, evidence.facts) for item in result["panels"]]
+    return [_panel(item, evidence) for item in result["panels"]]
 
 
 def _rounded(mean: float, floor: float) -> float:
@@ -221,8 +225,8 @@ def _rounded(mean: float, floor: float) -> float:
     return mean if abs(mean) > 1e-9 * floor else 0.0
 
 
-def _panel(item: Mapping[str, Any], floors: list[float], facts: _imufit.Facts) -> Panel:
-    name = item["channel"]
+def _panel(item: Mapping[str, Any], evidence: LogEvidence) -> Panel:
+    name, passes, facts = item["channel"], evidence.passes, evidence.facts
     inner = item["edges"]
     width = np.diff(inner)
     first = inner[0] - (width[0] if width.size else 1.0)
@@ -233,12 +237,12 @@ def _panel(item: Mapping[str, Any], floors: list[float], facts: _imufit.Facts) -
     return Panel(
         channel=name,
         covariate=item["covariate"],
-        channel_unit=UNITS[name[:3]],
+        channel_unit=passes.units[name],
         covariate_unit=item["unit"],
         centre=(edges[1:] + edges[:-1]) / 2,
         mean=item["mean"],
         band=item["band"],
-        noise_floor=floors[CHANNELS.index(name)],
+        noise_floor=evidence.floors[passes.channels.index(name)],
         share=item["share"],
     )
 
@@ -250,6 +254,8 @@ def _spectra(evidence: LogEvidence, step: Array, judged: Collection[int]) -> tup
     """
     from scipy.signal import welch  # noqa: PLC0415  only needed here
 
+    if evidence.at_rest:
+        return ()  # a mean over a rest has no spectrum
     sums: dict[int, list[Array]] = {}
     rates: dict[int, float] = {}
     for arrays, residuals in islice(residual_chunks(evidence, step, "spectrum"), SPECTRUM_CHUNKS):

@@ -74,6 +74,11 @@ class LogEvidence:
         return self.surveyed.facts
 
     @property
+    def at_rest(self) -> bool:
+        """True if rests judge the log in the place of a reference."""
+        return isinstance(self.passes, RestPasses)
+
+    @property
     def places(self) -> dict[str, range]:
         """Places of the parameters of every effect in a step of all parameters, by its id."""
         return _places(self.surveyed, self.slots)

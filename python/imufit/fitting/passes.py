@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,17 @@ class Passes:
         The log.
     progress : callable
         Called with the rows done.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Names of the nine channels of the evidence; empty for one that is not used.
+    units : mapping of str to str
+        Their SI units.
     """
+
+    channels: tuple[str, ...] = CHANNELS
+    units: Mapping[str, str] = MappingProxyType({name: UNITS[name[:3]] for name in CHANNELS})
 
     def __init__(self, log: LogSource, progress: Progress) -> None:
         self.log = log

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.errors import InputError
-from imufit.fitting.passes import CHUNK_ROWS, MIN_ROWS, Passes
+from imufit.fitting.passes import CHUNK_ROWS, MIN_ROWS, UNITS, Passes
 from imufit.fitting.rests import FEWEST_RESTS, RestReadings, read_rests
 from imufit.log import LogSource, whole
 from imufit.log.attitude_columns import attitude_offered
@@ -17,6 +18,11 @@ from imufit.progress import Progress
 
 NEEDS_REFERENCE = "it needs a reference attitude"
 """Reason why rests cannot show an effect."""
+REST_UNITS = MappingProxyType(
+    {"acc_norm": "m/s^2", "turn": "", "acc_pose": "rad", "mag_norm": UNITS["mag"]}
+    | {f"gyr_{axis}": UNITS["gyr"] for axis in "xyz"}
+)
+"""SI units of the channels at rest; what a turn leaves is counted in its standard error."""
 IN_REFERENCE = ("reference", "time")
 """Stages of effects that only a reference shows."""
 
@@ -46,6 +52,8 @@ class RestPasses(Passes):
         Called with the rows done.
     """
 
+    channels = tuple(_imufit.rest_channels())
+    units = REST_UNITS
     rests: RestReadings
 
     def survey(self) -> tuple[_imufit.Facts, dict[str, float]]:

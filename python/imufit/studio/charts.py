@@ -96,17 +96,19 @@ def _figure(traces: list[dict[str, Any]], x: str, y: str, **more: Any) -> Figure
     return {"data": traces, "layout": layout, "config": {"displaylogo": False, "responsive": True, "showTips": False}}
 
 
-def empty(sentence: str) -> Figure:
+def empty(sentence: str, height: int = HEIGHT) -> Figure:
     """Return a figure that states why there is nothing to draw.
 
     Parameters
     ----------
     sentence : str
         The reason.
+    height : int
+        Height, px.
     """
     note = {"text": words(sentence), "showarrow": False, "x": 0.5, "y": 0.5, "xref": "paper", "yref": "paper"}
     hidden = {"visible": False}
-    return _figure([], "", "", annotations=[note], xaxis=hidden, yaxis=hidden, showlegend=False)
+    return _figure([], "", "", annotations=[note], xaxis=hidden, yaxis=hidden, showlegend=False, height=height)
 
 
 def residual_panel(
@@ -354,7 +356,7 @@ def _decades(low: float, top: float) -> list[float]:
     return [10.0**power for power in range(first, last + 1, -(-(last - first) // DECADES))]
 
 
-LOOKS: Final = {
+LOOKS: Final = {axis: (colour, "solid", LINE) for axis, colour in AXES.items()} | {
     "kept model": (GREEN, "dashdot", LINE),
     "now": (BLUE, "solid", LINE),
     "measured": (GREY, "solid", 2.0 * LINE),
@@ -374,7 +376,7 @@ def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *,
     Parameters
     ----------
     channel, unit : str
-        Channel and its SI unit.
+        Channel, or sensor, and its SI unit.
     lines : sequence of (str, ndarray, ndarray)
         Name, times in s, and values in `unit` of each line.
     title : str

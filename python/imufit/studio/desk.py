@@ -483,7 +483,7 @@ class Desk:
         yield from self._unfitted(session, session.steps[: session.position + 1])
         if made is None:
             return
-        if made.comparison is None and session.has_reference:
+        if made.comparison is None:
             yield Piece(
                 f"computing the residuals of {words}, for the figures",
                 partial(session.compare, stack, self.progress),
@@ -507,7 +507,7 @@ class Desk:
                     yield Piece("computing the residuals over time, to draw them", partial(self._drawn_model, model))
         if session.second is not None:
             second = session.made(session.second)
-            if second is None or (second.comparison is None and session.has_reference):
+            if second is None or second.comparison is None:
                 yield Piece(
                     "computing the residuals of the kept model, for the figures",
                     partial(session.compare, session.second, self.progress),

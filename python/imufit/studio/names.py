@@ -25,6 +25,15 @@ QUANTITIES: Final[Mapping[str, str]] = {
 """Words for the symbols of covariates, as the glossary defines them; an axis follows a symbol, such as ``_x``."""
 
 
+AT_REST: Final = {
+    "acc_norm": "|f| at rest",
+    "turn": "turn from rest to rest",
+    "acc_pose": "gravity on a labelled side",
+    "mag_norm": "|m|",
+}
+"""Channels of a log that rests judge, in words."""
+
+
 def effect_name(effect: str) -> str:
     """Return the name of an effect in words, such as ``gyroscope bias``.
 
@@ -74,13 +83,15 @@ def parameter_name(effect: str, parameter: str) -> str:
 
 
 def channel_name(channel: str) -> str:
-    """Return a channel in words, such as ``gyroscope x``.
+    """Return a channel in words, such as ``gyroscope x``, or a sensor's name.
 
     Parameters
     ----------
     channel : str
         For instance ``gyr_x``.
     """
+    if channel in AT_REST or channel in SENSOR_NAMES:
+        return AT_REST.get(channel) or SENSOR_NAMES[channel]
     sensor, _, axis = channel.partition("_")
     return f"{SENSOR_NAMES[sensor]} {axis}" if sensor in SENSOR_NAMES and axis else printable(channel, NAME)
 

@@ -21,7 +21,6 @@ from imufit.comparing import cause_names, cause_panels, cause_shares, comparison
 from imufit.comparing.two_models import ln_bayes_factor
 from imufit.errors import InputError
 from imufit.fitting.analysis import Analysis, pooled
-from imufit.fitting.passes import CHANNELS
 from imufit.log import LogSource
 from imufit.loop import Fit, SensorModel
 from imufit.model.catalogue import each_log_has_its_own, find_effect
@@ -482,8 +481,8 @@ class Session:
                 made.diagnosis = self._with_evidence(made).diagnose(progress=progress)
             return made.diagnosis
 
-    def compare(self, stack: Stack | None = None, progress: Progress = silent) -> Comparison | None:
-        """Say where a stack (default: the present one) fails; None for logs without a reference.
+    def compare(self, stack: Stack | None = None, progress: Progress = silent) -> Comparison:
+        """Say where a stack (default: the present one) fails: in every row beside a reference, or else at the rests.
 
         Parameters
         ----------
@@ -494,7 +493,7 @@ class Session:
         """
         with self._work:
             made = self.fit(stack, progress)
-            if made.comparison is None and self.has_reference:
+            if made.comparison is None:
                 fit = self._with_evidence(made)
                 made.comparison = comparison(fit.analysis, fit.estimate.step, self.shown)
             return made.comparison
@@ -512,13 +511,13 @@ class Session:
         Returns
         -------
         dict
-            Fraction of the excess variance by channel and cause; empty for logs without a reference.
+            Fraction of the excess variance by channel and cause; rests show no causes.
         """
         with self._work:
             made = self.fit(stack, progress)
             found = self.compare(stack, progress)
             if made.shares is None:
-                failing = [] if found is None else [item.channel for item in found.channels if item.ratio > FAILS]
+                failing = [item.channel for item in found.channels if item.ratio > FAILS]
                 fit = self._with_evidence(made)
                 made.shares = cause_shares(fit.analysis, fit.estimate.step, self.shown, failing) if failing else {}
             return made.shares
@@ -548,7 +547,8 @@ class Session:
         without = step.copy()
         without[chosen] = fit.estimate.step[chosen]
         before, after = problem.mean_squares(without, self.shown), problem.mean_squares(step, self.shown)
-        floors = dict(zip(CHANNELS, analysis.logs[self.shown].floors, strict=True))
+        evidence = analysis.logs[self.shown]
+        floors = dict(zip(evidence.passes.channels, evidence.floors, strict=True))
         return max(before, key=lambda name: (before[name] - after[name]) / floors[name] ** 2, default=None)
 
     def weighed(self) -> float | None:
@@ -675,11 +675,11 @@ class Session:
         return found[0], by_place.get(1), by_place.get(2)
 
     def _at_hand(self, stack: Stack) -> Fit | None:
-        """Return the fit of a stack if it was made, has its evidence, and a reference judges every row."""
+        """Return the fit of a stack if it was made and has its evidence."""
         made = self.made(stack)
         # A fit does not change; the thread at work may only put another one in its place.
         fit = None if made is None else made.fit
-        return fit if fit is not None and fit.has_evidence and self.has_reference else None
+        return fit if fit is not None and fit.has_evidence else None
 
     def _nearest(self, target: Stack) -> Made:
         """Return the fit of the last step before a stack that was made."""

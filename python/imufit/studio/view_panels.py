@@ -11,6 +11,7 @@ from nicegui import events, run, ui
 
 from imufit.figures import quantity
 from imufit.fitting.passes import UNITS
+from imufit.log.columns import GROUPS
 from imufit.model.catalogue import find_effect
 from imufit.results import Comparison, Diagnosis, Spectrum, Unexplained
 from imufit.results.comparison import Panel
@@ -41,10 +42,10 @@ ONWARD: Final = 0.5
 """Part of the window's width by which a press moves the window: half of what was seen stays in sight."""
 SMALL: Final = 0.005
 """Share of the noise floor's variance below which a part is not listed."""
-NO_RESIDUAL: Final = (
-    "The log has no reference attitude, which a residual over time needs: the readings are drawn. The notes name what "
-    "judged the log."
-)
+NO_SPECTRUM: Final = "The log has no stretch without a gap for a spectrum."
+LOW: Final = 90
+"""Height of the place of a figure that a log never has, px: the sentence, and the margins around it."""
+NO_SPECTRUM_AT_REST: Final = "Residuals are those of rests, which have no spectrum."
 SHARES: Final = "The percentages are the parts of the excess over the noise floor that each entry explains."
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
@@ -127,21 +128,20 @@ class PanelView:
                 chart.update_figure(charts.empty(BEING_READ))
         made = session.made()
         found = None if made is None else made.comparison
-        judged = session.begun and session.has_reference
+        judged = session.begun
         self._covariate.visible = judged
         # Before a residual is there, the readings are drawn, and there is nothing to choose.
         self._trace_kind.visible = judged and bool(self._desk.models)
-        self._title.set_content(FAILS_WHERE if session.has_reference and not session.refused else "Readings")
-        self._pair.visible = session.has_reference and not session.refused
+        failing = (judged or session.has_reference) and not session.refused
+        self._title.set_content(FAILS_WHERE if failing else "Readings")
+        self._pair.visible = failing
         if not judged:
-            if session.begun:
-                words = NO_RESIDUAL
-            elif session.refused:
+            if session.refused:
                 words = "The log cannot be judged: the readings alone are drawn."
             else:
                 words = "The readings are drawn while the evidence is taken."
             self._note.set_text(words)
-            self._refresh_readings(found)
+            self._refresh_readings()
             return
         if found is None:
             self._draw_at_once(session)
@@ -156,7 +156,8 @@ class PanelView:
         if all(a is b or a == b for a, b in zip(state, self._state, strict=False)) and len(state) == len(self._state):
             return
         self._state = state
-        channel = desk.channel or self._failing(found)
+        known = {item.channel for item in found.channels}
+        channel = desk.channel if desk.channel in known else self._failing(found)
         if channel is None:
             return
         self._shown = channel
@@ -221,19 +222,15 @@ class PanelView:
             self._panel.update_figure(charts.residual_panel(panel))
         self._note.set_text(UNDER_WAY)
 
-    def _refresh_readings(self, found: Comparison | None) -> None:
-        """Show the readings over time: of a log without a reference, or before the evidence is there.
-
-        Unless the person chose a channel, the one that fails most at the rests is shown.
-        """
+    def _refresh_readings(self) -> None:
+        """Show the readings over time, before the evidence is there or of a log that cannot be judged."""
         desk = self._desk
         channels = [] if desk.traces is None else [item.name for item in desk.traces.channels if item.name[:3] in UNITS]
-        state = (desk.traces, desk.channel, found)
+        state = (desk.traces, desk.channel)
         if not channels or state == self._state:
             return
         self._state = state
-        wanted = (desk.channel, None if found is None else worst_channel(found))
-        channel = next((name for name in wanted if name in channels), channels[0])
+        channel = desk.channel if desk.channel in channels else channels[0]
         self._setting = True
         self._channel.set_options({name: _channel(name) for name in channels}, value=channel)
         self._setting = False
@@ -319,9 +316,10 @@ class PanelView:
         else:
             ui.timer(0, lambda: self._draw_cause(channel, covariate), once=True)
         spectrum = _spectrum_of(found, channel)
+        by_rows = self._session is not None and self._session.has_reference
         both = None if second is None else _spectrum_of(second, channel)
         self._spectrum.update_figure(
-            charts.empty("The log has no stretch without a gap for a spectrum.")
+            (charts.empty(NO_SPECTRUM) if by_rows else charts.empty(NO_SPECTRUM_AT_REST, LOW))
             if spectrum is None
             else charts.spectrum(spectrum, both)
         )
@@ -367,10 +365,17 @@ class PanelView:
         kept = None if session.second is None else desk.models.get(session.second.model)
         # Before the residuals are there, and on a log that has none, the readings stand in their place.
         kind = READING if start is None and now is None else self._kind
+        # A channel of rests is not a column: the readings of its sensor are drawn.
+        columns = [item.name for item in traces.channels]
+        sensor = channel[:3] if channel[:3] in UNITS else "gyr"
+        of_sensor = [name for name in GROUPS[sensor] if name in columns]
 
         def work() -> list[tuple[str, Any, Any]]:
             lines = []
-            if kind == READING:
+            if channel not in columns:
+                found = traces.window(of_sensor, begin, end, PIXELS)
+                lines += [(name[-1], *points.line()) for name, points in found.items()]
+            elif kind == READING:
                 lines.append(("measured", *traces.window([channel], begin, end, PIXELS)[channel].line()))
                 if now is not None:
                     lines.append(("predicted", *now.window([channel], begin, end, PIXELS)[channel][1].line()))
@@ -383,7 +388,8 @@ class PanelView:
             return lines
 
         lines = await run.io_bound(work)
-        figure = charts.trace(channel, UNITS[channel[:3]], lines or [], title=kind)
+        drawn = channel if channel in columns else sensor
+        figure = charts.trace(drawn, UNITS[sensor], lines or [], title=kind)
         figure["layout"]["xaxis"]["range"] = [begin, end]
         self._trace.update_figure(figure)
 
