@@ -27,7 +27,7 @@ ROTATES_MS = 240_000
 SIZES = {1280: 900, 380: 800}
 """Height of the window by its width, px: a laptop and a phone."""
 EFFECTS = {"acc.bias": {"x": 0.08, "y": -0.05, "z": 0.03}, "gyr.scale": {"x": 0.03, "y": -0.02, "z": 0.02}}
-IN_DOCS = ("failing", "fallen", "mystery")
+IN_DOCS = ("rests", "failing", "fallen", "mystery")
 COLOURS = 128
 """Colours of a picture of the documents: the page has some 20, their smooth edges need the others."""
 

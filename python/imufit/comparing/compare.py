@@ -13,15 +13,12 @@ from numpy.typing import NDArray
 from imufit.comparing.attitude import attitude_comparison
 from imufit.comparing.notes import notes
 from imufit.comparing.traces import Held
-from imufit.errors import InputError
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS, UNITS
 from imufit.fitting.row_residuals import residual_chunks
-from imufit.log.attitude_columns import attitude_offered
 from imufit.log.segments import is_gap
 from imufit.progress import Progress
-from imufit.remedy import command
 from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
 
 if TYPE_CHECKING:
@@ -54,7 +51,6 @@ def compare(fit: FittedStack, log: LogSource | None, progress: Progress) -> Comp
     """
     if log is not None and not any(log == known for known in fit.logs):
         return compare_model(fit.model, log, progress)
-    _refuse_rests(fit.analysis)
     own = fit.worst if log is None else next(k for k, known in enumerate(fit.logs) if known == log)
     found = comparison(fit.analysis, fit.estimate.step, own)
     return _with_attitude(found, fit.model_of(own), fit.logs[own], progress)
@@ -88,7 +84,6 @@ def held_model(model: EffectStack, log: LogSource, progress: Progress) -> Held:
         Called with (rows done, rows in all, what is being done).
     """
     analysis = Analysis.of(model, (log,), progress, keep_constants=True)
-    _refuse_rests(analysis)
     return Held(analysis, analysis.estimate_unnamed().step, analysis.model.effects)
 
 
@@ -106,22 +101,6 @@ def compare_held(held: Held, model: EffectStack, progress: Progress) -> Comparis
     """
     found = comparison(held.analysis, held.step)
     return _with_attitude(found, model, held.analysis.logs[0].surveyed.log, progress)
-
-
-def _refuse_rests(analysis: Analysis) -> None:
-    """Refuse logs without a reference: every sample is needed."""
-    for each in analysis.logs:
-        if each.at_rest:
-            raise InputError(
-                "the log has no reference attitude (ref_qw ref_qx ref_qy ref_qz), which a comparison needs",
-                file=each.surveyed.log.path,
-                remedy="Ask `"
-                + command("diagnose")
-                + "`, which judges the rests of such a log, or `"
-                + command("calibrate")
-                + "`."
-                + attitude_offered(each.surveyed.log),
-            )
 
 
 def _with_attitude(found: Comparison, model: EffectStack, log: LogSource, progress: Progress) -> Comparison:
@@ -174,10 +153,11 @@ def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
             for b, rms in enumerate(item["block_rms"])
             if np.isfinite(rms)
         ]
-    panels = _panels(result, evidence)
     ratios = {channel.channel: channel.ratio for channel in channels}
+    # A channel at its noise floor has no excess, and so no parts of one.
+    panels = [panel if stands_out[panel.channel] else replace(panel, share=0.0) for panel in _panels(result, evidence)]
     for panel in panels:
-        if panel.share >= MIN_SHARE and stands_out[panel.channel]:
+        if panel.share >= MIN_SHARE:
             where.append(Where(panel.channel, panel.covariate, panel.share, *spans[panel.channel]))
     where.sort(key=lambda w: -w.share * (ratios[w.channel] ** 2 - 1.0))
     panels.sort(key=lambda p: -p.share * max(ratios[p.channel] ** 2 - 1.0, 1e-6))

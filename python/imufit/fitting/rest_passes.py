@@ -19,10 +19,10 @@ from imufit.progress import Progress
 NEEDS_REFERENCE = "it needs a reference attitude"
 """Reason why rests cannot show an effect."""
 REST_UNITS = MappingProxyType(
-    {"acc_norm": "m/s^2", "turn": "", "acc_pose": "rad", "mag_norm": UNITS["mag"]}
+    {"acc_norm": "m/s^2", "turn": "σ", "acc_pose": "rad", "mag_norm": UNITS["mag"]}
     | {f"gyr_{axis}": UNITS["gyr"] for axis in "xyz"}
 )
-"""SI units of the channels at rest; what a turn leaves is counted in its standard error."""
+"""SI units of the channels at rest; the residual of a turn is counted in its standard error, σ."""
 IN_REFERENCE = ("reference", "time")
 """Stages of effects that only a reference shows."""
 

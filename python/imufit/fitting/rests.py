@@ -440,7 +440,8 @@ def _samples(
         values = np.sort([pose.mean[axis] for pose in poses])
         gaps = np.flatnonzero(np.diff(values) > CLEAR * np.sqrt(variance)) if values.size else nothing.astype(np.intp)
         middles = 0.5 * (values[gaps] + values[gaps + 1]) if gaps.size else nothing
-        force.append(np.repeat(middles, -(-EDGES // max(middles.size, 1))))
+        # The lowest value comes first: an edge lies above it.
+        force.append(np.concatenate([values[:1], np.repeat(middles, -(-EDGES // max(middles.size, 1)))]))
 
     def both(name: str) -> Array:
         columns = [table[name] for table in (stills, field) if table[name] is not None]
