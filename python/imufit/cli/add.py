@@ -73,7 +73,7 @@ def add(
         addition = additions[-1]
         fit = additions[-2].fit if others else fit
         shown = html_file is not None or plots is not None
-        comparison = engine.compared(fit, progress) if shown else None
+        comparison = fit.compare(progress=progress) if shown else None
         rows = engine.rows_of_fit(addition.fit, fit, progress=progress) if shown else None
     for made in additions:
         out.say(made.sentence, bold=True)

@@ -62,7 +62,7 @@ def diagnose(
         fit = engine.sensor_model(path=model).fit(opened, progress=progress)
         diagnosis = fit.diagnose(progress=progress)
         shown = html_file is not None or plots is not None
-        comparison = engine.compared(fit, progress) if shown else None
+        comparison = fit.compare(progress=progress) if shown else None
         rows = engine.rows_of_fit(fit, candidate=diagnosis.best, progress=progress) if shown else None
     output.result(diagnosis, verbose)
     if diagnosis.verdict == "missing":

@@ -174,11 +174,6 @@ def studio(logs: Sequence[Path], reading: Reading, demo: bool, *, port: int, rea
     start(logs, reading, demo, port=port, ready=ready)
 
 
-def compared(fit: Any, progress: Progress) -> Comparison | None:
-    """Return where a fit fails on its own log; None where rests stand in for a reference."""
-    return fit.compare(progress=progress) if fit.analysis.judged_by == "reference" else None
-
-
 def rows_of_fit(fit: Any, first: Any = None, candidate: str | None = None, *, progress: Progress) -> LogRows:
     """Return the rows of a fit's log that a report shows."""
     from imufit.comparing import rows_of_fit  # noqa: PLC0415

@@ -12,7 +12,6 @@ from imufit.comparing.compare import compare_held, held_model
 from imufit.comparing.noise_budget import noise_budget
 from imufit.comparing.traces import Held, traces
 from imufit.errors import InputError
-from imufit.fitting.rest_passes import RestPasses
 from imufit.log import Log
 from imufit.log.several import name_of
 from imufit.progress import Progress, silent
@@ -76,7 +75,7 @@ def compare_with_rows(model: EffectStack, log: LogSource, progress: Progress = s
 
 
 def _rows(held: Held, first: Held | None, number: int, log: LogSource, progress: Progress) -> LogRows:
-    rests = _rests(log) if isinstance(held.analysis.logs[number].passes, RestPasses) else ()
+    rests = _rests(log) if held.analysis.logs[number].at_rest else ()
     logs = held.analysis.logs
     return LogRows(
         traces=traces(held, first, number),

@@ -7,7 +7,6 @@ import numpy as np
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS
-from imufit.fitting.rest_passes import RestPasses
 from imufit.results import NoisePart
 
 UNITS = {"acc": "m/s^2", "gyr": "rad/s", "mag": "uT"}
@@ -22,7 +21,7 @@ def noise_budget(analysis: Analysis) -> tuple[NoisePart, ...]:
         Evidence of the logs.
     """
     evidence = analysis.logs[0]
-    if isinstance(evidence.passes, RestPasses):
+    if evidence.at_rest:
         return ()
     zeros = {
         channel: (walk, scatter, block)

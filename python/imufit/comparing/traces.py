@@ -13,7 +13,6 @@ from imufit import _imufit
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.fitted_stack import FittedStack
 from imufit.fitting.passes import CHANNELS, UNITS
-from imufit.fitting.rest_passes import RestPasses
 from imufit.fitting.row_residuals import residual_chunks
 from imufit.log.columns import SENSOR_NAMES
 from imufit.log.segments import is_gap
@@ -97,7 +96,7 @@ def traces(held: Held, first: Held | None = None, log: int = 0) -> tuple[Residua
         One for each channel that is judged; none where rests stand in for a reference.
     """
     evidence = held.analysis.logs[log]
-    if isinstance(evidence.passes, RestPasses):
+    if evidence.at_rest:
         return ()
     step = held.analysis.own_step(log, held.step)
     full = _full_steps(held, log, step)

@@ -11,7 +11,6 @@ from imufit.diagnosing.telegraph_noise import telegraph_noise
 from imufit.diagnosing.tones import moving, strongest
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
-from imufit.fitting.rest_passes import RestPasses
 
 Array = NDArray[np.float64]
 
@@ -40,7 +39,7 @@ def fast_changes(analysis: Analysis, step: Array) -> list[Seen]:
     shaken = is_shaken(analysis)
     found: list[Seen] = []
     for log, evidence in enumerate(analysis.logs):
-        if isinstance(evidence.passes, RestPasses):
+        if evidence.at_rest:
             continue
         several = log if len(analysis.logs) > 1 else None
         found += [(several, *change) for change in _changes(evidence, analysis.own_step(log, step), shaken=shaken)]

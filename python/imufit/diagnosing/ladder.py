@@ -50,7 +50,6 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
         climb.up()
     climb, diagnosis = climb.end()
     fit, worst = climb.fit, start.worst
-    whole = start.analysis.judged_by == "reference"
     return Ladder(
         steps=tuple(climb.steps),
         model=fit.model.effects,
@@ -59,8 +58,8 @@ def ladder(start: FittedStack, progress: Progress | None = None) -> Ladder:
         ratio_end=fit.ratio,
         attitude=attitude_comparison(fit.model_of(worst), fit.logs[worst], progress=progress or silent),
         diagnosis=diagnosis,
-        comparison_start=comparison(start.analysis, start.estimate.step, worst) if whole else None,
-        comparison_end=comparison(fit.analysis, fit.estimate.step, worst) if whole else None,
+        comparison_start=comparison(start.analysis, start.estimate.step, worst),
+        comparison_end=comparison(fit.analysis, fit.estimate.step, worst),
         first=climb.first,
         fit=fit,
         sentence=_sentence(start.ratio, fit.ratio, climb.steps, diagnosis),

@@ -9,7 +9,6 @@ from imufit.diagnosing.shaking import is_shaken
 from imufit.fitting.analysis import Analysis
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS
-from imufit.fitting.rest_passes import RestPasses
 
 ABOVE = 2.0
 """Residual of the quiet blocks over the stated noise, with the noise of the reference, from which on the stated noise
@@ -33,7 +32,7 @@ def seen_in_rows(analysis: Analysis) -> list[Seen]:
     found = [
         (log, index, 0.0, f"it stands at {ratio:.1f} times its stated noise")
         for log, evidence in enumerate(() if is_shaken(analysis) else analysis.logs)
-        if not isinstance(evidence.passes, RestPasses)
+        if not evidence.at_rest
         for index, ratio in _above_stated_noise(evidence).items()
     ]
     false = [[fault for fault in each.faults if fault.false_readings] for each in analysis.logs]

@@ -132,7 +132,7 @@ class LogEvidence:
         step : numpy.ndarray
             Step of every parameter.
         """
-        return self if isinstance(self.passes, RestPasses) else self._whitened(step)
+        return self if self.at_rest else self._whitened(step)
 
     def _whitened(self, step: Array) -> LogEvidence:
         """Return evidence that replaces its whitened form, whitened; `step` leaves only its noise."""
@@ -168,7 +168,7 @@ class LogEvidence:
         counts : sequence of int
             Samples of each channel.
         """
-        if isinstance(self.passes, RestPasses):
+        if self.at_rest:
             return 0.0
         noise = self.facts.reference_noise
         own = np.array(self.white.reference_variance(*noise))

@@ -12,7 +12,6 @@ from imufit import _imufit
 from imufit.errors import InputError
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS
-from imufit.fitting.rest_passes import RestPasses
 from imufit.log import Chunk
 
 Array = NDArray[np.float64]
@@ -76,7 +75,7 @@ def check_reference(evidence: LogEvidence) -> None:
     InputError
         The log has no reference, so that no row has a model.
     """
-    if isinstance(evidence.passes, RestPasses):
+    if evidence.at_rest:
         raise InputError(
             "the log has no reference attitude, from which the readings of its rows would follow",
             file=evidence.surveyed.log.path,

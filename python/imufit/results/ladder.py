@@ -105,7 +105,7 @@ class Ladder(Plotted, Result):
     diagnosis : Diagnosis
         After the last step; where other causes explain the log as well as effects of the model, without these.
     comparison_start, comparison_end : Comparison or None
-        First and last model against the log; None where rests stand in for a reference.
+        First and last model against the log.
     first : Diagnosis or None
         Before the first step.
     fit : Any

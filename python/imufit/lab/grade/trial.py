@@ -184,8 +184,8 @@ def true_ratio(puzzle: Puzzle, result: Ladder) -> float:
     result : Ladder
         The ladder on its log.
     """
-    if result.comparison_end is None:
-        return float("nan")
+    if result.comparison_end is None or result.diagnosis.evidence != "reference":
+        return float("nan")  # the noise of a sample is not that of a rest
     truth = _noise_of(puzzle.simulation) if puzzle.twin is None else _residual_of(puzzle.twin)
     squares = [(channel.rms / truth[channel.channel]) ** 2 for channel in result.comparison_end.channels]
     return float(np.sqrt(np.mean(squares)))
