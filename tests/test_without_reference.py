@@ -150,9 +150,10 @@ def test_a_quaternion_beside_the_readings_is_offered_as_the_reference(stream, tm
     known = dict(zip(("qw", "qx", "qy", "qz"), made.ref_q.T, strict=True))
     path = tmp_path / "a.csv"
     made.with_fields(ref_q=None, ref_p=None, covariates=known).write(path)
-    with pytest.raises(InputError, match="If qw, qx, qy, qz were measured, not computed") as caught:
-        compare(open_log(path, stream=stream))
-    (mapping,) = python_mappings(str(caught.value))
+    (offer,) = [
+        note for note in compare(open_log(path, stream=stream)).notes if "If qw, qx, qy, qz were measured" in note
+    ]
+    (mapping,) = python_mappings(offer)
     log = open_log(path, mapping, stream=stream)
     assert compare(log).n == made.n
     # what the file cannot be read without stands in the mapping too
@@ -162,9 +163,8 @@ def test_a_quaternion_beside_the_readings_is_offered_as_the_reference(stream, tm
     stated = {
         f"{sensor}_{axis}": f"{name}_{axis}" for sensor, name in (("acc", "first"), ("gyr", "second")) for axis in "xyz"
     }
-    with pytest.raises(InputError, match="If qw, qx, qy, qz") as caught:
-        compare(open_log(other, stated, stream=stream))
-    (mapping,) = python_mappings(str(caught.value))
+    (offer,) = [note for note in compare(open_log(other, stated, stream=stream)).notes if "If qw, qx, qy, qz" in note]
+    (mapping,) = python_mappings(offer)
     assert mapping.items() >= stated.items()
     assert compare(open_log(other, mapping, stream=stream)).n == made.n
 
@@ -206,17 +206,26 @@ def test_command_says_what_it_rests_on(capsys, tmp_path):
     assert answer["evidence"] == "rests"
 
 
-def test_a_comparison_needs_every_sample_and_says_what_to_ask_instead(capsys, tmp_path):
-    path = tmp_path / "log.parquet"
-    poses(seed=1, duration=60.0).write(path)
-    code, _, err = run(capsys, "compare", path)
-    assert code == 2
-    assert len(err) == 1
-    assert "imufit diagnose" in err[0]
+def test_a_comparison_shows_where_the_rests_fail(capsys, tmp_path):
+    path, page = tmp_path / "log.parquet", tmp_path / "page.html"
+    poses({"acc.scale": {"x": 0.0, "y": 0.0, "z": 0.03}}, seed=1, duration=120.0).write(path)
+    code, out, _ = run(capsys, "compare", path, "--json", "-", "--html", page)
+    assert code == 0
+    found = strict_json(out)
+    channels = found["channels"]
+    assert set(channels) >= {"acc_norm", "turn", "gyr_x", "mag_norm"}
+    assert channels["acc_norm"]["ratio"] > 10.0
+    assert channels["gyr_x"]["ratio"] < 1.5
+    # A rest with z along gravity is 3 % too long, one across gravity is not.
+    named = [where["covariate"] for where in found["where"] if where["channel"] == "acc_norm"]
+    assert next(name for name in named if name != "constant") == "f_z"
+    assert found["attitude"] is None
+    assert "acc_norm" in page.read_text()
 
 
 def test_the_ladder_climbs_on_rests():
     answer = ladder(poses({"gyr.bias": {"x": 0.02, "y": 0.01, "z": -0.01}}, seed=5))
     assert answer.model == ("gyr.bias",)
     assert answer.ratio_end < 1.1 < answer.ratio_start
-    assert answer.comparison_end is None
+    assert max(item.ratio for item in answer.comparison_start.channels) > 10.0
+    assert max(item.ratio for item in answer.comparison_end.channels) < 2.0

@@ -7,6 +7,7 @@ import numpy as np
 from imufit.fitting.log_evidence import LogEvidence
 from imufit.fitting.passes import CHANNELS, UNITS
 from imufit.fitting.rest_passes import NEEDS_REFERENCE, RestPasses
+from imufit.log.attitude_columns import attitude_offered
 from imufit.log.columns import SENSOR_NAMES
 
 OFF_FLOOR = 1.2
@@ -78,6 +79,8 @@ def _of_rests(evidence: LogEvidence, passes: RestPasses) -> list[str]:
     if "mag" in rests.sensors:
         told.append("the length of the magnetic field, which is the same everywhere and is estimated beside the model")
     out = [f"The log has no reference attitude. It is judged by {'; '.join(told)}."]
+    if offered := str(attitude_offered(evidence.surveyed.log)).strip():
+        out.append(offered + ".")
     limits = []
     if "acc" in rests.sensors and not rests.labels:
         limits.append(
