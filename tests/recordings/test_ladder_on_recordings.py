@@ -18,11 +18,6 @@ BROAD = (
 )
 
 
-def climbed(name: str) -> tuple[Log, Ladder]:
-    log = imufit.read(recording(name))
-    return log, imufit.ladder(log)
-
-
 def tilt_rmse(log: Log) -> dict[str, float]:
     """Return the root mean square error of each method's angle, deg."""
     comparison = replay(log, ["accel", "complementary"]).comparison()
@@ -78,9 +73,10 @@ def test_iron_of_the_aircraft_is_the_same_in_both_parts_of_the_flight() -> None:
     ],
 )
 def test_error_falls_on_the_robot_arm(name: str) -> None:
-    _, whole = climbed(name)
-    assert whole.ratio_end < 0.5 * whole.ratio_start
-    assert "mag.hard_iron" in whole.model
+    log = imufit.read(recording(name))
+    first = imufit.ladder(log[: log.n // 2])
+    assert first.ratio_end < 0.5 * first.ratio_start
+    assert "mag.hard_iron" in first.model
 
 
 def test_iron_of_the_robot_arm_is_named_beside_errors_that_nothing_explains() -> None:
