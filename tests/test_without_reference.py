@@ -208,7 +208,8 @@ def test_command_says_what_it_rests_on(capsys, tmp_path):
 
 def test_a_comparison_shows_where_the_rests_fail(capsys, tmp_path):
     path, page = tmp_path / "log.parquet", tmp_path / "page.html"
-    poses({"acc.scale": {"x": 0.0, "y": 0.0, "z": 0.03}}, seed=1, duration=120.0).write(path)
+    log = poses({"acc.scale": {"x": 0.0, "y": 0.0, "z": 0.03}}, seed=1, duration=120.0)
+    log.write(path)
     code, out, _ = run(capsys, "compare", path, "--json", "-", "--html", page)
     assert code == 0
     found = strict_json(out)
@@ -221,6 +222,10 @@ def test_a_comparison_shows_where_the_rests_fail(capsys, tmp_path):
     assert next(name for name in named if name != "constant") == "f_z"
     assert found["attitude"] is None
     assert "acc_norm" in page.read_text()
+    # The worst time is one at which z lay along gravity.
+    begin, end, channel, _ = compare(log).segments[0]
+    assert channel == "acc_norm"
+    assert np.median(np.abs(log.acc[(log.t >= begin) & (log.t <= end), 2])) > 8.0
 
 
 def test_the_ladder_climbs_on_rests():

@@ -123,7 +123,7 @@ def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
     facts = evidence.facts
     result = analysis.problem.residual(step, log)
     floors = evidence.floors
-    edges = np.linspace(facts.t_start, facts.t_end, evidence.raw.blocks + 1)
+    blocks = evidence.passes.spans(facts)
     channels, where, segments = [], [], []
     spans = {}
     stands_out: dict[str, bool] = {}
@@ -147,9 +147,10 @@ def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
             share = min(item["mean"] ** 2 / excess, 1.0)
             where.append(Where(name, "constant", share, facts.t_start, facts.t_end))
         first, last = item["stretch"]
-        spans[name] = (float(edges[first]), float(edges[last]))
+        seen = blocks[first:last]
+        spans[name] = (float(seen[:, 0].min()), float(seen[:, 1].max()))
         segments += [
-            (float(edges[b]), float(edges[b + 1]), name, float(rms / floor))
+            (float(blocks[b, 0]), float(blocks[b, 1]), name, float(rms / floor))
             for b, rms in enumerate(item["block_rms"])
             if np.isfinite(rms)
         ]
