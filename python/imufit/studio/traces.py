@@ -41,7 +41,7 @@ BLOCK: Final = 64
 takes a tenth of a second. The pyramid of 20 million rows of 14 columns then takes 150 MB."""
 EVALUATED: Final = 8_192
 """Rows of which the model's readings are computed anew for a window: at 5 us a row a twentieth of a second."""
-STRETCHES: Final = 4
+STRETCHES: Final = 3
 """Stretches that a window is drawn from of which too few rows are judged, half of these rows together: to read one and
 to evaluate it with its past takes 16 ms at 1 kHz."""
 EVALUATED_BLOCK: Final = 16
