@@ -104,7 +104,6 @@ def install(monkeypatch):
         ("contents", contents(two_rows)),
         ("sensor_model", model),
         ("ladder", ladder_result),
-        ("compared", comparison()),
         ("rows_of_fit", rows()),
         ("compare_with_rows", (comparison(), rows())),
         ("explain", card()),
