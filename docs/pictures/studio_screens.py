@@ -216,7 +216,7 @@ def guided(page: Page, folder: Path) -> None:
 def rotating(page: Page, folder: Path) -> None:
     """Turn the device freely, for the magnetometer."""
     guided(page, folder)
-    page.get_by_text("Turn the device until").wait_for(timeout=ROTATES_MS)
+    page.get_by_text("The blue arrow is").wait_for(timeout=ROTATES_MS)
     page.wait_for_timeout(6000)
 
 

@@ -45,7 +45,7 @@ SMALL: Final = 0.005
 NO_SPECTRUM: Final = "The log has no stretch without a gap for a spectrum."
 LOW: Final = 90
 """Height of the place of a figure that a log never has, px: the sentence, and the margins around it."""
-NO_SPECTRUM_AT_REST: Final = "Residuals are those of rests, which have no spectrum."
+NO_SPECTRUM_AT_REST: Final = "A spectrum needs a reference."
 SHARES: Final = "The percentages are the parts of the excess over the noise floor that each entry explains."
 RESIDUAL: Final = "residual"
 READING: Final = "reading"

@@ -10,7 +10,7 @@ from nicegui import ui
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from imufit.calibrating.free_turning import DIRECTIONS
+from imufit.calibrating.free_turning import DIRECTIONS, ENOUGH
 from imufit.figures.style import GREEN, ORANGE, SKY
 from imufit.studio.body import HEIGHT, Body
 
@@ -23,9 +23,11 @@ DOT: Final = 0.11
 SEEN: Final = 0.6
 """Size of a dot once the field has pointed there, over its size before: colour is not all that distinguishes them."""
 HOW: Final = (
-    "The device stands still in this picture, and the blue arrow is the magnetic field. "
-    "Turn the device until the arrow has pointed at the orange dots."
+    "The picture turns with the device. The blue arrow is the magnetic field. "
+    "Turn the device until the arrow points at an orange dot, then at the next one: "
+    f"{ENOUGH} of the {len(DIRECTIONS)} dots are enough."
 )
+"""Words over the picture."""
 
 
 class Directions:
