@@ -95,12 +95,18 @@ def test_windows_are_there_while_the_log_is_still_read(long):
     assert seen[0][2]["acc_x"].t.size
 
 
-def test_residual_and_predicted_are_those_of_the_fit(log):
-    fit = SensorModel(["gyr.bias"]).fit(log)
+def built(log, fit):
+    """The traces of a log, and those of a model fitted to it, after their passes."""
     traces = Traces(log)
     traces.build()
     model = ModelTraces(traces, fit.analysis.logs[0], fit.analysis.own_step(0, fit.estimate.step))
     model.build()
+    return traces, model
+
+
+def test_residual_and_predicted_are_those_of_the_fit(log):
+    fit = SensorModel(["gyr.bias"]).fit(log)
+    _, model = built(log, fit)
     assert {channel.name for channel in model.channels} >= {"gyr_x", "acc_z"}
     residual, predicted = model.window(["gyr_x"], 10.0, 11.0, 500)["gyr_x"]
     inside = (residual.t >= 10.0) & (residual.t <= 11.0)
@@ -113,10 +119,7 @@ def test_residual_and_predicted_are_those_of_the_fit(log):
 def test_wide_residual_comes_from_the_pyramid_and_keeps_the_extremes(log, monkeypatch):
     monkeypatch.setattr(module, "EVALUATED", 500)
     fit = SensorModel().fit(log)
-    traces = Traces(log)
-    traces.build()
-    model = ModelTraces(traces, fit.analysis.logs[0], fit.analysis.own_step(0, fit.estimate.step))
-    model.build()
+    traces, model = built(log, fit)
     residual, _ = model.window(["gyr_z"], *traces.span, 50)["gyr_z"]
     exact = fit.residuals("gyr")[:, 2]
     assert residual.t.size <= 100
@@ -135,10 +138,7 @@ def test_rows_that_an_excerpt_leaves_out_have_a_residual_in_a_narrow_window(log,
     fit = SensorModel().fit(log)
     judged = fit.analysis.logs[0].passes.log
     assert judged.n == 2400 < log.n
-    traces = Traces(log)
-    traces.build()
-    model = ModelTraces(traces, fit.analysis.logs[0], fit.analysis.own_step(0, fit.estimate.step))
-    model.build()
+    traces, model = built(log, fit)
     wide, _ = model.window(["acc_y"], *traces.span, 400)["acc_y"]
     assert np.isnan(wide.low).sum() > 20  # between the stretches
     narrow, _ = model.window(["acc_y"], 20.0, 22.0, 500)["acc_y"]
@@ -152,10 +152,7 @@ def test_window_with_few_judged_rows_shows_rows_from_all_over_it(log, monkeypatc
     monkeypatch.setattr("imufit.log.excerpt.MOST_ROWS", 1200)
     monkeypatch.setattr(module, "EVALUATED", 1280)
     fit = SensorModel().fit(log)
-    traces = Traces(log)
-    traces.build()
-    model = ModelTraces(traces, fit.analysis.logs[0], fit.analysis.own_step(0, fit.estimate.step))
-    model.build()
+    _, model = built(log, fit)
     begin, end = 15.0, 35.0
     found, _ = model.window(["acc_y"], begin, end, 2000)["acc_y"]
     seen = np.isfinite(found.low)

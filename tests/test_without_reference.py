@@ -150,9 +150,8 @@ def test_a_quaternion_beside_the_readings_is_offered_as_the_reference(stream, tm
     known = dict(zip(("qw", "qx", "qy", "qz"), made.ref_q.T, strict=True))
     path = tmp_path / "a.csv"
     made.with_fields(ref_q=None, ref_p=None, covariates=known).write(path)
-    (offer,) = [
-        note for note in compare(open_log(path, stream=stream)).notes if "If qw, qx, qy, qz were measured" in note
-    ]
+    notes = compare(open_log(path, stream=stream)).notes
+    (offer,) = [note for note in notes if "If qw, qx, qy, qz were measured, not computed" in note]
     (mapping,) = python_mappings(offer)
     log = open_log(path, mapping, stream=stream)
     assert compare(log).n == made.n
