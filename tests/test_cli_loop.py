@@ -72,6 +72,8 @@ def test_loop_finds_an_effect_that_was_put_in(capsys, tmp_path):
     code, out, err = run(capsys, "compare", log, "--json", "-")
     assert (code, err) == (0, [])
     assert strict_json(out)["sensors"]["gyr"]["ratio"] > 1.5
+    code, out, err = run(capsys, "compare", log)
+    assert [line for line in out.splitlines() if line.startswith("  imufit ")] == [f"  imufit diagnose {log}"]
 
     code, out, err = run(capsys, "diagnose", log, "--json", answer)
     assert (code, err) == (0, [])

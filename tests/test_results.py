@@ -11,6 +11,7 @@ from imufit.figures import quantity
 from imufit.figures.waterfall import waterfall
 from imufit.results import Addition, Parameter, Table
 from imufit.results.diagnosis import ENOUGH
+from imufit.results.judged import Judged
 from imufit.results.noise_part import noise_table
 from imufit.results.parameter import parameter_table
 from imufit.results.sentences import explanation
@@ -208,6 +209,22 @@ def test_a_probable_candidate_is_not_called_insignificant():
     assert likely.to_dict()["status"] == "not significant"
     assert "more probable than not" in explanation(card(), likely)
     assert "more probable than not" not in explanation(card(), unlikely)
+
+
+def test_adequate_is_said_of_logs_that_were_judged_as_a_whole():
+    judged, left = Judged("mag", True, None), Judged("acc", False, "too few rests")
+    whole = dataclasses.replace(diagnosis("adequate"), judged=(judged,), ratio=1.0)
+    assert whole.headline == "ADEQUATE"
+    assert dataclasses.replace(whole, judged=(judged, left)).headline == "PARTLY JUDGED"
+    assert dataclasses.replace(whole, ratio=1.5).headline == "ABOVE THE NOISE"
+    assert diagnosis("missing").headline == "MISSING"
+
+
+def test_channels_stand_with_the_worst_one_first():
+    ratios = [row[1] for row in comparison().channel_table().rows]
+    known = [float(ratio) for ratio in ratios if ratio != "-"]
+    assert known == sorted(known, reverse=True)
+    assert "-" not in ratios[: len(known)]
 
 
 def test_waterfall_is_logarithmic_only_where_the_fall_is_large():

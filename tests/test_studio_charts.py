@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from imufit.results import Spectrum
+from imufit.results.comparison import Panel
 from imufit.studio import charts
 
 
@@ -67,7 +68,29 @@ def test_the_axis_of_a_spectrum_names_two_numbers_at_least(decades):
 
 def test_a_prediction_leaves_the_reading_beneath_in_sight():
     t, values = np.array([0.0, 1.0]), np.array([9.7, 9.9])
-    figure = charts.trace("acc_x", "m/s^2", [("measured", t, values), ("predicted", t, values)], title="reading")
+    lines = [("measured", t, values), ("predicted", t, values)]
+    figure = charts.trace("acc_x", "m/s^2", lines, (0.0, 1.0), title="reading")
     measured, predicted = (trace["line"] for trace in figure["data"])
     assert predicted["width"] < measured["width"]
     assert (measured["dash"], predicted["dash"]) == ("solid", "dot")
+
+
+def test_times_at_rest_are_shaded_within_the_window_and_named_in_the_legend():
+    t, values = np.linspace(0.0, 10.0, 11), np.zeros(11)
+    rests = [(0.0, 1.0), (3.0, 6.0), (8.0, 9.0)]
+    figure = charts.trace("acc", "m/s^2", [("x", t, values)], (4.0, 10.0), title="reading", at_rest=rests)
+    assert [(shape["x0"], shape["x1"]) for shape in figure["layout"]["shapes"]] == [(4.0, 6.0), (8.0, 9.0)]
+    assert [trace["name"] for trace in figure["data"]] == ["x", "at rest"]
+
+
+def test_without_a_rest_in_the_window_the_legend_names_none():
+    t = np.array([0.0, 1.0])
+    figure = charts.trace("acc", "m/s^2", [("x", t, t)], (0.0, 1.0), at_rest=[(2.0, 3.0)])
+    assert [trace["name"] for trace in figure["data"]] == ["x"]
+
+
+def test_the_line_of_a_candidate_bears_its_name():
+    centre, mean = np.array([0.0, 1.0]), np.array([0.1, 0.2])
+    panel = Panel("acc_x", "f_x", "m/s^2", "m/s^2", centre, mean, 0.1 * mean, 0.01, 0.5)
+    names = [trace["name"] for trace in charts.residual_panel(panel, panel, effect="accelerometer scale error")["data"]]
+    assert "with accelerometer scale error" in names

@@ -330,3 +330,22 @@ def test_a_mapping_that_does_not_read_the_file_leaves_the_question_and_what_was_
     assert [(desk.trouble, desk.cures, desk.unmapped)] == asked
     assert desk.typed == typed
     assert desk.mistyped.startswith("In mystery.csv: ")
+
+
+def faulty(path, effects):
+    """A simulated log with effects."""
+    save_simulation(simulate("handheld", effects, 3, duration=20.0, rate=50.0), path)
+    return LogFile(path, path.name)
+
+
+def test_a_step_shows_where_the_error_falls_though_a_healthy_channel_was_chosen(tmp_path):
+    async def look_at(channel: str) -> str | None:
+        desk = Desk()
+        await desk.open([log])
+        desk.channel = channel
+        await desk.attempt(lambda: desk.session.add("gyr.bias"))
+        return desk.channel
+
+    log = faulty(tmp_path / "bias.csv", {"gyr.bias": {"x": 0.05, "y": 0.0, "z": 0.0}})
+    assert asyncio.run(look_at("acc_x")) is None
+    assert asyncio.run(look_at("gyr_x")) == "gyr_x"

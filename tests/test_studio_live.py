@@ -48,7 +48,7 @@ def connect(page, scenario):
     entry.click()
     about = page.get_by_test_id("about").inner_text()
     assert "with accelerometer, gyroscope, magnetometer and thermometer" in about
-    assert about.endswith("noise, and no other error.")
+    assert about.endswith("errors within the data sheet of an MPU-6050 as well.")
     page.get_by_role("button", name="Connect", exact=True).click()
     wait_until(page, lambda: number(page, "rows") > 50)
 

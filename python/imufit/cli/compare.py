@@ -17,6 +17,7 @@ from imufit.cli.arguments import (
     plots_option,
     verbose_option,
 )
+from imufit.cli.next_command import say_next
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import log_argument
@@ -56,6 +57,8 @@ def compare(
         else:
             comparison, rows = engine.compare_with_rows(held, opened, progress)
     output.result(comparison, verbose)
+    if comparison.failing:
+        say_next(output, "to look for the effect that is missing", ["diagnose"], [log], model)
     output.json(comparison.to_dict())
     if plot_file is not None:
         output.plot(plot_file, comparison.plot())

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from click.core import ParameterSource
 
 from imufit.cli import engine
 from imufit.cli.arguments import (
@@ -20,6 +18,7 @@ from imufit.cli.arguments import (
     title_of,
     verbose_option,
 )
+from imufit.cli.next_command import say_next
 from imufit.cli.output import Output
 from imufit.cli.progress import ProgressBar
 from imufit.cli.reading import logs_argument
@@ -66,23 +65,10 @@ def diagnose(
         rows = engine.rows_of_fit(fit, candidate=diagnosis.best, progress=progress) if shown else None
     output.result(diagnosis, verbose)
     if diagnosis.verdict == "missing":
-        _next(output, diagnosis.best, [*map(str, logs), *([] if model is None else ["--model", str(model)])])
+        words = "to add the effect, or to go on until nothing is missing"
+        say_next(output, words, [f"add {diagnosis.best}", "ladder"], logs, model)
     output.json(diagnosis.to_dict())
     if plot_file is not None:
         output.plot(plot_file, diagnosis.plot())
     title = f"{title_of(logs)}: which effect is missing"
     output.report(html_file, plots, title, comparison=comparison, diagnosis=diagnosis, rows=rows)
-
-
-_OF_THE_LOG = ("mapping", "frame", "noise", "drop", "effects_from")
-"""Options of the logs and of the catalogue, which the next command needs too."""
-
-
-def _next(output: Output, effect: str | None, arguments: list[str]) -> None:
-    """Print the commands that add the effect, and that go on until nothing is missing."""
-    context = click.get_current_context()
-    given = any(context.get_parameter_source(name) is ParameterSource.COMMANDLINE for name in _OF_THE_LOG)
-    options = ", with the options of the log as here" if given else ""
-    output.say(f"Next, to add the effect, or to go on until nothing is missing{options}:")
-    named = shlex.join(arguments)
-    output.lines([f"  imufit add {effect} {named}", f"  imufit ladder {named}"])

@@ -20,6 +20,7 @@ from imufit.fitting.row_residuals import residual_chunks
 from imufit.log.segments import is_gap
 from imufit.progress import Progress
 from imufit.results import ChannelResidual, Comparison, Panel, Spectrum, Where
+from imufit.results.comparison import OFFSET
 
 if TYPE_CHECKING:
     from imufit.fitting import FittedStack
@@ -145,7 +146,7 @@ def comparison(analysis: Analysis, step: Array, log: int = 0) -> Comparison:
         stands_out[name] = excess > SCATTER * floor**2 * np.sqrt(2.0 / item["n"])
         if stands_out[name] and item["mean"] ** 2 >= MIN_SHARE * excess:
             share = min(item["mean"] ** 2 / excess, 1.0)
-            where.append(Where(name, "constant", share, facts.t_start, facts.t_end))
+            where.append(Where(name, OFFSET, share, facts.t_start, facts.t_end))
         first, last = item["stretch"]
         seen = blocks[first:last]
         spans[name] = (float(seen[:, 0].min()), float(seen[:, 1].max()))

@@ -98,14 +98,13 @@ def diagnose(fit: FittedStack, excluded: Sequence[str] = ()) -> Diagnosis:
         evidence=analysis.judged_by,
         judged=judged(analysis),
         noise=noise_budget(analysis),
+        ratio=fit.ratio,
     )
     if wrong := tuple(contradicted(fit)):
         # The residual follows the wrong value, and names no other cause.
         sentence = " ".join(sentences.contradicted(held, given) for held, given in wrong)
         return replace(found, sentence=sentence, unexplained=(), contradicted=tuple(held for held, _ in wrong))
-    return replace(
-        found, sentence=sentences.answer(found, best, ratio=fit.ratio, untold=len(unshown), spoilt=result.spoilt)
-    )
+    return replace(found, sentence=sentences.answer(found, best, untold=len(unshown), spoilt=result.spoilt))
 
 
 def _decided(fit: FittedStack, excluded: Sequence[str]) -> Verdict:

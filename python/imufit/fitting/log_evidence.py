@@ -79,6 +79,12 @@ class LogEvidence:
         return isinstance(self.passes, RestPasses)
 
     @property
+    def rests(self) -> Array:
+        """Times at which each rest that judges the log begins and ends, (rests, 2), s; none beside a reference."""
+        passes = self.passes
+        return passes.rests.held if isinstance(passes, RestPasses) else np.zeros((0, 2))
+
+    @property
     def places(self) -> dict[str, range]:
         """Places of the parameters of every effect in a step of all parameters, by its id."""
         return _places(self.surveyed, self.slots)

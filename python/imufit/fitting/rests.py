@@ -57,6 +57,8 @@ class RestReadings:
         Blocks of time: groups of rests, or equal parts of the log where only the field counts.
     spans : (blocks, 2) array
         Times at which each block begins and ends, s.
+    held : (rests, 2) array
+        Times at which each rest begins and ends, s.
     rests, attitudes, turns, labels : int
         How many were found; attitudes differ by more than 8 degrees, labels are those that stand in for a reference.
     levels : int
@@ -82,6 +84,7 @@ class RestReadings:
     arrays: dict[str, Any]
     blocks: int
     spans: Array
+    held: Array
     rests: int
     attitudes: int
     levels: int
@@ -152,6 +155,7 @@ def read_rests(log: Log, covariates: Sequence[str]) -> RestReadings:
         arrays=arrays,
         blocks=blocks,
         spans=spans,
+        held=np.array([(pose.t_start, pose.t_end) for pose in poses]).reshape(-1, 2),
         rests=len(poses),
         levels=_levels(poses),
         attitudes=distinct(np.array([pose.direction for pose in poses])) if poses else 0,

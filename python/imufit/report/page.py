@@ -231,13 +231,21 @@ def _stands_out(candidate: Candidate, diagnosis: Diagnosis | None) -> bool:
 
 def _candidate_table(candidates: Sequence[Candidate]) -> Table:
     """Return the candidates with their predicted parameters and rivals."""
-    header = ("effect", "status", ">before → expected", ">p", "predicted", "typical size", "smallest detectable")
+    header = (
+        "effect",
+        "status",
+        ">before → expected",
+        ">probability",
+        "predicted",
+        "typical size",
+        "smallest detectable",
+    )
     rows = tuple(
         (
             item.effect,
             item.outcome,
             item.error_change,
-            quantity.p_value(item.p_value),
+            quantity.probability(item.probability),
             ", ".join(in_lines(item.parameters)) if item.status == SIGNIFICANT else "-",
             _typical(item),
             item.smallest_detectable,
@@ -245,7 +253,7 @@ def _candidate_table(candidates: Sequence[Candidate]) -> Table:
         )
         for item in candidates
     )
-    return Table("", (*header, "rivals (correlation)"), rows)
+    return Table("", (*header, "smallest detectable", "rivals (correlation)"), rows)
 
 
 def _typical(candidate: Candidate) -> str:

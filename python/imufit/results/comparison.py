@@ -103,6 +103,10 @@ class Panel(Plotted, Part):
         return drawn_panels((self,), ax)
 
 
+FAILS: Final = 1.05
+"""Residual over noise floor from which on a channel fails: below, the excess is a tenth of the noise's variance."""
+OFFSET: Final = "constant"
+"""Name of what a channel's excess depends on where its residual is an offset."""
 NEARLY_WHOLE: Final = 0.9
 """Part of a log: a stretch of so much of it says no more than the whole log does."""
 MOST_PANELS: Final = 12
@@ -178,7 +182,7 @@ class Where(Part):
         return json_fields(self)
 
     def __str__(self) -> str:
-        dependence = "is constant" if self.covariate == "constant" else f"depends on {self.covariate}"
+        dependence = "is constant" if self.covariate == OFFSET else f"depends on {self.covariate}"
         return f"{quantity.share(self.share)} of the excess of {self.channel} {dependence}"
 
 
@@ -236,7 +240,7 @@ class Comparison(Plotted, Result):
         worst = max(self.channels, key=lambda channel: channel.ratio if np.isfinite(channel.ratio) else -1.0)
         text = f"With {name}, {worst.channel} stands at {quantity.ratio(worst.ratio)} times its noise floor"
         text += ", the worst of the channels." if len(self.channels) > 1 else "."
-        if worst.ratio > 1.02:
+        if worst.ratio > FAILS:
             causes = [where for where in self.where if where.channel == worst.channel]
             cause = causes[0] if causes else self.where[0] if self.where else None
             if cause is not None:
@@ -245,6 +249,11 @@ class Comparison(Plotted, Result):
                 )
                 text += f" {cause}{within}."
         return text
+
+    @property
+    def failing(self) -> tuple[str, ...]:
+        """Names of the channels whose residual stands above the noise floor."""
+        return tuple(item.channel for item in self.channels if item.ratio > FAILS)
 
     def _throughout(self, cause: Where) -> bool:
         """Whether a cause lies in nearly the whole log."""
@@ -303,7 +312,7 @@ class Comparison(Plotted, Result):
         return residual_spectra(self.spectra, ax).result
 
     def channel_table(self) -> Table:
-        """Residual by channel in shown units."""
+        """Residual by channel in shown units, the worst channel first."""
         rows = tuple(
             (
                 item.channel,
@@ -313,7 +322,7 @@ class Comparison(Plotted, Result):
                 quantity.quantity(item.noise_floor, item.unit),
                 f"{item.n}",
             )
-            for item in self.channels
+            for item in sorted(self.channels, key=lambda item: -item.ratio if np.isfinite(item.ratio) else math.inf)
         )
         header = ("channel", ">over floor", ">residual RMS", ">mean", ">noise floor", ">samples")
         return Table("Residual by channel (measured - modelled)", header, rows)

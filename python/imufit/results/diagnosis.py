@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from imufit.figures import quantity
 from imufit.results.data_fault import DataFault, fault_table
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from imufit.figures.place import Drawing, Place
 
+OFF_FLOOR: Final = 1.2
+"""Held-out error over the noise from which on a residual is no longer said to be at its noise floor."""
 VERDICTS = {
     "adequate": "Nothing that this log can show is missing.",
     "missing": "One effect is missing and stands out.",
@@ -270,6 +272,8 @@ class Diagnosis(Plotted, Result):
         The noise floor of each channel as a sum of parts.
     contradicted : tuple of Parameter
         Fixed values of the model that the logs contradict. Any candidate may look as if it were there beside them.
+    ratio : float
+        Held-out error of the model over the noise floor; NaN where faults of the data spoil the logs.
     """
 
     verdict: str
@@ -289,6 +293,14 @@ class Diagnosis(Plotted, Result):
     judged: tuple[Judged, ...] = ()
     noise: tuple[NoisePart, ...] = ()
     contradicted: tuple[Parameter, ...] = ()
+    ratio: float = math.nan
+
+    @property
+    def headline(self) -> str:
+        """The verdict in capitals: ``ADEQUATE`` is for logs of which every sensor was judged and is at its noise."""
+        if self.verdict == "adequate" and not all(item.judged for item in self.judged):
+            return "PARTLY JUDGED"
+        return "ABOVE THE NOISE" if self.verdict == "adequate" and self.ratio > OFF_FLOOR else self.verdict.upper()
 
     @property
     def best_candidate(self) -> Candidate | None:
@@ -462,7 +474,7 @@ class Diagnosis(Plotted, Result):
     def sentences(self) -> list[str]:
         """Verdict, result, next experiment, faults of the data that only concern some rows, and notes."""
         experiment = f"Next: {self.experiment}" if self.experiment else ""
-        verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
+        verdict = f"{self.headline}: {self.sentence or VERDICTS.get(self.verdict, '')}"
         without = [f"{item}. {item.sentence}" for item in self.without]
         return [verdict, *without, experiment, *self.local_faults(), *self.notes]
 

@@ -220,7 +220,7 @@ class Ladder(Plotted, Result):
             f"times the noise floor with {' + '.join(self.model) or 'the ideal sensor'}."
         )
         attitude = "" if self.attitude is None else self.attitude.sentence
-        verdict = f"{self.verdict.upper()}: {self.sentence or VERDICTS.get(self.verdict, '')}"
+        verdict = f"{self.diagnosis.headline}: {self.sentence or VERDICTS.get(self.verdict, '')}"
         without = [f"{item}. {item.sentence}" for item in self.diagnosis.without]
         faults = self.diagnosis.local_faults()
         return [verdict, *without, result, *map(str, self.revisions), attitude, *self.warnings(), experiment, *faults]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from imufit.figures import quantity
 from imufit.results.data_fault import DataFault
-from imufit.results.diagnosis import IN_DOUBT, LIKELY, NOT_TESTABLE, SIGNIFICANT, Candidate, Diagnosis
+from imufit.results.diagnosis import IN_DOUBT, LIKELY, NOT_TESTABLE, OFF_FLOOR, SIGNIFICANT, Candidate, Diagnosis
 from imufit.results.disagreement import Disagreement
 from imufit.results.effect_card import EffectCard
 from imufit.results.judged import left_out
@@ -61,11 +61,7 @@ def explanation(card: EffectCard, candidate: Candidate) -> str:
     return text
 
 
-OFF_FLOOR = 1.2
-"""Held-out error over the noise from which on a residual is no longer said to be at its noise floor."""
-
-
-def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: int, spoilt: bool) -> str:
+def answer(found: Diagnosis, best: Candidate | None, *, untold: int, spoilt: bool) -> str:
     """Give an answer in a few sentences: the verdict, logs that disagree, sensors that were not judged.
 
     Parameters
@@ -74,15 +70,13 @@ def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: in
         The answer.
     best : Candidate or None
         The effect that stands out, be it named or not.
-    ratio : float
-        Held-out residual over the noise.
     untold : int
         Number of effects that only a reference would show.
     spoilt : bool
         The logs differ so much that an answer for all of them does not exist.
     """
     adequate = found.verdict == "adequate"
-    text = _adequate(found, ratio, untold) if adequate else _missing(found, best)
+    text = _adequate(found, untold) if adequate else _missing(found, best)
     if found.disagrees:
         text = _with_disagreements(text, found.disagrees, spoilt=spoilt)
     missing = left_out(found.judged)
@@ -91,18 +85,18 @@ def answer(found: Diagnosis, best: Candidate | None, *, ratio: float, untold: in
     if not adequate:
         return f"{text} {capital(missing)}."
     judged = ", ".join(item.sensor for item in found.judged if item.judged)
-    outcome = "judged" if ratio > OFF_FLOOR else "nothing missing"
+    outcome = "judged" if found.ratio > OFF_FLOOR else "nothing missing"
     return f"{judged}: {outcome}; {missing}. {text}" if judged else f"{capital(missing)}. {text}"
 
 
-def _adequate(found: Diagnosis, ratio: float, untold: int) -> str:
+def _adequate(found: Diagnosis, untold: int) -> str:
     """Say that nothing is missing, as far as the logs show."""
     rests = "rests" in found.evidence
-    if ratio > OFF_FLOOR:
+    if found.ratio > OFF_FLOOR:
         return (
             f"{'Without a reference attitude no' if rests else 'No'} effect is missing for certain, but the residual "
-            f"stands at {ratio:.2f} times the noise: the noise is stronger or more coloured than stated, or the log "
-            "does not contain the cause of the residual."
+            f"stands at {found.ratio:.2f} times the noise: the noise is stronger or more coloured than stated, or the "
+            "log does not contain the cause of the residual."
         )
     if rests:
         text = "Nothing that this log can show without a reference attitude is missing."

@@ -13,7 +13,6 @@ from imufit.comparing.compare import MIN_SHARE
 from imufit.figures import quantity
 from imufit.results import Comparison
 from imufit.studio.names import covariate_name, with_symbol
-from imufit.studio.session import FAILS
 
 SMALL: Final = f"< {100.0 * MIN_SHARE:.0f} %"
 """Words for a share that chance gives as well."""
@@ -51,7 +50,7 @@ def against(
     for cause in causes:
         known.setdefault(cause, None if shares is None else shares.get(cause, 0.0))
     names = {name: with_symbol(covariate_name(name), name) for name in known}
-    if not any(item.channel == channel and item.ratio > FAILS for item in found.channels):
+    if channel not in found.failing:
         return names
     largest_first = sorted(known.items(), key=lambda item: -(item[1] or 0.0))
     return {name: f"{names[name]} ({_share(share)})" for name, share in largest_first}

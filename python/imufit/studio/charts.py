@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -112,7 +112,12 @@ def empty(sentence: str, height: int = HEIGHT) -> Figure:
 
 
 def residual_panel(
-    panel: Panel, after: Panel | None = None, other: Panel | None = None, *, explained: bool = False
+    panel: Panel,
+    after: Panel | None = None,
+    other: Panel | None = None,
+    *,
+    effect: str = "this effect",
+    explained: bool = False,
 ) -> Figure:
     """Draw the residual of one channel against one covariate.
 
@@ -124,6 +129,8 @@ def residual_panel(
         With one effect more: the one that is looked at.
     other : Panel, optional
         With the second of two models.
+    effect : str
+        The effect that is looked at, in words.
     explained : bool
         Whether the panel stands against the part of the residual that the covariate explains.
     """
@@ -150,7 +157,7 @@ def residual_panel(
     if other is not None:
         traces.append(_line(x_factor * other.centre, factor * other.mean, GREEN, "kept model", dash="dashdot"))
     if after is not None:
-        traces.append(_line(x_factor * after.centre, factor * after.mean, ORANGE, "with this effect", dash="dash"))
+        traces.append(_line(x_factor * after.centre, factor * after.mean, ORANGE, f"with {words(effect)}", dash="dash"))
     y_title = f"residual of {channel}, {unit}"
     return _figure([trace for part in traces for trace in part], x_title, y_title, yaxis={"range": [-limit, limit]})
 
@@ -170,6 +177,11 @@ def _area(x: Array, low: Array, high: Array, colour: str, opacity: float, name: 
     outline = {"x": _numbers(np.concatenate([x, x[::-1]])), "y": _numbers(np.concatenate([high, low[::-1]]))}
     fill = {"fill": "toself", "fillcolor": f"rgba({red},{green},{blue},{opacity})", "line": {"width": 0}}
     return [{"type": "scatter", "mode": "lines", **outline, **fill, "name": name, "hoverinfo": "skip"}]
+
+
+def _entry(name: str, mark: Figure) -> Figure:
+    """Return an entry of the legend for something without a trace of its own."""
+    return {"type": "scatter", "mode": "markers", "name": name, "x": [None], "y": [None], "marker": mark}
 
 
 def _numbers(values: Array) -> list[float | None]:
@@ -291,7 +303,7 @@ def fall(
     if position < len(ratios) - 1:
         # The bars are one trace: their paleness has an entry of the legend of its own.
         mark = {"symbol": "square", "size": 11, "color": BLUE, "opacity": UNDONE}
-        bars.append({"type": "scatter", "mode": "markers", "name": "undone", "x": [None], "y": [None], "marker": mark})
+        bars.append(_entry("undone", mark))
     known = [(k, value) for k, value in enumerate(expected) if value is not None]
     if best is not None:
         # One mark for what is expected, of a step that was made and of the next one.
@@ -370,7 +382,37 @@ LEFT: Final = 72
 """Margin for the name of the value's axis and for seven characters beside each tick, px."""
 
 
-def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *, title: str = "residual") -> Figure:
+REST: Final = "rgba(0, 158, 115, 0.14)"
+"""Fill of a time at rest, the green of the figures, so pale that lines stay readable on either background."""
+MOST_RESTS: Final = 200
+"""Times at rest that are drawn at most: as many have six pixels each on a wide screen."""
+
+
+def rests(spans: Iterable[tuple[float, float]], begin: float, end: float) -> list[Figure]:
+    """Return the shapes of times at rest behind the lines of a window; none where more would fall into it than fit.
+
+    Parameters
+    ----------
+    spans : iterable of (float, float)
+        Begin and end of each rest, s.
+    begin, end : float
+        The window, s.
+    """
+    seen = [(max(a, begin), min(b, end)) for a, b in spans if b > begin and a < end]
+    across = {"type": "rect", "xref": "x", "yref": "paper", "y0": 0, "y1": 1}
+    look = {"fillcolor": REST, "line": {"width": 0}, "layer": "below"}
+    return [{**across, "x0": a, "x1": b, **look} for a, b in seen] if len(seen) <= MOST_RESTS else []
+
+
+def trace(
+    channel: str,
+    unit: str,
+    lines: Sequence[tuple[str, Array, Array]],
+    window: tuple[float, float],
+    *,
+    title: str = "residual",
+    at_rest: Iterable[tuple[float, float]] = (),
+) -> Figure:
     """Draw quantities of one channel over time.
 
     Parameters
@@ -379,17 +421,27 @@ def trace(channel: str, unit: str, lines: Sequence[tuple[str, Array, Array]], *,
         Channel, or sensor, and its SI unit.
     lines : sequence of (str, ndarray, ndarray)
         Name, times in s, and values in `unit` of each line.
+    window : (float, float)
+        Begin and end of what is drawn, s.
     title : str
         The quantity.
+    at_rest : iterable of (float, float), optional
+        Begin and end of each time at rest, s.
     """
     factor, shown = quantity.shown_unit(unit)
     drawn: list[Figure] = []
     for name, t, values in lines:
         colour, dash, width = LOOKS.get(name, (GREY, "solid", LINE))
         drawn += _line(t, factor * values, colour, name, dash=dash, width=width)
+    shapes = rests(at_rest, *window)
+    if shapes:
+        mark = {"symbol": "square", "size": 11, "color": REST}
+        drawn.append(_entry("at rest", mark))
     figure = _figure(drawn, "time, s", f"{title} of {words(channel_name(channel))}, {shown}")
     # Margins that follow the labels may call for other labels, and these for other margins, without an end.
     for name in ("xaxis", "yaxis"):
         figure["layout"][name] |= {"automargin": False, "tickangle": 0}
     figure["layout"]["margin"]["l"] = LEFT
+    figure["layout"]["shapes"] = shapes
+    figure["layout"]["xaxis"]["range"] = list(window)
     return figure

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -218,12 +217,6 @@ class Desk:
         return None if made is None else made.diagnosis
 
     @property
-    def ratio(self) -> float:
-        """Held-out error of the present model over the noise; NaN while it is not there."""
-        made = self._made
-        return math.nan if made is None else made.numbers.ratio
-
-    @property
     def _made(self) -> Made | None:
         """Return what was worked out of the present model; None while that is not there."""
         session = self.session
@@ -401,12 +394,21 @@ class Desk:
             The change; a quick one.
         """
         self._no_trouble()
+        before = self._made
         try:
             action()
         except InputError as error:
             self._note(str(error), [], None)
         self.changed.emit()
         await self.update()
+        self._leave_healthy(before)
+
+    def _leave_healthy(self, before: Made | None) -> None:
+        """Give up the chosen panel if a step changed the error elsewhere: the fall would not be seen in it."""
+        shown = [made.comparison.failing for made in (before, self._made) if made is not None and made.comparison]
+        if self.channel is not None and any(shown) and all(self.channel not in failing for failing in shown):
+            self.channel = self.covariate = None
+            self.changed.emit()
 
     async def update(self) -> None:
         """Bring fit, diagnosis and comparison of the present model up to date; further changes join the work."""

@@ -280,7 +280,8 @@ def offers(arrivals: Sequence[Arrival]) -> list[Offer]:
             Way.TOGETHER, tuple(item.file for item in with_sensors), "Open all of them as logs of one sensor"
         )
         found.insert(0 if all(item.reference for item in with_sensors) else len(found), together)
-    found += [Offer(Way.OPEN, (item.file,), f"Open {item.file.name} alone") for item in with_sensors]
+    alone = " alone" if len(arrivals) > 1 else ""
+    found += [Offer(Way.OPEN, (item.file,), f"Open {item.file.name}{alone}") for item in with_sensors]
     return found
 
 

@@ -29,7 +29,7 @@ AT_REST: Final = {
     "acc_norm": "|f| at rest",
     "turn": "turn from rest to rest",
     "acc_pose": "gravity on a labelled side",
-    "mag_norm": "|m|",
+    "mag_norm": "|m| in every row",
 }
 """Channels of a log that rests judge, in words."""
 

@@ -37,8 +37,6 @@ Array = NDArray[np.float64]
 FULL: Final = 4
 """Fits that keep their evidence: the first, the present, the one before, and the second of two models. The evidence of
 two minutes at 100 Hz takes some 20 MB."""
-FAILS: Final = 1.05
-"""Residual over noise floor from which on a channel fails: below, the excess is a tenth of the noise's variance."""
 
 
 @dataclass(frozen=True)
@@ -517,7 +515,7 @@ class Session:
             made = self.fit(stack, progress)
             found = self.compare(stack, progress)
             if made.shares is None:
-                failing = [item.channel for item in found.channels if item.ratio > FAILS]
+                failing = list(found.failing)
                 fit = self._with_evidence(made)
                 made.shares = cause_shares(fit.analysis, fit.estimate.step, self.shown, failing) if failing else {}
             return made.shares
@@ -581,6 +579,11 @@ class Session:
         if self._start is None:
             return all("ref_qw" in log.columns or "ref_angle" in log.columns for log in self.logs)
         return self.start.analysis.judged_by == "reference"
+
+    @property
+    def rests(self) -> Array:
+        """Times at which each rest begins and ends that stands in for the reference, (rests, 2), s; often none."""
+        return self.start.analysis.logs[self.shown].rests if self.begun else np.zeros((0, 2))
 
     @property
     def shown(self) -> int:

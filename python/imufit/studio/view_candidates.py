@@ -36,6 +36,8 @@ ROW_INTO_SIGHT: Final = (
 BARS_INTO_SIGHT: Final = "document.querySelector('.studio-fall').scrollIntoView({block: 'end', behavior: 'smooth'})"
 """Script that lays the bars at the lower edge of the window: the sentence on top stands over them."""
 
+LOOKED_AT: Final = "studio-looked"
+"""Class of the row of the candidate that the figure draws."""
 ADD: Final = "Add"
 SWITCH_ON: Final = "Switch on"
 """Word on the button of a candidate that stands in the model, switched off."""
@@ -48,6 +50,9 @@ CONTRADICTED: Final = (
 )
 """Sentence over the candidates beside a wrong fixed value, whose error each of them would explain."""
 
+WIDE: Final = (
+    "Until the effect is added, its own residual counts as noise: the standard errors are wider than after it."
+)
 ALIKE: Final = 2
 """Effects that are named as those that look most like another one."""
 HELPS: Final = " alone; lowers the error beside the other missing effects"
@@ -98,6 +103,7 @@ class CandidateView:
     def __init__(self, desk: Desk, panels: PanelView) -> None:
         self._desk, self._panels = desk, panels
         self._looked_at = ""
+        self._rows: dict[str, ui.element] = {}
         self._opened: list[str] = []
         self._unfolded: set[str] = set()
         self._drawn: tuple[object, ...] | None = None
@@ -118,6 +124,7 @@ class CandidateView:
         self._drawn = state
         self._opened = []
         self.look_at("")
+        self._rows = {}
         self._list.clear()
         with self._list:
             # While another log is loaded, nothing can be added to the model of the present one.
@@ -179,6 +186,7 @@ class CandidateView:
             .props(attribute("data-mark", f"candidate-{effect}"))
             .props(attribute(MARK, effect))
         )
+        self._rows[effect] = row
         with row:
             with ui.element("div").classes("studio-row"):
                 name = heading_of(effect).classes("cursor-pointer").props("tabindex=0 role=button aria-expanded=false")
@@ -236,6 +244,9 @@ class CandidateView:
             Its id.
         """
         if effect != self._looked_at:
+            for name, change in ((self._looked_at, "remove"), (effect, "add")):
+                if name in self._rows:
+                    self._rows[name].classes(**{change: LOOKED_AT})
             self._looked_at = effect
             self._panels.propose(effect)
 
@@ -245,7 +256,7 @@ class CandidateView:
         if diagnosis is None or self._desk.guessing:
             return []
         found = [item for item in diagnosis.candidates if item.effect == effect and item.parameters]
-        return [("predicted here", "; ".join(in_lines(item.parameters))) for item in found]
+        return [("predicted here", f"{'; '.join(in_lines(item.parameters))}. {WIDE}") for item in found]
 
 
 def _how_to_look() -> None:

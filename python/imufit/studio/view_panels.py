@@ -14,7 +14,7 @@ from imufit.fitting.passes import UNITS
 from imufit.log.columns import GROUPS
 from imufit.model.catalogue import find_effect
 from imufit.results import Comparison, Diagnosis, Spectrum, Unexplained
-from imufit.results.comparison import Panel
+from imufit.results.comparison import OFFSET, Panel
 from imufit.results.noise_part import NoisePart
 from imufit.results.phrasing import capital
 from imufit.results.sentences import leading
@@ -25,7 +25,7 @@ from imufit.studio.desk import BEING_READ, Desk
 from imufit.studio.explained import Explained
 from imufit.studio.icons import bare
 from imufit.studio.names import channel_name, covariate_name, effect_name, with_symbol
-from imufit.studio.session import FAILS, Session, worst_channel
+from imufit.studio.session import Session, worst_channel
 from imufit.studio.stack import Stack
 
 PIXELS: Final = 1200
@@ -46,7 +46,11 @@ NO_SPECTRUM: Final = "The log has no stretch without a gap for a spectrum."
 LOW: Final = 90
 """Height of the place of a figure that a log never has, px: the sentence, and the margins around it."""
 NO_SPECTRUM_AT_REST: Final = "A spectrum needs a reference."
-SHARES: Final = "The percentages are the parts of the excess over the noise floor that each entry explains."
+SHARES: Final = (
+    "The percentages are the parts of the excess over the noise floor that each entry explains alone. Entries overlap: "
+    "together they may explain more than 100 %."
+)
+CONSTANT: Final = " A constant offset is {share} of the excess over this floor."
 RESIDUAL: Final = "residual"
 READING: Final = "reading"
 
@@ -176,7 +180,7 @@ class PanelView:
         if told is not None and told.best is not None:
             return self._of_clearest_value(told) or worst_channel(found, find_effect(told.best).sensors)
         worst = worst_channel(found)
-        if any(item.channel == worst and item.ratio > FAILS for item in found.channels):
+        if worst in found.failing:
             return worst
         return self._shown or worst_channel(self._at_start() or found)
 
@@ -267,7 +271,7 @@ class PanelView:
         left = self._left(found)
         if left is not None and left.channel == channel:
             return left.covariate
-        fails = any(item.channel == channel and item.ratio > FAILS for item in found.channels)
+        fails = channel in found.failing
         judged = found if fails else self._at_start() or found
         opens = opens_on(judged, channel, self._shares(channel) if fails else {})
         if opens in names:
@@ -298,6 +302,11 @@ class PanelView:
         self._proposed = effect
         self.refresh()
 
+    @property
+    def _effect(self) -> str:
+        """The effect whose share is drawn, in words."""
+        return effect_name(self._proposed) if self._proposed else ""
+
     # --- drawing
 
     def _draw(self, found: Comparison, second: Comparison | None, channel: str) -> None:
@@ -310,7 +319,7 @@ class PanelView:
             after = _panel_of(explained, channel, covariate)
         other = None if second is None else _panel_of(second.panels, channel, covariate)
         if panel is not None:
-            self._panel.update_figure(charts.residual_panel(panel, after, other))
+            self._panel.update_figure(charts.residual_panel(panel, after, other, effect=self._effect))
         elif covariate is None:
             self._panel.update_figure(charts.empty("No covariate is seen in this channel."))
         else:
@@ -327,7 +336,9 @@ class PanelView:
         rises = "" if panel is not None or covariate is None else RISES.format(cause=covariate_name(covariate))
         beside = _without_effect_on(self._proposed, channel)
         alone = f"{capital(channel_name(channel))} alone: its residual stands at {quantity.ratio(level.ratio)}"
-        self._note.set_text(f"{alone} times its noise floor.{rises}{beside}")
+        offset = next((item for item in found.where if (item.channel, item.covariate) == (channel, OFFSET)), None)
+        constant = "" if offset is None else CONSTANT.format(share=quantity.share(offset.share))
+        self._note.set_text(f"{alone} times its noise floor.{constant}{rises}{beside}")
         self._say_floor(channel)
         ui.timer(0, lambda: self._draw_trace(channel), once=True)
 
@@ -340,7 +351,7 @@ class PanelView:
 
     async def _draw_cause(self, channel: str, cause: str) -> None:
         """Draw the residual against the part of it that a cause without a name explains."""
-        session, state, proposed = self._session, self._state, self._proposed
+        session, state, proposed, effect = self._session, self._state, self._proposed, self._effect
         if session is None:
             return
         found = await run.io_bound(lambda: session.against_cause(channel, cause, proposed))
@@ -350,7 +361,7 @@ class PanelView:
         self._panel.update_figure(
             charts.empty("Too few rows show this cause.")
             if panel is None
-            else charts.residual_panel(panel, after, other, explained=True)
+            else charts.residual_panel(panel, after, other, effect=effect, explained=True)
         )
 
     async def _draw_trace(self, channel: str) -> None:
@@ -389,9 +400,10 @@ class PanelView:
 
         lines = await run.io_bound(work)
         drawn = channel if channel in columns else sensor
-        figure = charts.trace(drawn, UNITS[sensor], lines or [], title=kind)
-        figure["layout"]["xaxis"]["range"] = [begin, end]
-        self._trace.update_figure(figure)
+        at_rest = session.rests.tolist()
+        self._trace.update_figure(
+            charts.trace(drawn, UNITS[sensor], lines or [], (begin, end), title=kind, at_rest=at_rest)
+        )
 
     async def _zoomed(self, event: events.GenericEventArguments) -> None:
         given = event.args if isinstance(event.args, dict) else {}

@@ -19,7 +19,6 @@ from imufit.printable import NAME, printable
 from imufit.remedy import Option
 from imufit.results import Diagnosis
 from imufit.results.phrasing import capital
-from imufit.results.sentences import OFF_FLOOR
 from imufit.studio import server
 from imufit.studio.attribute import attribute
 from imufit.studio.by_sensor import by_sensor
@@ -316,7 +315,7 @@ class Top:
                 ui.label(printable(held.key, NAME)).classes("studio-id")
         with ui.row().classes("w-full items-start gap-2 no-wrap"):
             word = WRONG_VALUE if diagnosis.contradicted else diagnosis.verdict
-            icon = ui.icon(_icon_of(diagnosis, self._desk.ratio), size="sm")
+            icon = ui.icon(_icon_of(diagnosis), size="sm")
             icon.props(f'role=img aria-label="{word}" title="{word}"')
             Explained(diagnosis.sentence or diagnosis.verdict, seen).classes("studio-sentence").props(
                 "data-mark=verdict"
@@ -451,8 +450,10 @@ class Top:
                 return
             assert desk.session is not None
             if game.level == DEMONSTRATION:
-                reveal = ui.button("Reveal the truth", on_click=lambda: desk.reveal(None))
-                reveal.props("outline").props("data-mark=reveal")
+                # Before an effect is added, Add is the one thing to press.
+                if _named(desk) != NOTHING:
+                    reveal = ui.button("Reveal the truth", on_click=lambda: desk.reveal(None))
+                    reveal.props("outline").props("data-mark=reveal")
                 return
             groups = by_sensor(desk.session.start.analysis.candidates)
             names = [name for effects in groups.values() for name in effects]
@@ -495,12 +496,11 @@ ADDED: Final = "The bars show what the effect took off the error. Reveal the tru
 """Task of the demonstration once an effect is added."""
 
 
-def _icon_of(diagnosis: Diagnosis, ratio: float) -> str:
+def _icon_of(diagnosis: Diagnosis) -> str:
     if diagnosis.contradicted:
         return ICONS["unknown"]
     # The tick is for a whole model: every sensor was judged, and no residual stands above its noise.
-    whole = all(item.judged for item in diagnosis.judged) and ratio <= OFF_FLOOR
-    return ICONS[diagnosis.verdict] if whole or diagnosis.verdict != "adequate" else PART_JUDGED
+    return ICONS[diagnosis.verdict] if diagnosis.headline == diagnosis.verdict.upper() else PART_JUDGED
 
 
 def _named(desk: Desk) -> str:

@@ -10,14 +10,14 @@ use imufit_model::sensor::CHANNELS;
 
 use crate::gram::Gram;
 use crate::normal_equations::NormalEquations;
-use crate::part::Part;
+use crate::part::{Part, sample_shares};
 
 /// In which form the evidence is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// Whitened; observations have unit variance.
     White,
-    /// As it stands; residuals are in units of the noise floor.
+    /// As it stands; residuals are in units of the noise floor, and every channel counts equally.
     Raw,
 }
 
@@ -45,6 +45,8 @@ impl Columns {
 pub struct BlockEquations {
     parts: Arc<[Part]>,
     columns: Arc<[Columns]>,
+    /// Share of one sample of each channel in the error.
+    shares: [f64; CHANNELS],
     /// Parameters that have been given values, what these explain being taken off the observations.
     given: Vec<usize>,
     values: Vec<f64>,
@@ -70,6 +72,7 @@ impl BlockEquations {
         };
         let columns: Vec<Columns> = parts.iter().zip(places).map(of).collect();
         Self {
+            shares: sample_shares(&parts),
             parts,
             columns: columns.into(),
             given: Vec::new(),
@@ -97,14 +100,15 @@ impl BlockEquations {
                 Form::Raw => &part.raw,
             };
             for block in 0..evidence.layout.blocks {
-                let weights = match form {
-                    Form::White => part.block_weights(block),
-                    Form::Raw => part.raw_weights(),
+                let (weights, shares) = match form {
+                    Form::White => (part.block_weights(block), [1.0; CHANNELS]),
+                    Form::Raw => (part.raw_weights(), self.shares),
                 };
                 let mut equations = NormalEquations::zeros(asked.len());
                 for (channel, chosen) in chosen.iter().enumerate() {
                     if let Some(b) = evidence.get(block, channel) {
-                        equations.add_channel(&b.gram, b.n, chosen, weights[channel]);
+                        let share = shares[channel];
+                        equations.add_channel(&b.gram, share * b.n as f64, chosen, share * weights[channel]);
                     }
                 }
                 out.push(self.without_given(equations, parameters.len()));
@@ -130,7 +134,7 @@ impl BlockEquations {
             let weights = part.weights();
             for (channel, chosen) in columns.chosen(&asked).enumerate() {
                 if let Some((gram, n)) = &columns.total[channel] {
-                    equations.add_channel(gram, *n, &chosen, weights[channel]);
+                    equations.add_channel(gram, *n as f64, &chosen, weights[channel]);
                 }
             }
         }

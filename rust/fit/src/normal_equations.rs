@@ -57,8 +57,8 @@ impl NormalEquations {
         self.n += factor * other.n;
     }
 
-    /// Adds one channel's Gram matrix of `[columns | residual]` over `n` samples; `chosen` are pairs of a place here and one there.
-    pub fn add_channel(&mut self, gram: &Gram, n: usize, chosen: &[(usize, usize)], weight: f64) {
+    /// Adds one channel's Gram matrix of `[columns | residual]` that counts as `n` observations; `chosen` are pairs of a place here and one there.
+    pub fn add_channel(&mut self, gram: &Gram, n: f64, chosen: &[(usize, usize)], weight: f64) {
         if !(weight > 0.0 && weight.is_finite()) {
             return;
         }
@@ -70,7 +70,7 @@ impl NormalEquations {
             self.right[*q] += weight * gram.at(*j, last);
         }
         self.square += weight * gram.at(last, last);
-        self.n += n as f64;
+        self.n += n;
     }
 
     /// Equations of the parameters `kept` once others have been given values: what these explain is taken off the observations.

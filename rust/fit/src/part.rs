@@ -42,6 +42,21 @@ impl Part {
     }
 }
 
+/// Share of one sample of each channel in an error that all channels share equally, however many samples each has in all logs.
+///
+/// Pooled by samples, three thousand rows of a healthy magnetometer would hide what twenty rests show.
+pub fn sample_shares(parts: &[Part]) -> [f64; CHANNELS] {
+    let weighed = |part: &Part, channel: usize| part.raw_weights()[channel] > 0.0;
+    let of = |channel: usize| {
+        let judged = parts.iter().filter(|part| weighed(part, channel));
+        judged.map(|part| part.raw.count(channel)).sum::<usize>()
+    };
+    std::array::from_fn(|channel| match of(channel) {
+        0 => 0.0,
+        samples => 1.0 / samples as f64,
+    })
+}
+
 /// Slots of several logs: an effect that all logs share has one set of parameters, one that each log has for itself (`own`)
 /// a set for each log that can tell of it, in the order of the logs. With them for each log the place of each of its parameters.
 pub fn joined(parts: &[Part], own: &[bool]) -> (Vec<Slot>, Vec<Vec<usize>>) {

@@ -101,7 +101,7 @@ pub fn fit_all(evidence: &Evidence) -> Option<Saturated> {
             if let Some((gram, n)) = sum.as_ref().filter(|_| variance[channel].is_finite()) {
                 // A noiseless channel must not outweigh the rest beyond what numbers can hold.
                 let weight = 1.0 / variance[channel].max(1e-24 * largest).max(f64::MIN_POSITIVE);
-                total.add_channel(gram, *n, &chosen[channel], weight);
+                total.add_channel(gram, *n as f64, &chosen[channel], weight);
             }
         }
         let solved = total.solve(&DVector::zeros(fitted.len()))?.solution;

@@ -13,7 +13,7 @@ pub const FOLDS: usize = 12;
 pub struct HeldOut {
     /// Whitened sum of squares of each fold.
     pub white: Vec<f64>,
-    /// Residual RMS over the noise floor, unwhitened, over all folds.
+    /// Residual RMS over the noise floor, unwhitened, over all folds: root of the mean square over the channels.
     pub ratio: f64,
 }
 

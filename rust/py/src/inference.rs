@@ -1,6 +1,6 @@
 //! Questions asked of the evidence.
 
-use imufit_fit::part::Part;
+use imufit_fit::part::{Part, sample_shares};
 use imufit_fit::{residual, saturated};
 use imufit_inference::criterion::Criterion;
 use imufit_inference::problem::{Limit, Problem, parameters_of};
@@ -162,7 +162,7 @@ impl PyProblem {
                 covariance[*place][*other] = fitted.covariance[(k, j)];
             }
         }
-        let (square, n) = training(&self.0, &step);
+        let (training, n) = training(&self.0, &step);
         let out = PyDict::new(py);
         let mut fitted = vec![false; p];
         for k in &chosen {
@@ -176,7 +176,7 @@ impl PyProblem {
         out.set_item("full_step", PyArray1::from_slice(py, step.as_slice()))?;
         out.set_item("held_out", base.ratio)?;
         out.set_item("folds", PyArray1::from_vec(py, base.white))?;
-        out.set_item("training", (square / n.max(1.0)).sqrt())?;
+        out.set_item("training", training)?;
         out.set_item("samples", n)?;
         out.set_item("misfit", misfit)?;
         Ok(out)
@@ -398,20 +398,22 @@ impl PyProblem {
     }
 }
 
-/// Squared residual in units of the floors over all logs, and number of samples.
+/// Residual RMS over the noise floor of the data that was fitted, every channel counting equally; and the number of samples.
 fn training(problem: &Problem, step: &DVector<f64>) -> (f64, f64) {
-    let (mut square, mut count) = (0.0, 0.0);
+    let shares = sample_shares(&problem.parts);
+    let (mut square, mut channels, mut count) = (0.0, 0.0, 0.0);
     for (log, part) in problem.parts.iter().enumerate() {
         let step = problem.of_log(log, step);
-        for (channel, floor) in part.floors.iter().enumerate() {
-            let (s, n) = part.raw.square(channel, &step);
-            if n > 0 && *floor > 0.0 {
-                square += s / (floor * floor);
+        for (channel, weight) in part.raw_weights().into_iter().enumerate() {
+            if weight > 0.0 {
+                let (s, n) = part.raw.square(channel, &step);
+                square += shares[channel] * weight * s;
+                channels += shares[channel] * n as f64;
                 count += n as f64;
             }
         }
     }
-    (square, count)
+    ((square / channels).sqrt(), count)
 }
 
 /// Mean value, mean residual and half width of its 95 % band in each bin, and the share of variance.

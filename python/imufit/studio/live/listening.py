@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from imufit import _imufit
 from imufit.calibrating import Calibration, Stage, Wizard, calibrate
 from imufit.devices.emulate import Emulator
+from imufit.devices.emulate.data_sheet import data_sheet_errors
 from imufit.devices.monitor import Monitor, MonitorState
 from imufit.devices.record import Recorder
 from imufit.devices.record.arrived import Arrived
@@ -29,7 +30,7 @@ from imufit.log import read
 from imufit.log.columns import GROUPS, SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.rests.poses import SIDES
-from imufit.results import Recording
+from imufit.results import Parameter, Recording
 from imufit.results.phrasing import capital, listed
 from imufit.studio.live.rolling import Rolling
 
@@ -37,6 +38,8 @@ Array = NDArray[np.float64]
 
 EVERY: Final = 0.1
 """Time from one state to the next, s."""
+SENSOR: Final = 0
+"""Seed of the errors of an emulated device: always the same sensor, so that two calibrations of it agree."""
 RESTS: Final = 100
 """Rests that are remembered: an hour of them on a screen of a minute."""
 
@@ -145,6 +148,8 @@ class Listening:
         Where the calibration stands; None while none is guided.
     calibrated : tuple of str
         Sentences of the last calibration, or its problem.
+    estimated : tuple of Parameter
+        Parameters of the last calibration.
     model : Path or None
         File of the model of the last calibration; None where none was saved.
     """
@@ -160,6 +165,7 @@ class Listening:
         self.problem = ""
         self.stage: Stage | None = None
         self.calibrated: tuple[str, ...] = ()
+        self.estimated: tuple[Parameter, ...] = ()
         self.model: Path | None = None
         self._judge = _imufit.PoseJudge()
         self._over = threading.Event()
@@ -231,6 +237,7 @@ class Listening:
                 speed=source.speed,
                 rate=source.rate,
                 frame=source.frame,
+                effects=data_sheet_errors(SENSOR),
             ).__enter__()
             port = self._emulator.port
         monitor = Monitor(
@@ -366,7 +373,7 @@ class Listening:
             Log to write; it must not exist.
         """
         columns = () if self.rolling is None else self.rolling.columns
-        self.calibrated, self.model = (), None
+        self.calibrated, self.estimated, self.model = (), (), None
         self._wizard = Wizard(sensors_in(columns) or ("acc", "gyr", "mag"))
         self.stage = self._wizard.stage
         self.record(path)
@@ -380,6 +387,7 @@ class Listening:
             self.calibrated = (str(error),)
         else:
             self.model = model.resolve()
+            self.estimated = tuple(result.model.listed())
             self.calibrated = (*in_sentences(result), f"Saved as {self.model}.")
         self._wizard = self.stage = None
 

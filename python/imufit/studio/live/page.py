@@ -19,8 +19,11 @@ from imufit.log.columns import SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.printable import printable
 from imufit.rests.poses import SIDES
+from imufit.results import Parameter
+from imufit.results.parameter import in_lines
 from imufit.results.phrasing import listed
 from imufit.studio.body import Body, angles_in_words, side_rotation
+from imufit.studio.heading import heading_of
 from imufit.studio.icons import light_or_dark, link_with_words
 from imufit.studio.live.device import device
 from imufit.studio.live.directions import Directions
@@ -53,7 +56,8 @@ OPTION: Final = """
 CONNECTING: Final = (
     "1. Wire the sensor to an Arduino Uno: VCC to 5V, GND to GND, SDA to A4, SCL to A5.",
     "2. Write the program uno_mpu6050 of the project's folder firmware onto the Uno. The README of this folder has the "
-    "commands.",
+    "commands. Any program does as well that prints a line such as millis,ax,ay,az,gx,gy,gz once, then a line of these "
+    "numbers for each sample.",
     "3. Choose the Uno's port in the list above, such as /dev/ttyACM0, /dev/ttyUSB0 or COM3. Its line has 115200 bits "
     "per second.",
 )
@@ -126,7 +130,7 @@ def about(choice: str) -> str:
     sensors = [SENSORS[sensor] for sensor in scenario.sensors]
     return (
         f"A simulated device that this computer plays, with {listed(sensors)}. {scenario.description} "
-        "Its sensors have noise, and no other error."
+        "All of them have noise. Accelerometer and gyro have errors within the data sheet of an MPU-6050 as well."
     )
 
 
@@ -155,6 +159,7 @@ class _LivePage:
         self._wanted: Body | None = None
         self._directions: Directions | None = None
         self._held: str | None = None
+        self._resulted: tuple[str, ...] = ()
         self._seconds = 10
         self._figures: dict[str, ui.label] = {}
         with ui.column().classes("studio-live"):
@@ -441,10 +446,13 @@ class _LivePage:
             self._held = None
             self._draw(None)
             if listening is not None and listening.calibrated:
-                self._show_result(listening.calibrated, listening.model)
+                self._show_result(listening)
             else:
                 self._message.text = GUIDES
             return
+        if self._resulted:
+            self._result.clear()
+            self._resulted = ()
         self._message.text = stage.message
         self._progress.value = stage.progress
         assert listening is not None
@@ -477,19 +485,33 @@ class _LivePage:
                     self._directions = Directions()
             self._directions.show(turning.open, turning.field)
 
-    def _show_result(self, sentences: tuple[str, ...], model: Path | None) -> None:
-        shown = tuple(child.text for child in self._result.default_slot.children if isinstance(child, ui.label))
-        said = tuple(printable(sentence) for sentence in sentences)
+    def _show_result(self, listening: Listening) -> None:
+        """Lay out what a calibration did, and the values that it gives, once."""
         self._message.text = "The calibration has ended."
-        if shown != said:
-            self._result.clear()
-            with self._result:
-                for sentence in said:
-                    ui.label(sentence).classes("text-sm").style("overflow-wrap: anywhere")
-                if model is not None:
-                    ui.button("Download", icon="download", on_click=lambda: ui.download.file(model)).props(
-                        'outline size=12px data-testid="download-model"'
-                    )
+        if self._resulted is listening.calibrated:
+            return
+        self._resulted = listening.calibrated
+        self._result.clear()
+        with self._result:
+            for sentence in listening.calibrated:
+                ui.label(printable(sentence)).classes("text-sm").style("overflow-wrap: anywhere")
+            _values(listening.estimated)
+            model = listening.model
+            if model is not None:
+                ui.button("Download", icon="download", on_click=lambda: ui.download.file(model)).props(
+                    'outline size=12px data-testid="download-model"'
+                )
+
+
+def _values(parameters: Sequence[Parameter]) -> None:
+    """Lay out the parameters of each effect with their standard errors."""
+    by_effect: dict[str, list[Parameter]] = {}
+    for item in parameters:
+        by_effect.setdefault(item.effect, []).append(item)
+    with ui.element("div").classes("studio-live-values").props('data-testid="values"'):
+        for effect, items in by_effect.items():
+            heading_of(effect)
+            ui.label("; ".join(in_lines(items, len(items)))).classes("text-sm")
 
 
 def _attitude(angles: dict[str, Array]) -> tuple[str, Array | None]:

@@ -11,6 +11,7 @@ from imufit.figures import quantity
 from imufit.figures.style import AXES, GREY
 from imufit.log.columns import GROUPS, SENSOR_NAMES, SENSORS, UNITS
 from imufit.printable import NAME, printable
+from imufit.studio import charts
 from imufit.studio.charts import LABEL, words
 from imufit.studio.live.listening import Rest
 from imufit.studio.live.rolling import Rolling
@@ -23,8 +24,6 @@ DIGITS: Final = 5
 """Decimal places of values on their way to the browser: a tenth of the noise of the quietest of these sensors."""
 MOST: Final = 8
 """Panels at most: a device may send any number of columns."""
-REST: Final = "rgba(0, 158, 115, 0.14)"
-"""Fill of a time at rest, the green of the figures, so pale that traces stay readable on either background."""
 
 
 def groups(columns: Sequence[str]) -> list[tuple[str, tuple[str, ...]]]:
@@ -81,22 +80,6 @@ def panel(rolling: Rolling, title: str, names: Sequence[str], seconds: float, re
                 "hovertemplate": f"%{{fullData.name}}: %{{y:.4g}} {shown}<extra></extra>",
             }
         )
-    shapes = [
-        {
-            "type": "rect",
-            "xref": "x",
-            "yref": "paper",
-            "x0": max(rest.begin, edge[0]),
-            "x1": rest.end,
-            "y0": 0,
-            "y1": 1,
-            "fillcolor": REST,
-            "line": {"width": 0},
-            "layer": "below",
-        }
-        for rest in rests
-        if rest.end > edge[0]
-    ]
     # One margin for all panels: their times stand over one another.
     axis_look = {"zeroline": False, "fixedrange": True, "exponentformat": "power"}
     layout = {
@@ -110,7 +93,7 @@ def panel(rolling: Rolling, title: str, names: Sequence[str], seconds: float, re
         "legend": {"orientation": "h", "x": 1.0, "xanchor": "right", "y": 1.0, "yanchor": "bottom"},
         "hoverlabel": LABEL,
         "showlegend": len(names) > 1,
-        "shapes": shapes,
+        "shapes": charts.rests([(rest.begin, rest.end) for rest in rests], *edge),
         "uirevision": "live",
     }
     return {"data": traces, "layout": layout, "config": {"displayModeBar": False, "responsive": True}}
