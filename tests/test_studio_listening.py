@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from imufit.calibrating import calibrate
 from imufit.devices.emulate import Emulator
+from imufit.devices.emulate.data_sheet import data_sheet_errors
 from imufit.devices.record import LiveRows, Recorder, recover
 from imufit.errors import InputError
 from imufit.lab.simulate import simulate
 from imufit.log import read
 from imufit.studio.live.device import Device
 from imufit.studio.live.guided import held_side, how_to_lay
-from imufit.studio.live.listening import Listening, Source, free_name, in_sentences, shown_state
+from imufit.studio.live.listening import SENSOR, Listening, Source, free_name, in_sentences, shown_state
 from imufit.studio.live.panels import groups, panel
 from imufit.studio.live.rolling import Rolling
 
@@ -146,6 +147,12 @@ def test_guide_leads_through_six_sides_to_a_saved_model(followed, tmp_path):
     assert path.exists()
     assert (tmp_path / "sides.toml").exists()
     assert listening.stage is None
+    # The values are those of the errors that the emulated device was given.
+    given = data_sheet_errors(SENSOR)
+    found = [item for item in listening.estimated if item.effect in ("acc.bias", "acc.scale")]
+    assert len(found) == 6
+    for item in found:
+        assert abs(item.value - given[item.effect][item.name]) < 5.0 * item.standard_error
 
 
 def test_a_calibration_names_the_sensors_that_have_an_error_and_once_the_others():

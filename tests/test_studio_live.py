@@ -164,7 +164,8 @@ def test_emulated_device_is_followed_recorded_and_guided(served):
     wait_until(page, lambda: page.get_by_test_id("recorded").inner_text().startswith("walk.parquet: "))
     log = read(folder / "walk.parquet")
     assert log.n > 100
-    assert np.linalg.norm(log.acc, axis=1).mean() == pytest.approx(9.8, abs=0.2)
+    # The device has errors within its data sheet: 0.08 g and 3 % of g.
+    assert np.linalg.norm(log.acc, axis=1).mean() == pytest.approx(9.8, abs=1.1)
     assert f"{log.n} rows" in page.get_by_test_id("recorded").inner_text()
     the_recording_says_where_it_is(page, folder / "walk.parquet", log.n)
 

@@ -391,7 +391,8 @@ class PanelView:
                 if now is not None:
                     lines.append(("predicted", *now.window([channel], begin, end, PIXELS)[channel][1].line()))
             else:
-                for name, model in {"ideal sensor": start, "kept model": kept, "now": now}.items():
+                # The dashes of the kept model lie upon the line of the present one, where both agree.
+                for name, model in {"ideal sensor": start, "now": now, "kept model": kept}.items():
                     # The same model is drawn once: under its first name, the present one as such.
                     others = {"kept model": (start, now), "now": (start,)}.get(name, ())
                     if model is not None and all(model is not other for other in others):
