@@ -257,10 +257,18 @@ class LagSearch:
         return _Sums(table[0], table[1], table[2], table[3:])
 
     def _at_every_lag(self) -> Iterator[_Lags]:
-        """Compare at every lag with the reference stretched by each skew."""
+        """Compare at every lag with the reference stretched by each skew, where both have enough bins for an overlap."""
+        if self._too_short(self.own):
+            return
         for skew in self.skews:
             other = self._reference(float(skew))
+            if self._too_short(other):
+                continue
             yield self._scored(float(skew), self._latest(other), other, self._everywhere(other))
+
+    def _too_short(self, rates: Rates) -> bool:
+        """Say whether the rates are known in too few bins for an overlap at any lag."""
+        return bool(rates.known.sum() * self.step < LEAST_OVERLAP)
 
     def _near(self, lag: float, skews: Iterable[float], bins: int) -> Candidate:
         """Return the likeliest of some skews, at the lags that some bins hold on either side of one, s."""
