@@ -227,6 +227,16 @@ def test_a_comparison_shows_where_the_rests_fail(capsys, tmp_path):
     assert np.median(np.abs(log.acc[(log.t >= begin) & (log.t <= end), 2])) > 8.0
 
 
+def test_rows_of_the_field_do_not_dilute_what_the_rests_show():
+    """Every channel counts equally: the field stands in thousands of rows, the length at rest in a few dozen."""
+    log = poses({"acc.scale": {"x": 0.0, "y": 0.0, "z": 0.03}}, seed=1)
+    fit = SensorModel().fit(log)
+    channels = compare(log).channels
+    samples = {item.channel: item.n for item in channels}
+    assert samples["mag_norm"] > 20 * samples["acc_norm"]
+    assert fit.ratio == pytest.approx(np.sqrt(np.mean([item.ratio**2 for item in channels])), rel=0.1)
+
+
 def test_the_ladder_climbs_on_rests():
     answer = ladder(poses({"gyr.bias": {"x": 0.02, "y": 0.01, "z": -0.01}}, seed=5))
     assert answer.model == ("gyr.bias",)
