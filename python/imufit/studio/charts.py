@@ -51,6 +51,8 @@ WRITTEN_OUT: Final = 1e5
 """Number of an axis from which on its power stands in its place."""
 TWO_STEPS: Final = math.log10(5.0)
 """Decades that hold two of the numbers 1, 2, 5, 10 at least: from 2 to 5 and from 5 to 10 is the longest way."""
+EVEN_STEPS: Final = 5
+"""Numbers of a logarithmic axis in even steps at most: those at its upper end stand closest, and must not touch."""
 DECADES: Final = 6
 """Numbers that the logarithmic axis of the fall has room for."""
 ROOM: Final = 1.6
@@ -221,7 +223,7 @@ def _logarithmic(lines: Sequence[Figure]) -> Figure:
         # Plotly writes out what is short, and the power of the others.
         return {"type": "log", "dtick": math.ceil(decades / DECADES)}
     # In a window shorter than two of the steps 1, 2, 5, Plotly's even steps name more than one number.
-    return {"type": "log", "tickformat": "~g", **({} if decades < TWO_STEPS else {"dtick": "D2"})}
+    return {"type": "log", "tickformat": "~g", **({"nticks": EVEN_STEPS} if decades < TWO_STEPS else {"dtick": "D2"})}
 
 
 def allan(sensor: str, channels: Sequence[ChannelLike]) -> Figure:
